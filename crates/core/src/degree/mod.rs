@@ -1,0 +1,7 @@
+//! Observable degrees: derivative rows, the staircase of their spans, verdicts, sparse bases.
+
+pub mod coefficient;
+pub mod platform_rows;
+pub mod rows;
+pub mod sparse;
+pub mod staircase;

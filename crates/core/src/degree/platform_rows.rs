@@ -1,0 +1,93 @@
+//! Derivative rows of the platform: `R_ik = H F^k S_i` with the local chain shared by all positions.
+
+use obsdeg_exact::{Echelon, Field};
+
+use super::rows::DerivativeRows;
+use crate::model::platform::{Block, LOCAL, Platform, Sample, local_dynamics, local_output};
+
+/// A row of the local chain: `Z_component^(order)` as a functional of `(psi^n, eps^n)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LocalRow {
+    /// Component of Z in n: 1, 2 or 3.
+    pub component: usize,
+    /// Derivative order.
+    pub order: usize,
+    /// Shape 6.
+    pub row: [u64; LOCAL],
+}
+
+/// The rows of `H F^k` that raise the rank of one position, order by order until it stalls.
+/// `V_{k+1} = V_k + V_k F`, so only rows that were new at order k need a derivative.
+pub fn local_chain(field: &Field, w_n: u64, w_u: u64, measured_azimuth: bool) -> Vec<LocalRow> {
+    let f = local_dynamics(field, &w_n, &w_u);
+    let mut basis = Echelon::new(*field, LOCAL);
+    let mut chain: Vec<LocalRow> = Vec::new();
+    let mut candidates: Vec<LocalRow> = local_output(field, measured_azimuth)
+        .into_iter()
+        .map(|(component, row)| LocalRow { component, order: 0, row })
+        .collect();
+    while !candidates.is_empty() {
+        candidates.retain(|r| basis.insert(&r.row));
+        chain.extend_from_slice(&candidates);
+        for r in &mut candidates {
+            let old = r.row;
+            r.row = std::array::from_fn(|j| field.dot(0, (0..LOCAL).map(|i| (old[i], f[i][j]))));
+            r.order += 1;
+        }
+    }
+    chain
+}
+
+/// The platform as a source of derivative rows.
+#[derive(Debug, Clone)]
+pub struct PlatformRows {
+    field: Field,
+    columns: usize,
+    chain: Vec<LocalRow>,
+    blocks: Vec<Block<u64>>,
+    scratch: Vec<u64>,
+}
+
+impl PlatformRows {
+    /// The rows of `platform` at `sample`.
+    pub fn new(platform: &Platform, sample: &Sample) -> Self {
+        let p = &sample.point;
+        let azimuth = platform.scheme().measured_azimuth;
+        Self {
+            field: p.ring,
+            columns: platform.names().len(),
+            chain: local_chain(&p.ring, p.w_n, p.w_u, azimuth),
+            blocks: platform.blocks(p),
+            scratch: vec![0; platform.names().len()],
+        }
+    }
+}
+
+impl DerivativeRows for PlatformRows {
+    fn field(&self) -> Field {
+        self.field
+    }
+
+    fn columns(&self) -> usize {
+        self.columns
+    }
+
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64])) -> bool {
+        let f = self.field;
+        for block in &self.blocks {
+            for local in self.chain.iter().filter(|r| r.order == order) {
+                for (k, &column) in block.columns.iter().enumerate() {
+                    let terms = (0..LOCAL)
+                        .filter(|&i| local.row[i] != 0)
+                        .map(|i| (local.row[i], block.rows[i][k]));
+                    self.scratch[column] = f.dot(0, terms);
+                }
+                sink(&self.scratch);
+            }
+            for &column in &block.columns {
+                self.scratch[column] = 0;
+            }
+        }
+        self.chain.iter().any(|r| r.order >= order)
+    }
+}

@@ -1,0 +1,96 @@
+//! Sparse bases of row spaces and null spaces: vectors of minimal support.
+
+use obsdeg_exact::{Echelon, Field};
+
+/// How many column orders are tried for short vectors.
+const ORDERS: usize = 16;
+
+/// The rows of a reduced basis of the span of `rows` when columns are preferred as pivots in the
+/// order `columns`. Every such row is an elementary vector: no vector of the span has a smaller
+/// support inside its own.
+fn reduced(field: Field, rows: &[Vec<u64>], columns: &[usize]) -> Vec<Vec<u64>> {
+    let mut basis = Echelon::new(field, columns.len());
+    let mut permuted = vec![0; columns.len()];
+    for row in rows {
+        for (slot, &c) in permuted.iter_mut().zip(columns) {
+            *slot = row[c];
+        }
+        basis.insert(&permuted);
+    }
+    (0..basis.rank())
+        .map(|i| {
+            let mut row = vec![0; columns.len()];
+            for (&x, &c) in basis.row(i).iter().zip(columns) {
+                row[c] = x;
+            }
+            row
+        })
+        .collect()
+}
+
+/// The columns where a vector is not zero.
+pub fn support(vector: &[u64]) -> Vec<usize> {
+    (0..vector.len()).filter(|&c| vector[c] != 0).collect()
+}
+
+/// Elementary vectors of the span of `rows`, shortest first, that together with what `span` already
+/// holds are independent; `span` grows by them.
+pub fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> Vec<Vec<u64>> {
+    let field = span.field();
+    let n = span.columns();
+    let used: Vec<usize> = (0..n).filter(|&c| rows.iter().any(|r| r[c] != 0)).collect();
+    let step = used.len().div_ceil(ORDERS / 2).max(1);
+    let mut candidates: Vec<Vec<u64>> = Vec::new();
+    for shift in (0..used.len()).step_by(step) {
+        let mut order: Vec<usize> = (0..n).filter(|c| !used.contains(c)).collect();
+        order.extend(used[shift..].iter().chain(&used[..shift]));
+        candidates.extend(reduced(field, rows, &order));
+        order.reverse();
+        candidates.extend(reduced(field, rows, &order));
+    }
+    candidates.sort_by_cached_key(|v| {
+        let s = support(v);
+        (s.len(), s)
+    });
+    candidates.retain(|v| span.insert(v));
+    candidates
+}
+
+/// The vector of the span of `rows` that vanishes outside `support`, scaled to one at `lead`; `None`
+/// unless these vectors form a line.
+pub fn vector_on_support(field: Field, rows: &[Vec<u64>], support: &[usize], lead: usize) -> Option<Vec<u64>> {
+    let n = rows.first()?.len();
+    let mut order: Vec<usize> = (0..n).filter(|c| !support.contains(c)).collect();
+    order.extend(support);
+    let inside = |v: &Vec<u64>| (0..n).all(|c| v[c] == 0 || support.contains(&c));
+    let mut found = reduced(field, rows, &order).into_iter().filter(inside);
+    let mut v = found.next()?;
+    if found.next().is_some() || v[lead] == 0 {
+        return None;
+    }
+    let scale = field.inv(v[lead]);
+    for x in &mut v {
+        *x = field.mul(*x, scale);
+    }
+    Some(v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_short_vectors_of_a_mixed_basis() {
+        let f = Field::new((1 << 60) + 33);
+        let row = |a: [i64; 4]| a.map(|x| f.from_i64(x)).to_vec();
+        // span of (1,-1,0,0) and (0,0,1,2), given by mixed rows
+        let rows = [row([1, -1, 3, 6]), row([2, -2, 1, 2])];
+        let mut span = Echelon::new(f, 4);
+        let found = extend_by_short_vectors(&rows, &mut span);
+        let supports: Vec<Vec<usize>> = found.iter().map(|v| support(v)).collect();
+        assert_eq!(supports, [vec![0, 1], vec![2, 3]]);
+        let v = vector_on_support(f, &rows, &[2, 3], 2).expect("a line");
+        assert_eq!(v, row([0, 0, 1, 2]));
+        assert_eq!(vector_on_support(f, &rows, &[0, 1, 2, 3], 0), None);
+    }
+}

@@ -1,0 +1,51 @@
+//! The staircase `V_0 < V_1 < ...` of spans of derivative rows.
+
+use obsdeg_exact::Echelon;
+
+use super::rows::DerivativeRows;
+
+/// What the staircase says about every unknown.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Degrees {
+    /// `dim V_0, dim V_1, ...` up to the last order at which some segment still had rows.
+    pub rank_profile: Vec<usize>,
+    /// Per unknown: the smallest k with `e_c` in `V_k`, or `None`.
+    pub degree: Vec<Option<usize>>,
+    /// Per unknown: whether its column is zero in every row.
+    pub excited: Vec<bool>,
+}
+
+impl Degrees {
+    /// The final rank.
+    pub fn rank(&self) -> usize {
+        self.rank_profile.last().copied().unwrap_or(0)
+    }
+}
+
+/// Climbs the staircase: rows of order 0, 1, 2, ... go into `basis` (cleared first) until every
+/// segment's chain has stalled; `on_order` sees the basis of `V_k` after each order.
+pub fn climb(
+    rows: &mut impl DerivativeRows,
+    basis: &mut Echelon,
+    mut on_order: impl FnMut(usize, &Echelon),
+) -> Degrees {
+    basis.clear();
+    let mut degrees = Degrees { degree: vec![None; rows.columns()], ..Degrees::default() };
+    for order in 0.. {
+        let more = rows.emit(order, &mut |row| {
+            basis.insert(row);
+        });
+        if !more {
+            break;
+        }
+        for (c, degree) in degrees.degree.iter_mut().enumerate() {
+            if degree.is_none() && basis.has_unit(c) {
+                *degree = Some(order);
+            }
+        }
+        degrees.rank_profile.push(basis.rank());
+        on_order(order, basis);
+    }
+    degrees.excited = (0..basis.columns()).map(|c| !basis.is_zero_column(c)).collect();
+    degrees
+}

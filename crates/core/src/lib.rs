@@ -1,0 +1,10 @@
+//! The engine of obsdeg: models, observable degrees, solving expressions, and the audit of the paper.
+//!
+//! The way of the data: a model turns into derivative rows ([`degree::rows`]), these into a staircase
+//! ([`degree::staircase`]), the staircase into verdicts and sparse combinations
+//! ([`degree::verdict`]), these into solutions ([`solution`]), and all of it into one plain
+//! [`analysis::Analysis`].
+
+pub mod degree;
+pub mod model;
+pub mod solution;

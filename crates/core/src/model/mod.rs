@@ -1,0 +1,15 @@
+//! What can be judged: the platform of the paper, and how it is written down.
+
+pub mod angle;
+pub mod attitude;
+pub mod expression;
+pub mod geometry;
+pub mod platform;
+pub mod ring;
+pub mod scheme;
+pub mod scheme_file;
+
+pub use angle::{Angle, AngleError};
+pub use geometry::{Geometry, Term, Unknowns};
+pub use platform::Platform;
+pub use scheme::{Carry, Latitude, Position, Scheme, SchemeError};

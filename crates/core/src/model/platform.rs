@@ -1,0 +1,280 @@
+//! The inertially stabilized platform of the paper: (2), (3), (6)-(9) at each position of a scheme.
+
+use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order};
+
+use super::angle::Angle;
+use super::attitude::{Matrix3, c_n_from_euler, product};
+use super::geometry::{GYROS, Geometry, Term, Unknowns};
+use super::ring::Ring;
+use super::scheme::{Carry, Scheme, SchemeError};
+
+/// The local unknowns of one position, in n: `psi^n` then `eps^n`.
+pub const LOCAL: usize = 6;
+/// Names of the local unknowns.
+pub const LOCAL_NAMES: [&str; LOCAL] =
+    ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n"];
+
+/// A scheme with its unknowns spelled out.
+#[derive(Debug, Clone)]
+pub struct Platform {
+    scheme: Scheme,
+    names: Vec<String>,
+    units: Vec<&'static str>,
+}
+
+/// The platform at one point: cosines and sines of all angles and the earth rate, in some ring.
+#[derive(Debug, Clone)]
+pub struct Point<R: Ring> {
+    /// The ring.
+    pub ring: R,
+    /// North component of the earth rate.
+    pub w_n: R::Element,
+    /// Up component of the earth rate.
+    pub w_u: R::Element,
+    /// `(cos, sin)` of alpha, beta, gamma of each position.
+    pub cos_sin: Vec<[(R::Element, R::Element); 3]>,
+}
+
+/// `S_i`: how the local unknowns of one position depend on the unknowns of the scheme.
+#[derive(Debug, Clone)]
+pub struct Block<E> {
+    /// The columns (unknowns of the scheme) that occur.
+    pub columns: Vec<usize>,
+    /// One row per local unknown, one entry per column listed.
+    pub rows: [Vec<E>; LOCAL],
+}
+
+impl Platform {
+    /// The platform under `scheme`.
+    ///
+    /// # Errors
+    /// [`SchemeError`] when the scheme cannot be analysed.
+    pub fn new(scheme: Scheme) -> Result<Self, SchemeError> {
+        scheme.validate()?;
+        let mut names = Vec::new();
+        let mut units = Vec::new();
+        match &scheme.unknowns {
+            Unknowns::Drift => {
+                names.extend(LOCAL_NAMES.map(String::from));
+                units.extend(["rad", "rad", "rad", "deg/h", "deg/h", "deg/h"]);
+            }
+            Unknowns::Coefficients(terms) => {
+                let copies = if scheme.carry == Carry::Reset { scheme.positions.len() } else { 1 };
+                for i in 1..=copies {
+                    for axis in ['x', 'y', 'z'] {
+                        let at = if scheme.carry == Carry::Reset { format!("@{i}") } else { String::new() };
+                        names.push(format!("psi_{axis}{at}"));
+                        units.push("rad");
+                    }
+                }
+                for term in terms {
+                    for gyro in GYROS {
+                        names.push(format!("D_{}{gyro}", term.letters()));
+                        units.push(term.unit());
+                    }
+                }
+            }
+        }
+        Ok(Self { scheme, names, units })
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> &Scheme {
+        &self.scheme
+    }
+
+    /// The names of the unknowns: psi first, then the coefficients term by term.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The units of the unknowns.
+    pub fn units(&self) -> &[&'static str] {
+        &self.units
+    }
+
+    /// `S_i` of every position (section 4 of the method: the psi block depends on the carry).
+    pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
+        let ring = &point.ring;
+        let Unknowns::Coefficients(terms) = &self.scheme.unknowns else {
+            let rows = std::array::from_fn(|i| {
+                (0..LOCAL).map(|j| if i == j { ring.one() } else { ring.zero() }).collect()
+            });
+            return vec![Block { columns: (0..LOCAL).collect(), rows }];
+        };
+        let first_d = self.names.len() - 3 * terms.len();
+        let c_first = c_n_from_euler(ring, &point.cos_sin[0]);
+        point
+            .cos_sin
+            .iter()
+            .enumerate()
+            .map(|(i, cs)| {
+                let c = c_n_from_euler(ring, cs);
+                let psi_first = if self.scheme.carry == Carry::Reset { 3 * i } else { 0 };
+                let psi_block = if self.scheme.carry == Carry::Inertial { &c_first } else { &c };
+                let drift = drift_block(ring, &self.scheme.geometry, terms, &c);
+                let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
+                let rows = std::array::from_fn(|r| match r {
+                    0..3 => psi_block[r].iter().cloned().chain(zeros(3 * terms.len())).collect(),
+                    _ => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
+                });
+                let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
+                Block { columns, rows }
+            })
+            .collect()
+    }
+}
+
+/// `eps^n = C_c^n E(g^c) D` (3), (8): three rows, one column per coefficient (term by term, gyro by
+/// gyro). `g^c = C_n^c (0,-1,0)` is minus the second row of `C_c^n`.
+fn drift_block<R: Ring>(
+    ring: &R,
+    geometry: &Geometry,
+    terms: &[Term],
+    c: &Matrix3<R::Element>,
+) -> [Vec<R::Element>; 3] {
+    let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
+    let signed = |negative: bool, x: &R::Element| if negative { ring.neg(x) } else { x.clone() };
+    let mut out = [Vec::new(), Vec::new(), Vec::new()];
+    for term in terms {
+        for gyro in geometry.gyros() {
+            let excitation = term.factors(&gyro).iter().fold(ring.one(), |e, a| {
+                ring.mul(&e, &signed(a.negative, &g[a.axis]))
+            });
+            for (row, slot) in out.iter_mut().enumerate() {
+                let along_input = signed(gyro.I.negative, &c[row][gyro.I.axis]);
+                slot.push(ring.mul(&along_input, &excitation));
+            }
+        }
+    }
+    out
+}
+
+/// `F` of (8) on `(psi^n, eps^n)`: `psi' = psi x omega_ie + eps`, `eps' = 0`.
+pub fn local_dynamics<R: Ring>(ring: &R, w_n: &R::Element, w_u: &R::Element) -> [[R::Element; LOCAL]; LOCAL] {
+    let mut f: [[R::Element; LOCAL]; LOCAL] = std::array::from_fn(|_| std::array::from_fn(|_| ring.zero()));
+    f[0][2] = ring.neg(w_u);
+    f[1][2] = w_n.clone();
+    f[2][0] = w_u.clone();
+    f[2][1] = ring.neg(w_n);
+    for i in 0..3 {
+        f[i][3 + i] = ring.one();
+    }
+    f
+}
+
+/// `H` of (9), `Z^n = (psi_z, 0, -psi_x)`: the components (1, 3, and 2 for a measured azimuth
+/// `psi_y^n`) with their rows.
+pub fn local_output<R: Ring>(ring: &R, measured_azimuth: bool) -> Vec<(usize, [R::Element; LOCAL])> {
+    let unit = |j: usize, value: R::Element| {
+        let mut row: [R::Element; LOCAL] = std::array::from_fn(|_| ring.zero());
+        row[j] = value;
+        row
+    };
+    let mut out = vec![(1, unit(2, ring.one())), (3, unit(0, ring.neg(&ring.one())))];
+    if measured_azimuth {
+        out.push((2, unit(1, ring.one())));
+    }
+    out
+}
+
+/// The images of a scheme in one random prime field.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// The field and its root of unity.
+    pub roots: RootField,
+    /// The point.
+    pub point: Point<Field>,
+}
+
+/// Everything random that a sample needs, so that a conjugate embedding can reuse it.
+#[derive(Debug, Clone)]
+pub struct RandomValues {
+    roots: RootField,
+    rates: (u64, u64),
+    /// `exp(i angle)` of every generic angle.
+    generic: Vec<(String, u64)>,
+}
+
+impl RandomValues {
+    /// A random field that fits `scheme`, with random earth rates and generic angles.
+    ///
+    /// # Errors
+    /// [`PrimeError`] never for a validated scheme.
+    pub fn draw(scheme: &Scheme, rng: &mut SplitMix64) -> Result<Self, PrimeError> {
+        let angles = scheme.positions.iter().flat_map(|p| &p.angles).map(Angle::turn);
+        let latitude = scheme.latitude.map(|l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()));
+        let roots = RootField::random(common_order(angles.chain(latitude)), rng)?;
+        let p = roots.field.modulus();
+        let mut nonzero = || 1 + rng.below(p - 1);
+        let rates = (nonzero(), nonzero());
+        let generic = scheme.generic_names().into_iter().map(|n| (n, nonzero())).collect();
+        Ok(Self { roots, rates, generic })
+    }
+
+    /// The field.
+    pub fn roots(&self) -> &RootField {
+        &self.roots
+    }
+
+    /// Replaces the value of a generic angle by the one with `tan(angle/2) = t`; false when the name
+    /// is unknown or `t = +-i`.
+    pub fn set_half_tangent(&mut self, name: &str, t: u64) -> bool {
+        let f = &self.roots.field;
+        let it = f.mul(self.roots.imaginary_unit(), t);
+        let (num, den) = (f.add(f.one(), it), f.sub(f.one(), it));
+        let slot = self.generic.iter_mut().find(|(n, _)| n == name);
+        match slot {
+            Some((_, z)) if num != 0 && den != 0 => {
+                *z = f.mul(num, f.inv(den));
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
+    pub fn sample(&self, scheme: &Scheme, a: u64) -> Sample {
+        let roots = self.roots.conjugate(a);
+        let f = roots.field;
+        // the imaginary unit goes to i^a, so exp(i angle) at a fixed tangent is inverted for a = 3 mod 4
+        let flip = a % 4 == 3;
+        let unit = |angle: &Angle| {
+            let constant = roots.unit_circle(angle.turn()).unwrap_or(f.one());
+            let generic = angle.generic().and_then(|(name, minus)| {
+                let z = self.generic.iter().find(|(n, _)| n == name)?.1;
+                Some(if minus != flip { f.inv(z) } else { z })
+            });
+            f.mul(constant, generic.unwrap_or(f.one()))
+        };
+        let (w_n, w_u) = match scheme.latitude {
+            None => self.rates,
+            Some(latitude) => {
+                let turn = obsdeg_exact::Turn::from_nanodeg(latitude.nanodeg());
+                let (c, s) = roots.cos_sin(roots.unit_circle(turn).unwrap_or(f.one()));
+                (f.mul(self.rates.0, c), f.mul(self.rates.0, s))
+            }
+        };
+        let cos_sin = scheme
+            .positions
+            .iter()
+            .map(|p| std::array::from_fn(|k| roots.cos_sin(unit(&p.angles[k]))))
+            .collect();
+        Sample { roots, point: Point { ring: f, w_n, w_u, cos_sin } }
+    }
+}
+
+/// `C_n^c(i)` of one position: the transpose of (19).
+pub fn c_c_from_n<R: Ring>(point: &Point<R>, position: usize) -> Matrix3<R::Element> {
+    let c = c_n_from_euler(&point.ring, &point.cos_sin[position]);
+    std::array::from_fn(|i| std::array::from_fn(|j| c[j][i].clone()))
+}
+
+/// `C_c^n` of one position times a vector in c.
+pub fn to_n<R: Ring>(point: &Point<R>, position: usize, v: &[R::Element; 3]) -> [R::Element; 3] {
+    let c = c_n_from_euler(&point.ring, &point.cos_sin[position]);
+    let column: Matrix3<R::Element> = std::array::from_fn(|i| {
+        std::array::from_fn(|j| if j == 0 { v[i].clone() } else { point.ring.zero() })
+    });
+    product(&point.ring, &c, &column).map(|row| row[0].clone())
+}

@@ -1,0 +1,128 @@
+//! The rings in which one and the same model is written out.
+
+use obsdeg_exact::Field;
+
+/// What a model needs of its numbers. The platform is written once over this trait: its images in a
+/// prime field give the verdicts, in `f64` the decimals, as text the exact formulas.
+pub trait Ring {
+    /// An element.
+    type Element: Clone;
+    /// The neutral element of addition.
+    fn zero(&self) -> Self::Element;
+    /// The neutral element of multiplication.
+    fn one(&self) -> Self::Element;
+    /// `a + b`.
+    fn add(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
+    /// `a b`.
+    fn mul(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
+    /// `-a`.
+    fn neg(&self, a: &Self::Element) -> Self::Element;
+    /// Whether `a` is zero for certain.
+    fn is_zero(&self, a: &Self::Element) -> bool;
+
+    /// `sum a_i b_i`.
+    fn dot<'a>(
+        &self,
+        terms: impl IntoIterator<Item = (&'a Self::Element, &'a Self::Element)>,
+    ) -> Self::Element
+    where
+        Self::Element: 'a,
+    {
+        terms.into_iter().fold(self.zero(), |sum, (a, b)| {
+            if self.is_zero(a) || self.is_zero(b) { sum } else { self.add(&sum, &self.mul(a, b)) }
+        })
+    }
+}
+
+impl Ring for Field {
+    type Element = u64;
+    fn zero(&self) -> u64 {
+        0
+    }
+    fn one(&self) -> u64 {
+        Field::one(self)
+    }
+    fn add(&self, a: &u64, b: &u64) -> u64 {
+        Field::add(self, *a, *b)
+    }
+    fn mul(&self, a: &u64, b: &u64) -> u64 {
+        Field::mul(self, *a, *b)
+    }
+    fn neg(&self, a: &u64) -> u64 {
+        Field::neg(self, *a)
+    }
+    fn is_zero(&self, a: &u64) -> bool {
+        *a == 0
+    }
+}
+
+/// Floating-point numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Float;
+
+impl Ring for Float {
+    type Element = f64;
+    fn zero(&self) -> f64 {
+        0.0
+    }
+    fn one(&self) -> f64 {
+        1.0
+    }
+    fn add(&self, a: &f64, b: &f64) -> f64 {
+        a + b
+    }
+    fn mul(&self, a: &f64, b: &f64) -> f64 {
+        a * b
+    }
+    fn neg(&self, a: &f64) -> f64 {
+        -a
+    }
+    fn is_zero(&self, a: &f64) -> bool {
+        *a == 0.0
+    }
+}
+
+/// Expressions as text, unexpanded but for zeros and ones.
+#[derive(Debug, Clone, Copy)]
+pub struct Text;
+
+impl Ring for Text {
+    type Element = String;
+    fn zero(&self) -> String {
+        "0".into()
+    }
+    fn one(&self) -> String {
+        "1".into()
+    }
+    fn add(&self, a: &String, b: &String) -> String {
+        match (a.as_str(), b.as_str()) {
+            ("0", _) => b.clone(),
+            (_, "0") => a.clone(),
+            _ => format!("{a}+{b}"),
+        }
+    }
+    fn mul(&self, a: &String, b: &String) -> String {
+        let factor = |x: &str| if x.contains(['+', '-']) { format!("({x})") } else { x.to_string() };
+        match (a.as_str(), b.as_str()) {
+            ("0", _) | (_, "0") => "0".into(),
+            ("1", _) => b.clone(),
+            (_, "1") => a.clone(),
+            ("-1", _) => self.neg(b),
+            (_, "-1") => self.neg(a),
+            _ => format!("{}*{}", factor(a), factor(b)),
+        }
+    }
+    fn neg(&self, a: &String) -> String {
+        match a.as_str() {
+            "0" => "0".into(),
+            _ => match a.strip_prefix('-') {
+                Some(rest) if !rest.contains(['+', '-']) => rest.to_string(),
+                _ if a.contains(['+', '-']) => format!("-({a})"),
+                _ => format!("-{a}"),
+            },
+        }
+    }
+    fn is_zero(&self, a: &String) -> bool {
+        a == "0"
+    }
+}

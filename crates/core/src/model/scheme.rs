@@ -1,0 +1,285 @@
+//! A torquing scheme: positions, carry, latitude, geometry and what is unknown.
+
+use std::fmt;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::angle::{Angle, AngleError, format_decimal, parse_decimal};
+use super::attitude::{Euler, cardinal, cardinal_name};
+use super::geometry::{Geometry, Unknowns};
+
+/// What is carried from one position to the next (the paper does not say).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Carry {
+    /// `psi^c` is carried: what the paper's simulation did.
+    #[default]
+    Platform,
+    /// `psi^n` is carried: right for real torqued slews.
+    Inertial,
+    /// `psi` is a new unknown at each position.
+    Reset,
+}
+
+impl Carry {
+    /// The three carries.
+    pub const ALL: [Self; 3] = [Self::Platform, Self::Inertial, Self::Reset];
+}
+
+impl fmt::Display for Carry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Platform => "platform",
+            Self::Inertial => "inertial",
+            Self::Reset => "reset",
+        })
+    }
+}
+
+/// Not one of the three carries.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{found}` is not a carry; expected platform, inertial or reset")]
+pub struct CarryError {
+    /// The text found.
+    pub found: String,
+}
+
+impl FromStr for Carry {
+    type Err = CarryError;
+    fn from_str(text: &str) -> Result<Self, CarryError> {
+        Self::ALL
+            .into_iter()
+            .find(|c| c.to_string() == text)
+            .ok_or_else(|| CarryError { found: text.into() })
+    }
+}
+
+/// A geographic latitude, an exact decimal of degrees in -90..=90.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Latitude {
+    nanodeg: i64,
+}
+
+/// Why a text is no latitude.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LatitudeError {
+    /// Not an exact decimal.
+    #[error("latitude: {0}")]
+    Decimal(AngleError),
+    /// Beyond a pole.
+    #[error("latitude {found} is out of range; expected -90 to 90 degrees")]
+    OutOfRange {
+        /// The text found.
+        found: String,
+    },
+}
+
+impl Latitude {
+    /// The latitude in 1e-9 degrees.
+    pub fn nanodeg(self) -> i64 {
+        self.nanodeg
+    }
+
+    /// The latitude in degrees.
+    pub fn degrees(self) -> f64 {
+        self.nanodeg as f64 / 1e9
+    }
+
+    /// Whether `wN = 0`.
+    pub fn is_pole(self) -> bool {
+        self.nanodeg.abs() == 90_000_000_000
+    }
+
+    /// Whether `wU = 0`.
+    pub fn is_equator(self) -> bool {
+        self.nanodeg == 0
+    }
+}
+
+impl FromStr for Latitude {
+    type Err = LatitudeError;
+    fn from_str(text: &str) -> Result<Self, LatitudeError> {
+        let nanodeg = parse_decimal(text.trim()).map_err(LatitudeError::Decimal)?;
+        if nanodeg.abs() > 90_000_000_000 {
+            return Err(LatitudeError::OutOfRange { found: text.into() });
+        }
+        Ok(Self { nanodeg })
+    }
+}
+
+impl fmt::Display for Latitude {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&format_decimal(self.nanodeg))
+    }
+}
+
+/// One position of a scheme.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Position {
+    /// Its name in solutions, `p1`, `p2`, ... unless the scheme file names it.
+    pub name: String,
+    /// Euler angles.
+    pub angles: Euler,
+}
+
+/// Why a text is no attitude.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PositionError {
+    /// Not three angles.
+    #[error("position `{text}` has {found} angle(s); expected three, as in 180,0,0, or three direction letters, as in NUE")]
+    Count {
+        /// The text found.
+        text: String,
+        /// The number of parts.
+        found: usize,
+    },
+    /// One of the three is wrong.
+    #[error("position `{text}`, {which}: {error}")]
+    Angle {
+        /// The text found.
+        text: String,
+        /// alpha, beta or gamma.
+        which: &'static str,
+        /// What is wrong with it.
+        error: AngleError,
+    },
+    /// Letters, but no right-handed attitude.
+    #[error("`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, perpendicular and right-handed, as in NUE or NDW")]
+    Cardinal {
+        /// The text found.
+        found: String,
+    },
+}
+
+/// Reads `a,b,g` (degrees or names) or three direction letters.
+///
+/// # Errors
+/// [`PositionError`] naming the part that is wrong.
+pub fn parse_attitude(text: &str) -> Result<Euler, PositionError> {
+    let trimmed = text.trim();
+    let letters = !trimmed.is_empty() && trimmed.chars().all(|c| "NSUDEW".contains(c));
+    if letters && trimmed.len() == 3 {
+        return cardinal(trimmed).ok_or_else(|| PositionError::Cardinal { found: trimmed.into() });
+    }
+    let parts: Vec<&str> = trimmed.split(',').collect();
+    let [a, b, c] = parts[..] else {
+        let found = if trimmed.is_empty() { 0 } else { parts.len() };
+        return Err(PositionError::Count { text: text.into(), found });
+    };
+    let parse = |part: &str, which| {
+        let wrap = |error| PositionError::Angle { text: text.into(), which, error };
+        part.parse::<Angle>().map_err(wrap)
+    };
+    Ok([parse(a, "alpha")?, parse(b, "beta")?, parse(c, "gamma")?])
+}
+
+impl Position {
+    /// The angles as `a,b,g`.
+    pub fn angles_text(&self) -> String {
+        self.angles.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")
+    }
+
+    /// Direction letters when all angles are multiples of 90 degrees.
+    pub fn cardinal(&self) -> Option<String> {
+        cardinal_name(&self.angles)
+    }
+}
+
+/// A torquing scheme and the assumptions under which it is judged.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Scheme {
+    /// The positions, in order.
+    pub positions: Vec<Position>,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// `None`: generic (`wN`, `wU` independent).
+    pub latitude: Option<Latitude>,
+    /// How the gyros are mounted.
+    pub geometry: Geometry,
+    /// What is unknown besides psi.
+    pub unknowns: Unknowns,
+    /// Whether `psi_y^n` is measured too.
+    pub measured_azimuth: bool,
+    /// Linear combinations of unknowns to be judged, as written by the user.
+    pub combinations: Vec<String>,
+}
+
+/// Why a scheme cannot be analysed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SchemeError {
+    /// No position.
+    #[error("the scheme has no position; expected at least one, as in --angles 0,0,0")]
+    Empty,
+    /// More positions than the program takes.
+    #[error("the scheme has {found} positions; expected at most {MAX_POSITIONS}")]
+    TooMany {
+        /// Number of positions.
+        found: usize,
+    },
+    /// Two positions of one name.
+    #[error("two positions are named `{name}`; expected different names")]
+    DuplicateName {
+        /// The name.
+        name: String,
+    },
+    /// The drift alone is constant at one position only.
+    #[error("the unknowns `drift` describe a single position; found {found} positions (use coefficients such as --terms F,I,O,S)")]
+    DriftPositions {
+        /// Number of positions.
+        found: usize,
+    },
+    /// An impossible mounting.
+    #[error(transparent)]
+    Geometry(#[from] super::geometry::GeometryError),
+}
+
+/// Most positions that a scheme may have.
+pub const MAX_POSITIONS: usize = 1000;
+
+impl Scheme {
+    /// A scheme of the given attitudes, named p1, p2, ..., with the paper's defaults.
+    pub fn of_angles(angles: impl IntoIterator<Item = Euler>) -> Self {
+        let positions = angles
+            .into_iter()
+            .enumerate()
+            .map(|(i, angles)| Position { name: format!("p{}", i + 1), angles })
+            .collect();
+        Self { positions, ..Self::default() }
+    }
+
+    /// Checks what the types do not.
+    ///
+    /// # Errors
+    /// [`SchemeError`] naming the offender.
+    pub fn validate(&self) -> Result<(), SchemeError> {
+        let found = self.positions.len();
+        if found == 0 {
+            return Err(SchemeError::Empty);
+        }
+        if found > MAX_POSITIONS {
+            return Err(SchemeError::TooMany { found });
+        }
+        let mut names: Vec<&str> = self.positions.iter().map(|p| p.name.as_str()).collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(SchemeError::DuplicateName { name: pair[0].into() });
+        }
+        if self.unknowns == Unknowns::Drift && found > 1 {
+            return Err(SchemeError::DriftPositions { found });
+        }
+        Ok(self.geometry.validate()?)
+    }
+
+    /// The names of generic angles, in order of appearance.
+    pub fn generic_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for (name, _) in self.positions.iter().flat_map(|p| &p.angles).filter_map(Angle::generic) {
+            if !names.iter().any(|n| n == name) {
+                names.push(name.into());
+            }
+        }
+        names
+    }
+}

@@ -1,0 +1,55 @@
+//! Which observable rows a short solution uses.
+
+use obsdeg_exact::{Echelon, Field, echelon::express};
+
+/// How many orders of the rows are tried.
+const ORDERS: usize = 12;
+
+/// A set of independent rows (indices into `rows`, ascending) out of `allowed` whose combination gives
+/// `target` with no coefficient zero: of the sets that different row orders lead to, the cheapest by
+/// the sum of `cost`. `None` when `target` is not in the span.
+pub fn short_support(
+    field: Field,
+    rows: &[Vec<u64>],
+    allowed: &[usize],
+    target: &[u64],
+    cost: impl Fn(usize) -> usize,
+) -> Option<Vec<usize>> {
+    let mut best: Option<(usize, usize, Vec<usize>)> = None;
+    let step = allowed.len().div_ceil(ORDERS / 2).max(1);
+    for shift in (0..allowed.len()).step_by(step) {
+        let forward: Vec<usize> = allowed[shift..].iter().chain(&allowed[..shift]).copied().collect();
+        let backward: Vec<usize> = forward.iter().rev().copied().collect();
+        for order in [forward, backward] {
+            let mut basis = Echelon::new(field, target.len());
+            let independent: Vec<usize> = order.into_iter().filter(|&j| basis.insert(&rows[j])).collect();
+            let refs: Vec<&[u64]> = independent.iter().map(|&j| rows[j].as_slice()).collect();
+            let y = express(field, &refs, target)?;
+            let mut used: Vec<usize> =
+                independent.iter().zip(&y).filter(|(_, y)| **y != 0).map(|(&j, _)| j).collect();
+            used.sort_unstable();
+            let key = (used.iter().map(|&j| cost(j)).sum(), used.len());
+            if best.as_ref().is_none_or(|(a, b, _)| key < (*a, *b)) {
+                best = Some((key.0, key.1, used));
+            }
+        }
+    }
+    best.map(|(_, _, used)| used)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn takes_the_short_way() {
+        let f = Field::new((1 << 60) + 33);
+        let rows: Vec<Vec<u64>> =
+            [[1, 1, 1], [0, 1, 1], [1, 1, 0], [0, 1, 0]].map(|r| r.map(|a: i64| f.from_i64(a)).to_vec()).to_vec();
+        let e0 = [f.one(), 0, 0];
+        let found = short_support(f, &rows, &[0, 1, 2, 3], &e0, |_| 1);
+        assert!(found == Some(vec![0, 1]) || found == Some(vec![2, 3]), "{found:?}");
+        assert_eq!(short_support(f, &rows, &[0, 1, 2, 3], &e0, |j| if j < 2 { 5 } else { 1 }), Some(vec![2, 3]));
+        assert_eq!(short_support(f, &rows, &[1], &e0, |_| 1), None);
+    }
+}

@@ -1,0 +1,297 @@
+//! The incremental reduced row-echelon basis of a row space.
+
+use crate::Field;
+
+const NO_PIVOT: u32 = u32::MAX;
+
+/// A row space over a prime field, kept in reduced row-echelon form while rows come in.
+///
+/// Every basis row has a one in its pivot column, where all other basis rows are zero. So the unit
+/// vector `e_c` lies in the space exactly when column `c` is a pivot column whose row is `e_c`.
+///
+/// ```
+/// use obsdeg_exact::{Echelon, Field};
+/// let f = Field::new((1 << 60) + 33);
+/// let row = |a: [i64; 3]| a.map(|x| f.from_i64(x));
+/// let mut v = Echelon::new(f, 3);
+/// assert!(v.insert(&row([1, 1, 0])));
+/// assert!(!v.insert(&row([2, 2, 0])));
+/// assert!(!v.has_unit(0));
+/// assert!(v.insert(&row([1, -1, 0])));
+/// assert!(v.has_unit(0) && v.has_unit(1) && v.is_zero_column(2));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Echelon {
+    field: Field,
+    columns: usize,
+    /// Basis rows, one after another.
+    rows: Vec<u64>,
+    /// Pivot column of each basis row.
+    pivots: Vec<u32>,
+    /// Basis row of each pivot column.
+    row_of: Vec<u32>,
+    scratch: Vec<u64>,
+    live: Live,
+}
+
+/// Minus the entry of a row at a pivot, with the start of that pivot's basis row.
+type Live = Vec<(u64, usize)>;
+
+impl Echelon {
+    /// The zero space of row vectors of length `columns`.
+    pub fn new(field: Field, columns: usize) -> Self {
+        Self {
+            field,
+            columns,
+            rows: Vec::new(),
+            pivots: Vec::new(),
+            row_of: vec![NO_PIVOT; columns],
+            scratch: vec![0; columns],
+            live: Vec::new(),
+        }
+    }
+
+    /// Back to the zero space, keeping the memory.
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.pivots.clear();
+        self.row_of.fill(NO_PIVOT);
+    }
+
+    /// The field.
+    pub fn field(&self) -> Field {
+        self.field
+    }
+
+    /// The length of a row.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The dimension.
+    pub fn rank(&self) -> usize {
+        self.pivots.len()
+    }
+
+    /// Basis row `i`, shape `columns`.
+    pub fn row(&self, i: usize) -> &[u64] {
+        &self.rows[i * self.columns..(i + 1) * self.columns]
+    }
+
+    /// The pivot columns, in the order in which they were found.
+    pub fn pivots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.pivots.iter().map(|&c| c as usize)
+    }
+
+    /// The basis row whose pivot is `column`.
+    pub fn pivot_row(&self, column: usize) -> Option<&[u64]> {
+        match self.row_of[column] {
+            NO_PIVOT => None,
+            i => Some(self.row(i as usize)),
+        }
+    }
+
+    /// `row` minus its projection along the pivots: zero exactly when `row` is in the space.
+    fn reduce_into(&self, row: &[u64], out: &mut [u64], live: &mut Live) {
+        let f = self.field;
+        live.clear();
+        for (&a, &basis) in row.iter().zip(&self.row_of) {
+            if a != 0 && basis != NO_PIVOT {
+                live.push((f.neg(a), basis as usize * self.columns));
+            }
+        }
+        for (c, slot) in out.iter_mut().enumerate() {
+            *slot = match self.row_of[c] {
+                NO_PIVOT => f.dot(row[c], live.iter().map(|&(a, start)| (a, self.rows[start + c]))),
+                _ => 0,
+            };
+        }
+    }
+
+    /// Adds `row` (shape `columns`) to the space; true when the rank grew.
+    pub fn insert(&mut self, row: &[u64]) -> bool {
+        debug_assert_eq!(row.len(), self.columns);
+        let (mut new, mut live) = (std::mem::take(&mut self.scratch), std::mem::take(&mut self.live));
+        self.reduce_into(row, &mut new, &mut live);
+        let pivot = new.iter().position(|&a| a != 0);
+        if let Some(pivot) = pivot {
+            let f = self.field;
+            let scale = f.inv(new[pivot]);
+            let support: Vec<usize> = (pivot..self.columns).filter(|&c| new[c] != 0).collect();
+            for &c in &support {
+                new[c] = f.mul(new[c], scale);
+            }
+            for i in 0..self.rank() {
+                let basis = &mut self.rows[i * self.columns..(i + 1) * self.columns];
+                let factor = f.neg(basis[pivot]);
+                if factor != 0 {
+                    for &c in &support {
+                        basis[c] = f.add(basis[c], f.mul(factor, new[c]));
+                    }
+                }
+            }
+            self.row_of[pivot] = self.rank() as u32;
+            self.pivots.push(pivot as u32);
+            self.rows.extend_from_slice(&new);
+        }
+        (self.scratch, self.live) = (new, live);
+        pivot.is_some()
+    }
+
+    /// Whether `row` (shape `columns`) lies in the space.
+    pub fn contains(&self, row: &[u64]) -> bool {
+        let mut out = vec![0; self.columns];
+        self.reduce_into(row, &mut out, &mut Vec::new());
+        out.iter().all(|&a| a == 0)
+    }
+
+    /// Whether the unit vector of `column` lies in the space.
+    pub fn has_unit(&self, column: usize) -> bool {
+        self.pivot_row(column)
+            .is_some_and(|row| row.iter().enumerate().all(|(c, &a)| a == 0 || c == column))
+    }
+
+    /// Whether every vector of the space is zero in `column`.
+    pub fn is_zero_column(&self, column: usize) -> bool {
+        (0..self.rank()).all(|i| self.row(i)[column] == 0)
+    }
+
+    /// A basis of the null space `{v : r v = 0 for all r}`: one vector (shape `columns`) per column
+    /// that is no pivot, in column order, with a one there.
+    pub fn null_space(&self) -> Vec<Vec<u64>> {
+        (0..self.columns)
+            .filter(|&c| self.row_of[c] == NO_PIVOT)
+            .map(|free| {
+                let mut v = vec![0; self.columns];
+                v[free] = self.field.one();
+                for (i, pivot) in self.pivots().enumerate() {
+                    v[pivot] = self.field.neg(self.row(i)[free]);
+                }
+                v
+            })
+            .collect()
+    }
+}
+
+/// Solves `sum_i y_i rows[i] = target` (each of shape n): a solution `y` with zeros for the rows that
+/// depend on earlier ones, or `None` when `target` is not in their span.
+pub fn express(field: Field, rows: &[&[u64]], target: &[u64]) -> Option<Vec<u64>> {
+    // echelon form of [rows | identity]: the right part remembers how each basis row was made
+    let (m, n) = (rows.len(), target.len());
+    let mut basis: Vec<(usize, Vec<u64>, Vec<u64>)> = Vec::new();
+    let reduce = |basis: &[(usize, Vec<u64>, Vec<u64>)], row: &mut [u64], made: &mut [u64]| {
+        for (pivot, b, how) in basis {
+            let factor = field.neg(row[*pivot]);
+            if factor != 0 {
+                for (x, &y) in row.iter_mut().zip(b).filter(|(_, y)| **y != 0) {
+                    *x = field.add(*x, field.mul(factor, y));
+                }
+                for (x, &y) in made.iter_mut().zip(how).filter(|(_, y)| **y != 0) {
+                    *x = field.add(*x, field.mul(factor, y));
+                }
+            }
+        }
+    };
+    for (i, row) in rows.iter().enumerate() {
+        let mut row = row.to_vec();
+        let mut made = vec![0; m];
+        made[i] = field.one();
+        reduce(&basis, &mut row, &mut made);
+        if let Some(pivot) = (0..n).find(|&c| row[c] != 0) {
+            let scale = field.inv(row[pivot]);
+            for x in row.iter_mut().chain(made.iter_mut()) {
+                *x = field.mul(*x, scale);
+            }
+            basis.push((pivot, row, made));
+        }
+    }
+    let mut rest = target.to_vec();
+    let mut made = vec![0; m];
+    reduce(&basis, &mut rest, &mut made);
+    rest.iter().all(|&a| a == 0).then(|| made.iter().map(|&a| field.neg(a)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_bigint::BigInt;
+    use num_rational::BigRational;
+    use proptest::prelude::*;
+
+    fn field() -> Field {
+        Field::new((1 << 60) + 33)
+    }
+
+    /// Rank by fraction Gaussian elimination in plain rationals: the oracle.
+    fn rank_rational(rows: &[Vec<i64>]) -> usize {
+        let zero = BigRational::from_integer(BigInt::from(0));
+        let mut m: Vec<Vec<BigRational>> = rows
+            .iter()
+            .map(|r| r.iter().map(|&a| BigRational::from_integer(a.into())).collect())
+            .collect();
+        let mut rank = 0;
+        for c in 0..rows.first().map_or(0, Vec::len) {
+            let Some(p) = (rank..m.len()).find(|&i| m[i][c] != zero) else { continue };
+            m.swap(rank, p);
+            for i in rank + 1..m.len() {
+                let q = &m[i][c] / &m[rank][c];
+                for j in c..m[i].len() {
+                    let d = &q * &m[rank][j];
+                    m[i][j] -= d;
+                }
+            }
+            rank += 1;
+        }
+        rank
+    }
+
+    fn matrices() -> impl Strategy<Value = Vec<Vec<i64>>> {
+        (1usize..7, 1usize..7).prop_flat_map(|(m, n)| {
+            prop::collection::vec(prop::collection::vec(-2i64..3, n), m)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn rank_null_space_and_units(rows in matrices()) {
+            let f = field();
+            let n = rows[0].len();
+            let image: Vec<Vec<u64>> =
+                rows.iter().map(|r| r.iter().map(|&a| f.from_i64(a)).collect()).collect();
+            let mut v = Echelon::new(f, n);
+            for r in &image {
+                v.insert(r);
+            }
+            let rank = rank_rational(&rows);
+            prop_assert_eq!(v.rank(), rank);
+            let null = v.null_space();
+            prop_assert_eq!(null.len(), n - rank);
+            for u in &null {
+                for r in &image {
+                    let zipped = r.iter().copied().zip(u.iter().copied());
+                    prop_assert_eq!(f.dot(0, zipped), 0);
+                }
+            }
+            let refs: Vec<&[u64]> = image.iter().map(Vec::as_slice).collect();
+            for c in 0..n {
+                let mut with_unit = rows.clone();
+                with_unit.push((0..n).map(|j| i64::from(j == c)).collect());
+                let inside = rank_rational(&with_unit) == rank;
+                prop_assert_eq!(v.has_unit(c), inside);
+                let unit: Vec<u64> = (0..n).map(|j| if j == c { f.one() } else { 0 }).collect();
+                prop_assert_eq!(v.contains(&unit), inside);
+                match express(f, &refs, &unit) {
+                    None => prop_assert!(!inside),
+                    Some(y) => {
+                        prop_assert!(inside);
+                        for j in 0..n {
+                            let sum = f.dot(0, y.iter().zip(&image).map(|(&a, r)| (a, r[j])));
+                            prop_assert_eq!(sum, unit[j]);
+                        }
+                    }
+                }
+                prop_assert_eq!(v.is_zero_column(c), rows.iter().all(|r| r[c] == 0));
+            }
+        }
+    }
+}

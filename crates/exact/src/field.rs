@@ -1,0 +1,243 @@
+//! Arithmetic modulo a prime `2^60 < p < 2^61`.
+
+/// A prime field in Montgomery form: an element is the `u64` `a * 2^64 mod p`, below `p`.
+///
+/// ```
+/// use obsdeg_exact::Field;
+/// let f = Field::new((1 << 60) + 33); // a prime
+/// let third = f.inv(f.from_i64(3));
+/// assert_eq!(f.mul(third, f.from_i64(-6)), f.from_i64(-2));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Field {
+    p: u64,
+    /// `-p^-1 mod 2^64`.
+    neg_inv: u64,
+    /// `2^64 mod p`, the image of one.
+    one: u64,
+    /// `2^128 mod p`.
+    r2: u64,
+}
+
+/// How many products of two elements a `u128` takes between two reductions.
+const LAZY: usize = 8;
+
+impl Field {
+    /// The field of the prime `p`; `p` must be an odd prime between 2^60 and 2^61 (the caller's duty).
+    pub fn new(p: u64) -> Self {
+        debug_assert!(p > 1 << 60 && p < 1 << 61 && p % 2 == 1);
+        let mut inv = p; // Newton: doubles the number of right bits
+        for _ in 0..5 {
+            inv = inv.wrapping_mul(2u64.wrapping_sub(p.wrapping_mul(inv)));
+        }
+        let one = ((1u128 << 64) % u128::from(p)) as u64;
+        let r2 = ((u128::from(one) * u128::from(one)) % u128::from(p)) as u64;
+        Self { p, neg_inv: inv.wrapping_neg(), one, r2 }
+    }
+
+    /// The prime.
+    pub fn modulus(&self) -> u64 {
+        self.p
+    }
+
+    /// The neutral element of multiplication.
+    pub fn one(&self) -> u64 {
+        self.one
+    }
+
+    /// `t / 2^64 mod p` for `t < p * 2^64`.
+    #[inline]
+    fn redc(&self, t: u128) -> u64 {
+        let m = (t as u64).wrapping_mul(self.neg_inv);
+        let r = ((t + u128::from(m) * u128::from(self.p)) >> 64) as u64;
+        if r >= self.p { r - self.p } else { r }
+    }
+
+    /// The image of an unsigned integer.
+    pub fn from_u64(&self, a: u64) -> u64 {
+        self.redc(u128::from(a % self.p) * u128::from(self.r2))
+    }
+
+    /// The image of a signed integer.
+    pub fn from_i64(&self, a: i64) -> u64 {
+        let m = self.from_u64(a.unsigned_abs());
+        if a < 0 { self.neg(m) } else { m }
+    }
+
+    /// The image of `num / den`; `den` must not be a multiple of `p` (true of any small one).
+    pub fn from_ratio(&self, num: i64, den: i64) -> u64 {
+        self.mul(self.from_i64(num), self.inv(self.from_i64(den)))
+    }
+
+    /// The representative in `0..p` of an element.
+    pub fn to_u64(&self, a: u64) -> u64 {
+        self.redc(u128::from(a))
+    }
+
+    /// `a + b`.
+    #[inline]
+    pub fn add(&self, a: u64, b: u64) -> u64 {
+        let s = a + b;
+        if s >= self.p { s - self.p } else { s }
+    }
+
+    /// `a - b`.
+    #[inline]
+    pub fn sub(&self, a: u64, b: u64) -> u64 {
+        if a >= b { a - b } else { a + self.p - b }
+    }
+
+    /// `-a`.
+    #[inline]
+    pub fn neg(&self, a: u64) -> u64 {
+        if a == 0 { 0 } else { self.p - a }
+    }
+
+    /// `a b`.
+    #[inline]
+    pub fn mul(&self, a: u64, b: u64) -> u64 {
+        self.redc(u128::from(a) * u128::from(b))
+    }
+
+    /// `a^e`.
+    pub fn pow(&self, mut a: u64, mut e: u64) -> u64 {
+        let mut r = self.one;
+        while e > 0 {
+            if e & 1 == 1 {
+                r = self.mul(r, a);
+            }
+            a = self.mul(a, a);
+            e >>= 1;
+        }
+        r
+    }
+
+    /// `1 / a` (0 for `a = 0`), by the extended Euclidean algorithm.
+    pub fn inv(&self, a: u64) -> u64 {
+        let (mut r0, mut r1) = (self.p, a);
+        let (mut t0, mut t1) = (0i64, 1i64); // |t| < p < 2^61
+        while r1 != 0 {
+            let q = r0 / r1;
+            (r0, r1) = (r1, r0 - q * r1);
+            (t0, t1) = (t1, t0 - q as i64 * t1);
+        }
+        // a = A 2^64; t0 = A^-1 2^-64: two factors 2^64 restore the form
+        let plain = if a == 0 {
+            0
+        } else if t0 < 0 {
+            (t0 + self.p as i64) as u64
+        } else {
+            t0 as u64
+        };
+        self.mul(self.mul(plain, self.r2), self.r2)
+    }
+
+    /// `start + sum a_i b_i`, with one reduction at the end.
+    #[inline]
+    pub fn dot(&self, start: u64, terms: impl IntoIterator<Item = (u64, u64)>) -> u64 {
+        let bound = u128::from(self.p) << 64;
+        // `start` enters as start * 2^64, which the reduction divides out
+        let mut acc = u128::from(start) << 64;
+        let mut pending = 0;
+        for (a, b) in terms {
+            if pending == LAZY {
+                // acc < p 2^64 + 8 p^2 < 2 p 2^64
+                if acc >= bound {
+                    acc -= bound;
+                }
+                pending = 0;
+            }
+            acc += u128::from(a) * u128::from(b);
+            pending += 1;
+        }
+        if acc >= bound {
+            acc -= bound;
+        }
+        self.redc(acc)
+    }
+
+    /// A square root of `a`, or `None` when `a` is no square (Tonelli-Shanks).
+    pub fn sqrt(&self, a: u64) -> Option<u64> {
+        if a == 0 {
+            return Some(0);
+        }
+        let minus_one = self.neg(self.one);
+        if self.pow(a, (self.p - 1) / 2) == minus_one {
+            return None;
+        }
+        let s = (self.p - 1).trailing_zeros();
+        let q = (self.p - 1) >> s;
+        let non_square = (2..)
+            .map(|k| self.from_u64(k))
+            .find(|&k| self.pow(k, (self.p - 1) / 2) == minus_one)?;
+        let mut c = self.pow(non_square, q);
+        let mut t = self.pow(a, q);
+        let mut r = self.pow(a, q.div_ceil(2));
+        let mut m = s;
+        while t != self.one {
+            let mut i = 0;
+            let mut u = t;
+            while u != self.one {
+                u = self.mul(u, u);
+                i += 1;
+            }
+            let b = self.pow(c, 1 << (m - i - 1));
+            r = self.mul(r, b);
+            c = self.mul(b, b);
+            t = self.mul(t, c);
+            m = i;
+        }
+        Some(r)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_bigint::BigUint;
+    use proptest::prelude::*;
+
+    const P: u64 = (1 << 60) + 33;
+
+    fn big(a: u64) -> BigUint {
+        BigUint::from(a)
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_big_integers(a in any::<u64>(), b in any::<u64>()) {
+            let f = Field::new(P);
+            let (x, y) = (f.from_u64(a), f.from_u64(b));
+            prop_assert_eq!(big(f.to_u64(f.mul(x, y))), big(a) * big(b) % big(P));
+            prop_assert_eq!(big(f.to_u64(f.add(x, y))), (big(a) + big(b)) % big(P));
+            prop_assert_eq!(f.add(f.sub(x, y), y), x);
+            if a % P != 0 {
+                prop_assert_eq!(f.mul(x, f.inv(x)), f.one());
+            }
+        }
+
+        #[test]
+        fn dot_is_the_sum_of_products(v in prop::collection::vec((0..P, 0..P), 0..60), s in 0..P) {
+            let f = Field::new(P);
+            let slow = v.iter().fold(s, |acc, &(a, b)| f.add(acc, f.mul(a, b)));
+            prop_assert_eq!(f.dot(s, v.iter().copied()), slow);
+        }
+
+        #[test]
+        fn square_roots_square_back(a in 1..P) {
+            let f = Field::new(P);
+            let square = f.mul(a, a);
+            let r = f.sqrt(square).expect("a square has a root");
+            prop_assert_eq!(f.mul(r, r), square);
+        }
+    }
+
+    #[test]
+    fn extremes_do_not_overflow() {
+        let f = Field::new(P);
+        let m = P - 1;
+        let n = 1000;
+        let slow = (0..n).fold(m, |acc, _| f.add(acc, f.mul(m, m)));
+        assert_eq!(f.dot(m, (0..n).map(|_| (m, m))), slow);
+    }
+}

@@ -1,0 +1,31 @@
+//! Exact linear algebra over a random prime field.
+//!
+//! Observability is a question of rank over `Q(wN, wU)` extended by the sines and cosines of the
+//! angles of a scheme. All of these have images in a prime field `F_p` with `p = 1 mod n`, where `n`
+//! is the common denominator of a full turn: the field then holds the n-th roots of unity. Ranks are
+//! computed there in microseconds; [`certainty`] bounds the probability that a rank differs.
+//!
+//! One algorithm per module:
+//! - [`field`]: arithmetic modulo a prime of 61 bits (Montgomery form, lazily reduced dot products);
+//! - [`prime`]: random primes `p = 1 mod n` and their roots of unity;
+//! - [`turn`]: cosines and sines of decimal degrees in such a field;
+//! - [`echelon`]: the incremental reduced row-echelon basis;
+//! - [`radical`]: numbers of `Q(sqrt 2, sqrt 3)` recovered from their images;
+//! - [`polynomial`]: roots of small polynomials in the field;
+//! - [`certainty`]: the bound on the error probability.
+
+pub mod certainty;
+pub mod echelon;
+pub mod field;
+pub mod polynomial;
+pub mod prime;
+pub mod radical;
+pub mod rng;
+pub mod turn;
+
+pub use echelon::Echelon;
+pub use field::Field;
+pub use prime::{PrimeError, RootField};
+pub use radical::Radical;
+pub use rng::SplitMix64;
+pub use turn::Turn;
