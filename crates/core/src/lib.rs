@@ -5,6 +5,8 @@
 //! ([`degree::verdict`]), these into solutions ([`solution`]), and all of it into one plain
 //! [`analysis::Analysis`].
 
+pub mod analysis;
+pub mod audit;
 pub mod degree;
 pub mod model;
 pub mod solution;

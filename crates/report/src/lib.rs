@@ -1,1 +1,112 @@
-//! x
+//! Results as text: tables, JSON, Markdown, CSV, LaTeX. Pure formatting: nothing is computed here.
+
+mod audit;
+mod csv_text;
+mod latex;
+mod markdown;
+mod table;
+mod words;
+
+use std::fmt;
+use std::str::FromStr;
+
+use obsdeg_core::analysis::Analysis;
+use obsdeg_core::audit::Audit;
+
+/// A text format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Format {
+    /// For the terminal.
+    #[default]
+    Table,
+    /// JSON with a schema name.
+    Json,
+    /// GitHub-flavoured Markdown.
+    Markdown,
+    /// Comma-separated values: one row per unknown and combination.
+    Csv,
+    /// LaTeX tables for `\input` (packages booktabs, longtable, amsmath).
+    Latex,
+}
+
+/// Not a format.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{found}` is not a format; expected table, json, markdown, csv or latex")]
+pub struct FormatError {
+    /// The text found.
+    pub found: String,
+}
+
+impl Format {
+    /// All formats with their names.
+    pub const ALL: [(Self, &'static str); 5] = [
+        (Self::Table, "table"),
+        (Self::Json, "json"),
+        (Self::Markdown, "markdown"),
+        (Self::Csv, "csv"),
+        (Self::Latex, "latex"),
+    ];
+}
+
+impl FromStr for Format {
+    type Err = FormatError;
+    fn from_str(text: &str) -> Result<Self, FormatError> {
+        let known = Self::ALL.into_iter().find(|(_, name)| *name == text);
+        known.map(|(format, _)| format).ok_or_else(|| FormatError { found: text.into() })
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::ALL.iter().find(|(format, _)| format == self).map_or("", |(_, name)| name);
+        f.write_str(name)
+    }
+}
+
+/// How a table is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Layout {
+    /// Columns of the terminal; `None` for no limit.
+    pub width: Option<u16>,
+    /// Whether headings are styled with ANSI codes.
+    pub color: bool,
+}
+
+/// Why a result could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// JSON.
+    #[error("cannot write JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// CSV.
+    #[error("cannot write CSV: {0}")]
+    Csv(#[from] csv::Error),
+}
+
+/// An analysis in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a serializer fails.
+pub fn analysis(a: &Analysis, format: Format, layout: Layout) -> Result<String, ReportError> {
+    Ok(match format {
+        Format::Table => table::analysis(a, layout),
+        Format::Json => serde_json::to_string_pretty(a)? + "\n",
+        Format::Markdown => markdown::analysis(a),
+        Format::Csv => csv_text::analysis(a)?,
+        Format::Latex => latex::analysis(a),
+    })
+}
+
+/// An audit in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a serializer fails.
+pub fn audit(a: &Audit, format: Format, layout: Layout) -> Result<String, ReportError> {
+    Ok(match format {
+        Format::Table => audit::table(a, layout),
+        Format::Json => serde_json::to_string_pretty(a)? + "\n",
+        Format::Markdown => audit::markdown(a),
+        Format::Csv => audit::csv(a)?,
+        Format::Latex => audit::latex(a),
+    })
+}

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use obsdeg_exact::{Radical, RootField};
+use obsdeg_exact::{Field, Radical, RootField};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -12,7 +12,12 @@ pub enum Number {
     /// Exact: `a + b sqrt 2 + c sqrt 3 + d sqrt 6`.
     Radical(Radical),
     /// Exact: an expression in sines and cosines.
-    Text(String),
+    Text {
+        /// In the symbols of the engine.
+        raw: String,
+        /// For people.
+        shown: String,
+    },
     /// Rounded.
     Decimal(f64),
 }
@@ -42,7 +47,7 @@ pub struct Coefficient {
 pub type Rates = [i32; 2];
 
 /// The exponents that are tried, simplest first.
-pub(crate) fn candidate_rates() -> Vec<Rates> {
+fn candidate_rates() -> Vec<Rates> {
     let mut all: Vec<Rates> =
         (-2..=2).flat_map(|a| (-2..=2).map(move |b| [a, b])).collect();
     all.sort_by_key(|[a, b]| (a.abs() + b.abs(), -a, -b));
@@ -51,11 +56,45 @@ pub(crate) fn candidate_rates() -> Vec<Rates> {
 
 /// One value of a coefficient, with the earth rate there.
 #[derive(Debug, Clone, Copy)]
-pub struct Image<E> {
+pub struct Image {
     /// The value.
-    pub value: E,
+    pub value: u64,
     /// `(wN, wU)`.
-    pub rates: [E; 2],
+    pub rates: [u64; 2],
+}
+
+/// The exponents `(a, b)` with `value / (wN^a wU^b)` the same at two points of one field.
+pub fn rates_between(f: &Field, first: Image, second: Image) -> Option<Rates> {
+    if first.value == 0 && second.value == 0 {
+        return Some([0, 0]);
+    }
+    let number = |image: Image, rates| Some(f.mul(image.value, f.inv(power(f, image.rates, rates)?)));
+    candidate_rates()
+        .into_iter()
+        .find(|&rates| number(first, rates).is_some_and(|x| number(second, rates) == Some(x)))
+}
+
+/// `wN^a wU^b` in a field; `None` when a rate that occurs is zero.
+pub fn power(f: &Field, values: [u64; 2], rates: Rates) -> Option<u64> {
+    values.into_iter().zip(rates).try_fold(f.one(), |product, (w, e)| {
+        let base = match e {
+            0 => return Some(product),
+            _ if w == 0 => return None,
+            e if e < 0 => f.inv(w),
+            _ => w,
+        };
+        Some(f.mul(product, f.pow(base, e.unsigned_abs().into())))
+    })
+}
+
+/// The number whose images are `images[sample][embedding]`: recovered in the first sample, confirmed
+/// in every embedding of the second.
+pub fn recover_radical(fields: &[RootField; 2], images: &[[u64; 4]; 2]) -> Option<Radical> {
+    let radical = Radical::recover(&fields[0], images[0])?;
+    let exponents = obsdeg_exact::radical::embeddings(fields[1].order);
+    let confirmed =
+        exponents.iter().zip(images[1]).all(|(&a, image)| image == radical.image(&fields[1].conjugate(a)));
+    confirmed.then_some(radical)
 }
 
 impl Coefficient {
@@ -64,58 +103,40 @@ impl Coefficient {
         match &self.number {
             Number::Radical(r) => r.terms() == 0,
             Number::Decimal(x) => *x == 0.0,
-            Number::Text(t) => t == "0",
+            Number::Text { raw, .. } => raw == "0",
         }
     }
 
-    /// The coefficient whose images are `images[sample][embedding]`: recovered in the first sample,
-    /// confirmed in every embedding of the second.
-    pub fn recover(fields: &[RootField; 2], images: &[[Image<u64>; 4]; 2]) -> Option<Self> {
-        candidate_rates().into_iter().find_map(|rates| {
-            let number = |sample: usize, k: usize| {
-                let (f, image) = (&fields[sample].field, images[sample][k]);
-                let mut value = image.value;
-                for (e, &rate) in rates.iter().zip(&image.rates) {
-                    if *e != 0 && rate == 0 {
-                        return None;
-                    }
-                    let factor = f.pow(if *e > 0 { f.inv(rate) } else { rate }, e.unsigned_abs().into());
-                    value = f.mul(value, factor);
-                }
-                Some(value)
-            };
-            let first = [number(0, 0)?, number(0, 1)?, number(0, 2)?, number(0, 3)?];
-            let radical = Radical::recover(&fields[0], first)?;
-            let exponents = obsdeg_exact::radical::embeddings(fields[1].order);
-            let confirmed = exponents
-                .iter()
-                .enumerate()
-                .all(|(k, &a)| number(1, k) == Some(radical.image(&fields[1].conjugate(a))));
-            confirmed.then_some(Self { number: Number::Radical(radical), rates })
-        })
+    /// The number one.
+    pub fn one() -> Self {
+        Self { number: Number::Radical(Radical::rational(1, 1)), rates: [0, 0] }
     }
 
-    /// The decimal coefficient with values `images` at several earth rates, if it is a number times a
-    /// power product.
-    pub fn fit(images: &[Image<f64>]) -> Option<Self> {
-        let (first, rest) = images.split_first()?;
-        if images.iter().all(|i| i.value.abs() < 1e-11) {
-            return Some(Self { number: Number::Decimal(0.0), rates: [0, 0] });
-        }
-        candidate_rates().into_iter().find_map(|rates| {
-            let number = |i: &Image<f64>| i.value / (i.rates[0].powi(rates[0]) * i.rates[1].powi(rates[1]));
-            let x = number(first);
-            rest.iter()
-                .all(|i| (number(i) - x).abs() <= 1e-8 * x.abs())
-                .then_some(Self { number: Number::Decimal(x), rates })
-        })
+    /// The number alone.
+    #[must_use]
+    pub fn without_rates(&self) -> Self {
+        Self { number: self.number.clone(), rates: [0, 0] }
+    }
+
+    /// The coefficient negated, for a number that prints with a leading minus.
+    #[must_use]
+    pub fn negated(&self) -> Self {
+        let number = match &self.number {
+            Number::Radical(r) => Number::Radical(r.negated()),
+            Number::Decimal(x) => Number::Decimal(-x),
+            Number::Text { raw, shown } => {
+                let strip = |s: &str| s.strip_prefix('-').map_or_else(|| format!("-({s})"), String::from);
+                Number::Text { raw: strip(raw), shown: strip(shown) }
+            }
+        };
+        Self { number, rates: self.rates }
     }
 
     /// How exact the number is.
     pub fn form(&self) -> Form {
         match self.number {
             Number::Radical(_) => Form::Exact,
-            Number::Text(_) => Form::Symbolic,
+            Number::Text { .. } => Form::Symbolic,
             Number::Decimal(_) => Form::Decimal,
         }
     }
@@ -156,9 +177,10 @@ impl Number {
                 let text = decimal(x.abs());
                 (*x < 0.0, if text == "1" { vec![] } else { vec![text] })
             }
-            Self::Text(t) => {
+            Self::Text { shown, .. } => {
+                let t = shown.as_str();
                 let inner = t.strip_prefix('-').filter(|rest| !has_sum(rest));
-                let (negative, t) = inner.map_or((false, t.as_str()), |rest| (true, rest));
+                let (negative, t) = inner.map_or((false, t), |rest| (true, rest));
                 let text = if has_sum(t) { format!("({t})") } else { t.to_string() };
                 (negative, if text == "1" { vec![] } else { vec![text] })
             }
@@ -241,13 +263,16 @@ mod tests {
     }
 
     #[test]
-    fn fits_power_products_only() {
-        let at = |f: &dyn Fn(f64, f64) -> f64| {
-            [(0.7, 1.3), (1.1, 0.6), (0.9, 1.7)].map(|(n, u)| Image { value: f(n, u), rates: [n, u] })
+    fn rates_are_found_by_comparison() {
+        let f = Field::new((1 << 60) + 33);
+        let at = |n: i64, u: i64| {
+            let rates = [f.from_i64(n), f.from_i64(u)];
+            let product = f.mul(f.from_ratio(-1, 3), f.mul(rates[1], f.inv(rates[0])));
+            Image { value: product, rates }
         };
-        let c = Coefficient::fit(&at(&|n, u| -0.25 * u / n)).expect("a power product");
-        assert_eq!(c.to_string(), "-0.25*wU/wN");
-        assert_eq!(Coefficient::fit(&at(&|n, u| n + u)), None);
+        assert_eq!(rates_between(&f, at(5, 7), at(11, 13)), Some([-1, 1]));
+        let sum = |n: i64, u: i64| Image { value: f.from_i64(n + u), ..at(n, u) };
+        assert_eq!(rates_between(&f, sum(5, 7), sum(11, 13)), None);
     }
 
     #[test]

@@ -233,6 +233,22 @@ impl RandomValues {
         }
     }
 
+    /// Puts a generic angle at 180 degrees, where `tan(angle/2)` is infinite; false when unknown.
+    pub fn set_half_turn(&mut self, name: &str) -> bool {
+        let f = &self.roots.field;
+        let minus_one = f.neg(f.one());
+        self.generic.iter_mut().find(|(n, _)| n == name).map(|(_, z)| *z = minus_one).is_some()
+    }
+
+    /// `(cos, sin)` of a generic angle at a sample of these values.
+    pub fn generic_cos_sin(&self, name: &str, sample: &Sample) -> Option<(u64, u64)> {
+        let z = self.generic.iter().find(|(n, _)| n == name)?.1;
+        let f = sample.roots.field;
+        // see `sample`: the sine at a fixed tangent must not depend on the sign of the imaginary unit
+        let flipped = sample.roots.imaginary_unit() != self.roots.imaginary_unit();
+        Some(sample.roots.cos_sin(if flipped { f.inv(z) } else { z }))
+    }
+
     /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
     pub fn sample(&self, scheme: &Scheme, a: u64) -> Sample {
         let roots = self.roots.conjugate(a);

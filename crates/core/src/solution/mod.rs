@@ -1,5 +1,10 @@
 //! How an observable quantity is solved from the derivatives of Z.
 
+pub mod formulas;
 pub mod local;
+pub mod loci;
+pub mod print;
 pub mod problem;
+pub mod solver;
 pub mod support;
+pub mod symbols;

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_exact::{Field, echelon::express};
+use obsdeg_symbolic::System;
 
-use crate::model::ring::{Ring, Text};
+use crate::model::ring::{Float, Ring, Text};
 
 /// `M x = b` with entries out of the table of observable rows, and the outputs `P x`.
 ///
@@ -13,11 +14,34 @@ use crate::model::ring::{Ring, Text};
 pub struct Problem {
     /// Number of unknowns.
     pub unknowns: usize,
-    /// One equation per row: places of its coefficients, and whether the right side is
-    /// `targets[index]` or zero.
-    pub equations: Vec<(Vec<Place>, Option<usize>)>,
+    /// One equation per row: places of its coefficients, and its right side.
+    pub equations: Vec<(Vec<Place>, Right)>,
     /// The outputs: the unknowns themselves, or sums of places times unknowns.
     pub outputs: Outputs,
+}
+
+/// The right side of an equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Right {
+    /// Zero.
+    Zero,
+    /// One.
+    One,
+    /// Minus the entry at a place.
+    Minus(Place),
+    /// An entry of the target.
+    Target(usize),
+}
+
+impl Right {
+    fn value<R: Ring>(self, ring: &R, table: &[Vec<R::Element>], target: &[R::Element]) -> R::Element {
+        match self {
+            Self::Zero => ring.zero(),
+            Self::One => ring.one(),
+            Self::Minus((r, c)) => ring.neg(&table[r][c]),
+            Self::Target(i) => target[i].clone(),
+        }
+    }
 }
 
 /// A place `(row, column)` in the table of observable rows.
@@ -36,28 +60,28 @@ impl Problem {
     /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique).
     /// The right sides are the target's entries, column by column.
     pub fn solution(rows: &[usize], columns: usize) -> Self {
-        let equation = |c: usize| (rows.iter().map(|&j| (j, c)).collect(), Some(c));
+        let equation = |c: usize| (rows.iter().map(|&j| (j, c)).collect(), Right::Target(c));
         Self { unknowns: rows.len(), equations: (0..columns).map(equation).collect(), outputs: Outputs::Unknowns }
     }
 
-    /// The combination of the given rows that vanishes outside `support` and is one at `lead`
-    /// (right side 0: the number one). Outputs: its entries on `support`.
+    /// The combination of the given rows that vanishes outside `support` and is one at `lead`.
+    /// Outputs: its entries on `support`.
     pub fn combination(rows: &[usize], columns: usize, support: &[usize], lead: usize) -> Self {
         let places = |c: usize| -> Vec<Place> { rows.iter().map(|&j| (j, c)).collect() };
         let equations = (0..columns)
             .filter(|c| *c == lead || !support.contains(c))
-            .map(|c| (places(c), (c == lead).then_some(0)))
+            .map(|c| (places(c), if c == lead { Right::One } else { Right::Zero }))
             .collect();
         let sums = support.iter().map(|&c| places(c)).collect();
         Self { unknowns: rows.len(), equations, outputs: Outputs::Sums(sums) }
     }
 
-    /// The vector on `support` that all the given rows annihilate, minus its lead entry, which is one:
-    /// `sum_c row[c] v_c = -row[lead]` (the right side of equation i is `targets[i]`).
+    /// The vector on `support` that all the given rows annihilate, without its lead entry, which is
+    /// one: `sum_c row[c] v_c = -row[lead]`.
     pub fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
         let others: Vec<usize> = support.iter().copied().filter(|&c| c != lead).collect();
-        let equation = |(i, &j): (usize, &usize)| (others.iter().map(|&c| (j, c)).collect(), Some(i));
-        Self { unknowns: others.len(), equations: rows.iter().enumerate().map(equation).collect(), outputs: Outputs::Unknowns }
+        let equation = |&j: &usize| (others.iter().map(|&c| (j, c)).collect(), Right::Minus((j, lead)));
+        Self { unknowns: others.len(), equations: rows.iter().map(equation).collect(), outputs: Outputs::Unknowns }
     }
 
     fn outputs_of<R: Ring>(&self, ring: &R, table: &[Vec<R::Element>], x: Vec<R::Element>) -> Vec<R::Element> {
@@ -76,7 +100,7 @@ impl Problem {
             .map(|i| self.equations.iter().map(|(places, _)| table[places[i].0][places[i].1]).collect())
             .collect();
         let refs: Vec<&[u64]> = columns.iter().map(Vec::as_slice).collect();
-        let right: Vec<u64> = self.equations.iter().map(|(_, t)| t.map_or(0, |t| targets[t])).collect();
+        let right: Vec<u64> = self.equations.iter().map(|(_, t)| t.value(f, table, targets)).collect();
         let x = express(*f, &refs, &right)?;
         Some(self.outputs_of(f, table, x))
     }
@@ -89,38 +113,27 @@ impl Problem {
             let (r, c) = self.equations[e].0[i];
             table[r][c]
         });
-        let b = DVector::from_iterator(m, self.equations.iter().map(|(_, t)| t.map_or(0.0, |t| targets[t])));
+        let b = DVector::from_iterator(m, self.equations.iter().map(|(_, t)| t.value(&Float, table, targets)));
         let qr = a.clone().qr();
         let (q, r) = (qr.q(), qr.r());
         let x = r.solve_upper_triangular(&(q.transpose() * &b))?;
         let residual = (&a * &x - &b).norm();
         let fine = x.iter().all(|v| v.is_finite()) && residual <= 1e-9 * (1.0 + b.norm());
-        fine.then(|| self.outputs_of(&crate::model::ring::Float, table, x.iter().copied().collect()))
+        fine.then(|| self.outputs_of(&Float, table, x.iter().copied().collect()))
     }
 
     /// The system as text for the symbolic worker: matrix, right side, output matrix.
-    pub fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> TextSystem {
+    pub fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> System {
         let cell = |&(r, c): &Place| table[r][c].clone();
         let matrix = self.equations.iter().map(|(places, _)| places.iter().map(cell).collect()).collect();
         let right =
-            self.equations.iter().map(|(_, t)| t.map_or_else(|| Text.zero(), |t| targets[t].clone())).collect();
+            self.equations.iter().map(|(_, t)| t.value(&Text, table, targets)).collect();
         let outputs = match &self.outputs {
             Outputs::Unknowns => Vec::new(),
             Outputs::Sums(sums) => sums.iter().map(|places| places.iter().map(cell).collect()).collect(),
         };
-        TextSystem { matrix, right, outputs }
+        System { matrix, right, outputs }
     }
-}
-
-/// A [`Problem`] written out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TextSystem {
-    /// `M`.
-    pub matrix: Vec<Vec<String>>,
-    /// `b`.
-    pub right: Vec<String>,
-    /// `P`; empty for the identity.
-    pub outputs: Vec<Vec<String>>,
 }
 
 #[cfg(test)]
@@ -143,11 +156,10 @@ mod tests {
         assert_eq!(y, [f.from_ratio(1, 3), f.from_ratio(-2, 3), f.from_ratio(2, 3)]);
         // rows 0 and 1 vanish outside {0, 2} as (1, 0, -2)
         let p = Problem::combination(&[0, 1], 3, &[0, 2], 0);
-        assert_eq!(p.solve_in_field(&f, &images, &[f.one()]), Some(vec![f.one(), f.from_i64(-2)]));
+        assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.one(), f.from_i64(-2)]));
         // (2, -1, 1) is annihilated by rows 0 and 1: lead 0 = 1 gives (-1/2, 1/2)
         let p = Problem::null_vector(&[0, 1], &[0, 1, 2], 0);
-        let right = [f.from_i64(-1), 0];
-        assert_eq!(p.solve_in_field(&f, &images, &right), Some(vec![f.from_ratio(-1, 2), f.from_ratio(1, 2)]));
+        assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.from_ratio(-1, 2), f.from_ratio(1, 2)]));
         // no solution
         let p = Problem::solution(&[0], 3);
         assert_eq!(p.solve_in_field(&f, &images, &[f.one(), 0, 0]), None);

@@ -1,0 +1,166 @@
+//! Two random fields in four embeddings each: what verdicts agree in and coefficients are recovered from.
+
+use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::radical::embeddings;
+use obsdeg_exact::{Echelon, PrimeError, RootField, SplitMix64};
+
+use super::platform_rows::PlatformRows;
+use super::staircase::{Degrees, climb};
+use crate::model::Platform;
+use crate::model::platform::{RandomValues, Sample};
+use crate::solution::local::{LocalObservable, RateZeros, local_observables, rows_at};
+
+/// How many pairs of fields are drawn before a disagreement is an error.
+const ATTEMPTS: usize = 4;
+
+/// Why no verdict could be reached.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum EnsembleError {
+    /// No field fits the angles.
+    #[error(transparent)]
+    Prime(#[from] PrimeError),
+    /// The fields kept disagreeing.
+    #[error("two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this scheme")]
+    Disagreement,
+}
+
+/// The verdicts of a scheme, agreed on by two random fields.
+#[derive(Debug, Clone)]
+pub struct Verdicts {
+    /// What was agreed on.
+    pub degrees: Degrees,
+    /// The bases of `V_0, V_1, ...` in the first field.
+    pub stairs: Vec<Echelon>,
+    /// The random values of the two fields.
+    pub values: [RandomValues; 2],
+    /// Bound on the probability that any of the verdicts is wrong.
+    pub error_bound: f64,
+}
+
+/// Judges `platform` in two random fields of the stream of `seed`.
+///
+/// # Errors
+/// [`EnsembleError`].
+pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> {
+    let scheme = platform.scheme();
+    let mut rng = SplitMix64::new(seed);
+    for _ in 0..ATTEMPTS {
+        let values = [RandomValues::draw(scheme, &mut rng)?, RandomValues::draw(scheme, &mut rng)?];
+        let (degrees, stairs) = staircase(platform, &values[0].sample(scheme, 1));
+        let (second, _) = staircase(platform, &values[1].sample(scheme, 1));
+        if degrees == second {
+            let claim = claim(platform, &degrees, values[0].roots().order);
+            return Ok(Verdicts { error_bound: error_bound(&claim, 2), degrees, stairs, values });
+        }
+    }
+    Err(EnsembleError::Disagreement)
+}
+
+/// The degrees and the bases of `V_0, V_1, ...` at one sample.
+pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>) {
+    let mut rows = PlatformRows::new(platform, sample);
+    let mut basis = Echelon::new(sample.point.ring, platform.names().len());
+    let mut stairs = Vec::new();
+    let degrees = climb(&mut rows, &mut basis, |_, v| stairs.push(v.clone()));
+    (degrees, stairs)
+}
+
+/// The size of the claim (see [`obsdeg_exact::certainty`]): a row is a row of `H F^k`, of degree k in
+/// the rates, times `S_i`, whose entries are products of at most six sines and cosines per g factor.
+fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
+    let generic = !platform.scheme().generic_names().is_empty();
+    let orders = degrees.rank_profile.len();
+    let unknowns = platform.names().len();
+    Claim {
+        unknowns,
+        decisions: orders * (1 + unknowns),
+        order,
+        row_degree: orders + if generic { 18 } else { 0 },
+        // |entry| <= 6, denominators 2^9, 15 entries of norm at most sqrt(15) together, w/ margin
+        row_bits: 16.0,
+    }
+}
+
+/// The rows of the local observables of every position, in one field and embedding.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Field and embedding.
+    pub sample: Sample,
+    /// One row per position and local observable, position by position.
+    pub rows: Vec<Vec<u64>>,
+}
+
+impl Table {
+    /// The values of `(wN, wU)`.
+    pub fn rates(&self) -> [u64; 2] {
+        [self.sample.point.w_n, self.sample.point.w_u]
+    }
+}
+
+/// The observable rows of a scheme in two fields, four embeddings each, with random rates: a formula in
+/// `wN` and `wU` that holds there holds at every latitude with the same zeros.
+#[derive(Debug, Clone)]
+pub struct Tables {
+    /// The observables of one position.
+    pub observables: Vec<LocalObservable>,
+    /// Zeros of the rates.
+    pub zeros: RateZeros,
+    /// `tables[field][embedding]`.
+    pub tables: [[Table; 4]; 2],
+    /// The first field and embedding at other rates.
+    pub other_rates: Table,
+}
+
+impl Tables {
+    /// The tables of `platform` in the fields of `verdicts`.
+    pub fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Self {
+        let scheme = platform.scheme();
+        let zeros = RateZeros::of(platform);
+        let observables = local_observables(zeros, scheme.measured_azimuth);
+        let mut rng = SplitMix64::new(seed ^ 0x5a5a_5a5a_5a5a_5a5a);
+        let mut rates = |roots: &RootField| {
+            let p = roots.field.modulus();
+            let mut draw = |zero: bool| if zero { 0 } else { 1 + rng.below(p - 1) };
+            [draw(zeros.w_n), draw(zeros.w_u)]
+        };
+        let table = |values: &RandomValues, a: u64, [w_n, w_u]: [u64; 2]| {
+            let mut sample = values.sample(scheme, a);
+            (sample.point.w_n, sample.point.w_u) = (w_n, w_u);
+            let rows = rows_at(platform, &sample.point, &observables);
+            Table { sample, rows }
+        };
+        let tables = [0, 1].map(|i| {
+            let values = &verdicts.values[i];
+            let rates = rates(values.roots());
+            embeddings(values.roots().order).map(|a| table(values, a, rates))
+        });
+        let first = &verdicts.values[0];
+        let other_rates = table(first, 1, rates(first.roots()));
+        Self { observables, zeros, tables, other_rates }
+    }
+
+    /// The two fields.
+    pub fn fields(&self) -> [RootField; 2] {
+        [self.tables[0][0].sample.roots, self.tables[1][0].sample.roots]
+    }
+
+    /// The derivative order of a row.
+    pub fn order(&self, row: usize) -> usize {
+        self.observables[row % self.observables.len()].order
+    }
+
+    /// The position of a row.
+    pub fn position(&self, row: usize) -> usize {
+        row / self.observables.len()
+    }
+
+    /// The rows of order up to `degree`.
+    pub fn rows_up_to(&self, degree: usize) -> Vec<usize> {
+        (0..self.tables[0][0].rows.len()).filter(|&j| self.order(j) <= degree).collect()
+    }
+
+    /// The first field and embedding.
+    pub fn first(&self) -> &Table {
+        &self.tables[0][0]
+    }
+}

@@ -1,0 +1,150 @@
+//! From the staircase to named combinations, null vectors and partners.
+
+use obsdeg_exact::Echelon;
+
+use super::coefficient::{Coefficient, linear_combination};
+use super::ensemble::Verdicts;
+use super::sparse::{extend_by_short_vectors, support, vector_on_support};
+use crate::model::Platform;
+use crate::solution::problem::Problem;
+use crate::solution::solver::{Functional, Solver};
+
+/// A named observable combination.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Combination {
+    /// The columns that occur.
+    pub support: Vec<usize>,
+    /// Its coefficients (one for the leading unknown), if they could be computed.
+    pub functional: Option<Functional>,
+    /// The smallest k with the combination in `V_k`.
+    pub degree: usize,
+}
+
+/// A null vector: a direction in which the unknowns change without any change of Z.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NullVector {
+    /// The columns that occur.
+    pub support: Vec<usize>,
+    /// Its components, if they could be computed.
+    pub components: Option<Functional>,
+}
+
+/// `D_FZ - wN*psi_y`; the unknowns alone when the coefficients are missing.
+pub fn expression(platform: &Platform, support: &[usize], functional: Option<&Functional>) -> String {
+    let names = platform.names();
+    match functional {
+        Some(f) => linear_combination(f.iter().map(|(c, k)| (k, names[*c].as_str()))),
+        None => {
+            let list: Vec<&str> = support.iter().map(|&c| names[c].as_str()).collect();
+            format!("a combination of {}", list.join(", "))
+        }
+    }
+}
+
+/// The leading column of a support: the first constant (a coefficient, not psi), else the first.
+fn lead(platform: &Platform, support: &[usize]) -> usize {
+    let constant = |c: &&usize| !platform.names()[**c].starts_with("psi");
+    support.iter().find(constant).copied().unwrap_or(support[0])
+}
+
+/// The sparse basis of the staircase beyond single unknowns: for every degree k, combinations that
+/// together with the unknowns of degree up to k and the combinations before span `V_k`.
+pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<'_>) -> Vec<Combination> {
+    let field = verdicts.values[0].roots().field;
+    let n = platform.names().len();
+    let mut chosen: Vec<(Vec<u64>, usize)> = Vec::new();
+    for (k, basis) in verdicts.stairs.iter().enumerate() {
+        let single = |c: usize| verdicts.degrees.degree[c].is_some_and(|d| d <= k);
+        let mut span = Echelon::new(field, n);
+        for c in (0..n).filter(|&c| single(c)) {
+            let unit: Vec<u64> = (0..n).map(|j| if j == c { field.one() } else { 0 }).collect();
+            span.insert(&unit);
+        }
+        for (v, _) in &chosen {
+            span.insert(v);
+        }
+        // basis rows whose pivot is no single unknown vanish at all single unknowns
+        let rows: Vec<Vec<u64>> =
+            basis.pivots().enumerate().filter(|&(_, c)| !single(c)).map(|(i, _)| basis.row(i).to_vec()).collect();
+        if span.rank() < basis.rank() {
+            chosen.extend(extend_by_short_vectors(&rows, &mut span).into_iter().map(|v| (v, k)));
+        }
+    }
+    chosen
+        .into_iter()
+        .map(|(v, degree)| {
+            let support = support(&v);
+            let functional = combination_coefficients(platform, solver, &support, degree);
+            Combination { support, functional, degree }
+        })
+        .collect()
+}
+
+fn combination_coefficients(
+    platform: &Platform,
+    solver: &mut Solver<'_>,
+    support: &[usize],
+    degree: usize,
+) -> Option<Functional> {
+    let lead = lead(platform, support);
+    let first = solver.tables.first();
+    let field = first.sample.roots.field;
+    // a short set of rows that makes the combination: first as a vector, then by its solution
+    let allowed = solver.tables.rows_up_to(degree);
+    let rows: Vec<Vec<u64>> = allowed.iter().map(|&j| first.rows[j].clone()).collect();
+    let vector = vector_on_support(field, &rows, support, lead)?;
+    let used = crate::solution::support::short_support(field, &first.rows, &allowed, &vector, |_| 1)?;
+    let problem = Problem::combination(&used, platform.names().len(), support, lead);
+    let values = solver.coefficients(&problem)?;
+    let mut functional: Functional = support.iter().copied().zip(values).collect();
+    functional.sort_by_key(|(c, _)| *c != lead);
+    Some(functional)
+}
+
+/// A sparse basis of the null space, without the unknowns that are not excited.
+pub fn null_space(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<'_>) -> Vec<NullVector> {
+    let Some(last) = verdicts.stairs.last() else { return Vec::new() };
+    let field = verdicts.values[0].roots().field;
+    let excited = &verdicts.degrees.excited;
+    let vectors: Vec<Vec<u64>> =
+        last.null_space().into_iter().filter(|v| support(v).iter().all(|&c| excited[c])).collect();
+    let mut span = Echelon::new(field, platform.names().len());
+    let short = extend_by_short_vectors(&vectors, &mut span);
+    short
+        .into_iter()
+        .map(|v| {
+            let support = support(&v);
+            let components = null_components(solver, &support);
+            NullVector { support, components }
+        })
+        .collect()
+}
+
+fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Functional> {
+    let lead = support[0];
+    let first = solver.tables.first();
+    let mut basis = Echelon::new(first.sample.roots.field, support.len() - 1);
+    // independent rows on the support without its lead determine the vector
+    let restricted = |j: usize| -> Vec<u64> { support[1..].iter().map(|&c| first.rows[j][c]).collect() };
+    let used: Vec<usize> = (0..first.rows.len()).filter(|&j| basis.insert(&restricted(j))).collect();
+    let values = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
+    let rest = support[1..].iter().copied().zip(values);
+    Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())
+}
+
+/// For every unknown: the others that share a null vector with it.
+pub fn partners(n: usize, null_space: &[NullVector]) -> Vec<Vec<usize>> {
+    (0..n)
+        .map(|c| {
+            let mut out: Vec<usize> = null_space
+                .iter()
+                .filter(|v| v.support.contains(&c))
+                .flat_map(|v| v.support.iter().copied())
+                .filter(|&d| d != c)
+                .collect();
+            out.sort_unstable();
+            out.dedup();
+            out
+        })
+        .collect()
+}

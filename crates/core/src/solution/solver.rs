@@ -1,0 +1,506 @@
+//! Coefficients and solutions: recovered from the fields, solved and verified by the symbolic worker,
+//! or as decimals.
+
+use std::collections::BTreeMap;
+
+use obsdeg_exact::Radical;
+use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, Worker, protocol::CheckTerm};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::problem::{Outputs, Problem};
+use super::support::short_support;
+use super::symbols::Symbols;
+use crate::degree::coefficient::{Coefficient, Form, Image, Number, Rates, power, rates_between, recover_radical};
+use crate::degree::ensemble::{Table, Tables, Verdicts};
+use crate::model::attitude::c_n_from_euler;
+use crate::model::platform::{LOCAL, Platform, Point, local_dynamics, local_output};
+use crate::model::ring::{Float, Ring, Text};
+use crate::solution::local::rows_at;
+
+/// Most angles with symbols of their own for which formulas are attempted.
+const MAX_SYMBOLIC_ANGLES: usize = 3;
+/// Longest number in a formula that is still readable.
+const READABLE: usize = 60;
+/// Longest number that is printed when there are no decimals to fall back to.
+const PRINTABLE: usize = 1000;
+/// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
+const FLOAT_RATES: (f64, f64) = (1.0, 1.0);
+
+/// The axes in which Z is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Frame {
+    /// Local geographic axes, as in the paper: `Z1` and `Z3` (`Z2` is zero).
+    #[default]
+    N,
+    /// Platform axes: `Zx`, `Zy`, `Zz`.
+    Platform,
+}
+
+/// How a solution was checked before it was printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verification {
+    /// By exact substitution of the derivatives of Z, and by comparison with the prime fields.
+    Symbolic,
+    /// By substitution in two prime fields.
+    Modular,
+    /// By substitution in floating point: residual below 1e-9.
+    Numeric,
+}
+
+/// `coefficient * Z_component^(order) @ position`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Index of the position.
+    pub position: usize,
+    /// 1, 2, 3: component in n (2 is a measured azimuth) or platform axis.
+    pub component: usize,
+    /// Whether this is the measured azimuth.
+    pub azimuth: bool,
+    /// Derivative order.
+    pub order: usize,
+    /// The coefficient.
+    pub coefficient: Coefficient,
+}
+
+/// An observable quantity as a sum of derivatives of Z.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    /// The terms, by order, component and position.
+    pub terms: Vec<Term>,
+    /// How it was checked.
+    pub verification: Verification,
+}
+
+impl Solved {
+    /// The least exact form among the coefficients.
+    pub fn form(&self) -> Form {
+        self.terms.iter().map(|t| t.coefficient.form()).max().unwrap_or(Form::Exact)
+    }
+}
+
+/// A linear functional of the unknowns: columns and coefficients.
+pub type Functional = Vec<(usize, Coefficient)>;
+
+/// Place of a term in a solution: (order, component, azimuth, rates, position).
+type Key = (usize, usize, bool, Rates, usize);
+
+/// Which row enters a term: (index in the support, sign, component in n).
+type Contribution = (usize, i64, usize);
+
+/// Everything that coefficients are computed from.
+pub struct Solver<'a> {
+    platform: &'a Platform,
+    verdicts: &'a Verdicts,
+    /// The tables in the fields.
+    pub tables: Tables,
+    symbols: Symbols,
+    text: Vec<Vec<String>>,
+    text_point: Point<Text>,
+    floats: Option<(Point<Float>, Vec<Vec<f64>>)>,
+    worker: Option<&'a mut Worker>,
+    frame: Frame,
+}
+
+impl<'a> Solver<'a> {
+    /// A solver for `platform`; without a worker nothing symbolic is started.
+    pub fn new(
+        platform: &'a Platform,
+        verdicts: &'a Verdicts,
+        seed: u64,
+        frame: Frame,
+        worker: Option<&'a mut Worker>,
+    ) -> Self {
+        let tables = Tables::new(platform, verdicts, seed);
+        let symbols = Symbols::of(platform);
+        let rate = |zero: bool| if zero { "0" } else { "1" };
+        let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
+        let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES;
+        let text = if usable { rows_at(platform, &text_point, &tables.observables) } else { Vec::new() };
+        let floats = platform.scheme().generic_names().is_empty().then(|| {
+            let point = float_point(platform, &tables);
+            let rows = rows_at(platform, &point, &tables.observables);
+            (point, rows)
+        });
+        Self { platform, verdicts, tables, symbols, text, text_point, floats, worker: worker.filter(|_| usable), frame }
+    }
+
+    /// Whether formulas in sines and cosines are out of question: too many different angles.
+    pub fn too_many_angles(&self) -> bool {
+        self.symbols.angles() > MAX_SYMBOLIC_ANGLES
+    }
+
+    /// The symbols of the formulas.
+    pub fn symbols(&self) -> &Symbols {
+        &self.symbols
+    }
+
+    /// The worker, if there is one and formulas are in question.
+    pub fn worker(&mut self) -> Option<&mut Worker> {
+        self.worker.as_deref_mut()
+    }
+
+    fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
+        let k = &table.sample.roots;
+        let number = match &c.number {
+            Number::Radical(r) => r.image(k),
+            Number::Text { raw, .. } => self.symbols.value(raw, &self.verdicts.values[field], &table.sample)?,
+            Number::Decimal(_) => return None,
+        };
+        Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
+    }
+
+    /// The coefficients of a functional as a row of the table's field.
+    pub fn functional_image(&self, functional: &Functional, field: usize, table: &Table) -> Option<Vec<u64>> {
+        let mut row = vec![0; self.platform.names().len()];
+        for (column, c) in functional {
+            row[*column] = self.image(c, field, table)?;
+        }
+        Some(row)
+    }
+
+    /// All nine tables with the index of their field.
+    fn all_tables(&self) -> impl Iterator<Item = (usize, &Table)> {
+        let main = self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)));
+        main.chain([(0, &self.tables.other_rates)])
+    }
+
+    /// The exponents of the rates and the nine images of the numbers of some values, given as nine
+    /// vectors in the order of `all_tables`.
+    fn split_rates(&self, values: &[Vec<u64>]) -> Option<Vec<(Rates, Vec<u64>)>> {
+        let first = self.tables.first();
+        let f = first.sample.roots.field;
+        (0..values[0].len())
+            .map(|i| {
+                let a = Image { value: values[0][i], rates: first.rates() };
+                let b = Image { value: values[8][i], rates: self.tables.other_rates.rates() };
+                let rates = rates_between(&f, a, b)?;
+                let numbers = self.all_tables().zip(values).map(|((_, t), v)| {
+                    let f = t.sample.roots.field;
+                    Some(f.mul(v[i], f.inv(power(&f, t.rates(), rates)?)))
+                });
+                Some((rates, numbers.collect::<Option<_>>()?))
+            })
+            .collect()
+    }
+
+    fn recover(&self, numbers: &[u64]) -> Option<Radical> {
+        let four = |i: usize| -> Option<[u64; 4]> { numbers[4 * i..4 * i + 4].try_into().ok() };
+        recover_radical(&self.tables.fields(), &[four(0)?, four(1)?])
+    }
+
+    fn request(&self, system: System, check: Option<Check>) -> Request {
+        Request {
+            symbols: self.symbols.independent(),
+            generators: self.symbols.generators(),
+            job: Job::Solve { system, check },
+        }
+    }
+
+    /// Whether the text has the given images (in the order of `all_tables`, without the last).
+    fn agrees(&self, text: &str, numbers: &[u64]) -> bool {
+        self.all_tables().zip(numbers).take(8).all(|((i, t), &n)| {
+            self.symbols.value(text, &self.verdicts.values[i], &t.sample) == Some(n)
+        })
+    }
+
+    fn text_number(&self, raw: String) -> Number {
+        Number::Text { shown: self.symbols.display(&raw), raw }
+    }
+
+    /// The outputs of a problem without targets, as coefficients: exact where possible, then decimals,
+    /// then (generic angles) formulas. `None` when nothing of these is at hand.
+    pub fn coefficients(&mut self, problem: &Problem) -> Option<Vec<Coefficient>> {
+        let solve = |(_, t): (usize, &Table)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
+        let values: Vec<Vec<u64>> = self.all_tables().map(solve).collect::<Option<_>>()?;
+        let split = self.split_rates(&values)?;
+        let exact: Option<Vec<Coefficient>> = split
+            .iter()
+            .map(|(rates, numbers)| {
+                Some(Coefficient { number: Number::Radical(self.recover(numbers)?), rates: *rates })
+            })
+            .collect();
+        if exact.is_some() {
+            return exact;
+        }
+        if let Some((_, rows)) = &self.floats {
+            let numbers = problem.solve_in_floats(rows, &[])?;
+            let pairs = numbers.into_iter().zip(&split);
+            return Some(pairs.map(|(x, (rates, _))| Coefficient { number: Number::Decimal(x), rates: *rates }).collect());
+        }
+        let request = self.request(problem.to_text(&self.text_or_none()?, &[]), None);
+        let (texts, _) = self.worker.as_deref_mut()?.ask(&request).ok()?;
+        let pairs = texts.into_iter().zip(&split);
+        pairs
+            .map(|(raw, (rates, numbers))| {
+                let fine = raw.len() <= PRINTABLE && self.agrees(&raw, numbers);
+                fine.then(|| Coefficient { number: self.simplest(raw, numbers), rates: *rates })
+            })
+            .collect()
+    }
+
+    fn text_or_none(&self) -> Option<Vec<Vec<String>>> {
+        (!self.text.is_empty()).then(|| self.text.clone())
+    }
+
+    fn simplest(&self, raw: String, numbers: &[u64]) -> Number {
+        self.recover(numbers).map_or_else(|| self.text_number(raw), Number::Radical)
+    }
+
+    /// A functional that is observable with the given degree, as a short sum of derivatives of Z.
+    /// `Err` says why there is none to print.
+    pub fn solve(&mut self, functional: &Functional, degree: usize) -> Result<Solved, String> {
+        const LOST: &str = "its coefficients have no short exact form";
+        let targets: Vec<Vec<u64>> = self
+            .all_tables()
+            .map(|(i, t)| self.functional_image(functional, i, t))
+            .collect::<Option<_>>()
+            .ok_or(LOST)?;
+        let first = self.tables.first();
+        let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
+        let support = short_support(
+            first.sample.roots.field,
+            &first.rows,
+            &self.tables.rows_up_to(degree),
+            &targets[0],
+            cost,
+        )
+        .ok_or("the rows of its order do not span it")?;
+        let problem = Problem::solution(&support, self.platform.names().len());
+        let y: Vec<Vec<u64>> = self
+            .all_tables()
+            .zip(&targets)
+            .map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target))
+            .collect::<Option<_>>()
+            .ok_or(LOST)?;
+        let split = self.split_rates(&y).ok_or(LOST)?;
+        let rates: Vec<Rates> = split.iter().map(|(r, _)| *r).collect();
+        let plan = self.plan(&support, &rates);
+        // numbers of the printed terms in every field
+        let numbers: Vec<Vec<u64>> = self
+            .all_tables()
+            .enumerate()
+            .map(|(s, (_, t))| {
+                let x: Vec<u64> = split.iter().map(|(_, numbers)| numbers[s]).collect();
+                self.term_numbers(&t.sample.point, &plan, &x)
+            })
+            .collect();
+        let of_term = |i: usize| -> Vec<u64> { numbers.iter().map(|v| v[i]).collect() };
+        let exact: Option<Vec<Number>> =
+            (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
+        let symbolic = self.ask_for_solution(functional, &problem, &support, &rates, &plan);
+        let (numbers, verification) = match (symbolic, exact) {
+            (Some(texts), exact) => {
+                if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
+                    return Err("the symbolic engine and the prime fields disagree: please report this scheme".into());
+                }
+                let longest = texts.iter().map(|t| self.symbols.display(t).len()).max().unwrap_or(0);
+                let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
+                if let Some(exact) = exact {
+                    (exact, Verification::Symbolic)
+                } else if longest <= limit {
+                    (texts.into_iter().map(|t| self.text_number(t)).collect(), Verification::Symbolic)
+                } else {
+                    let decimals = self.decimals(functional, &problem, &plan);
+                    let numbers = decimals.ok_or_else(|| format!("its longest coefficient has {longest} characters"))?;
+                    (numbers, Verification::Numeric)
+                }
+            }
+            (None, Some(exact)) => (exact, Verification::Modular),
+            (None, None) => {
+                let numbers = self.decimals(functional, &problem, &plan);
+                (numbers.ok_or("formulas in generic angles need the symbolic engine")?, Verification::Numeric)
+            }
+        };
+        let mut terms: Vec<Term> = plan
+            .iter()
+            .zip(numbers)
+            .map(|(((order, component, azimuth, rates, position), _), number)| Term {
+                position: *position,
+                component: *component,
+                azimuth: *azimuth,
+                order: *order,
+                coefficient: Coefficient { number, rates: *rates },
+            })
+            .collect();
+        terms.retain(|t| !t.coefficient.is_zero());
+        Ok(Solved { terms, verification })
+    }
+
+    /// The printed terms of a solution that uses the rows `support` with rates `rates`.
+    fn plan(&self, support: &[usize], rates: &[Rates]) -> Vec<(Key, Vec<Contribution>)> {
+        let mut plan: BTreeMap<Key, Vec<Contribution>> = BTreeMap::new();
+        for (j, (&row, r)) in support.iter().zip(rates).enumerate() {
+            let position = self.tables.position(row);
+            for z in &self.tables.observables[row % self.tables.observables.len()].solution {
+                let rates = [r[0] + z.rates[0], r[1] + z.rates[1]];
+                let azimuth = z.component == 2;
+                let printed = match self.frame {
+                    Frame::Platform if !azimuth => vec![1, 2, 3],
+                    _ => vec![z.component],
+                };
+                for component in printed {
+                    plan.entry((z.order, component, azimuth, rates, position))
+                        .or_default()
+                        .push((j, z.sign, z.component));
+                }
+            }
+        }
+        plan.into_iter().collect()
+    }
+
+    /// `sum sign * x_j * (axis factor)` for every printed term: `Z^n = C_c^n Z^c`.
+    fn term_numbers<R: Ring>(&self, point: &Point<R>, plan: &[(Key, Vec<Contribution>)], x: &[R::Element]) -> Vec<R::Element> {
+        let ring = &point.ring;
+        plan.iter()
+            .map(|((_, component, azimuth, _, position), contributions)| {
+                contributions.iter().fold(ring.zero(), |sum, &(j, sign, in_n)| {
+                    let axis = self.axis_factor(point, *position, *component, *azimuth, in_n);
+                    let value = ring.mul(&axis, &x[j]);
+                    ring.add(&sum, &if sign < 0 { ring.neg(&value) } else { value })
+                })
+            })
+            .collect()
+    }
+
+    fn axis_factor<R: Ring>(&self, point: &Point<R>, position: usize, component: usize, azimuth: bool, in_n: usize) -> R::Element {
+        match self.frame {
+            Frame::Platform if !azimuth => {
+                c_n_from_euler(&point.ring, &point.cos_sin[position])[in_n - 1][component - 1].clone()
+            }
+            _ => point.ring.one(),
+        }
+    }
+
+    fn decimals(&self, functional: &Functional, problem: &Problem, plan: &[(Key, Vec<Contribution>)]) -> Option<Vec<Number>> {
+        let (point, rows) = self.floats.as_ref()?;
+        let mut target = vec![0.0; self.platform.names().len()];
+        for (column, c) in functional {
+            target[*column] = match &c.number {
+                Number::Radical(r) => r.to_f64(),
+                Number::Decimal(x) => *x,
+                Number::Text { .. } => return None,
+            };
+        }
+        let x = problem.solve_in_floats(rows, &target)?;
+        Some(self.term_numbers(point, plan, &x).into_iter().map(|v| Number::Decimal(tidy(v))).collect())
+    }
+
+    /// The numbers of the printed terms as text, solved and verified by the worker; `None` when there
+    /// is none, or the job failed.
+    fn ask_for_solution(
+        &mut self,
+        functional: &Functional,
+        problem: &Problem,
+        support: &[usize],
+        rates: &[Rates],
+        plan: &[(Key, Vec<Contribution>)],
+    ) -> Option<Vec<String>> {
+        let text = self.text_or_none()?;
+        let mut target = vec![(Text.zero(), Text.one()); self.platform.names().len()];
+        for (column, c) in functional {
+            let number = match &c.number {
+                Number::Radical(r) => radical_text(r),
+                Number::Text { raw, .. } => raw.clone(),
+                Number::Decimal(_) => return None,
+            };
+            target[*column] = (number, rates_text(c.rates));
+        }
+        let numbers: Vec<String> = target.iter().map(|(n, _)| n.clone()).collect();
+        let mut system = problem.to_text(&text, &numbers);
+        // outputs: the printed terms
+        let n = support.len();
+        system.outputs = plan
+            .iter()
+            .map(|((_, component, azimuth, _, position), contributions)| {
+                let mut row = vec![Text.zero(); n];
+                for &(j, sign, in_n) in contributions {
+                    let axis = self.axis_factor(&self.text_point, *position, *component, *azimuth, in_n);
+                    row[j] = Text.add(&row[j], &if sign < 0 { Text.neg(&axis) } else { axis });
+                }
+                row
+            })
+            .collect();
+        debug_assert!(problem.outputs == Outputs::Unknowns);
+        let check = self.check(support, rates, target);
+        let request = self.request(system, Some(check));
+        match self.worker.as_deref_mut()?.ask(&request) {
+            Ok((texts, true)) => Some(texts),
+            _ => None,
+        }
+    }
+
+    fn check(&self, support: &[usize], rates: &[Rates], target: Vec<(String, String)>) -> Check {
+        let zeros = self.tables.zeros;
+        let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
+        let azimuth = self.platform.scheme().measured_azimuth;
+        let components: Vec<usize> = local_output(&Text, azimuth).iter().map(|(c, _)| *c).collect();
+        let state = |i: usize| format!("x_{i}");
+        let unknown = |c: usize| format!("u_{c}");
+        let segments = self.platform.blocks(&self.text_point).into_iter().map(|block| {
+            let entry = |row: &Vec<String>| -> String {
+                let names: Vec<String> = block.columns.iter().map(|&c| unknown(c)).collect();
+                Text.dot(row.iter().zip(&names))
+            };
+            block.rows.iter().map(entry).collect()
+        });
+        let terms = support.iter().zip(rates).map(|(&row, r)| {
+            let observable = &self.tables.observables[row % self.tables.observables.len()];
+            let term = |z: &crate::solution::local::ZTerm| {
+                let factor = rates_text([r[0] + z.rates[0], r[1] + z.rates[1]]);
+                CheckTerm {
+                    factor: if z.sign < 0 { format!("-{factor}") } else { factor },
+                    segment: self.tables.position(row),
+                    output: components.iter().position(|&c| c == z.component).unwrap_or(0),
+                    order: z.order,
+                }
+            };
+            observable.solution.iter().map(term).collect()
+        });
+        Check {
+            dynamics: dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), azimuth, state),
+            unknowns: (0..self.platform.names().len()).map(unknown).collect(),
+            segments: segments.collect(),
+            terms: terms.collect(),
+            target,
+        }
+    }
+}
+
+/// (8) and (9) as text, with names for the six local unknowns.
+pub fn dynamics_text(w_n: &str, w_u: &str, azimuth: bool, state: impl Fn(usize) -> String) -> Dynamics {
+    let states: Vec<String> = (0..LOCAL).map(state).collect();
+    let row = |row: &[String; LOCAL]| Text.dot(row.iter().zip(&states));
+    Dynamics {
+        equations: local_dynamics(&Text, &w_n.to_string(), &w_u.to_string()).iter().map(row).collect(),
+        outputs: local_output(&Text, azimuth).iter().map(|(_, r)| row(r)).collect(),
+        states,
+    }
+}
+
+fn float_point(platform: &Platform, tables: &Tables) -> Point<Float> {
+    let cos_sin = platform
+        .scheme()
+        .positions
+        .iter()
+        .map(|p| std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64()))
+        .collect();
+    let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
+    let (w_n, w_u) = (rate(tables.zeros.w_n, FLOAT_RATES.0), rate(tables.zeros.w_u, FLOAT_RATES.1));
+    Point { ring: Float, w_n, w_u, cos_sin }
+}
+
+/// Zero for what rounding left over.
+fn tidy(x: f64) -> f64 {
+    if x.abs() < 1e-12 { 0.0 } else { x }
+}
+
+fn radical_text(r: &Radical) -> String {
+    r.to_string().replace("sqrt(6)", "r_2*r_3").replace("sqrt(2)", "r_2").replace("sqrt(3)", "r_3")
+}
+
+fn rates_text(rates: Rates) -> String {
+    format!("wN^({})*wU^({})", rates[0], rates[1])
+}

@@ -1,0 +1,245 @@
+//! The symbols of exact formulas: sines and cosines of angles, square roots of 2 and 3.
+
+use crate::model::angle::{Angle, format_decimal};
+use crate::model::expression::{Environment, evaluate, parse};
+use crate::model::platform::{Platform, Point, RandomValues, Sample};
+use crate::model::ring::{Ring, Text};
+
+/// An angle whose sine and cosine stay symbols.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Base {
+    /// A generic angle.
+    Name(String),
+    /// A constant angle between 0 and 45 degrees, in 1e-9 degrees.
+    Constant(i64),
+}
+
+/// The symbols that the formulas of a scheme need.
+#[derive(Debug, Clone, Default)]
+pub struct Symbols {
+    bases: Vec<Base>,
+    radicals: bool,
+}
+
+impl Symbols {
+    /// The symbols of `platform`: one base per generic name, and one per constant angle that is no
+    /// multiple of 15 degrees, up to sign, complement and supplement.
+    pub fn of(platform: &Platform) -> Self {
+        let mut out = Self::default();
+        for angle in platform.scheme().positions.iter().flat_map(|p| &p.angles) {
+            if let Some((name, _)) = angle.generic() {
+                out.add(Base::Name(name.into()));
+            }
+            if !angle.turn().is_multiple_of_deg(15) {
+                out.add(Base::Constant(octant(angle).0));
+            } else if !angle.turn().is_multiple_of_deg(90) {
+                out.radicals = true;
+            }
+        }
+        out
+    }
+
+    fn add(&mut self, base: Base) {
+        if !self.bases.contains(&base) {
+            self.bases.push(base);
+        }
+    }
+
+    /// How many angles have symbols.
+    pub fn angles(&self) -> usize {
+        self.bases.len()
+    }
+
+    /// Whether square roots of 2 or 3 occur.
+    pub fn has_radicals(&self) -> bool {
+        self.radicals
+    }
+
+    /// Independent symbols, for the worker: the rates and the sines.
+    pub fn independent(&self) -> Vec<String> {
+        let sines = (0..self.bases.len()).map(|i| format!("s_{}", self.suffix(i)));
+        ["wN", "wU"].into_iter().map(String::from).chain(sines).collect()
+    }
+
+    /// Algebraic symbols with their squares, for the worker: the cosines and the square roots.
+    pub fn generators(&self) -> Vec<(String, String)> {
+        let roots = if self.radicals { vec![("r_2".into(), "2".into()), ("r_3".into(), "3".into())] } else { vec![] };
+        let cosines = (0..self.bases.len()).map(|i| {
+            let suffix = self.suffix(i);
+            (format!("c_{suffix}"), format!("1-s_{suffix}^2"))
+        });
+        roots.into_iter().chain(cosines).collect()
+    }
+
+    /// Names and numbers share no suffix: names start with a letter.
+    fn suffix(&self, i: usize) -> String {
+        match &self.bases[i] {
+            Base::Name(name) => name.clone(),
+            Base::Constant(_) => format!("{i}"),
+        }
+    }
+
+    /// The platform as text, with rates 1 (or 0): coefficients are homogeneous in them.
+    pub fn point(&self, platform: &Platform, w_n: &str, w_u: &str) -> Point<Text> {
+        let cos_sin = platform
+            .scheme()
+            .positions
+            .iter()
+            .map(|p| std::array::from_fn(|k| self.cos_sin(&p.angles[k])))
+            .collect();
+        Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), cos_sin }
+    }
+
+    fn cos_sin(&self, angle: &Angle) -> (String, String) {
+        let constant = self.constant_cos_sin(angle);
+        match angle.generic() {
+            None => constant,
+            Some((name, minus)) => {
+                let (c, mut s) = (format!("c_{name}"), format!("s_{name}"));
+                if minus {
+                    s = Text.neg(&s);
+                }
+                let (a, b) = constant;
+                let cos = Text.add(&Text.mul(&c, &a), &Text.neg(&Text.mul(&s, &b)));
+                let sin = Text.add(&Text.mul(&s, &a), &Text.mul(&c, &b));
+                (cos, sin)
+            }
+        }
+    }
+
+    fn constant_cos_sin(&self, angle: &Angle) -> (String, String) {
+        let (base, quadrant, mirrored) = octant(angle);
+        let (c, s) = match base {
+            0 => ("1".into(), "0".into()),
+            15_000_000_000 => ("(r_2*r_3+r_2)/4".into(), "(r_2*r_3-r_2)/4".into()),
+            30_000_000_000 => ("r_3/2".into(), "1/2".into()),
+            45_000_000_000 => ("r_2/2".into(), "r_2/2".into()),
+            _ => match self.bases.iter().position(|b| *b == Base::Constant(base)) {
+                Some(i) => (format!("c_{}", self.suffix(i)), format!("s_{}", self.suffix(i))),
+                None => ("0".into(), "0".into()),
+            },
+        };
+        let (c, s): (String, String) = if mirrored { (s, c) } else { (c, s) };
+        match quadrant {
+            0 => (c, s),
+            1 => (Text.neg(&s), c),
+            2 => (Text.neg(&c), Text.neg(&s)),
+            _ => (s, Text.neg(&c)),
+        }
+    }
+
+    /// Replaces the symbols by what they stand for: `sin(alpha)`, `cos(25)`, `sqrt(2)`.
+    pub fn display(&self, text: &str) -> String {
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some(c) = rest.chars().next() {
+            let word = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
+            if word == 0 || !c.is_ascii_alphabetic() {
+                let end = if word == 0 { c.len_utf8() } else { word };
+                out.push_str(&rest[..end]);
+                rest = &rest[end..];
+                continue;
+            }
+            out.push_str(&self.meaning(&rest[..word]).unwrap_or_else(|| rest[..word].to_string()));
+            rest = &rest[word..];
+        }
+        out
+    }
+
+    fn meaning(&self, word: &str) -> Option<String> {
+        if let Some(n) = word.strip_prefix("r_") {
+            return Some(format!("sqrt({n})"));
+        }
+        let (function, suffix) = match word.split_at_checked(2)? {
+            ("s_", suffix) => ("sin", suffix),
+            ("c_", suffix) => ("cos", suffix),
+            _ => return None,
+        };
+        let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
+        Some(match &self.bases[i] {
+            Base::Name(name) => format!("{function}({name})"),
+            Base::Constant(nanodeg) => format!("{function}({})", format_decimal(*nanodeg)),
+        })
+    }
+
+    /// The value of a text in the symbols at a sample; `None` for what has none.
+    pub fn value(&self, text: &str, values: &RandomValues, sample: &Sample) -> Option<u64> {
+        let env = SymbolValues { symbols: self, values, sample };
+        evaluate(&parse(text).ok()?, &sample.roots.field, &env).ok()
+    }
+}
+
+/// `(base, quadrant, mirrored)`: the constant part of an angle is quadrant * 90 + base, or
+/// quadrant * 90 + (90 - base) when mirrored, with a base of 0 to 45 degrees in 1e-9 degrees.
+fn octant(angle: &Angle) -> (i64, i64, bool) {
+    const RIGHT: i64 = 90_000_000_000;
+    let nanodeg = angle.turn().nanodeg();
+    let (quadrant, rest) = (nanodeg / RIGHT, nanodeg % RIGHT);
+    if 2 * rest > RIGHT { (RIGHT - rest, quadrant, true) } else { (rest, quadrant, false) }
+}
+
+struct SymbolValues<'a> {
+    symbols: &'a Symbols,
+    values: &'a RandomValues,
+    sample: &'a Sample,
+}
+
+impl Environment for SymbolValues<'_> {
+    fn name(&self, name: &str) -> Option<u64> {
+        let (k, f) = (&self.sample.roots, self.sample.roots.field);
+        let angle = |nanodeg: i64| k.cos_sin(k.unit_circle(Angle::from_nanodeg(nanodeg).turn()).unwrap_or(f.one()));
+        match name {
+            "wN" => return Some(self.sample.point.w_n),
+            "wU" => return Some(self.sample.point.w_u),
+            "r_2" => return Some(f.mul(f.from_i64(2), angle(45_000_000_000).0)),
+            "r_3" => return Some(f.mul(f.from_i64(2), angle(30_000_000_000).0)),
+            _ => {}
+        }
+        let (kind, suffix) = name.split_at_checked(2)?;
+        let i = (0..self.symbols.bases.len()).find(|&i| self.symbols.suffix(i) == suffix)?;
+        let (c, s) = match &self.symbols.bases[i] {
+            Base::Constant(nanodeg) => angle(*nanodeg),
+            Base::Name(name) => self.values.generic_cos_sin(name, self.sample)?,
+        };
+        match kind {
+            "c_" => Some(c),
+            "s_" => Some(s),
+            _ => None,
+        }
+    }
+
+    fn cos_sin(&self, _: &str) -> Option<(u64, u64)> {
+        None
+    }
+
+    fn known(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::scheme::{Scheme, parse_attitude};
+    use obsdeg_exact::SplitMix64;
+
+    /// The text of every cosine and sine has the value that the sample has.
+    #[test]
+    fn texts_have_the_values_of_the_sample() {
+        let attitudes = ["0,15,30", "45,60,75", "90,105,120", "-135,150,-165", "25,65,-115", "12.5,102.5,347.5", "alpha,-alpha,beta+15", "180-beta,alpha+25,270"];
+        let scheme = Scheme::of_angles(attitudes.map(|a| parse_attitude(a).expect("an attitude")));
+        let platform = Platform::new(scheme).expect("valid");
+        let symbols = Symbols::of(&platform);
+        assert_eq!(symbols.angles(), 4);
+        let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(2)).expect("fits");
+        let text = symbols.point(&platform, "wN", "wU");
+        for a in obsdeg_exact::radical::embeddings(values.roots().order) {
+            let sample = values.sample(platform.scheme(), a);
+            for (t, v) in text.cos_sin.iter().flatten().zip(sample.point.cos_sin.iter().flatten()) {
+                assert_eq!(symbols.value(&t.0, &values, &sample), Some(v.0), "{}", t.0);
+                assert_eq!(symbols.value(&t.1, &values, &sample), Some(v.1), "{}", t.1);
+            }
+        }
+        assert_eq!(symbols.display("-s_alpha*c_0^2/r_3"), "-sin(alpha)*cos(25)^2/sqrt(3)");
+    }
+}

@@ -1,0 +1,33 @@
+//! Comma-separated values.
+
+use obsdeg_core::analysis::Analysis;
+
+use crate::ReportError;
+
+/// Rows as CSV text.
+pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<String, ReportError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.write_record(&row)?;
+    }
+    let bytes = writer.into_inner().map_err(|e| csv::Error::from(e.into_error()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// One row per unknown, then one per combination.
+pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
+    let header = ["kind", "name", "unit", "status", "degree", "partners", "solution"].map(String::from).to_vec();
+    let degree = |d: Option<usize>| d.map_or_else(String::new, |k| k.to_string());
+    let unknowns = a.quantities.iter().map(|q| {
+        let solution = q.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
+        let status = q.status.to_string().replace(' ', "_");
+        vec!["unknown".into(), q.name.clone(), q.unit.clone(), status, degree(q.degree), q.partners.join(" "), solution]
+    });
+    let combinations = a.combinations.iter().map(|c| {
+        let solution = c.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
+        let kind = if c.requested { "requested" } else { "combination" };
+        let status = c.status.to_string().replace(' ', "_");
+        vec![kind.into(), c.expression.clone(), String::new(), status, degree(c.degree), String::new(), solution]
+    });
+    write(std::iter::once(header).chain(unknowns).chain(combinations))
+}

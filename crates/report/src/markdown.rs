@@ -1,0 +1,84 @@
+//! GitHub-flavoured Markdown.
+
+use obsdeg_core::analysis::Analysis;
+
+use crate::words;
+
+/// Text in a table cell or paragraph, with what Markdown would read as markup escaped.
+pub(crate) fn escape(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        if matches!(c, '\\' | '|' | '*' | '_' | '`' | '<' | '>' | '[' | ']' | '#') {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// A table.
+pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut out = format!("| {} |\n|{}\n", header.join(" | "), " --- |".repeat(header.len()));
+    for row in rows {
+        out.push_str(&format!("| {} |\n", row.join(" | ")));
+    }
+    out
+}
+
+/// A formula as code; the bar is escaped, since tables split at bars even in code.
+fn code(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("`{}`", text.replace('|', "\\|")) }
+}
+
+pub(crate) fn analysis(a: &Analysis) -> String {
+    let mut out = format!("# Observable degrees\n\n{}; {}.\n\n", escape(&words::headline(a)), words::rank(a));
+    out.push_str(&table(
+        &["position", "alpha, beta, gamma [deg]", "X_p Y_p Z_p"],
+        a.positions.iter().map(|p| {
+            let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
+            vec![escape(&p.name), escape(&angles.join(", ")), p.attitude.clone().unwrap_or_default()]
+        }),
+    ));
+    out.push_str("\n## Unknowns\n\n");
+    out.push_str(&table(
+        &["unknown", "unit", "verdict", "degree", "solution, or why there is none"],
+        a.quantities.iter().map(|q| {
+            let why = if q.solution.is_some() { code(&words::explanation(q)) } else { escape(&words::explanation(q)) };
+            vec![code(&q.name), escape(&q.unit), q.status.to_string(), words::degree(q.degree), why]
+        }),
+    ));
+    if !a.combinations.is_empty() {
+        out.push_str("\n## Combinations\n\n");
+        out.push_str(&table(
+            &["combination", "verdict", "degree", "solution"],
+            a.combinations.iter().map(|c| {
+                let solution = c.solution.as_ref().map_or_else(String::new, |s| code(&s.text));
+                vec![code(&c.expression), c.status.to_string(), words::degree(c.degree), solution]
+            }),
+        ));
+    }
+    let mut section = |title: &str, items: Vec<String>| {
+        if !items.is_empty() {
+            out.push_str(&format!("\n## {title}\n\n"));
+            for item in items {
+                out.push_str(&format!("- {item}\n"));
+            }
+        }
+    };
+    section("Directions that Z does not see", a.null_space.iter().map(|v| code(&words::null_vector(v))).collect());
+    section("Not excited", words::not_excited(a).iter().map(|n| code(n)).collect());
+    section("Degenerate angles", a.degenerate_loci.iter().flatten().map(|l| escape(&words::locus(l))).collect());
+    let formula = |f: &obsdeg_core::solution::formulas::Formula| {
+        let at = f.position.as_ref().map(|p| format!(" @{p}")).unwrap_or_default();
+        code(&format!("{}{at} = {}", f.left, f.right))
+    };
+    section("Formulas", a.formulas.iter().flatten().map(formula).collect());
+    let carry = |c: &obsdeg_core::analysis::CarryReport| {
+        escape(&format!("{}: {}", words::carry(c), words::differences(c)))
+    };
+    section("Under the other carries", a.carries.iter().map(carry).collect());
+    section("Assumed", words::assumptions(a).iter().map(|s| escape(s)).collect());
+    let certainty = std::iter::once(words::certainty(a)).chain(a.notes.iter().map(|n| format!("note: {n}")));
+    section("Certainty", certainty.map(|s| escape(&s)).collect());
+    out
+}

@@ -1,0 +1,161 @@
+//! Sentences that several formats share.
+
+use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Status, Verdict};
+use obsdeg_core::model::Carry;
+use obsdeg_core::solution::solver::{Frame, Verification};
+
+pub(crate) fn degree(d: Option<usize>) -> String {
+    d.map_or_else(|| "-".into(), |k| k.to_string())
+}
+
+pub(crate) fn list(items: &[usize]) -> String {
+    items.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// `2 positions, platform carry, generic latitude`.
+pub(crate) fn headline(a: &Analysis) -> String {
+    let n = a.positions.len();
+    let latitude = a.latitude_deg.map_or_else(|| "generic latitude".into(), |l| format!("latitude {l} deg"));
+    let azimuth = if a.measured_azimuth { ", azimuth measured" } else { "" };
+    format!("{n} position{}, {} carry, {latitude}{azimuth}", if n == 1 { "" } else { "s" }, a.carry)
+}
+
+/// `rank 8 of 15; rank profile 2 6 8 for derivatives of order 0, 1, 2`.
+pub(crate) fn rank(a: &Analysis) -> String {
+    let orders: Vec<String> = (0..a.rank_profile.len()).map(|k| k.to_string()).collect();
+    format!(
+        "rank {} of {}; rank profile {} with derivatives up to order {}",
+        a.rank,
+        a.unknowns.len(),
+        list(&a.rank_profile),
+        orders.join(", ")
+    )
+}
+
+/// What stands beside the verdict on an unknown: its solution, its partners, or why there is neither.
+pub(crate) fn explanation(q: &Quantity) -> String {
+    let mut out = match (&q.solution, q.status) {
+        (Some(s), _) => s.text.clone(),
+        (None, Status::Inseparable) => format!("not told from {}", q.partners.join(", ")),
+        _ => String::new(),
+    };
+    if let Some(e) = &q.elsewhere {
+        let mut where_else = Vec::new();
+        if let Some(k) = e.other_latitudes {
+            where_else.push(format!("degree {k} at other latitudes"));
+        }
+        if let Some(k) = e.other_angles {
+            where_else.push(format!("degree {k} at other angles"));
+        }
+        let joint = if out.is_empty() { "" } else { "; " };
+        out = format!("{out}{joint}{}", where_else.join(", "));
+    }
+    out
+}
+
+fn verdict(v: &Verdict) -> String {
+    match (v.status, v.degree) {
+        (Status::Observable, Some(k)) => format!("degree {k}"),
+        (status, _) => status.to_string(),
+    }
+}
+
+/// `D_FZ inseparable -> degree 1`.
+pub(crate) fn difference(d: &Difference) -> String {
+    format!("{} {} -> {}", d.name, verdict(&d.here), verdict(&d.there))
+}
+
+/// `inertial (rank profile 2 6 8 of 15)`.
+pub(crate) fn carry(c: &CarryReport) -> String {
+    format!("{} (rank profile {} of {})", c.carry, list(&c.rank_profile), c.unknowns)
+}
+
+/// The differences under another carry, or that there are none.
+pub(crate) fn differences(c: &CarryReport) -> String {
+    if c.differs.is_empty() {
+        return "no verdict differs".into();
+    }
+    c.differs.iter().map(difference).collect::<Vec<_>>().join("; ")
+}
+
+/// What was assumed, a sentence each.
+pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
+    let carry = match a.carry {
+        Carry::Platform => "platform: psi in platform axes goes on from position to position (the paper's simulation)",
+        Carry::Inertial => "inertial: psi in geographic axes goes on from position to position (real torqued slews)",
+        Carry::Reset => "reset: psi is a new unknown at each position",
+    };
+    let latitude = a.latitude_deg.map_or_else(
+        || "generic: wN and wU independent, not zero".to_string(),
+        |l| format!("{l} deg: wN = w_ie cos, wU = w_ie sin"),
+    );
+    let gyros: Vec<String> = ["X", "Y", "Z"]
+        .iter()
+        .zip(a.geometry.gyros())
+        .map(|(g, x)| format!("{g}: I={} O={} S={}", x.I, x.O, x.S))
+        .collect();
+    let z = match a.frame {
+        Frame::N => "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives",
+        Frame::Platform => "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives",
+    };
+    let mut out = vec![
+        format!("carry {carry}"),
+        format!("latitude {latitude}"),
+        format!("gyros {}; drift terms {}", gyros.join(", "), a.terms),
+        format!("observation {z}"),
+    ];
+    if a.measured_azimuth {
+        out.push("azimuth psi_y^n is measured: Za".into());
+    }
+    out
+}
+
+/// How certain the verdicts and solutions are.
+pub(crate) fn certainty(a: &Analysis) -> String {
+    let c = &a.certainty;
+    let mut out = format!(
+        "{} (p = {}, {}; seed {}): a verdict is wrong with probability below {:.0e}",
+        c.method, c.primes[0], c.primes[1], c.seed, c.error_bound
+    );
+    let solutions: Vec<Verification> = a
+        .quantities
+        .iter()
+        .filter_map(|q| q.solution.as_ref())
+        .chain(a.combinations.iter().filter_map(|c| c.solution.as_ref()))
+        .map(|s| s.verification)
+        .collect();
+    for (kind, how) in [
+        (Verification::Symbolic, "by exact substitution"),
+        (Verification::Modular, "by substitution in both prime fields"),
+        (Verification::Numeric, "by substitution in floating point (decimals are rounded to six digits)"),
+    ] {
+        let n = solutions.iter().filter(|v| **v == kind).count();
+        if n > 0 {
+            out.push_str(&format!("; {n} solution{} verified {how}", if n == 1 { "" } else { "s" }));
+        }
+    }
+    out
+}
+
+/// The unknowns that are not excited.
+pub(crate) fn not_excited(a: &Analysis) -> Vec<&str> {
+    a.quantities.iter().filter(|q| q.status == Status::NotExcited).map(|q| q.name.as_str()).collect()
+}
+
+/// A null vector as `psi_y = 1, D_FZ = wN`.
+pub(crate) fn null_vector(v: &[obsdeg_core::analysis::Component]) -> String {
+    let part = |c: &obsdeg_core::analysis::Component| match &c.coefficient {
+        Some(k) => format!("{} = {k}", c.name),
+        None => c.name.clone(),
+    };
+    v.iter().map(part).collect::<Vec<_>>().join(", ")
+}
+
+/// A locus as `alpha = 0: rank profile 2 4 5; D_FX degree 1 -> not observable`.
+pub(crate) fn locus(l: &obsdeg_core::solution::loci::Locus) -> String {
+    let show = |d: Option<usize>| d.map_or_else(|| "not observable".into(), |k| format!("degree {k}"));
+    let changes: Vec<String> =
+        l.changes.iter().map(|c| format!("{} {} -> {}", c.name, show(c.general), show(c.there))).collect();
+    let changes = if changes.is_empty() { String::new() } else { format!("; {}", changes.join("; ")) };
+    format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))
+}

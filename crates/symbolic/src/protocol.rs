@@ -1,0 +1,114 @@
+//! What travels between the program and its worker: one JSON object per line.
+
+use serde::{Deserialize, Serialize};
+
+/// Starts every answer of the worker, so that a banner is told from an answer.
+pub const PREFIX: &str = "obsdeg:";
+
+/// A job and the numbers it is about: rational functions of `symbols`, extended by square roots.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Request {
+    /// Independent symbols, in the order of the model.
+    pub symbols: Vec<String>,
+    /// Algebraic symbols `g` with `g^2` given as a polynomial in the symbols, such as `r_2` with `2`
+    /// or `c_alpha` with `1-s_alpha^2`.
+    pub generators: Vec<(String, String)>,
+    /// What to do.
+    pub job: Job,
+}
+
+/// What to do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Job {
+    /// Solve `M x = b` and answer with `x`, or `P x`; verify `x` by substitution if asked.
+    Solve {
+        /// The system.
+        system: System,
+        /// How the solution is checked against the dynamics.
+        check: Option<Check>,
+    },
+    /// Differentiate the outputs along the dynamics up to `order`; answer output by output, order by
+    /// order.
+    Derive {
+        /// The system.
+        dynamics: Dynamics,
+        /// Highest order.
+        order: usize,
+    },
+    /// The irreducible factors of one maximal minor of a matrix of rational functions of the symbols.
+    MinorFactors {
+        /// The matrix.
+        matrix: Vec<Vec<String>>,
+    },
+}
+
+/// A linear system in text.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct System {
+    /// `M`, row by row: polynomials in symbols and generators.
+    pub matrix: Vec<Vec<String>>,
+    /// `b`.
+    pub right: Vec<String>,
+    /// `P`; empty for the identity.
+    pub outputs: Vec<Vec<String>>,
+}
+
+/// `x' = f(x)`, `z = h(x)`, polynomial in the states with coefficients in symbols and generators.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dynamics {
+    /// The states.
+    pub states: Vec<String>,
+    /// `f`, one per state.
+    pub equations: Vec<String>,
+    /// `h`.
+    pub outputs: Vec<String>,
+}
+
+/// A claim `sum_i x_i sum_t factor_t (d/dt)^order_t z_output_t at segment_t = target`, to be verified
+/// by differentiating and substituting.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Check {
+    /// The local system of every segment.
+    pub dynamics: Dynamics,
+    /// The unknowns.
+    pub unknowns: Vec<String>,
+    /// Per segment, the states as linear expressions in the unknowns.
+    pub segments: Vec<Vec<String>>,
+    /// Per `x_i`, its terms.
+    pub terms: Vec<Vec<CheckTerm>>,
+    /// The claimed combination: per unknown, a polynomial in symbols and generators and a rational
+    /// function of the symbols to multiply it with.
+    pub target: Vec<(String, String)>,
+}
+
+/// One term of a [`Check`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CheckTerm {
+    /// Factor: a rational function of the symbols.
+    pub factor: String,
+    /// Index of the segment.
+    pub segment: usize,
+    /// Index of the output.
+    pub output: usize,
+    /// Derivative order.
+    pub order: usize,
+}
+
+/// An answer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Response {
+    /// Expressions, in the order that the job states, and whether the check, if any, held.
+    Values {
+        /// The expressions.
+        values: Vec<String>,
+        /// True when a check was asked for and held.
+        verified: bool,
+    },
+    /// The job failed.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+}
