@@ -1,1 +1,82 @@
-fn main(){}
+//! The command line of obsdeg: arguments in, text out, exit codes. One file per command.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is the command line")]
+
+mod analyze;
+mod arguments;
+mod completions;
+mod failure;
+mod lock;
+mod output;
+mod paper;
+mod schema;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use failure::Failure;
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg analyze --angles 0,0,0 --angles 180,0,0
+  obsdeg analyze --scheme scheme.toml --carry inertial --format json -o verdicts.json
+  obsdeg paper
+
+Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error.";
+
+/// Exact observable degrees: which unknowns a scheme determines, and with how many derivatives.
+#[derive(Debug, Parser)]
+#[command(name = "obsdeg", version, about, after_help = AFTER_HELP, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The observable degree of every unknown of a torquing scheme, and how it is solved
+    Analyze(analyze::Arguments),
+    /// Recompute every equation and claim of the paper and say where it is wrong
+    Paper(paper::Arguments),
+    /// Print the completion script of a shell
+    Completions(completions::Arguments),
+    /// Print the manual page
+    Man,
+    /// Print a JSON Schema: of results, or of scheme files
+    Schema(schema::Arguments),
+    /// Serve symbolic jobs on stdin and stdout (started by the program itself)
+    #[command(hide = true)]
+    SymbolicWorker,
+}
+
+fn run() -> Result<ExitCode, Failure> {
+    match Cli::parse().command {
+        Command::Analyze(a) => analyze::run(&a),
+        Command::Paper(a) => paper::run(&a),
+        Command::Completions(a) => completions::run(&a),
+        Command::Man => completions::man(),
+        Command::Schema(a) => schema::run(&a),
+        Command::SymbolicWorker => symbolic_worker(),
+    }
+}
+
+#[cfg(feature = "symbolica")]
+fn symbolic_worker() -> Result<ExitCode, Failure> {
+    let served = obsdeg_symbolic::worker::serve(std::io::stdin().lock(), std::io::stdout());
+    served.map_err(|e| Failure::internal(format!("the symbolic worker lost its pipe: {e}")))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(not(feature = "symbolica"))]
+fn symbolic_worker() -> Result<ExitCode, Failure> {
+    Err(Failure::input("this program was built without the symbolic engine".into()))
+}
+
+fn main() -> ExitCode {
+    // a panic is a defect of the program: its message is on stderr already
+    match std::panic::catch_unwind(run) {
+        Ok(Ok(code)) => code,
+        Ok(Err(failure)) => failure.report(),
+        Err(_) => ExitCode::from(failure::INTERNAL),
+    }
+}

@@ -6,8 +6,9 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::degree::coefficient::{Coefficient, Form, Image, Number, rates_between, recover_radical};
+use crate::degree::coefficient::{Coefficient, Form, Image, Number, rates_between, readable, recover_radical};
 use crate::degree::ensemble::{EnsembleError, Verdicts, judge};
+use crate::degree::staircase::Degrees;
 use crate::degree::verdict::{combinations, expression, null_space, partners};
 use crate::model::attitude::c_n_from_euler;
 use crate::model::expression::{Environment, Expression, ExpressionError, evaluate, parse};
@@ -319,7 +320,7 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
 
     let mut quantities: Vec<Quantity> = Vec::new();
     for (c, name) in platform.names().iter().enumerate() {
-        let Verdict { status, degree } = verdict(&verdicts, c);
+        let Verdict { status, degree } = verdict(&verdicts.degrees, c);
         let unit = vec![(c, Coefficient::one())];
         let solution = degree.filter(|_| options.solutions).and_then(|k| solve(&unit, k, name));
         let elsewhere = (degree.is_none()).then(|| Elsewhere {
@@ -404,7 +405,8 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
             .map(|v| match &v.components {
                 Some(f) => f
                     .iter()
-                    .map(|(c, k)| Component { name: platform.names()[*c].clone(), coefficient: Some(k.to_string()) })
+                    .zip(readable(f.iter().map(|(_, k)| k.clone()).collect()))
+                    .map(|((c, _), k)| Component { name: platform.names()[*c].clone(), coefficient: Some(k.to_string()) })
                     .collect(),
                 None => v
                     .support
@@ -450,11 +452,11 @@ fn engine_note(built: bool, solver: &mut Solver<'_>) -> Option<String> {
     ))
 }
 
-fn verdict(verdicts: &Verdicts, column: usize) -> Verdict {
-    let degree = verdicts.degrees.degree[column];
+pub(crate) fn verdict(degrees: &Degrees, column: usize) -> Verdict {
+    let degree = degrees.degree[column];
     let status = match degree {
         Some(_) => Status::Observable,
-        None if verdicts.degrees.excited[column] => Status::Inseparable,
+        None if degrees.excited[column] => Status::Inseparable,
         None => Status::NotExcited,
     };
     Verdict { status, degree }
@@ -508,7 +510,7 @@ fn carry_reports(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Result<
         let there = judge(&other, seed)?;
         let differs = platform.names().iter().enumerate().filter_map(|(c, name)| {
             let d = other.names().iter().position(|n| n == name)?;
-            let (here, there) = (verdict(verdicts, c), verdict(&there, d));
+            let (here, there) = (verdict(&verdicts.degrees, c), verdict(&there.degrees, d));
             (here != there).then(|| Difference { name: name.clone(), here, there })
         });
         out.push(CarryReport {

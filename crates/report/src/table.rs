@@ -1,10 +1,12 @@
 //! The table for the terminal.
 
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table};
+use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use obsdeg_core::analysis::Analysis;
 
 use crate::{Layout, words};
+
+/// One line under the header, nothing else.
+const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// A section heading.
 pub(crate) fn heading(out: &mut String, text: &str, layout: Layout) {
@@ -21,7 +23,7 @@ pub(crate) fn heading(out: &mut String, text: &str, layout: Layout) {
 /// An empty table with a header.
 pub(crate) fn table(header: &[&str], layout: Layout) -> Table {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY).set_header(header.to_vec());
+    table.load_style(STYLE).set_header(header.to_vec());
     if let Some(width) = layout.width {
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     }

@@ -153,9 +153,7 @@ pub(crate) fn null_vector(v: &[obsdeg_core::analysis::Component]) -> String {
 
 /// A locus as `alpha = 0: rank profile 2 4 5; D_FX degree 1 -> not observable`.
 pub(crate) fn locus(l: &obsdeg_core::solution::loci::Locus) -> String {
-    let show = |d: Option<usize>| d.map_or_else(|| "not observable".into(), |k| format!("degree {k}"));
-    let changes: Vec<String> =
-        l.changes.iter().map(|c| format!("{} {} -> {}", c.name, show(c.general), show(c.there))).collect();
+    let changes: Vec<String> = l.changes.iter().map(difference).collect();
     let changes = if changes.is_empty() { String::new() } else { format!("; {}", changes.join("; ")) };
     format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))
 }

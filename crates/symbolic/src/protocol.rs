@@ -46,7 +46,7 @@ pub enum Job {
 /// A linear system in text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct System {
-    /// `M`, row by row: polynomials in symbols and generators.
+    /// `M`, row by row: rational functions of symbols and generators.
     pub matrix: Vec<Vec<String>>,
     /// `b`.
     pub right: Vec<String>,
@@ -77,8 +77,8 @@ pub struct Check {
     pub segments: Vec<Vec<String>>,
     /// Per `x_i`, its terms.
     pub terms: Vec<Vec<CheckTerm>>,
-    /// The claimed combination: per unknown, a polynomial in symbols and generators and a rational
-    /// function of the symbols to multiply it with.
+    /// The claimed combination: per unknown, a rational function of symbols and generators and one
+    /// of the symbols to multiply it with.
     pub target: Vec<(String, String)>,
 }
 

@@ -22,6 +22,17 @@ pub enum Number {
     Decimal(f64),
 }
 
+/// Longest number in a formula that is still readable.
+pub const READABLE: usize = 40;
+
+/// Coefficients as they are printed: if one of them is too long to be read, all become decimals.
+pub fn readable(coefficients: Vec<Coefficient>) -> Vec<Coefficient> {
+    if coefficients.iter().any(Coefficient::is_unreadable) {
+        return coefficients.iter().map(Coefficient::rounded).collect();
+    }
+    coefficients
+}
+
 /// How exact a printed coefficient is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -110,6 +121,20 @@ impl Coefficient {
     /// The number one.
     pub fn one() -> Self {
         Self { number: Number::Radical(Radical::rational(1, 1)), rates: [0, 0] }
+    }
+
+    /// The same as a decimal, if the number is a long root expression.
+    #[must_use]
+    pub fn rounded(&self) -> Self {
+        match &self.number {
+            Number::Radical(r) => Self { number: Number::Decimal(r.to_f64()), rates: self.rates },
+            _ => self.clone(),
+        }
+    }
+
+    /// Whether the number is exact and longer than [`READABLE`] as text.
+    pub fn is_unreadable(&self) -> bool {
+        matches!(self.number, Number::Radical(_)) && self.without_rates().to_string().len() > READABLE
     }
 
     /// The number alone.

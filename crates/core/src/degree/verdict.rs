@@ -2,7 +2,7 @@
 
 use obsdeg_exact::Echelon;
 
-use super::coefficient::{Coefficient, linear_combination};
+use super::coefficient::{Coefficient, linear_combination, readable};
 use super::ensemble::Verdicts;
 use super::sparse::{extend_by_short_vectors, support, vector_on_support};
 use crate::model::Platform;
@@ -33,7 +33,10 @@ pub struct NullVector {
 pub fn expression(platform: &Platform, support: &[usize], functional: Option<&Functional>) -> String {
     let names = platform.names();
     match functional {
-        Some(f) => linear_combination(f.iter().map(|(c, k)| (k, names[*c].as_str()))),
+        Some(f) => {
+            let printed = readable(f.iter().map(|(_, k)| k.clone()).collect());
+            linear_combination(f.iter().zip(&printed).map(|((c, _), k)| (k, names[*c].as_str())))
+        }
         None => {
             let list: Vec<&str> = support.iter().map(|&c| names[c].as_str()).collect();
             format!("a combination of {}", list.join(", "))

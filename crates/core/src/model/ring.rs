@@ -82,6 +82,22 @@ impl Ring for Float {
     }
 }
 
+/// The sign of a text and its magnitude as a factor: a sum is put in brackets.
+fn signed_factor(text: &str) -> (bool, String) {
+    let (minus, rest) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
+    let mut depth = 0;
+    let sum = rest.char_indices().any(|(i, c)| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            '+' | '-' => return depth == 0 && i > 0,
+            _ => {}
+        }
+        false
+    });
+    if sum { (false, format!("({text})")) } else { (minus, rest.to_string()) }
+}
+
 /// Expressions as text, unexpanded but for zeros and ones.
 #[derive(Debug, Clone, Copy)]
 pub struct Text;
@@ -98,31 +114,45 @@ impl Ring for Text {
         match (a.as_str(), b.as_str()) {
             ("0", _) => b.clone(),
             (_, "0") => a.clone(),
+            _ if b.starts_with('-') => format!("{a}{b}"),
             _ => format!("{a}+{b}"),
         }
     }
     fn mul(&self, a: &String, b: &String) -> String {
-        let factor = |x: &str| if x.contains(['+', '-']) { format!("({x})") } else { x.to_string() };
-        match (a.as_str(), b.as_str()) {
-            ("0", _) | (_, "0") => "0".into(),
-            ("1", _) => b.clone(),
-            (_, "1") => a.clone(),
-            ("-1", _) => self.neg(b),
-            (_, "-1") => self.neg(a),
-            _ => format!("{}*{}", factor(a), factor(b)),
-        }
+        let ((minus_a, a), (minus_b, b)) = (signed_factor(a), signed_factor(b));
+        let magnitude = match (a.as_str(), b.as_str()) {
+            ("0", _) | (_, "0") => return "0".into(),
+            ("1", _) => b,
+            (_, "1") => a,
+            _ => format!("{a}*{b}"),
+        };
+        if minus_a == minus_b { magnitude } else { format!("-{magnitude}") }
     }
     fn neg(&self, a: &String) -> String {
-        match a.as_str() {
-            "0" => "0".into(),
-            _ => match a.strip_prefix('-') {
-                Some(rest) if !rest.contains(['+', '-']) => rest.to_string(),
-                _ if a.contains(['+', '-']) => format!("-({a})"),
-                _ => format!("-{a}"),
-            },
+        match signed_factor(a) {
+            (_, zero) if zero == "0" => zero,
+            (true, magnitude) => magnitude,
+            (false, magnitude) => format!("-{magnitude}"),
         }
     }
     fn is_zero(&self, a: &String) -> bool {
         a == "0"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_keep_signs_outside_and_sums_in_brackets() {
+        let t = |s: &str| s.to_string();
+        assert_eq!(Text.mul(&t("-a"), &t("-b*c")), "a*b*c");
+        assert_eq!(Text.mul(&t("-a"), &t("b-c")), "-a*(b-c)");
+        assert_eq!(Text.mul(&t("-(a+b)"), &t("-1")), "(a+b)");
+        assert_eq!(Text.neg(&t("-a+b")), "-(-a+b)");
+        assert_eq!(Text.neg(&t("0")), "0");
+        assert_eq!(Text.add(&t("a"), &t("-b")), "a-b");
+        assert_eq!(Text.mul(&t("a+b"), &t("1")), "(a+b)");
     }
 }

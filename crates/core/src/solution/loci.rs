@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::local::rows_at;
 use super::solver::Solver;
+use crate::analysis::{Difference, verdict};
 use crate::degree::ensemble::{Verdicts, staircase};
 use crate::degree::staircase::Degrees;
 use crate::model::Platform;
@@ -15,26 +16,14 @@ use crate::model::platform::{Point, RandomValues};
 use crate::model::ring::{Ring, Text};
 
 /// A condition and what it does.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Locus {
     /// The condition, one irreducible factor, such as `alpha = 0` or a polynomial in half tangents.
     pub condition: String,
     /// The rank profile at a general point of the locus.
     pub rank_profile: Vec<usize>,
-    /// The unknowns whose verdict changes there: name, degree elsewhere, degree there (null: not
-    /// observable).
-    pub changes: Vec<Change>,
-}
-
-/// One changed verdict.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct Change {
-    /// The unknown.
-    pub name: String,
-    /// Its degree at general angles.
-    pub general: Option<usize>,
-    /// Its degree on the locus.
-    pub there: Option<usize>,
+    /// The unknowns whose verdict changes there.
+    pub changes: Vec<Difference>,
 }
 
 /// Where a generic angle is put.
@@ -87,12 +76,16 @@ pub fn loci(
     let mut out: Vec<Locus> = Vec::new();
     for condition in conditions {
         let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else { continue };
-        let changes: Vec<Change> = platform
+        let changes: Vec<Difference> = platform
             .names()
             .iter()
             .enumerate()
-            .filter(|&(c, _)| there.degree[c] != verdicts.degrees.degree[c])
-            .map(|(c, name)| Change { name: name.clone(), general: verdicts.degrees.degree[c], there: there.degree[c] })
+            .map(|(c, name)| Difference {
+                name: name.clone(),
+                here: verdict(&verdicts.degrees, c),
+                there: verdict(&there, c),
+            })
+            .filter(|d| d.here != d.there)
             .collect();
         if changes.is_empty() && there.rank_profile == verdicts.degrees.rank_profile {
             continue;
@@ -110,19 +103,27 @@ fn candidate_requests(platform: &Platform, verdicts: &Verdicts, solver: &Solver<
     let n = platform.names().len();
     let symbols: Vec<String> = names.iter().map(|name| format!("t_{name}")).collect();
     let mut out: Vec<Request> = Vec::new();
+    // where all entries of one column vanish, its unknown is no longer excited
+    for c in 0..n {
+        let column: Vec<Vec<String>> = text.iter().filter(|row| row[c] != "0").map(|row| vec![row[c].clone()]).collect();
+        let job = Job::MinorFactors { matrix: column };
+        out.push(Request { symbols: symbols.clone(), generators: vec![], job });
+    }
     for k in 0..verdicts.degrees.rank_profile.len() {
         let mut basis = Echelon::new(first.sample.roots.field, n);
         let rows: Vec<usize> =
             solver.tables.rows_up_to(k).into_iter().filter(|&j| basis.insert(&first.rows[j])).collect();
         let outside = (0..n).filter(|&c| !basis.has_unit(c) && !basis.is_zero_column(c));
         for removed in std::iter::once(None).chain(outside.map(Some)) {
-            let matrix: Vec<Vec<String>> = rows
-                .iter()
-                .map(|&j| (0..n).filter(|&c| Some(c) != removed).map(|c| text[j][c].clone()).collect())
-                .collect();
+            let used = |c: &usize| Some(*c) != removed && rows.iter().any(|&j| text[j][*c] != "0");
+            let columns: Vec<usize> = (0..n).filter(used).collect();
+            let matrix =
+                rows.iter().map(|&j| columns.iter().map(|&c| text[j][c].clone()).collect()).collect();
             let request =
                 Request { symbols: symbols.clone(), generators: vec![], job: Job::MinorFactors { matrix } };
-            out.push(request);
+            if !out.contains(&request) {
+                out.push(request);
+            }
         }
     }
     out

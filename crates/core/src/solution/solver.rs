@@ -11,7 +11,9 @@ use serde::Serialize;
 use super::problem::{Outputs, Problem};
 use super::support::short_support;
 use super::symbols::Symbols;
-use crate::degree::coefficient::{Coefficient, Form, Image, Number, Rates, power, rates_between, recover_radical};
+use crate::degree::coefficient::{
+    Coefficient, Form, Image, Number, READABLE, Rates, power, rates_between, readable, recover_radical,
+};
 use crate::degree::ensemble::{Table, Tables, Verdicts};
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::{LOCAL, Platform, Point, local_dynamics, local_output};
@@ -20,8 +22,6 @@ use crate::solution::local::rows_at;
 
 /// Most angles with symbols of their own for which formulas are attempted.
 const MAX_SYMBOLIC_ANGLES: usize = 3;
-/// Longest number in a formula that is still readable.
-const READABLE: usize = 60;
 /// Longest number that is printed when there are no decimals to fall back to.
 const PRINTABLE: usize = 1000;
 /// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
@@ -326,6 +326,10 @@ impl<'a> Solver<'a> {
             })
             .collect();
         terms.retain(|t| !t.coefficient.is_zero());
+        let printed = readable(terms.iter().map(|t| t.coefficient.clone()).collect());
+        for (term, coefficient) in terms.iter_mut().zip(printed) {
+            term.coefficient = coefficient;
+        }
         Ok(Solved { terms, verification })
     }
 

@@ -13,9 +13,9 @@ use tower::Tower;
 /// Why a job failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum JobError {
-    /// A text is no polynomial in the announced symbols.
-    #[error("`{text}` is not a polynomial in the announced symbols")]
-    NotAPolynomial { text: String },
+    /// A text is no rational function of the announced symbols.
+    #[error("`{text}` is not a rational function of the announced symbols")]
+    NotAnElement { text: String },
     /// Rows or columns of different lengths.
     #[error("the {what} has {found} entries, expected {expected}")]
     Shape { what: &'static str, found: usize, expected: usize },

@@ -19,14 +19,14 @@ pub(crate) struct Element(pub(crate) Vec<Scalar>);
 pub(crate) struct Tower {
     symbols: Arc<Vec<PolyVariable>>,
     /// Symbols, then generators.
-    all: Arc<Vec<PolyVariable>>,
+    ids: Vec<Symbol>,
     symbol_scalars: Vec<Scalar>,
     squares: Vec<Scalar>,
     names: Vec<String>,
 }
 
 pub(crate) fn atom(text: &str) -> Result<Atom, JobError> {
-    try_parse!(text).map_err(|_| JobError::NotAPolynomial { text: text.into() })
+    try_parse!(text).map_err(|_| JobError::NotAnElement { text: text.into() })
 }
 
 fn variable(name: &str) -> PolyVariable {
@@ -38,9 +38,8 @@ impl Tower {
     pub(crate) fn new(symbols: &[String], generators: &[(String, String)]) -> Result<Self, JobError> {
         let names: Vec<String> = generators.iter().map(|(name, _)| name.clone()).collect();
         let symbol_map: Arc<Vec<PolyVariable>> = Arc::new(symbols.iter().map(|s| variable(s)).collect());
-        let all = Arc::new(symbol_map.iter().cloned().chain(names.iter().map(|n| variable(n))).collect());
-        let mut tower =
-            Self { symbols: symbol_map, all, symbol_scalars: vec![], squares: vec![], names };
+        let ids = symbols.iter().chain(&names).map(|s| symbol!(s)).collect();
+        let mut tower = Self { symbols: symbol_map, ids, symbol_scalars: vec![], squares: vec![], names };
         tower.symbol_scalars = symbols.iter().map(|s| tower.scalar(s)).collect::<Result<_, _>>()?;
         tower.squares = generators.iter().map(|(_, square)| tower.scalar(square)).collect::<Result<_, _>>()?;
         Ok(tower)
@@ -50,7 +49,7 @@ impl Tower {
     pub(crate) fn scalar(&self, text: &str) -> Result<Scalar, JobError> {
         let s: Scalar = atom(text)?.to_rational_polynomial(&Q, &Z, self.symbols.clone());
         if s.get_variables().len() != self.symbols.len() {
-            return Err(JobError::NotAPolynomial { text: text.into() });
+            return Err(JobError::NotAnElement { text: text.into() });
         }
         Ok(s)
     }
@@ -73,35 +72,51 @@ impl Tower {
         e
     }
 
-    /// A polynomial in symbols and generators.
+    /// A rational function of symbols and generators.
     pub(crate) fn element(&self, text: &str) -> Result<Element, JobError> {
         self.element_of(&atom(text)?)
     }
 
     pub(crate) fn element_of(&self, atom: &Atom) -> Result<Element, JobError> {
-        let wrong = || JobError::NotAPolynomial { text: atom.to_string() };
-        let p = atom.try_to_polynomial::<_, u16>(&Q, self.all.clone()).map_err(|_| wrong())?;
-        if p.get_vars_ref().len() != self.all.len() {
-            return Err(wrong());
-        }
-        let mut out = self.zero();
-        for term in &p {
-            let coefficient = Atom::num(term.coefficient.clone());
-            let mut value: Scalar = coefficient.to_rational_polynomial(&Q, &Z, self.symbols.clone());
-            let (of_symbols, of_generators) = term.exponents.split_at(self.symbols.len());
-            for (s, &e) in self.symbol_scalars.iter().zip(of_symbols).filter(|(_, e)| **e > 0) {
-                value = &value * &s.pow(u64::from(e));
+        self.element_of_view(atom.as_view())
+    }
+
+    fn element_of_view(&self, view: AtomView<'_>) -> Result<Element, JobError> {
+        let wrong = || JobError::NotAnElement { text: view.to_owned().to_string() };
+        match view {
+            AtomView::Num(n) => {
+                Ok(self.from_scalar(n.as_view().to_owned().to_rational_polynomial(&Q, &Z, self.symbols.clone())))
             }
-            let mut index = 0;
-            for (i, (&e, square)) in of_generators.iter().zip(&self.squares).enumerate() {
-                index |= usize::from(e % 2) << i;
-                if e > 1 {
-                    value = &value * &square.pow(u64::from(e / 2));
+            AtomView::Var(v) => {
+                let known = self.ids.iter().position(|s| *s == v.get_symbol()).ok_or_else(wrong)?;
+                let mut out = self.zero();
+                match known.checked_sub(self.symbol_scalars.len()) {
+                    None => out.0[0] = self.symbol_scalars[known].clone(),
+                    Some(generator) => out.0[1 << generator] = self.one_scalar(),
                 }
+                Ok(out)
             }
-            out.0[index] = &out.0[index] + &value;
+            AtomView::Pow(p) => {
+                let (base, exponent) = p.get_base_exp();
+                let exponent: i64 = exponent.to_owned().to_string().parse().map_err(|_| wrong())?;
+                let mut base = self.element_of_view(base)?;
+                if exponent < 0 {
+                    if self.is_zero(&base) {
+                        return Err(wrong());
+                    }
+                    base = self.inv(&base);
+                }
+                let one = self.from_scalar(self.one_scalar());
+                Ok((0..exponent.unsigned_abs()).fold(one, |product, _| self.mul(&product, &base)))
+            }
+            AtomView::Mul(m) => m
+                .iter()
+                .try_fold(self.from_scalar(self.one_scalar()), |product, x| Ok(self.mul(&product, &self.element_of_view(x)?))),
+            AtomView::Add(a) => {
+                a.iter().try_fold(self.zero(), |sum, x| Ok(self.add(&sum, &self.element_of_view(x)?)))
+            }
+            AtomView::Fun(_) => Err(wrong()),
         }
-        Ok(out)
     }
 
     pub(crate) fn is_zero(&self, a: &Element) -> bool {
@@ -182,12 +197,13 @@ impl Tower {
                 parts = parts.iter().map(|x| x * &inverse).collect();
                 powers[k] += 2;
             }
-            let always = parts.iter().enumerate().all(|(i, x)| x.is_zero() || i & (1 << k) != 0);
-            if always {
+            // g out of every part: from its own factor g, or from g^2 = square
+            let has = |i: usize| i & (1 << k) != 0;
+            while powers[k] < 0 && parts.iter().enumerate().all(|(i, x)| has(i) || divides(x)) {
                 powers[k] += 1;
                 let mut moved = vec![self.zero_scalar(); parts.len()];
-                for (i, x) in parts.into_iter().enumerate().filter(|(i, _)| i & (1 << k) != 0) {
-                    moved[i ^ (1 << k)] = x;
+                for (i, x) in parts.iter().enumerate() {
+                    moved[i ^ (1 << k)] = if has(i) { x.clone() } else { x * &inverse };
                 }
                 parts = moved;
             }

@@ -1,0 +1,111 @@
+//! `obsdeg analyze`: the degree table of one scheme.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use obsdeg_core::analysis::{AnalysisError, Options, analyze};
+use obsdeg_core::solution::solver::Frame;
+use obsdeg_symbolic::{Worker, WorkerConfig};
+
+use crate::arguments::{OutputArguments, SchemeArguments};
+use crate::failure::Failure;
+use crate::{lock, output};
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg analyze --angles 0,0,0 --angles 180,0,0        the paper's two positions
+  obsdeg analyze --angles NUE --angles NDW              the same by direction letters
+  obsdeg analyze --angles alpha,0,gamma                 any alpha, any gamma, with degenerate angles
+  obsdeg analyze --angles -90,0,0 --latitude 28.2 --carry inertial
+  obsdeg analyze --angles 0,0,0 --terms drift           eps^n of a single position
+  obsdeg analyze --angles 0,0,0 --combination \"D_FZ - wN*psi_y\"
+  obsdeg analyze --scheme scheme.toml --format json -o verdicts.json
+
+Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in
+rad/s and Z in g. Exit codes: 0 done, 2 bad input, 3 internal error.";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FrameArgument {
+    N,
+    Platform,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    scheme: SchemeArguments,
+
+    /// Solving expressions; off never starts the symbolic engine
+    #[arg(long, value_name = "ON|OFF", default_value = "on", hide_possible_values = true)]
+    solutions: Switch,
+
+    /// Axes of Z in solutions: n (North-Up-East, as in the paper) or platform
+    #[arg(long, value_name = "FRAME", default_value = "n", hide_possible_values = true)]
+    frame: FrameArgument,
+
+    /// Print Z and its derivatives, and psi and eps at each position, as formulas
+    #[arg(long)]
+    formulas: bool,
+
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Seconds that the symbolic engine may take
+    #[arg(long, value_name = "SECONDS", default_value_t = 20)]
+    symbolic_limit: u64,
+
+    #[command(flatten)]
+    output: OutputArguments,
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    output::check(&a.output)?;
+    let scheme = a.scheme.scheme()?;
+    let options = Options {
+        seed: a.seed,
+        solutions: a.solutions == Switch::On,
+        formulas: a.formulas,
+        frame: if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform },
+    };
+    let mut worker = worker(a.symbolic_limit)?;
+    let analysis = analyze(&scheme, options, worker.as_mut()).map_err(|e| match e {
+        AnalysisError::Combination { text, reason, span } => {
+            Failure::at(&format!("combination: {reason}"), "--combination", &text, span)
+        }
+        AnalysisError::Scheme(e) => Failure::input(e.to_string()),
+        AnalysisError::Verdict(e) => Failure::internal(e.to_string()),
+    })?;
+    // the banner of the engine is its licence notice
+    for line in worker.iter().flat_map(Worker::banner).filter(|_| !a.output.quiet) {
+        eprintln!("{line}");
+    }
+    let text = obsdeg_report::analysis(&analysis, a.output.format, output::layout(&a.output))
+        .map_err(|e| Failure::internal(e.to_string()))?;
+    output::write(&a.output, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The symbolic engine in a process of its own, if this build has one; nothing starts yet.
+fn worker(limit_s: u64) -> Result<Option<Worker>, Failure> {
+    if !cfg!(feature = "symbolica") {
+        return Ok(None);
+    }
+    let program = std::env::current_exe()
+        .map_err(|e| Failure::internal(format!("cannot find the program itself: {e}")))?;
+    Ok(Some(Worker::new(WorkerConfig {
+        program,
+        arguments: vec!["symbolic-worker".into()],
+        lock_file: lock::symbolic_lock_file(),
+        lock_limit: Duration::from_secs(60),
+        time_limit: Duration::from_secs(limit_s),
+    })))
+}

@@ -1,0 +1,105 @@
+//! Arguments that several commands share.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use obsdeg_core::model::attitude::Euler;
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns, scheme_file};
+use obsdeg_report::Format;
+
+use crate::failure::Failure;
+
+/// What is analysed.
+#[derive(Debug, Args)]
+pub(crate) struct SchemeArguments {
+    /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz); once per position.
+    /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE)
+    #[arg(long, value_name = "A,B,G", allow_hyphen_values = true, value_parser = attitude, conflicts_with = "scheme")]
+    angles: Vec<EulerArgument>,
+
+    /// Scheme file (TOML)
+    #[arg(long, value_name = "FILE", required_unless_present = "angles")]
+    scheme: Option<PathBuf>,
+
+    /// What is carried between positions: platform (the paper), inertial or reset
+    #[arg(long, value_name = "CARRY")]
+    carry: Option<Carry>,
+
+    /// Latitude in degrees, exact; left out: generic
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<Latitude>,
+
+    /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS; or drift for eps^n of one position
+    #[arg(long, value_name = "TERMS")]
+    terms: Option<Unknowns>,
+
+    /// The azimuth psi_y^n is measured too
+    #[arg(long)]
+    measured_azimuth: bool,
+
+    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
+    combination: Vec<String>,
+}
+
+/// Three Euler angles (a type of its own: clap would take a list for several values).
+#[derive(Debug, Clone)]
+struct EulerArgument(Euler);
+
+fn attitude(text: &str) -> Result<EulerArgument, String> {
+    if text.starts_with("--") {
+        return Err(format!("expected three angles such as 180,0,0, found the option `{text}`"));
+    }
+    parse_attitude(text).map(EulerArgument).map_err(|e| e.to_string())
+}
+
+impl SchemeArguments {
+    /// The scheme: from the file or the angles, with whatever options override.
+    pub(crate) fn scheme(&self) -> Result<Scheme, Failure> {
+        let mut scheme = match &self.scheme {
+            Some(path) => {
+                let name = path.display().to_string();
+                let text = std::fs::read_to_string(path)
+                    .map_err(|e| Failure::input(format!("cannot read the scheme file {name}: {e}")))?;
+                scheme_file::read(&text).map_err(|e| match e.span {
+                    Some(span) => Failure::at(&e.message, &name, &text, span),
+                    None => Failure::input(format!("{name}: {}", e.message)),
+                })?
+            }
+            None => Scheme::of_angles(self.angles.iter().map(|a| a.0.clone())),
+        };
+        if let Some(carry) = self.carry {
+            scheme.carry = carry;
+        }
+        if let Some(latitude) = self.latitude {
+            scheme.latitude = Some(latitude);
+        }
+        if let Some(terms) = &self.terms {
+            scheme.unknowns = terms.clone();
+        }
+        scheme.measured_azimuth |= self.measured_azimuth;
+        scheme.combinations.extend(self.combination.iter().cloned());
+        Ok(scheme)
+    }
+}
+
+/// Where and how results are written.
+#[derive(Debug, Args)]
+pub(crate) struct OutputArguments {
+    /// table, json, markdown, csv or latex
+    #[arg(long, value_name = "FORMAT", default_value_t = Format::Table)]
+    pub(crate) format: Format,
+
+    /// Write to a file instead of stdout
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+
+    /// Replace an existing file
+    #[arg(long, requires = "output")]
+    pub(crate) force: bool,
+
+    /// Say nothing on stderr but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}

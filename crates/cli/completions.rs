@@ -1,0 +1,44 @@
+//! `obsdeg completions` and `obsdeg man`.
+
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use crate::failure::Failure;
+use crate::{Cli, output};
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg completions bash > /etc/bash_completion.d/obsdeg
+  obsdeg completions zsh > _obsdeg";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub(crate) struct Arguments {
+    /// The shell
+    shell: Shell,
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    let mut text = Vec::new();
+    clap_complete::generate(a.shell, &mut Cli::command(), "obsdeg", &mut text);
+    output::print(&String::from_utf8_lossy(&text))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The manual page: the program, then every command.
+pub(crate) fn man() -> Result<ExitCode, Failure> {
+    let mut text = Vec::new();
+    let mut command = Cli::command();
+    command.build();
+    let mut render = |c: clap::Command| {
+        clap_mangen::Man::new(c).render(&mut text).map_err(|e| Failure::internal(e.to_string()))
+    };
+    render(command.clone())?;
+    for sub in command.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help") {
+        render(sub.clone().name(format!("obsdeg-{}", sub.get_name())))?;
+    }
+    output::print(&String::from_utf8_lossy(&text))?;
+    Ok(ExitCode::SUCCESS)
+}

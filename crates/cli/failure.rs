@@ -1,0 +1,44 @@
+//! Failures: what is said on stderr, and the exit code.
+
+use std::ops::Range;
+use std::process::ExitCode;
+
+use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+
+/// Bad input.
+pub(crate) const INPUT: u8 = 2;
+/// A defect of the program.
+pub(crate) const INTERNAL: u8 = 3;
+
+/// Why a command stopped.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    message: String,
+    code: u8,
+}
+
+impl Failure {
+    /// The input is wrong.
+    pub(crate) fn input(message: String) -> Self {
+        Self { message: format!("error: {message}"), code: INPUT }
+    }
+
+    /// The program is wrong.
+    pub(crate) fn internal(message: String) -> Self {
+        Self { message: format!("internal error: {message}"), code: INTERNAL }
+    }
+
+    /// The input is wrong at a place of a text, which is drawn.
+    pub(crate) fn at(message: &str, name: &str, text: &str, span: Range<usize>) -> Self {
+        let end = span.end.min(text.len());
+        let span = span.start.min(end)..end;
+        let snippet = Snippet::source(text).path(name).annotation(AnnotationKind::Primary.span(span));
+        let report = [Level::ERROR.primary_title(message).element(snippet)];
+        Self { message: Renderer::plain().render(&report).to_string(), code: INPUT }
+    }
+
+    pub(crate) fn report(&self) -> ExitCode {
+        eprintln!("{}", self.message);
+        ExitCode::from(self.code)
+    }
+}

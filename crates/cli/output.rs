@@ -1,0 +1,64 @@
+//! Results to stdout or to a file, whole or not at all.
+
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+
+use obsdeg_report::Layout;
+
+use crate::arguments::OutputArguments;
+use crate::failure::Failure;
+
+/// Columns of a table that does not go to a terminal.
+const WIDTH: u16 = 120;
+
+/// The layout for where the output goes.
+pub(crate) fn layout(out: &OutputArguments) -> Layout {
+    let stdout = std::io::stdout();
+    if out.output.is_some() || !stdout.is_terminal() {
+        return Layout { width: Some(WIDTH), color: false };
+    }
+    Layout {
+        width: terminal_size::terminal_size().map(|(w, _)| w.0),
+        color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
+    }
+}
+
+/// Refuses early, before any work, what `write` would refuse.
+pub(crate) fn check(out: &OutputArguments) -> Result<(), Failure> {
+    match &out.output {
+        Some(path) if path.exists() && !out.force => {
+            Err(Failure::input(format!("{} exists; --force replaces it", path.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes `text` to the file of the arguments (by a temporary file and a rename) or to stdout.
+pub(crate) fn write(out: &OutputArguments, text: &str) -> Result<(), Failure> {
+    check(out)?;
+    match &out.output {
+        Some(path) => write_file(path, text)
+            .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display()))),
+        None => print(text),
+    }
+}
+
+/// Writes to stdout; a reader that has left is no error.
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::input(format!("cannot write to stdout: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new().prefix(".obsdeg").tempfile_in(folder)?;
+    file.write_all(text.as_bytes())?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}

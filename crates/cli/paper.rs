@@ -1,0 +1,38 @@
+//! `obsdeg paper`: the paper against the algebra.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use obsdeg_core::audit::audit;
+
+use crate::arguments::OutputArguments;
+use crate::failure::Failure;
+use crate::output;
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg paper
+  obsdeg paper --format json --seed 7
+
+The paper: Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06.
+Exit codes: 0 done (whatever the findings), 2 bad input, 3 internal error.";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub(crate) struct Arguments {
+    /// Seed of the random points
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    #[command(flatten)]
+    output: OutputArguments,
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    output::check(&a.output)?;
+    let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
+    let text = obsdeg_report::audit(&audit, a.output.format, output::layout(&a.output))
+        .map_err(|e| Failure::internal(e.to_string()))?;
+    output::write(&a.output, &text)?;
+    Ok(ExitCode::SUCCESS)
+}

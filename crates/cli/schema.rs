@@ -1,0 +1,39 @@
+//! `obsdeg schema`: JSON Schemas, generated from the types.
+
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use obsdeg_core::analysis::Analysis;
+use obsdeg_core::audit::Audit;
+use obsdeg_core::model::scheme_file::SchemeFile;
+use schemars::schema_for;
+
+use crate::failure::Failure;
+use crate::output;
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Kind {
+    /// The JSON of `obsdeg analyze`
+    Analysis,
+    /// The JSON of `obsdeg paper`
+    Audit,
+    /// Scheme files
+    Scheme,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// What the schema describes
+    kind: Kind,
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    let schema = match a.kind {
+        Kind::Analysis => schema_for!(Analysis),
+        Kind::Audit => schema_for!(Audit),
+        Kind::Scheme => schema_for!(SchemeFile),
+    };
+    let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
+    output::print(&(text + "\n"))?;
+    Ok(ExitCode::SUCCESS)
+}
