@@ -1,0 +1,164 @@
+//! The reference verdicts: rank profiles and degrees that were derived independently of this program.
+
+use obsdeg_core::analysis::{Analysis, Options, Status, analyze};
+use obsdeg_core::model::attitude::{cardinal, cardinal_names};
+use obsdeg_core::model::scheme::{Scheme, parse_attitude};
+use obsdeg_core::model::{Carry, Unknowns};
+
+const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
+
+fn scheme(attitudes: &[&str], carry: Carry) -> Scheme {
+    Scheme { carry, ..Scheme::of_angles(attitudes.iter().map(|a| parse_attitude(a).expect("an attitude"))) }
+}
+
+fn judged(scheme: &Scheme) -> Analysis {
+    analyze(scheme, Options { solutions: false, ..Options::default() }, None).expect("analysed")
+}
+
+fn degree(a: &Analysis, name: &str) -> Option<usize> {
+    a.quantities.iter().find(|q| q.name == name).expect("an unknown").degree
+}
+
+/// Degrees of all unknowns whose name satisfies the filter.
+fn degrees(a: &Analysis, which: impl Fn(&str) -> bool) -> Vec<Option<usize>> {
+    a.quantities.iter().filter(|q| which(&q.name)).map(|q| q.degree).collect()
+}
+
+fn all(a: &Analysis, which: impl Fn(&str) -> bool, expected: Option<usize>) -> bool {
+    let found = degrees(a, which);
+    !found.is_empty() && found.iter().all(|d| *d == expected)
+}
+
+fn psi(n: &str) -> bool {
+    n.starts_with("psi")
+}
+fn input(n: &str) -> bool {
+    n.starts_with("D_I")
+}
+fn other(n: &str) -> bool {
+    n.starts_with("D_") && !input(n)
+}
+
+fn drift(latitude: Option<&str>, measured_azimuth: bool) -> Analysis {
+    judged(&Scheme {
+        unknowns: Unknowns::Drift,
+        latitude: latitude.map(|l| l.parse().expect("a latitude")),
+        measured_azimuth,
+        combinations: vec!["eps_z^n - wN*psi_y^n".into()],
+        ..scheme(&["0,0,0"], Carry::Platform)
+    })
+}
+
+#[test]
+fn single_position() {
+    let a = drift(None, false);
+    assert_eq!(a.rank_profile, [2, 4, 5]);
+    for (name, expected) in [
+        ("psi_x^n", Some(0)),
+        ("psi_z^n", Some(0)),
+        ("eps_x^n", Some(1)),
+        ("eps_y^n", Some(2)),
+        ("psi_y^n", None),
+        ("eps_z^n", None),
+    ] {
+        assert_eq!(degree(&a, name), expected, "{name}");
+    }
+    let asked = a.combinations.iter().find(|c| c.requested).expect("asked for");
+    assert_eq!((asked.status, asked.degree), (Status::Observable, Some(1)));
+}
+
+#[test]
+fn single_position_at_pole_and_equator_and_with_azimuth() {
+    let pole = drift(Some("90"), false);
+    assert_eq!((pole.rank, degree(&pole, "eps_y^n"), degree(&pole, "eps_z^n")), (4, None, Some(1)));
+    assert_eq!(drift(Some("-90"), false).rank, 4);
+    assert_eq!(drift(Some("0"), false).rank, 5);
+    assert_eq!(drift(Some("28.2"), false).rank, 5);
+    let azimuth = drift(None, true);
+    assert_eq!((azimuth.rank, degree(&azimuth, "eps_y^n")), (6, Some(1)));
+}
+
+#[test]
+fn the_papers_two_positions() {
+    let p1p2 = ["0,0,0", "180,0,0"];
+    let a = judged(&scheme(&p1p2, Carry::Platform));
+    assert_eq!(a.rank_profile, [2, 6, 8]);
+    for (name, expected) in
+        [("psi_x", 0), ("psi_z", 0), ("D_FX", 1), ("D_FY", 2), ("D_IY", 2), ("D_SX", 1), ("D_SZ", 1)]
+    {
+        assert_eq!(degree(&a, name), Some(expected), "{name}");
+    }
+    let status = |name: &str| a.quantities.iter().find(|q| q.name == name).map(|q| q.status);
+    for name in ["D_IX", "D_IZ", "D_OX", "D_OY", "D_OZ", "D_SY"] {
+        assert_eq!(status(name), Some(Status::NotExcited), "{name}");
+    }
+    let psi_y = a.quantities.iter().find(|q| q.name == "psi_y").expect("psi_y");
+    assert_eq!((psi_y.status, psi_y.partners.as_slice()), (Status::Inseparable, ["D_FZ".to_string()].as_slice()));
+    let combinations: Vec<(&str, Option<usize>)> =
+        a.combinations.iter().map(|c| (c.expression.as_str(), c.degree)).collect();
+    assert_eq!(combinations, [("D_FZ - wN*psi_y", Some(1))]);
+
+    let inertial = judged(&scheme(&p1p2, Carry::Inertial));
+    assert_eq!((degree(&inertial, "D_FZ"), degree(&inertial, "D_SZ")), (Some(1), None));
+    assert!(inertial.quantities.iter().any(|q| q.name == "D_SZ" && q.partners == ["psi_y"]));
+
+    let reset = judged(&scheme(&p1p2, Carry::Reset));
+    for (name, expected) in
+        [("D_FX", Some(1)), ("D_SX", Some(1)), ("D_FY", Some(2)), ("D_IY", Some(2)), ("D_FZ", None), ("D_SZ", None)]
+    {
+        assert_eq!(degree(&reset, name), expected, "{name}");
+    }
+    assert!(reset.unknowns.contains(&"psi_x@1".to_string()) && reset.unknowns.contains(&"psi_z@2".to_string()));
+}
+
+#[test]
+fn six_positions() {
+    let a = judged(&scheme(&S6, Carry::Platform));
+    assert_eq!(a.rank_profile, [3, 14, 15]);
+    assert!(all(&a, psi, Some(0)) && all(&a, input, Some(2)) && all(&a, other, Some(1)));
+    let a = judged(&scheme(&S6, Carry::Inertial));
+    assert_eq!(a.rank_profile, [2, 14, 15]);
+    assert!(all(&a, psi, Some(1)) && all(&a, input, Some(2)) && all(&a, other, Some(1)));
+    let a = judged(&scheme(&S6, Carry::Reset));
+    assert_eq!((a.rank_profile.as_slice(), a.unknowns.len()), ([12, 24, 30].as_slice(), 30));
+    assert!(all(&a, |n| n.starts_with("D_"), Some(2)));
+    assert_eq!(a.quantities.iter().filter_map(|q| q.degree).max(), Some(2));
+    assert!(a.quantities.iter().all(|q| q.degree.is_some()));
+}
+
+#[test]
+fn five_and_four_positions() {
+    let a = judged(&scheme(&S6[..5], Carry::Platform));
+    assert_eq!(a.rank_profile, [3, 13, 15]);
+    assert!(all(&a, |n| n.starts_with("D_"), Some(2)));
+    let a = judged(&scheme(&S6[..5], Carry::Inertial));
+    assert_eq!(a.rank_profile, [2, 12, 15]);
+    assert!(all(&a, |_| true, Some(2)));
+    let a = judged(&scheme(&S6[..4], Carry::Platform));
+    assert_eq!(a.rank_profile, [3, 11, 15]);
+    assert!(all(&a, psi, Some(0)) && all(&a, |n| n.starts_with("D_"), Some(2)));
+    let a = judged(&scheme(&S6[..4], Carry::Inertial));
+    assert_eq!((a.rank_profile.as_slice(), a.rank), ([2, 10, 14].as_slice(), 14));
+}
+
+#[test]
+fn all_cardinal_attitudes() {
+    let angles = cardinal_names().iter().filter_map(|n| cardinal(n)).collect::<Vec<_>>();
+    assert_eq!(angles.len(), 24);
+    let a = judged(&Scheme { carry: Carry::Inertial, ..Scheme::of_angles(angles) });
+    assert_eq!(a.rank_profile, [2, 12, 15]);
+    assert!(all(&a, input, Some(2)) && all(&a, other, Some(1)));
+}
+
+/// Fewest positions for all 12 coefficients at generic attitudes: platform 4, inertial 5, reset 6.
+#[test]
+fn fewest_positions() {
+    for (carry, fewest) in [(Carry::Platform, 4), (Carry::Inertial, 5), (Carry::Reset, 6)] {
+        let complete = |n: usize| {
+            let angles = (0..n).map(|i| std::array::from_fn(|k| format!("a{i}x{k}").parse().expect("a name")));
+            let a = judged(&Scheme { carry, ..Scheme::of_angles(angles) });
+            degrees(&a, |n| n.starts_with("D_")).iter().all(Option::is_some)
+        };
+        assert!(complete(fewest) && !complete(fewest - 1), "{carry}");
+    }
+}
