@@ -1,1 +1,74 @@
-fn main(){}
+//! Exact six-position verdicts per second on one core.
+//!
+//! `cargo bench -p obsdeg-core` prints times per verdict; the counter column is verdicts per second.
+//! A verdict is the full answer (rank profile, degree of all 15 unknowns, what is excited) from the
+//! cosines and sines of the attitudes, in one field; the certified verdict runs in two fields.
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use obsdeg_core::degree::platform_rows::PlatformRows;
+use obsdeg_core::degree::staircase::climb;
+use obsdeg_core::model::platform::{Platform, RandomValues, Sample};
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_exact::{Echelon, SplitMix64};
+
+fn main() {
+    divan::main();
+}
+
+const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
+
+fn platform(carry: Carry) -> Platform {
+    let angles = S6.iter().filter_map(|a| parse_attitude(a).ok());
+    match Platform::new(Scheme { carry, ..Scheme::of_angles(angles) }) {
+        Ok(platform) => platform,
+        Err(e) => panic!("{e}"),
+    }
+}
+
+fn samples(platform: &Platform) -> Vec<Sample> {
+    let mut rng = SplitMix64::new(1);
+    (0..2)
+        .filter_map(|_| RandomValues::draw(platform.scheme(), &mut rng).ok())
+        .map(|v| v.sample(platform.scheme(), 1))
+        .collect()
+}
+
+const CARRIES: [Carry; 3] = Carry::ALL;
+
+/// One field.
+#[divan::bench(args = CARRIES)]
+fn six_positions_one_field(bencher: Bencher<'_, '_>, carry: Carry) {
+    let platform = platform(carry);
+    let sample = &samples(&platform)[0];
+    let mut basis = Echelon::new(sample.point.ring, platform.names().len());
+    bencher.counter(ItemsCount::new(1usize)).bench_local(|| {
+        climb(&mut PlatformRows::new(black_box(&platform), black_box(sample)), &mut basis, |_, _| {})
+    });
+}
+
+/// Two fields that agree: what `analyze` prints.
+#[divan::bench(args = CARRIES)]
+fn six_positions_two_fields(bencher: Bencher<'_, '_>, carry: Carry) {
+    let platform = platform(carry);
+    let samples = samples(&platform);
+    let mut bases: Vec<Echelon> =
+        samples.iter().map(|s| Echelon::new(s.point.ring, platform.names().len())).collect();
+    bencher.counter(ItemsCount::new(1usize)).bench_local(|| {
+        let mut verdicts = samples.iter().zip(&mut bases).map(|(sample, basis)| {
+            climb(&mut PlatformRows::new(black_box(&platform), black_box(sample)), basis, |_, _| {})
+        });
+        verdicts.next() == verdicts.next()
+    });
+}
+
+/// One field, from the rows of each attitude: what a search over schemes of known attitudes repeats.
+#[divan::bench(args = CARRIES)]
+fn six_positions_prepared(bencher: Bencher<'_, '_>, carry: Carry) {
+    let platform = platform(carry);
+    let sample = &samples(&platform)[0];
+    let mut rows = PlatformRows::new(&platform, sample);
+    let mut basis = Echelon::new(sample.point.ring, platform.names().len());
+    bencher.counter(ItemsCount::new(1usize)).bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
+}

@@ -6,8 +6,10 @@ const NO_PIVOT: u32 = u32::MAX;
 
 /// A row space over a prime field, kept in reduced row-echelon form while rows come in.
 ///
-/// Every basis row has a one in its pivot column, where all other basis rows are zero. So the unit
-/// vector `e_c` lies in the space exactly when column `c` is a pivot column whose row is `e_c`.
+/// Every basis row has a nonzero entry in its pivot column, where all other basis rows are zero. So the
+/// unit vector `e_c` lies in the space exactly when column `c` is a pivot column and its row is zero
+/// elsewhere. Rows are not scaled to a one at the pivot: an inversion costs as much as a hundred
+/// products, and without it elimination needs none.
 ///
 /// ```
 /// use obsdeg_exact::{Echelon, Field};
@@ -30,12 +32,21 @@ pub struct Echelon {
     pivots: Vec<u32>,
     /// Basis row of each pivot column.
     row_of: Vec<u32>,
+    /// The columns that are no pivots.
+    free: Vec<u32>,
     scratch: Vec<u64>,
-    live: Live,
+    workspace: Workspace,
 }
 
-/// Minus the entry of a row at a pivot, with the start of that pivot's basis row.
-type Live = Vec<(u64, usize)>;
+/// A weight, and the start and the pivot entry of the basis row that it multiplies.
+type Live = Vec<(u64, usize, u64)>;
+
+/// Memory of a reduction, kept between rows.
+#[derive(Debug, Clone, Default)]
+struct Workspace {
+    live: Live,
+    sums: Vec<u128>,
+}
 
 impl Echelon {
     /// The zero space of row vectors of length `columns`.
@@ -46,8 +57,9 @@ impl Echelon {
             rows: Vec::new(),
             pivots: Vec::new(),
             row_of: vec![NO_PIVOT; columns],
+            free: (0..columns as u32).collect(),
             scratch: vec![0; columns],
-            live: Vec::new(),
+            workspace: Workspace::default(),
         }
     }
 
@@ -56,6 +68,8 @@ impl Echelon {
         self.rows.clear();
         self.pivots.clear();
         self.row_of.fill(NO_PIVOT);
+        self.free.clear();
+        self.free.extend(0..self.columns as u32);
     }
 
     /// The field.
@@ -91,57 +105,82 @@ impl Echelon {
         }
     }
 
-    /// `row` minus its projection along the pivots: zero exactly when `row` is in the space.
-    fn reduce_into(&self, row: &[u64], out: &mut [u64], live: &mut Live) {
+    /// A multiple of `row` plus basis rows that vanishes at all pivots: zero exactly when `row` is in
+    /// the space. With pivot entries `d_i` and `D` their product over the basis rows that `row` needs,
+    /// `out = D row - sum_i row[pivot_i] (D / d_i) basis_i`.
+    fn reduce_into(&self, row: &[u64], out: &mut [u64], workspace: &mut Workspace) {
         let f = self.field;
+        let Workspace { live, sums } = workspace;
         live.clear();
-        for (&a, &basis) in row.iter().zip(&self.row_of) {
+        let mut product = f.one();
+        for (c, (&a, &basis)) in row.iter().zip(&self.row_of).enumerate() {
             if a != 0 && basis != NO_PIVOT {
-                live.push((f.neg(a), basis as usize * self.columns));
+                let start = basis as usize * self.columns;
+                let pivot = self.rows[start + c];
+                live.push((f.neg(f.mul(a, product)), start, pivot));
+                product = f.mul(product, pivot);
             }
         }
-        for (c, slot) in out.iter_mut().enumerate() {
-            *slot = match self.row_of[c] {
-                NO_PIVOT => f.dot(row[c], live.iter().map(|&(a, start)| (a, self.rows[start + c]))),
-                _ => 0,
-            };
+        let mut after = f.one();
+        for (weight, _, pivot) in live.iter_mut().rev() {
+            *weight = f.mul(*weight, after);
+            after = f.mul(after, *pivot);
+        }
+        out.fill(0);
+        if live.is_empty() {
+            for &c in &self.free {
+                out[c as usize] = row[c as usize];
+            }
+            return;
+        }
+        sums.clear();
+        sums.extend(row.iter().map(|&x| f.lazy(product, x)));
+        for (i, &(weight, start, _)) in live.iter().enumerate() {
+            if (i + 1) % Field::LAZY == 0 {
+                sums.iter_mut().for_each(|s| *s = f.settle(*s));
+            }
+            for (s, &b) in sums.iter_mut().zip(&self.rows[start..start + self.columns]) {
+                *s += f.lazy(weight, b);
+            }
+        }
+        for &c in &self.free {
+            out[c as usize] = f.reduce(sums[c as usize]);
         }
     }
 
     /// Adds `row` (shape `columns`) to the space; true when the rank grew.
     pub fn insert(&mut self, row: &[u64]) -> bool {
         debug_assert_eq!(row.len(), self.columns);
-        let (mut new, mut live) = (std::mem::take(&mut self.scratch), std::mem::take(&mut self.live));
-        self.reduce_into(row, &mut new, &mut live);
+        let mut new = std::mem::take(&mut self.scratch);
+        let mut workspace = std::mem::take(&mut self.workspace);
+        self.reduce_into(row, &mut new, &mut workspace);
         let pivot = new.iter().position(|&a| a != 0);
         if let Some(pivot) = pivot {
             let f = self.field;
-            let scale = f.inv(new[pivot]);
-            let support: Vec<usize> = (pivot..self.columns).filter(|&c| new[c] != 0).collect();
-            for &c in &support {
-                new[c] = f.mul(new[c], scale);
-            }
-            for i in 0..self.rank() {
-                let basis = &mut self.rows[i * self.columns..(i + 1) * self.columns];
+            let entry = new[pivot];
+            for (basis, &own) in self.rows.chunks_exact_mut(self.columns).zip(&self.pivots) {
                 let factor = f.neg(basis[pivot]);
                 if factor != 0 {
-                    for &c in &support {
-                        basis[c] = f.add(basis[c], f.mul(factor, new[c]));
+                    for &c in &self.free {
+                        let c = c as usize;
+                        basis[c] = f.reduce(f.lazy(entry, basis[c]) + f.lazy(factor, new[c]));
                     }
+                    basis[own as usize] = f.mul(entry, basis[own as usize]);
                 }
             }
+            self.free.retain(|&c| c as usize != pivot);
             self.row_of[pivot] = self.rank() as u32;
             self.pivots.push(pivot as u32);
             self.rows.extend_from_slice(&new);
         }
-        (self.scratch, self.live) = (new, live);
+        (self.scratch, self.workspace) = (new, workspace);
         pivot.is_some()
     }
 
     /// Whether `row` (shape `columns`) lies in the space.
     pub fn contains(&self, row: &[u64]) -> bool {
         let mut out = vec![0; self.columns];
-        self.reduce_into(row, &mut out, &mut Vec::new());
+        self.reduce_into(row, &mut out, &mut Workspace::default());
         out.iter().all(|&a| a == 0)
     }
 
@@ -165,7 +204,10 @@ impl Echelon {
                 let mut v = vec![0; self.columns];
                 v[free] = self.field.one();
                 for (i, pivot) in self.pivots().enumerate() {
-                    v[pivot] = self.field.neg(self.row(i)[free]);
+                    let row = self.row(i);
+                    if row[free] != 0 {
+                        v[pivot] = self.field.neg(self.field.mul(row[free], self.field.inv(row[pivot])));
+                    }
                 }
                 v
             })

@@ -19,10 +19,10 @@ pub struct Field {
     r2: u64,
 }
 
-/// How many products of two elements a `u128` takes between two reductions.
-const LAZY: usize = 8;
-
 impl Field {
+    /// How many products of two elements may be added to a settled sum: `p 2^64 + 8 p^2 < 2 p 2^64`.
+    pub const LAZY: usize = 8;
+
     /// The field of the prime `p`; `p` must be an odd prime between 2^60 and 2^61 (the caller's duty).
     pub fn new(p: u64) -> Self {
         debug_assert!(p > 1 << 60 && p < 1 << 61 && p % 2 == 1);
@@ -132,28 +132,40 @@ impl Field {
         self.mul(self.mul(plain, self.r2), self.r2)
     }
 
+    /// The product as an unreduced sum: see [`Field::settle`] and [`Field::reduce`].
+    #[inline]
+    pub fn lazy(&self, a: u64, b: u64) -> u128 {
+        u128::from(a) * u128::from(b)
+    }
+
+    /// Brings a settled sum plus at most [`Field::LAZY`] products below `p 2^64`: a settled sum.
+    #[inline]
+    pub fn settle(&self, sum: u128) -> u128 {
+        let bound = u128::from(self.p) << 64;
+        if sum >= bound { sum - bound } else { sum }
+    }
+
+    /// The element that a settled sum plus at most [`Field::LAZY`] products stands for.
+    #[inline]
+    pub fn reduce(&self, sum: u128) -> u64 {
+        self.redc(self.settle(sum))
+    }
+
     /// `start + sum a_i b_i`, with one reduction at the end.
     #[inline]
     pub fn dot(&self, start: u64, terms: impl IntoIterator<Item = (u64, u64)>) -> u64 {
-        let bound = u128::from(self.p) << 64;
         // `start` enters as start * 2^64, which the reduction divides out
-        let mut acc = u128::from(start) << 64;
+        let mut sum = u128::from(start) << 64;
         let mut pending = 0;
         for (a, b) in terms {
-            if pending == LAZY {
-                // acc < p 2^64 + 8 p^2 < 2 p 2^64
-                if acc >= bound {
-                    acc -= bound;
-                }
+            if pending == Self::LAZY {
+                sum = self.settle(sum);
                 pending = 0;
             }
-            acc += u128::from(a) * u128::from(b);
+            sum += self.lazy(a, b);
             pending += 1;
         }
-        if acc >= bound {
-            acc -= bound;
-        }
-        self.redc(acc)
+        self.reduce(sum)
     }
 
     /// A square root of `a`, or `None` when `a` is no square (Tonelli-Shanks).

@@ -23,7 +23,7 @@ impl Degrees {
 }
 
 /// Climbs the staircase: rows of order 0, 1, 2, ... go into `basis` (cleared first) until every
-/// segment's chain has stalled; `on_order` sees the basis of `V_k` after each order.
+/// segment's chain has stalled or the rank is full; `on_order` sees the basis of `V_k` after each order.
 pub fn climb(
     rows: &mut impl DerivativeRows,
     basis: &mut Echelon,
@@ -32,9 +32,13 @@ pub fn climb(
     basis.clear();
     let mut degrees = Degrees { degree: vec![None; rows.columns()], ..Degrees::default() };
     for order in 0.. {
-        let more = rows.emit(order, &mut |row| {
-            basis.insert(row);
-        });
+        let full = basis.rank() == basis.columns();
+        let more = !full
+            && rows.emit(order, &mut |row| {
+                if basis.rank() < basis.columns() {
+                    basis.insert(row);
+                }
+            });
         if !more {
             break;
         }

@@ -4,7 +4,7 @@ use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order}
 
 use super::angle::Angle;
 use super::attitude::{Matrix3, c_n_from_euler, product};
-use super::geometry::{GYROS, Geometry, Term, Unknowns};
+use super::geometry::{GYROS, SignedAxis, Unknowns};
 use super::ring::Ring;
 use super::scheme::{Carry, Scheme, SchemeError};
 
@@ -20,6 +20,14 @@ pub struct Platform {
     scheme: Scheme,
     names: Vec<String>,
     units: Vec<&'static str>,
+    drift: Vec<DriftTerm>,
+}
+
+/// How one coefficient enters the drift: along the input axis of its gyro, times components of g.
+#[derive(Debug, Clone)]
+struct DriftTerm {
+    input: SignedAxis,
+    factors: Vec<SignedAxis>,
 }
 
 /// The platform at one point: cosines and sines of all angles and the earth rate, in some ring.
@@ -75,7 +83,14 @@ impl Platform {
                 }
             }
         }
-        Ok(Self { scheme, names, units })
+        let drift = match &scheme.unknowns {
+            Unknowns::Drift => Vec::new(),
+            Unknowns::Coefficients(terms) => terms
+                .iter()
+                .flat_map(|term| scheme.geometry.gyros().map(|g| DriftTerm { input: g.I, factors: term.factors(&g) }))
+                .collect(),
+        };
+        Ok(Self { scheme, names, units, drift })
     }
 
     /// The scheme.
@@ -96,13 +111,13 @@ impl Platform {
     /// `S_i` of every position (section 4 of the method: the psi block depends on the carry).
     pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
-        let Unknowns::Coefficients(terms) = &self.scheme.unknowns else {
+        if self.scheme.unknowns == Unknowns::Drift {
             let rows = std::array::from_fn(|i| {
                 (0..LOCAL).map(|j| if i == j { ring.one() } else { ring.zero() }).collect()
             });
             return vec![Block { columns: (0..LOCAL).collect(), rows }];
-        };
-        let first_d = self.names.len() - 3 * terms.len();
+        }
+        let first_d = self.names.len() - self.drift.len();
         let c_first = c_n_from_euler(ring, &point.cos_sin[0]);
         point
             .cos_sin
@@ -112,10 +127,10 @@ impl Platform {
                 let c = c_n_from_euler(ring, cs);
                 let psi_first = if self.scheme.carry == Carry::Reset { 3 * i } else { 0 };
                 let psi_block = if self.scheme.carry == Carry::Inertial { &c_first } else { &c };
-                let drift = drift_block(ring, &self.scheme.geometry, terms, &c);
+                let drift = drift_block(ring, &self.drift, &c);
                 let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
                 let rows = std::array::from_fn(|r| match r {
-                    0..3 => psi_block[r].iter().cloned().chain(zeros(3 * terms.len())).collect(),
+                    0..3 => psi_block[r].iter().cloned().chain(zeros(self.drift.len())).collect(),
                     _ => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
                 });
                 let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
@@ -127,27 +142,20 @@ impl Platform {
 
 /// `eps^n = C_c^n E(g^c) D` (3), (8): three rows, one column per coefficient (term by term, gyro by
 /// gyro). `g^c = C_n^c (0,-1,0)` is minus the second row of `C_c^n`.
-fn drift_block<R: Ring>(
-    ring: &R,
-    geometry: &Geometry,
-    terms: &[Term],
-    c: &Matrix3<R::Element>,
-) -> [Vec<R::Element>; 3] {
+fn drift_block<R: Ring>(ring: &R, terms: &[DriftTerm], c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
     let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
-    let signed = |negative: bool, x: &R::Element| if negative { ring.neg(x) } else { x.clone() };
-    let mut out = [Vec::new(), Vec::new(), Vec::new()];
-    for term in terms {
-        for gyro in geometry.gyros() {
-            let excitation = term.factors(&gyro).iter().fold(ring.one(), |e, a| {
-                ring.mul(&e, &signed(a.negative, &g[a.axis]))
-            });
-            for (row, slot) in out.iter_mut().enumerate() {
-                let along_input = signed(gyro.I.negative, &c[row][gyro.I.axis]);
-                slot.push(ring.mul(&along_input, &excitation));
-            }
+    let signed = |a: &SignedAxis, x: &R::Element| if a.negative { ring.neg(x) } else { x.clone() };
+    let excitation = |t: &DriftTerm| match t.factors.split_first() {
+        None => ring.one(),
+        Some((first, rest)) => {
+            rest.iter().fold(signed(first, &g[first.axis]), |e, a| ring.mul(&e, &signed(a, &g[a.axis])))
         }
-    }
-    out
+    };
+    let excitations: Vec<R::Element> = terms.iter().map(excitation).collect();
+    std::array::from_fn(|row| {
+        let along_input = |t: &DriftTerm| signed(&t.input, &c[row][t.input.axis]);
+        terms.iter().zip(&excitations).map(|(t, e)| ring.mul(&along_input(t), e)).collect()
+    })
 }
 
 /// `F` of (8) on `(psi^n, eps^n)`: `psi' = psi x omega_ie + eps`, `eps' = 0`.
