@@ -30,7 +30,8 @@ fn coefficients(s: Scheme) -> Vec<Option<usize>> {
 
 /// Angles that are special (multiples of 90 and 30) half of the time.
 fn attitudes(most: usize) -> impl Strategy<Value = Vec<Attitude>> {
-    let angle = || prop_oneof![(-2i32..3).prop_map(|k| 90 * k), (-6i32..7).prop_map(|k| 30 * k), -180i32..180];
+    let angle =
+        || prop_oneof![(-2i32..3).prop_map(|k| 90 * k), (-6i32..7).prop_map(|k| 30 * k), -180i32..180];
     prop::collection::vec((angle(), angle(), angle()), 1..most)
 }
 

@@ -93,7 +93,10 @@ fn the_papers_two_positions() {
         assert_eq!(status(name), Some(Status::NotExcited), "{name}");
     }
     let psi_y = a.quantities.iter().find(|q| q.name == "psi_y").expect("psi_y");
-    assert_eq!((psi_y.status, psi_y.partners.as_slice()), (Status::Inseparable, ["D_FZ".to_string()].as_slice()));
+    assert_eq!(
+        (psi_y.status, psi_y.partners.as_slice()),
+        (Status::Inseparable, ["D_FZ".to_string()].as_slice())
+    );
     let combinations: Vec<(&str, Option<usize>)> =
         a.combinations.iter().map(|c| (c.expression.as_str(), c.degree)).collect();
     assert_eq!(combinations, [("D_FZ - wN*psi_y", Some(1))]);
@@ -103,12 +106,19 @@ fn the_papers_two_positions() {
     assert!(inertial.quantities.iter().any(|q| q.name == "D_SZ" && q.partners == ["psi_y"]));
 
     let reset = judged(&scheme(&p1p2, Carry::Reset));
-    for (name, expected) in
-        [("D_FX", Some(1)), ("D_SX", Some(1)), ("D_FY", Some(2)), ("D_IY", Some(2)), ("D_FZ", None), ("D_SZ", None)]
-    {
+    for (name, expected) in [
+        ("D_FX", Some(1)),
+        ("D_SX", Some(1)),
+        ("D_FY", Some(2)),
+        ("D_IY", Some(2)),
+        ("D_FZ", None),
+        ("D_SZ", None),
+    ] {
         assert_eq!(degree(&reset, name), expected, "{name}");
     }
-    assert!(reset.unknowns.contains(&"psi_x@1".to_string()) && reset.unknowns.contains(&"psi_z@2".to_string()));
+    assert!(
+        reset.unknowns.contains(&"psi_x@1".to_string()) && reset.unknowns.contains(&"psi_z@2".to_string())
+    );
 }
 
 #[test]
@@ -155,7 +165,8 @@ fn all_cardinal_attitudes() {
 fn fewest_positions() {
     for (carry, fewest) in [(Carry::Platform, 4), (Carry::Inertial, 5), (Carry::Reset, 6)] {
         let complete = |n: usize| {
-            let angles = (0..n).map(|i| std::array::from_fn(|k| format!("a{i}x{k}").parse().expect("a name")));
+            let angles =
+                (0..n).map(|i| std::array::from_fn(|k| format!("a{i}x{k}").parse().expect("a name")));
             let a = judged(&Scheme { carry, ..Scheme::of_angles(angles) });
             degrees(&a, |n| n.starts_with("D_")).iter().all(Option::is_some)
         };

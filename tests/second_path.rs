@@ -54,9 +54,7 @@ impl Rref {
 
     fn has_unit(&self, c: usize) -> bool {
         let zero = q(0, 1);
-        self.rows
-            .iter()
-            .any(|(p, row)| *p == c && row.iter().enumerate().all(|(j, x)| j == c || *x == zero))
+        self.rows.iter().any(|(p, row)| *p == c && row.iter().enumerate().all(|(j, x)| j == c || *x == zero))
     }
 }
 
@@ -139,7 +137,9 @@ fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, V
     let mut basis = Rref { columns: n, rows: Vec::new() };
     let (mut profile, mut degree) = (Vec::new(), vec![None; n]);
     let times = |row: &[Q], m: &[Vec<Q>]| -> Vec<Q> {
-        (0..m[0].len()).map(|j| row.iter().zip(m).filter(|(x, _)| **x != zero).map(|(x, r)| x * &r[j]).sum()).collect()
+        (0..m[0].len())
+            .map(|j| row.iter().zip(m).filter(|(x, _)| **x != zero).map(|(x, r)| x * &r[j]).sum())
+            .collect()
     };
     let mut local: Vec<Rref> = tangents.iter().map(|_| Rref { columns: 15, rows: Vec::new() }).collect();
     loop {
@@ -166,7 +166,8 @@ fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, V
 }
 
 fn engine(tangents: &[[(i64, i64); 3]], carry: Carry, rng: &mut SplitMix64) -> Degrees {
-    let angles = (0..tangents.len()).map(|i| std::array::from_fn(|k| format!("a{i}x{k}").parse().expect("a name")));
+    let angles =
+        (0..tangents.len()).map(|i| std::array::from_fn(|k| format!("a{i}x{k}").parse().expect("a name")));
     let platform = Platform::new(Scheme { carry, ..Scheme::of_angles(angles) }).expect("valid");
     let mut values = RandomValues::draw(platform.scheme(), rng).expect("fits");
     for (i, t) in tangents.iter().enumerate() {
@@ -207,12 +208,16 @@ fn rational_arithmetic_agrees_on_random_schemes() {
     assert!(ranks.len() > 8, "the schemes should differ in rank: {ranks:?}");
 }
 
+type Matrix = Vec<Vec<u64>>;
+
+/// Rows of the current order, dynamics, map to the unknowns.
+type Segment = (Matrix, Matrix, Matrix);
+
 /// Linear dynamics per segment given by dense matrices: a second source of derivative rows.
 struct Matrices {
     field: Field,
     columns: usize,
-    /// Rows of the current order, dynamics, map to the unknowns.
-    segments: Vec<(Vec<Vec<u64>>, Vec<Vec<u64>>, Vec<Vec<u64>>)>,
+    segments: Vec<Segment>,
     orders: usize,
 }
 
@@ -269,14 +274,16 @@ const EPS_C: [&str; 3] = [
 
 /// The platform as text equations, in n or in platform axes.
 fn from_text(in_n: bool, attitudes: &[&str], carry: Carry, seed: u64) -> (Vec<usize>, Vec<Option<usize>>) {
-    let angles = attitudes.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("an attitude"));
+    let angles =
+        attitudes.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("an attitude"));
     let scheme = Scheme { carry, ..Scheme::of_angles(angles) };
     let platform = Platform::new(scheme).expect("valid");
     let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(seed)).expect("fits");
     let sample = values.sample(platform.scheme(), 1);
     let f = sample.roots.field;
     let d_names: Vec<String> = platform.names().iter().filter(|n| n.starts_with("D_")).cloned().collect();
-    let states: Vec<String> = ["psi_x", "psi_y", "psi_z"].map(String::from).into_iter().chain(d_names).collect();
+    let states: Vec<String> =
+        ["psi_x", "psi_y", "psi_z"].map(String::from).into_iter().chain(d_names).collect();
     let n = platform.names().len();
     let matrices: Vec<[[u64; 3]; 3]> = sample
         .point
@@ -349,7 +356,13 @@ fn from_text(in_n: bool, attitudes: &[&str], carry: Carry, seed: u64) -> (Vec<us
                     (true, Carry::Inertial) => first[a][b],
                     (true, _) => c[a][b],
                     (false, Carry::Inertial) => f.dot(0, (0..3).map(|k| (c[k][a], first[k][b]))),
-                    (false, _) => if a == b { f.one() } else { 0 },
+                    (false, _) => {
+                        if a == b {
+                            f.one()
+                        } else {
+                            0
+                        }
+                    }
                 };
             }
         }
@@ -363,17 +376,23 @@ fn from_text(in_n: bool, attitudes: &[&str], carry: Carry, seed: u64) -> (Vec<us
 #[test]
 fn text_equations_in_both_axes_give_the_same_verdicts() {
     let s6 = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
-    let schemes: [&[&str]; 5] = [&["0,0,0", "180,0,0"], &s6[..4], &s6[..5], &s6, &["90,0,0", "0,90,0", "0,0,90"]];
+    let schemes: [&[&str]; 5] =
+        [&["0,0,0", "180,0,0"], &s6[..4], &s6[..5], &s6, &["90,0,0", "0,90,0", "0,0,90"]];
     for attitudes in schemes {
         for carry in Carry::ALL {
-            let angles = attitudes.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("an attitude"));
+            let angles =
+                attitudes.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("an attitude"));
             let platform = Platform::new(Scheme { carry, ..Scheme::of_angles(angles) }).expect("valid");
             let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(5)).expect("fits");
             let built_in = staircase(&platform, &values.sample(platform.scheme(), 1)).0;
             for in_n in [true, false] {
                 let (profile, degree) = from_text(in_n, attitudes, carry, 5);
                 // orders past the last that can add repeat the rank
-                assert_eq!(profile[..built_in.rank_profile.len()], built_in.rank_profile, "{carry} {in_n} {attitudes:?}");
+                assert_eq!(
+                    profile[..built_in.rank_profile.len()],
+                    built_in.rank_profile,
+                    "{carry} {in_n} {attitudes:?}"
+                );
                 assert_eq!(profile.last(), built_in.rank_profile.last());
                 assert_eq!(degree, built_in.degree, "{carry} {in_n} {attitudes:?}");
             }

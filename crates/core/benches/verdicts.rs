@@ -70,5 +70,7 @@ fn six_positions_prepared(bencher: Bencher<'_, '_>, carry: Carry) {
     let sample = &samples(&platform)[0];
     let mut rows = PlatformRows::new(&platform, sample);
     let mut basis = Echelon::new(sample.point.ring, platform.names().len());
-    bencher.counter(ItemsCount::new(1usize)).bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
+    bencher
+        .counter(ItemsCount::new(1usize))
+        .bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
 }

@@ -6,7 +6,9 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::degree::coefficient::{Coefficient, Form, Image, Number, rates_between, readable, recover_radical};
+use crate::degree::coefficient::{
+    Coefficient, Form, Image, Number, rates_between, readable, recover_radical,
+};
 use crate::degree::ensemble::{EnsembleError, Verdicts, judge};
 use crate::degree::staircase::Degrees;
 use crate::degree::verdict::{combinations, expression, null_space, partners};
@@ -19,7 +21,7 @@ use crate::model::{Angle, Carry, Scheme, SchemeError, Unknowns};
 use crate::solution::formulas::{Formula, formulas};
 use crate::solution::loci::{Locus, loci};
 use crate::solution::print::text;
-use crate::solution::solver::{Frame, Functional, Solved, Solver, Verification};
+use crate::solution::solver::{Frame, Functional, Solved, Solver, Sparse, Verification};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.analysis/1";
@@ -281,7 +283,11 @@ pub struct Certainty {
 ///
 /// # Errors
 /// [`AnalysisError`].
-pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -> Result<Analysis, AnalysisError> {
+pub fn analyze(
+    scheme: &Scheme,
+    options: Options,
+    worker: Option<&mut Worker>,
+) -> Result<Analysis, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
     let verdicts = judge(&platform, options.seed)?;
     let requested = requested_combinations(&platform, &verdicts)?;
@@ -292,6 +298,12 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
     let basis = combinations(&platform, &verdicts, &mut solver);
     let null = null_space(&platform, &verdicts, &mut solver);
     let partners = partners(platform.names().len(), &null);
+    let units: Vec<Option<Functional>> =
+        (0..platform.names().len()).map(|c| solver.functional(vec![(c, Coefficient::one())])).collect();
+    let requested: Vec<(String, Option<Functional>, Verdict)> = requested
+        .into_iter()
+        .map(|(text, terms, verdict)| (text, solver.functional(terms), verdict))
+        .collect();
     let names: Vec<String> = scheme.positions.iter().map(|p| p.name.clone()).collect();
     let mut solve = |functional: &Functional, degree: usize, what: &str| -> Option<Solution> {
         match solver.solve(functional, degree) {
@@ -321,8 +333,8 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
     let mut quantities: Vec<Quantity> = Vec::new();
     for (c, name) in platform.names().iter().enumerate() {
         let Verdict { status, degree } = verdict(&verdicts.degrees, c);
-        let unit = vec![(c, Coefficient::one())];
-        let solution = degree.filter(|_| options.solutions).and_then(|k| solve(&unit, k, name));
+        let unit = units[c].as_ref();
+        let solution = degree.filter(|_| options.solutions).and_then(|k| solve(unit?, k, name));
         let elsewhere = (degree.is_none()).then(|| Elsewhere {
             other_latitudes: other_latitudes.as_ref().and_then(|d| d[c]),
             other_angles: other_angles.as_ref().and_then(|d| d[c]),
@@ -341,7 +353,7 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
 
     let mut reports: Vec<CombinationReport> = Vec::new();
     for c in &basis {
-        let expression = expression(&platform, &c.support, c.functional.as_ref());
+        let expression = expression(&platform, &c.support, c.functional.as_ref().map(|f| &f.terms));
         let wanted = c.functional.as_ref().filter(|_| options.solutions);
         let solution = wanted.and_then(|f| solve(f, c.degree, &expression));
         reports.push(CombinationReport {
@@ -354,7 +366,7 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
     }
     for (text, functional, verdict) in requested {
         let wanted = verdict.degree.filter(|_| options.solutions);
-        let solution = wanted.and_then(|k| solve(&functional, k, &text));
+        let solution = wanted.and_then(|k| solve(functional.as_ref()?, k, &text));
         reports.push(CombinationReport {
             expression: text,
             requested: true,
@@ -406,7 +418,10 @@ pub fn analyze(scheme: &Scheme, options: Options, worker: Option<&mut Worker>) -
                 Some(f) => f
                     .iter()
                     .zip(readable(f.iter().map(|(_, k)| k.clone()).collect()))
-                    .map(|((c, _), k)| Component { name: platform.names()[*c].clone(), coefficient: Some(k.to_string()) })
+                    .map(|((c, _), k)| Component {
+                        name: platform.names()[*c].clone(),
+                        coefficient: Some(k.to_string()),
+                    })
                     .collect(),
                 None => v
                     .support
@@ -481,7 +496,9 @@ fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
 }
 
 fn position_reports(scheme: &Scheme) -> Vec<PositionReport> {
-    let report = |angle: &Angle| angle.degrees().map_or_else(|| AngleReport::Generic(angle.to_string()), AngleReport::Degrees);
+    let report = |angle: &Angle| {
+        angle.degrees().map_or_else(|| AngleReport::Generic(angle.to_string()), AngleReport::Degrees)
+    };
     scheme
         .positions
         .iter()
@@ -499,7 +516,11 @@ fn position_reports(scheme: &Scheme) -> Vec<PositionReport> {
         .collect()
 }
 
-fn carry_reports(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Result<Vec<CarryReport>, AnalysisError> {
+fn carry_reports(
+    platform: &Platform,
+    verdicts: &Verdicts,
+    seed: u64,
+) -> Result<Vec<CarryReport>, AnalysisError> {
     let scheme = platform.scheme();
     if scheme.unknowns == Unknowns::Drift {
         return Ok(Vec::new());
@@ -552,7 +573,8 @@ fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<
     let rates = [sample.point.w_n, sample.point.w_u];
     let at = |values: &[u64]| evaluate(expression, &f, &Unit { names, values, rates });
     let zero = vec![0; names.len()];
-    let unit = |c: usize| -> Vec<u64> { (0..names.len()).map(|j| if j == c { f.one() } else { 0 }).collect() };
+    let unit =
+        |c: usize| -> Vec<u64> { (0..names.len()).map(|j| if j == c { f.one() } else { 0 }).collect() };
     let row: Vec<u64> = (0..names.len()).map(|c| at(&unit(c))).collect::<Result<_, _>>()?;
     let probe: Vec<u64> = (0..names.len() as u64).map(|c| f.from_u64(1_000_003 + 7919 * c * c)).collect();
     let linear = at(&zero)? == 0 && at(&probe)? == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
@@ -566,7 +588,7 @@ fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<
     Ok(row)
 }
 
-type Requested = (String, Functional, Verdict);
+type Requested = (String, Sparse, Verdict);
 
 /// Reads and judges the combinations that a scheme asks for.
 fn requested_combinations(platform: &Platform, verdicts: &Verdicts) -> Result<Vec<Requested>, AnalysisError> {
@@ -591,14 +613,18 @@ fn requested_combinations(platform: &Platform, verdicts: &Verdicts) -> Result<Ve
                 None if moved => Status::Inseparable,
                 None => Status::NotExcited,
             };
-            let functional = functional_of(&parsed, platform, verdicts).map_err(wrap)?;
-            Ok((text.clone(), functional, Verdict { status, degree }))
+            let terms = terms_of(&parsed, platform, verdicts).map_err(wrap)?;
+            Ok((text.clone(), terms, Verdict { status, degree }))
         })
         .collect()
 }
 
 /// The exact coefficients of a linear expression with rational coefficients and rates.
-fn functional_of(parsed: &Expression, platform: &Platform, verdicts: &Verdicts) -> Result<Functional, ExpressionError> {
+fn terms_of(
+    parsed: &Expression,
+    platform: &Platform,
+    verdicts: &Verdicts,
+) -> Result<Sparse, ExpressionError> {
     let scheme = platform.scheme();
     let names = platform.names();
     let at = |field: usize, a: u64, rates: Option<[u64; 2]>| {

@@ -186,8 +186,7 @@ impl Echelon {
 
     /// Whether the unit vector of `column` lies in the space.
     pub fn has_unit(&self, column: usize) -> bool {
-        self.pivot_row(column)
-            .is_some_and(|row| row.iter().enumerate().all(|(c, &a)| a == 0 || c == column))
+        self.pivot_row(column).is_some_and(|row| row.iter().enumerate().all(|(c, &a)| a == 0 || c == column))
     }
 
     /// Whether every vector of the space is zero in `column`.
@@ -267,10 +266,8 @@ mod tests {
     /// Rank by fraction Gaussian elimination in plain rationals: the oracle.
     fn rank_rational(rows: &[Vec<i64>]) -> usize {
         let zero = BigRational::from_integer(BigInt::from(0));
-        let mut m: Vec<Vec<BigRational>> = rows
-            .iter()
-            .map(|r| r.iter().map(|&a| BigRational::from_integer(a.into())).collect())
-            .collect();
+        let mut m: Vec<Vec<BigRational>> =
+            rows.iter().map(|r| r.iter().map(|&a| BigRational::from_integer(a.into())).collect()).collect();
         let mut rank = 0;
         for c in 0..rows.first().map_or(0, Vec::len) {
             let Some(p) = (rank..m.len()).find(|&i| m[i][c] != zero) else { continue };
@@ -288,9 +285,8 @@ mod tests {
     }
 
     fn matrices() -> impl Strategy<Value = Vec<Vec<i64>>> {
-        (1usize..7, 1usize..7).prop_flat_map(|(m, n)| {
-            prop::collection::vec(prop::collection::vec(-2i64..3, n), m)
-        })
+        (1usize..7, 1usize..7)
+            .prop_flat_map(|(m, n)| prop::collection::vec(prop::collection::vec(-2i64..3, n), m))
     }
 
     proptest! {

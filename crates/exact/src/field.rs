@@ -179,9 +179,8 @@ impl Field {
         }
         let s = (self.p - 1).trailing_zeros();
         let q = (self.p - 1) >> s;
-        let non_square = (2..)
-            .map(|k| self.from_u64(k))
-            .find(|&k| self.pow(k, (self.p - 1) / 2) == minus_one)?;
+        let non_square =
+            (2..).map(|k| self.from_u64(k)).find(|&k| self.pow(k, (self.p - 1) / 2) == minus_one)?;
         let mut c = self.pow(non_square, q);
         let mut t = self.pow(a, q);
         let mut r = self.pow(a, q.div_ceil(2));

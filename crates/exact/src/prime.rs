@@ -6,7 +6,9 @@ use crate::{Field, SplitMix64};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PrimeError {
     /// The order is not usable.
-    #[error("the order of the roots of unity is {found}; expected a multiple of 4 up to 2^42 with no prime factor but 2, 3 and 5")]
+    #[error(
+        "the order of the roots of unity is {found}; expected a multiple of 4 up to 2^42 with no prime factor but 2, 3 and 5"
+    )]
     Order {
         /// The order that was asked for.
         found: u64,
@@ -121,8 +123,14 @@ mod tests {
     fn primality_of_known_numbers() {
         // OEIS A014233: the least strong pseudoprimes to the first 1, 2, .. 11 prime bases
         for n in [
-            2047, 1_373_653, 25_326_001, 3_215_031_751, 2_152_302_898_747, 3_474_749_660_383,
-            341_550_071_728_321, 3_825_123_056_546_413_051,
+            2047,
+            1_373_653,
+            25_326_001,
+            3_215_031_751,
+            2_152_302_898_747,
+            3_474_749_660_383,
+            341_550_071_728_321,
+            3_825_123_056_546_413_051,
         ] {
             assert!(!is_prime(n), "{n}");
         }
@@ -130,7 +138,7 @@ mod tests {
         assert!(is_prime((1 << 61) - 1));
         assert!((1..33).all(|d| !is_prime((1u64 << 60) + d)));
         assert!(is_prime((1 << 60) + 33));
-        let sieve = |n: u64| n > 1 && (2..n).all(|d| n % d != 0);
+        let sieve = |n: u64| n > 1 && (2..n).all(|d| !n.is_multiple_of(d));
         assert!((0..500).all(|n| is_prime(n) == sieve(n)));
     }
 

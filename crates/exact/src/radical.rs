@@ -38,8 +38,7 @@ impl Ratio {
             (t0, t1) = (t1, t0.checked_sub((q as i64).checked_mul(t1)?)?);
         }
         let (num, den) = if t1 < 0 { (-(r1 as i64), -t1) } else { (r1 as i64, t1) };
-        (den > 0 && den as u64 <= BOUND && field.from_ratio(num, den) == value)
-            .then_some(Self { num, den })
+        (den > 0 && den as u64 <= BOUND && field.from_ratio(num, den) == value).then_some(Self { num, den })
     }
 }
 
@@ -55,7 +54,8 @@ pub struct Radical {
 /// for fields of the given order: they fix or flip `sqrt 2` and `sqrt 3` in all four ways.
 pub fn embeddings(order: u64) -> [u64; 4] {
     [1, 5, 7, 11].map(|a| {
-        let prime_to_order = |e: &u64| [2, 3, 5].iter().all(|q| !order.is_multiple_of(*q) || e % q != 0);
+        let prime_to_order =
+            |e: &u64| [2, 3, 5].iter().all(|q| !order.is_multiple_of(*q) || !e.is_multiple_of(*q));
         // a + 24 j runs through all residues modulo 5, so one of the first five fits
         (0..5).map(|j| a + 24 * j).find(prime_to_order).unwrap_or(a)
     })
@@ -151,7 +151,13 @@ impl fmt::Display for Radical {
             if q.num == 0 {
                 continue;
             }
-            let sign = if q.num < 0 { "-" } else if first { "" } else { "+" };
+            let sign = if q.num < 0 {
+                "-"
+            } else if first {
+                ""
+            } else {
+                "+"
+            };
             first = false;
             match (q.num.unsigned_abs(), root) {
                 (n, 1) => write!(out, "{sign}{n}")?,

@@ -16,18 +16,35 @@ pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<Strin
 
 /// One row per unknown, then one per combination.
 pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
-    let header = ["kind", "name", "unit", "status", "degree", "partners", "solution"].map(String::from).to_vec();
+    let header =
+        ["kind", "name", "unit", "status", "degree", "partners", "solution"].map(String::from).to_vec();
     let degree = |d: Option<usize>| d.map_or_else(String::new, |k| k.to_string());
     let unknowns = a.quantities.iter().map(|q| {
         let solution = q.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
         let status = q.status.to_string().replace(' ', "_");
-        vec!["unknown".into(), q.name.clone(), q.unit.clone(), status, degree(q.degree), q.partners.join(" "), solution]
+        vec![
+            "unknown".into(),
+            q.name.clone(),
+            q.unit.clone(),
+            status,
+            degree(q.degree),
+            q.partners.join(" "),
+            solution,
+        ]
     });
     let combinations = a.combinations.iter().map(|c| {
         let solution = c.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
         let kind = if c.requested { "requested" } else { "combination" };
         let status = c.status.to_string().replace(' ', "_");
-        vec![kind.into(), c.expression.clone(), String::new(), status, degree(c.degree), String::new(), solution]
+        vec![
+            kind.into(),
+            c.expression.clone(),
+            String::new(),
+            status,
+            degree(c.degree),
+            String::new(),
+            solution,
+        ]
     });
     write(std::iter::once(header).chain(unknowns).chain(combinations))
 }

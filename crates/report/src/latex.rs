@@ -10,8 +10,9 @@ use crate::words;
 /// Plain text with LaTeX's special characters escaped.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::new();
-    for c in text.chars() {
+    for c in text.replace("->", "\u{2192}").chars() {
         match c {
+            '\u{2192}' => out.push_str("$\\to$"),
             '\\' => out.push_str("\\textbackslash{}"),
             '^' => out.push_str("\\textasciicircum{}"),
             '~' => out.push_str("\\textasciitilde{}"),
@@ -65,6 +66,7 @@ fn expression(text: &str) -> String {
                     out.push_str(&format!("\\sqrt{{{}}}", rest.get(1..close).unwrap_or("")));
                     rest = rest.get(close + 1..).unwrap_or("");
                 }
+                "deg" => out.push_str("^{\\circ}"),
                 "sin" | "cos" | "tan" => out.push_str(&format!("\\{word}")),
                 _ => out.push_str(&symbol(word)),
             }
@@ -143,8 +145,10 @@ fn solution(s: &Solution, frame: Frame, positions: &[String]) -> String {
 
 /// A longtable.
 pub(crate) fn table(columns: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut out =
-        format!("\\begin{{longtable}}{{{columns}}}\n\\toprule\n{} \\\\\n\\midrule\n\\endhead\n", header.join(" & "));
+    let mut out = format!(
+        "\\begin{{longtable}}{{{columns}}}\n\\toprule\n{} \\\\\n\\midrule\n\\endhead\n",
+        header.join(" & ")
+    );
     for row in rows {
         out.push_str(&format!("{} \\\\\n", row.join(" & ")));
     }
@@ -154,7 +158,11 @@ pub(crate) fn table(columns: &str, header: &[&str], rows: impl IntoIterator<Item
 pub(crate) fn analysis(a: &Analysis) -> String {
     let names: Vec<String> = a.positions.iter().map(|p| p.name.clone()).collect();
     let mut out = String::from("% needs the packages booktabs, longtable and amsmath\n");
-    out.push_str(&format!("\\paragraph{{Observable degrees}} {}; {}.\n", escape(&words::headline(a)), escape(&words::rank(a))));
+    out.push_str(&format!(
+        "\\paragraph{{Observable degrees}} {}; {}.\n",
+        escape(&words::headline(a)),
+        escape(&words::rank(a))
+    ));
     out.push_str(&table(
         "lll",
         &["position", "$\\alpha, \\beta, \\gamma$ [deg]", "$X_p\\,Y_p\\,Z_p$"],
@@ -171,7 +179,13 @@ pub(crate) fn analysis(a: &Analysis) -> String {
                 Some(s) => format!("${}$", solution(s, a.frame, &names)),
                 None => escape(&words::explanation(q)),
             };
-            vec![format!("${}$", symbol(&q.name)), escape(&q.unit), q.status.to_string(), words::degree(q.degree), how]
+            vec![
+                format!("${}$", symbol(&q.name)),
+                escape(&q.unit),
+                q.status.to_string(),
+                words::degree(q.degree),
+                how,
+            ]
         }),
     ));
     if !a.combinations.is_empty() {
@@ -179,8 +193,16 @@ pub(crate) fn analysis(a: &Analysis) -> String {
             "llrp{0.5\\linewidth}",
             &["combination", "verdict", "degree", "solution"],
             a.combinations.iter().map(|c| {
-                let how = c.solution.as_ref().map_or_else(String::new, |s| format!("${}$", solution(s, a.frame, &names)));
-                vec![format!("${}$", expression(&c.expression)), c.status.to_string(), words::degree(c.degree), how]
+                let how = c
+                    .solution
+                    .as_ref()
+                    .map_or_else(String::new, |s| format!("${}$", solution(s, a.frame, &names)));
+                vec![
+                    format!("${}$", expression(&c.expression)),
+                    c.status.to_string(),
+                    words::degree(c.degree),
+                    how,
+                ]
             }),
         ));
     }
@@ -195,7 +217,9 @@ pub(crate) fn analysis(a: &Analysis) -> String {
     for c in &a.carries {
         lines.push(escape(&format!("under the other carry {}: {}", words::carry(c), words::differences(c))));
     }
-    lines.extend(a.degenerate_loci.iter().flatten().map(|l| escape(&format!("degenerate: {}", words::locus(l)))));
+    lines.extend(
+        a.degenerate_loci.iter().flatten().map(|l| escape(&format!("degenerate: {}", words::locus(l)))),
+    );
     lines.extend(words::assumptions(a).iter().map(|s| escape(&format!("assumed: {s}"))));
     lines.push(escape(&words::certainty(a)));
     lines.extend(a.notes.iter().map(|n| escape(&format!("note: {n}"))));
@@ -217,6 +241,7 @@ mod tests {
         assert_eq!(symbol("eps_y^n"), "\\varepsilon_{y}^{n}");
         assert_eq!(expression("D_FZ - wN*psi_y"), "D_{FZ} - \\omega_N\\,\\psi_{y}");
         assert_eq!(expression("sqrt(2)*cos(alpha)^2/4"), "\\sqrt{2}\\,\\cos(\\mathit{alpha})^{2}/4");
+        assert_eq!(expression("sin(25 deg)"), "\\sin(25 ^{\\circ})");
         assert_eq!(escape("50% & a_b"), "50\\% \\& a\\_b");
     }
 }

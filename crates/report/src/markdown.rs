@@ -43,7 +43,11 @@ pub(crate) fn analysis(a: &Analysis) -> String {
     out.push_str(&table(
         &["unknown", "unit", "verdict", "degree", "solution, or why there is none"],
         a.quantities.iter().map(|q| {
-            let why = if q.solution.is_some() { code(&words::explanation(q)) } else { escape(&words::explanation(q)) };
+            let why = if q.solution.is_some() {
+                code(&words::explanation(q))
+            } else {
+                escape(&words::explanation(q))
+            };
             vec![code(&q.name), escape(&q.unit), q.status.to_string(), words::degree(q.degree), why]
         }),
     ));
@@ -65,9 +69,15 @@ pub(crate) fn analysis(a: &Analysis) -> String {
             }
         }
     };
-    section("Directions that Z does not see", a.null_space.iter().map(|v| code(&words::null_vector(v))).collect());
+    section(
+        "Directions that Z does not see",
+        a.null_space.iter().map(|v| code(&words::null_vector(v))).collect(),
+    );
     section("Not excited", words::not_excited(a).iter().map(|n| code(n)).collect());
-    section("Degenerate angles", a.degenerate_loci.iter().flatten().map(|l| escape(&words::locus(l))).collect());
+    section(
+        "Degenerate angles",
+        a.degenerate_loci.iter().flatten().map(|l| escape(&words::locus(l))).collect(),
+    );
     let formula = |f: &obsdeg_core::solution::formulas::Formula| {
         let at = f.position.as_ref().map(|p| format!(" @{p}")).unwrap_or_default();
         code(&format!("{}{at} = {}", f.left, f.right))

@@ -60,7 +60,8 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
     heading(&mut out, &format!("Observable degrees: {}", words::headline(a)), layout);
     paragraph(&mut out, &words::rank(a), layout);
 
-    let mut positions = table(&["position", "alpha, beta, gamma [deg]", "X_p Y_p Z_p", "g in x, y, z [g]"], layout);
+    let mut positions =
+        table(&["position", "alpha, beta, gamma [deg]", "X_p Y_p Z_p", "g in x, y, z [g]"], layout);
     for p in &a.positions {
         let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
         let g = p.g_c.map_or_else(String::new, |g| g.map(short).join(", "));
@@ -69,7 +70,8 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
     out.push_str(&trimmed(&positions));
 
     heading(&mut out, "Unknowns", layout);
-    let mut unknowns = table(&["unknown", "unit", "verdict", "degree", "solution, or why there is none"], layout);
+    let mut unknowns =
+        table(&["unknown", "unit", "verdict", "degree", "solution, or why there is none"], layout);
     for q in &a.quantities {
         unknowns.add_row(vec![
             Cell::new(&q.name),

@@ -81,8 +81,12 @@ pub(crate) fn differences(c: &CarryReport) -> String {
 /// What was assumed, a sentence each.
 pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let carry = match a.carry {
-        Carry::Platform => "platform: psi in platform axes goes on from position to position (the paper's simulation)",
-        Carry::Inertial => "inertial: psi in geographic axes goes on from position to position (real torqued slews)",
+        Carry::Platform => {
+            "platform: psi in platform axes goes on from position to position (the paper's simulation)"
+        }
+        Carry::Inertial => {
+            "inertial: psi in geographic axes goes on from position to position (real torqued slews)"
+        }
         Carry::Reset => "reset: psi is a new unknown at each position",
     };
     let latitude = a.latitude_deg.map_or_else(
@@ -95,7 +99,9 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         .map(|(g, x)| format!("{g}: I={} O={} S={}", x.I, x.O, x.S))
         .collect();
     let z = match a.frame {
-        Frame::N => "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives",
+        Frame::N => {
+            "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
+        }
         Frame::Platform => "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives",
     };
     let mut out = vec![

@@ -150,7 +150,8 @@ impl Worker {
             self.running = Some(start(&self.config)?);
         }
         let Some(running) = &mut self.running else { return Err(WorkerError::Ended) };
-        let line = serde_json::to_string(request).map_err(|e| WorkerError::Garbled { found: e.to_string() })?;
+        let line =
+            serde_json::to_string(request).map_err(|e| WorkerError::Garbled { found: e.to_string() })?;
         let input = running.input.as_mut().ok_or(WorkerError::Ended)?;
         writeln!(input, "{line}").and_then(|()| input.flush()).map_err(|_| WorkerError::Ended)?;
         loop {
@@ -196,7 +197,8 @@ fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
 }
 
 fn acquire(config: &WorkerConfig) -> Result<File, WorkerError> {
-    let lock_error = |e: std::io::Error| WorkerError::Lock { path: config.lock_file.clone(), reason: e.to_string() };
+    let lock_error =
+        |e: std::io::Error| WorkerError::Lock { path: config.lock_file.clone(), reason: e.to_string() };
     let file = OpenOptions::new()
         .create(true)
         .truncate(false)

@@ -97,7 +97,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         Ok(16)
     };
     let p1p2 = Judged::of(positions(&["0,0,0", "180,0,0"]), seed)?;
-    let (platform, inertial, reset) = (fewest(Carry::Platform)?, fewest(Carry::Inertial)?, fewest(Carry::Reset)?);
+    let (platform, inertial, reset) =
+        (fewest(Carry::Platform)?, fewest(Carry::Inertial)?, fewest(Carry::Reset)?);
     line(
         "section 2.2",
         "all coefficients but the D_I need only Z and Z'",
@@ -142,7 +143,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     let options = Options { seed, solutions: false, ..Options::default() };
     let local = analyze(&scheme, options, None)?;
     let unknown = |name: &str| local.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
-    let asked: Vec<Option<usize>> = local.combinations.iter().filter(|c| c.requested).map(|c| c.degree).collect();
+    let asked: Vec<Option<usize>> =
+        local.combinations.iter().filter(|c| c.requested).map(|c| c.degree).collect();
     let best = [unknown("psi_x^n"), unknown("psi_z^n")];
     let middle = [unknown("eps_x^n"), asked[0]];
     let worst = unknown("eps_y^n");

@@ -37,7 +37,8 @@ impl Environment for At {
 /// `psi_x psi_y psi_z` and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in
 /// c, `Z1 Z3` with `p`, `pp` for derivatives, and `Zcx..` for Z in c.
 fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
-    let angles = parse_attitude(attitude).unwrap_or_else(|_| std::array::from_fn(|_| crate::model::Angle::from_degrees(0)));
+    let angles = parse_attitude(attitude)
+        .unwrap_or_else(|_| std::array::from_fn(|_| crate::model::Angle::from_degrees(0)));
     let platform = Platform::new(Scheme::of_angles([angles]))?;
     let values = RandomValues::draw(platform.scheme(), rng).map_err(EnsembleError::from)?;
     let sample = values.sample(platform.scheme(), 1);
@@ -56,12 +57,14 @@ fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
         put(name, value);
     }
     let block = &platform.blocks(&sample.point)[0];
-    let local: [u64; LOCAL] =
-        std::array::from_fn(|i| f.dot(0, block.rows[i].iter().copied().zip(block.columns.iter().map(|&c| x[c]))));
+    let local: [u64; LOCAL] = std::array::from_fn(|i| {
+        f.dot(0, block.rows[i].iter().copied().zip(block.columns.iter().map(|&c| x[c])))
+    });
     for (name, value) in ["px", "py", "pz", "ex", "ey", "ez"].into_iter().zip(local) {
         put(name, value);
     }
-    let to_c = |v: [u64; 3]| -> [u64; 3] { std::array::from_fn(|j| f.dot(0, (0..3).map(|i| (c[i][j], v[i])))) };
+    let to_c =
+        |v: [u64; 3]| -> [u64; 3] { std::array::from_fn(|j| f.dot(0, (0..3).map(|i| (c[i][j], v[i])))) };
     for (name, value) in ["cx", "cy", "cz"].into_iter().zip(to_c([local[3], local[4], local[5]])) {
         put(name, value);
     }
@@ -168,7 +171,9 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         out.push(Line { place, claim, finding: finding(holds), reason });
     };
     let holds = |attitude: &str, pairs: &[(&str, &str)]| identity(attitude, pairs, seed);
-    let plain = |ok: bool| if ok { "identity at random points of two prime fields" } else { "not an identity" }.to_string();
+    let plain = |ok: bool| {
+        if ok { "identity at random points of two prime fields" } else { "not an identity" }.to_string()
+    };
 
     // (4): the sign of the specific force that (21)-(28) use
     let with = |sign: &str| -> Vec<(String, String)> {
@@ -202,10 +207,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     line("(9)", "Z^n = (psi_z, 0, -psi_x)", ok, plain(ok));
     let ok = holds(ANY, &[("Z1p", "wU*px - wN*py + ez"), ("Z3p", "wU*pz - ex")])?;
     line("(10)", "Z' in n", ok, plain(ok));
-    let ok = holds(
-        ANY,
-        &[("Z1pp", "-(wN^2 + wU^2)*pz + wU*ex - wN*ey"), ("Z3pp", "wU^2*px - wU*wN*py + wU*ez")],
-    )?;
+    let ok =
+        holds(ANY, &[("Z1pp", "-(wN^2 + wU^2)*pz + wU*ex - wN*ey"), ("Z3pp", "wU^2*px - wU*wN*py + wU*ez")])?;
     line("(12)", "Z'' in n", ok, plain(ok));
     for (place, claim, left, right) in [
         ("(13)", "psi_x = -Z3", "px", "-Z3"),

@@ -59,8 +59,7 @@ pub type Rates = [i32; 2];
 
 /// The exponents that are tried, simplest first.
 fn candidate_rates() -> Vec<Rates> {
-    let mut all: Vec<Rates> =
-        (-2..=2).flat_map(|a| (-2..=2).map(move |b| [a, b])).collect();
+    let mut all: Vec<Rates> = (-2..=2).flat_map(|a| (-2..=2).map(move |b| [a, b])).collect();
     all.sort_by_key(|[a, b]| (a.abs() + b.abs(), -a, -b));
     all
 }
@@ -280,10 +279,8 @@ mod tests {
         assert_eq!(coefficient(-1.0, [1, 0]).to_string(), "-wN");
         assert_eq!(coefficient(0.5, [-1, 1]).to_string(), "0.5*wU/wN");
         assert_eq!(coefficient(1.0, [0, 0]).to_string(), "1");
-        let sum = linear_combination([
-            (&coefficient(1.0, [0, 0]), "D_FZ"),
-            (&coefficient(-1.0, [1, 0]), "psi_y"),
-        ]);
+        let sum =
+            linear_combination([(&coefficient(1.0, [0, 0]), "D_FZ"), (&coefficient(-1.0, [1, 0]), "psi_y")]);
         assert_eq!(sum, "D_FZ - wN*psi_y");
     }
 

@@ -20,7 +20,9 @@ pub enum EnsembleError {
     #[error(transparent)]
     Prime(#[from] PrimeError),
     /// The fields kept disagreeing.
-    #[error("two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this scheme")]
+    #[error(
+        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this scheme"
+    )]
     Disagreement,
 }
 

@@ -77,9 +77,8 @@ impl DerivativeRows for PlatformRows {
         for block in &self.blocks {
             for local in self.chain.iter().filter(|r| r.order == order) {
                 for (k, &column) in block.columns.iter().enumerate() {
-                    let terms = (0..LOCAL)
-                        .filter(|&i| local.row[i] != 0)
-                        .map(|i| (local.row[i], block.rows[i][k]));
+                    let terms =
+                        (0..LOCAL).filter(|&i| local.row[i] != 0).map(|i| (local.row[i], block.rows[i][k]));
                     self.scratch[column] = f.dot(0, terms);
                 }
                 sink(&self.scratch);

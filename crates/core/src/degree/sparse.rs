@@ -58,7 +58,12 @@ pub fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> Vec<Vec
 
 /// The vector of the span of `rows` that vanishes outside `support`, scaled to one at `lead`; `None`
 /// unless these vectors form a line.
-pub fn vector_on_support(field: Field, rows: &[Vec<u64>], support: &[usize], lead: usize) -> Option<Vec<u64>> {
+pub fn vector_on_support(
+    field: Field,
+    rows: &[Vec<u64>],
+    support: &[usize],
+    lead: usize,
+) -> Option<Vec<u64>> {
     let n = rows.first()?.len();
     let mut order: Vec<usize> = (0..n).filter(|c| !support.contains(c)).collect();
     order.extend(support);

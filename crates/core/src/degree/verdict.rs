@@ -7,7 +7,7 @@ use super::ensemble::Verdicts;
 use super::sparse::{extend_by_short_vectors, support, vector_on_support};
 use crate::model::Platform;
 use crate::solution::problem::Problem;
-use crate::solution::solver::{Functional, Solver};
+use crate::solution::solver::{Functional, Solver, Sparse};
 
 /// A named observable combination.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,13 +26,13 @@ pub struct NullVector {
     /// The columns that occur.
     pub support: Vec<usize>,
     /// Its components, if they could be computed.
-    pub components: Option<Functional>,
+    pub components: Option<Sparse>,
 }
 
 /// `D_FZ - wN*psi_y`; the unknowns alone when the coefficients are missing.
-pub fn expression(platform: &Platform, support: &[usize], functional: Option<&Functional>) -> String {
+pub fn expression(platform: &Platform, support: &[usize], terms: Option<&Sparse>) -> String {
     let names = platform.names();
-    match functional {
+    match terms {
         Some(f) => {
             let printed = readable(f.iter().map(|(_, k)| k.clone()).collect());
             linear_combination(f.iter().zip(&printed).map(|((c, _), k)| (k, names[*c].as_str())))
@@ -67,8 +67,12 @@ pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solve
             span.insert(v);
         }
         // basis rows whose pivot is no single unknown vanish at all single unknowns
-        let rows: Vec<Vec<u64>> =
-            basis.pivots().enumerate().filter(|&(_, c)| !single(c)).map(|(i, _)| basis.row(i).to_vec()).collect();
+        let rows: Vec<Vec<u64>> = basis
+            .pivots()
+            .enumerate()
+            .filter(|&(_, c)| !single(c))
+            .map(|(i, _)| basis.row(i).to_vec())
+            .collect();
         if span.rank() < basis.rank() {
             chosen.extend(extend_by_short_vectors(&rows, &mut span).into_iter().map(|v| (v, k)));
         }
@@ -98,9 +102,8 @@ fn combination_coefficients(
     let vector = vector_on_support(field, &rows, support, lead)?;
     let used = crate::solution::support::short_support(field, &first.rows, &allowed, &vector, |_| 1)?;
     let problem = Problem::combination(&used, platform.names().len(), support, lead);
-    let values = solver.coefficients(&problem)?;
-    let mut functional: Functional = support.iter().copied().zip(values).collect();
-    functional.sort_by_key(|(c, _)| *c != lead);
+    let mut functional = solver.functional_of(support, &problem)?;
+    functional.terms.sort_by_key(|(c, _)| *c != lead);
     Some(functional)
 }
 
@@ -123,14 +126,14 @@ pub fn null_space(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<
         .collect()
 }
 
-fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Functional> {
+fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Sparse> {
     let lead = support[0];
     let first = solver.tables.first();
     let mut basis = Echelon::new(first.sample.roots.field, support.len() - 1);
     // independent rows on the support without its lead determine the vector
     let restricted = |j: usize| -> Vec<u64> { support[1..].iter().map(|&c| first.rows[j][c]).collect() };
     let used: Vec<usize> = (0..first.rows.len()).filter(|&j| basis.insert(&restricted(j))).collect();
-    let values = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
+    let (values, _) = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
     let rest = support[1..].iter().copied().zip(values);
     Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())
 }

@@ -40,13 +40,17 @@ pub enum AngleError {
         found: String,
     },
     /// Neither a number nor a name.
-    #[error("angle `{found}` is not a number; expected decimal degrees such as -90 or 12.5, or a name such as alpha")]
+    #[error(
+        "angle `{found}` is not a number; expected decimal degrees such as -90 or 12.5, or a name such as alpha"
+    )]
     NotANumber {
         /// The text found.
         found: String,
     },
     /// More decimals than are kept exactly.
-    #[error("angle `{found}` has {decimals} decimals; expected at most {MAX_DECIMALS} (angles are exact, not rounded)")]
+    #[error(
+        "angle `{found}` has {decimals} decimals; expected at most {MAX_DECIMALS} (angles are exact, not rounded)"
+    )]
     TooManyDecimals {
         /// The text found.
         found: String,
@@ -165,9 +169,8 @@ impl FromStr for Angle {
         let text = text.trim();
         // split `+-number` and `+-name` at a sign inside the text
         let split = text.char_indices().skip(1).find(|&(_, c)| c == '+' || c == '-').map(|(i, _)| i);
-        let is_name = |s: &str| {
-            s.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_alphabetic())
-        };
+        let is_name =
+            |s: &str| s.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_alphabetic());
         let signed = |s: &str, nanodeg: i64| {
             let minus = s.starts_with('-');
             Self::named(s.strip_prefix(['+', '-']).unwrap_or(s), minus, nanodeg)

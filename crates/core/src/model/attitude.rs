@@ -11,9 +11,7 @@ pub type Euler = [Angle; 3];
 
 /// `a b`.
 pub fn product<R: Ring>(ring: &R, a: &Matrix3<R::Element>, b: &Matrix3<R::Element>) -> Matrix3<R::Element> {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| ring.dot((0..3).map(|k| (&a[i][k], &b[k][j]))))
-    })
+    std::array::from_fn(|i| std::array::from_fn(|j| ring.dot((0..3).map(|k| (&a[i][k], &b[k][j])))))
 }
 
 /// The elementary passive rotation about `axis` (0, 1, 2) by the angle of cosine `c` and sine `s`:

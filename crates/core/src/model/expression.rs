@@ -23,9 +23,15 @@ pub struct Expression {
 #[allow(missing_docs, reason = "the usual operations")]
 pub enum Node {
     /// `mantissa / 10^decimals`.
-    Number { mantissa: i64, decimals: u32 },
+    Number {
+        mantissa: i64,
+        decimals: u32,
+    },
     Name(String),
-    Call { function: Function, argument: String },
+    Call {
+        function: Function,
+        argument: String,
+    },
     Negate(Box<Expression>),
     Add(Box<Expression>, Box<Expression>),
     Subtract(Box<Expression>, Box<Expression>),
@@ -405,7 +411,8 @@ mod tests {
     #[test]
     fn values_that_fail() {
         let f = Field::new((1 << 60) + 33);
-        let wrong = |text: &str| evaluate(&parse(text).expect("parses"), &f, &Env).expect_err("wrong").to_string();
+        let wrong =
+            |text: &str| evaluate(&parse(text).expect("parses"), &f, &Env).expect_err("wrong").to_string();
         assert_eq!(wrong("D_FZ"), "`D_FZ` is not known here; did you mean `D_FX`?");
         assert_eq!(wrong("1/(x-3)"), "division by zero");
         assert_eq!(wrong("nothing_like_it"), "`nothing_like_it` is not known here");

@@ -124,7 +124,9 @@ pub enum GeometryError {
         s: SignedAxis,
     },
     /// Two gyros measure about the same axis.
-    #[error("gyros {first} and {second} both have their input axis along {axis}; expected three different axes")]
+    #[error(
+        "gyros {first} and {second} both have their input axis along {axis}; expected three different axes"
+    )]
     SharedInput {
         /// One gyro.
         first: char,
@@ -189,18 +191,8 @@ pub enum Term {
 
 impl Term {
     /// All terms in the order of the unknowns.
-    pub const ALL: [Self; 10] = [
-        Self::F,
-        Self::I,
-        Self::O,
-        Self::S,
-        Self::II,
-        Self::OO,
-        Self::SS,
-        Self::IO,
-        Self::IS,
-        Self::OS,
-    ];
+    pub const ALL: [Self; 10] =
+        [Self::F, Self::I, Self::O, Self::S, Self::II, Self::OO, Self::SS, Self::IO, Self::IS, Self::OS];
 
     /// The letters of the term.
     pub fn letters(self) -> &'static str {
@@ -245,7 +237,9 @@ impl Term {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TermError {
     /// Not a term.
-    #[error("`{found}` is not a term of the gyro model; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, or `drift` alone")]
+    #[error(
+        "`{found}` is not a term of the gyro model; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, or `drift` alone"
+    )]
     Unknown {
         /// The text found.
         found: String,
@@ -318,8 +312,7 @@ mod tests {
     fn the_default_is_the_papers_and_valid() {
         let g = Geometry::default();
         assert_eq!(g.validate(), Ok(()));
-        let text: Vec<String> =
-            g.gyros().iter().map(|a| format!("I={} O={} S={}", a.I, a.O, a.S)).collect();
+        let text: Vec<String> = g.gyros().iter().map(|a| format!("I={} O={} S={}", a.I, a.O, a.S)).collect();
         assert_eq!(text, ["I=+x O=-z S=+y", "I=+y O=-z S=-x", "I=+z O=+x S=+y"]);
     }
 

@@ -11,8 +11,7 @@ use super::scheme::{Carry, Scheme, SchemeError};
 /// The local unknowns of one position, in n: `psi^n` then `eps^n`.
 pub const LOCAL: usize = 6;
 /// Names of the local unknowns.
-pub const LOCAL_NAMES: [&str; LOCAL] =
-    ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n"];
+pub const LOCAL_NAMES: [&str; LOCAL] = ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n"];
 
 /// A scheme with its unknowns spelled out.
 #[derive(Debug, Clone)]
@@ -87,7 +86,9 @@ impl Platform {
             Unknowns::Drift => Vec::new(),
             Unknowns::Coefficients(terms) => terms
                 .iter()
-                .flat_map(|term| scheme.geometry.gyros().map(|g| DriftTerm { input: g.I, factors: term.factors(&g) }))
+                .flat_map(|term| {
+                    scheme.geometry.gyros().map(|g| DriftTerm { input: g.I, factors: term.factors(&g) })
+                })
                 .collect(),
         };
         Ok(Self { scheme, names, units, drift })

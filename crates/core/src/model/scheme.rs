@@ -49,10 +49,7 @@ pub struct CarryError {
 impl FromStr for Carry {
     type Err = CarryError;
     fn from_str(text: &str) -> Result<Self, CarryError> {
-        Self::ALL
-            .into_iter()
-            .find(|c| c.to_string() == text)
-            .ok_or_else(|| CarryError { found: text.into() })
+        Self::ALL.into_iter().find(|c| c.to_string() == text).ok_or_else(|| CarryError { found: text.into() })
     }
 }
 
@@ -128,7 +125,9 @@ pub struct Position {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PositionError {
     /// Not three angles.
-    #[error("position `{text}` has {found} angle(s); expected three, as in 180,0,0, or three direction letters, as in NUE")]
+    #[error(
+        "position `{text}` has {found} angle(s); expected three, as in 180,0,0, or three direction letters, as in NUE"
+    )]
     Count {
         /// The text found.
         text: String,
@@ -146,7 +145,9 @@ pub enum PositionError {
         error: AngleError,
     },
     /// Letters, but no right-handed attitude.
-    #[error("`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, perpendicular and right-handed, as in NUE or NDW")]
+    #[error(
+        "`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, perpendicular and right-handed, as in NUE or NDW"
+    )]
     Cardinal {
         /// The text found.
         found: String,
@@ -225,7 +226,9 @@ pub enum SchemeError {
         name: String,
     },
     /// The drift alone is constant at one position only.
-    #[error("the unknowns `drift` describe a single position; found {found} positions (use coefficients such as --terms F,I,O,S)")]
+    #[error(
+        "the unknowns `drift` describe a single position; found {found} positions (use coefficients such as --terms F,I,O,S)"
+    )]
     DriftPositions {
         /// Number of positions.
         found: usize,

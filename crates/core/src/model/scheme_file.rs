@@ -75,10 +75,8 @@ pub struct PositionEntry {
 /// # Errors
 /// [`SchemeFileError`] with the byte range of the offender.
 pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
-    let file: SchemeFile = toml::from_str(text).map_err(|e| SchemeFileError {
-        message: e.message().trim().to_string(),
-        span: e.span(),
-    })?;
+    let file: SchemeFile = toml::from_str(text)
+        .map_err(|e| SchemeFileError { message: e.message().trim().to_string(), span: e.span() })?;
     let at = |span: Range<usize>, message: String| SchemeFileError { message, span: Some(span) };
     // numbers are read from the text itself, where they are exact
     let literal = |value: &Spanned<toml::Value>| match value.get_ref() {
@@ -95,7 +93,10 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         geometry.get_ref().validate().map_err(|e| at(geometry.span(), e.to_string()))?;
     }
     if let Some(carry) = &file.carry {
-        scheme.carry = carry.get_ref().parse().map_err(|e: super::scheme::CarryError| at(carry.span(), e.to_string()))?;
+        scheme.carry = carry
+            .get_ref()
+            .parse()
+            .map_err(|e: super::scheme::CarryError| at(carry.span(), e.to_string()))?;
     }
     if let Some(latitude) = &file.latitude_deg {
         let parsed: Result<Latitude, _> = literal(latitude).parse();
@@ -137,7 +138,10 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         let name = p.name.clone().unwrap_or_else(|| format!("p{}", i + 1));
         let plain = |c: char| c.is_alphanumeric() || "_-. ".contains(c);
         if name.is_empty() || !name.chars().all(plain) {
-            return Err(at(entry.span(), format!("position name `{name}`; expected letters, digits, `_`, `-`, `.` and blanks")));
+            return Err(at(
+                entry.span(),
+                format!("position name `{name}`; expected letters, digits, `_`, `-`, `.` and blanks"),
+            ));
         }
         scheme.positions.push(Position { name, angles });
     }
@@ -173,7 +177,10 @@ attitude = "NDW"
         assert_eq!(scheme.latitude.map(|l| l.to_string()), Some("28.2".into()));
         assert_eq!(scheme.unknowns.to_string(), "F,I,SS");
         assert_eq!(scheme.positions[0].angles_text(), "0,-12.123456789,alpha");
-        assert_eq!((scheme.positions[1].name.as_str(), scheme.positions[1].angles_text().as_str()), ("upside down", "180,0,0"));
+        assert_eq!(
+            (scheme.positions[1].name.as_str(), scheme.positions[1].angles_text().as_str()),
+            ("upside down", "180,0,0")
+        );
         assert_eq!(scheme.validate(), Ok(()));
     }
 

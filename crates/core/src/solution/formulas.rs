@@ -42,9 +42,14 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
         .map(|b| b.rows.iter().map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()).collect())
         .collect();
     let columns: Vec<Vec<usize>> = platform.blocks(&text_point).into_iter().map(|b| b.columns).collect();
-    let worker = solver.worker().ok_or("formulas of Z need the symbolic engine and at most three angles that are no multiples of 15 deg")?;
-    let request =
-        Request { symbols: vec!["wN".into(), "wU".into()], generators: vec![], job: Job::Derive { dynamics, order: ORDER } };
+    let worker = solver.worker().ok_or(
+        "formulas of Z need the symbolic engine and at most three angles that are no multiples of 15 deg",
+    )?;
+    let request = Request {
+        symbols: vec!["wN".into(), "wU".into()],
+        generators: vec![],
+        job: Job::Derive { dynamics, order: ORDER },
+    };
     let (texts, _) = worker.ask(&request).map_err(|e| format!("no formulas of Z: {e}"))?;
     let mut out = Vec::new();
     for (i, (component, _)) in local_output(&Text, azimuth).iter().enumerate() {
@@ -64,7 +69,8 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
                 .collect();
             let mut right = String::new();
             for term in terms {
-                let (negative, magnitude) = term.strip_prefix('-').map_or((false, term.as_str()), |m| (true, m));
+                let (negative, magnitude) =
+                    term.strip_prefix('-').map_or((false, term.as_str()), |m| (true, m));
                 right.push_str(match (right.is_empty(), negative) {
                     (true, true) => "-",
                     (true, false) => "",

@@ -42,10 +42,7 @@ impl RateZeros {
     /// Of the latitude of `platform`.
     pub fn of(platform: &Platform) -> Self {
         let latitude = platform.scheme().latitude;
-        Self {
-            w_n: latitude.is_some_and(|l| l.is_pole()),
-            w_u: latitude.is_some_and(|l| l.is_equator()),
-        }
+        Self { w_n: latitude.is_some_and(|l| l.is_pole()), w_u: latitude.is_some_and(|l| l.is_equator()) }
     }
 }
 
@@ -104,7 +101,6 @@ pub fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalO
     out
 }
 
-
 /// The rows of `observables` at every position of `platform`, at `point`.
 pub fn rows_at<R: Ring>(
     platform: &Platform,
@@ -113,9 +109,8 @@ pub fn rows_at<R: Ring>(
 ) -> Vec<Vec<R::Element>> {
     let ring = &point.ring;
     let power = |rates: Rates| {
-        let factor = |base: &R::Element, e: i32| {
-            (0..e).fold(ring.one(), |product, _| ring.mul(&product, base))
-        };
+        let factor =
+            |base: &R::Element, e: i32| (0..e).fold(ring.one(), |product, _| ring.mul(&product, base));
         ring.mul(&factor(&point.w_n, rates[0]), &factor(&point.w_u, rates[1]))
     };
     let row = |block: &Block<R::Element>, o: &LocalObservable| {
@@ -145,9 +140,13 @@ mod tests {
     fn observables_of_one_position_follow_from_the_recursion() {
         let f = Field::new((1 << 60) + 33);
         let mut rng = SplitMix64::new(4);
-        for (pole, equator, azimuth) in
-            [(false, false, false), (true, false, false), (false, true, false), (false, false, true), (true, false, true)]
-        {
+        for (pole, equator, azimuth) in [
+            (false, false, false),
+            (true, false, false),
+            (false, true, false),
+            (false, false, true),
+            (true, false, true),
+        ] {
             let mut rate = |zero: bool| if zero { 0 } else { f.from_u64(rng.next_u64()) };
             let (w_n, w_u) = (rate(pole), rate(equator));
             let dynamics = local_dynamics(&f, &w_n, &w_u);
@@ -159,9 +158,8 @@ mod tests {
                 })
             };
             let power = |r: Rates| {
-                let factor = |w: u64, e: i32| {
-                    f.pow(if e < 0 { f.inv(w) } else { w }, e.unsigned_abs().into())
-                };
+                let factor =
+                    |w: u64, e: i32| f.pow(if e < 0 { f.inv(w) } else { w }, e.unsigned_abs().into());
                 f.mul(factor(w_n, r[0]), factor(w_u, r[1]))
             };
             let observables = local_observables(RateZeros { w_n: pole, w_u: equator }, azimuth);

@@ -59,14 +59,17 @@ pub fn loci(
     }
     let others = platform.scheme().positions.iter().flat_map(|p| &p.angles);
     if !others.clone().all(|a| a.turn().is_multiple_of_deg(90)) {
-        return Err("degenerate loci are computed when all other angles and offsets are multiples of 90 deg".into());
+        return Err(
+            "degenerate loci are computed when all other angles and offsets are multiples of 90 deg".into()
+        );
     }
     let requests = candidate_requests(platform, verdicts, solver, &names);
     let Some(worker) = solver.worker() else { return Ok(None) };
     let mut conditions: Vec<Condition> = names.iter().cloned().map(Condition::HalfTurn).collect();
     let mut seen: Vec<String> = Vec::new();
     for request in requests {
-        let (factors, _) = worker.ask(&request).map_err(|e| format!("degenerate loci were not computed: {e}"))?;
+        let (factors, _) =
+            worker.ask(&request).map_err(|e| format!("degenerate loci were not computed: {e}"))?;
         for factor in factors.into_iter().filter(|f| !seen.contains(f)).collect::<Vec<_>>() {
             conditions.push(Condition::Factor(factor.clone()));
             seen.push(factor);
@@ -96,7 +99,12 @@ pub fn loci(
 }
 
 /// One request per candidate matrix, over `t_name = tan(name/2)`.
-fn candidate_requests(platform: &Platform, verdicts: &Verdicts, solver: &Solver<'_>, names: &[String]) -> Vec<Request> {
+fn candidate_requests(
+    platform: &Platform,
+    verdicts: &Verdicts,
+    solver: &Solver<'_>,
+    names: &[String],
+) -> Vec<Request> {
     let point = half_tangent_point(platform, solver);
     let text = rows_at(platform, &point, &solver.tables.observables);
     let first = solver.tables.first();
@@ -105,7 +113,8 @@ fn candidate_requests(platform: &Platform, verdicts: &Verdicts, solver: &Solver<
     let mut out: Vec<Request> = Vec::new();
     // where all entries of one column vanish, its unknown is no longer excited
     for c in 0..n {
-        let column: Vec<Vec<String>> = text.iter().filter(|row| row[c] != "0").map(|row| vec![row[c].clone()]).collect();
+        let column: Vec<Vec<String>> =
+            text.iter().filter(|row| row[c] != "0").map(|row| vec![row[c].clone()]).collect();
         let job = Job::MinorFactors { matrix: column };
         out.push(Request { symbols: symbols.clone(), generators: vec![], job });
     }
@@ -131,7 +140,8 @@ fn candidate_requests(platform: &Platform, verdicts: &Verdicts, solver: &Solver<
 
 fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
     let rate = |zero: bool| if zero { Text.zero() } else { Text.one() };
-    let quarter = [("1", "0"), ("0", "1"), ("-1", "0"), ("0", "-1")].map(|(c, s)| (c.to_string(), s.to_string()));
+    let quarter =
+        [("1", "0"), ("0", "1"), ("-1", "0"), ("0", "-1")].map(|(c, s)| (c.to_string(), s.to_string()));
     let cos_sin = |angle: &crate::model::Angle| {
         let (a, b) = &quarter[(angle.turn().nanodeg() / 90_000_000_000) as usize % 4];
         let Some((name, minus)) = angle.generic() else { return (a.clone(), b.clone()) };

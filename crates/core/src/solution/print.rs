@@ -102,7 +102,9 @@ pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
     match grouped.factor {
         None if out.is_empty() => "0".into(),
         None => out,
-        Some(factor) if grouped.groups.len() == 1 && grouped.groups[0].terms.len() == 1 => format!("{factor} {out}"),
+        Some(factor) if grouped.groups.len() == 1 && grouped.groups[0].terms.len() == 1 => {
+            format!("{factor} {out}")
+        }
         Some(factor) => format!("{factor} [ {out} ]"),
     }
 }

@@ -61,7 +61,11 @@ impl Problem {
     /// The right sides are the target's entries, column by column.
     pub fn solution(rows: &[usize], columns: usize) -> Self {
         let equation = |c: usize| (rows.iter().map(|&j| (j, c)).collect(), Right::Target(c));
-        Self { unknowns: rows.len(), equations: (0..columns).map(equation).collect(), outputs: Outputs::Unknowns }
+        Self {
+            unknowns: rows.len(),
+            equations: (0..columns).map(equation).collect(),
+            outputs: Outputs::Unknowns,
+        }
     }
 
     /// The combination of the given rows that vanishes outside `support` and is one at `lead`.
@@ -81,10 +85,19 @@ impl Problem {
     pub fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
         let others: Vec<usize> = support.iter().copied().filter(|&c| c != lead).collect();
         let equation = |&j: &usize| (others.iter().map(|&c| (j, c)).collect(), Right::Minus((j, lead)));
-        Self { unknowns: others.len(), equations: rows.iter().map(equation).collect(), outputs: Outputs::Unknowns }
+        Self {
+            unknowns: others.len(),
+            equations: rows.iter().map(equation).collect(),
+            outputs: Outputs::Unknowns,
+        }
     }
 
-    fn outputs_of<R: Ring>(&self, ring: &R, table: &[Vec<R::Element>], x: Vec<R::Element>) -> Vec<R::Element> {
+    fn outputs_of<R: Ring>(
+        &self,
+        ring: &R,
+        table: &[Vec<R::Element>],
+        x: Vec<R::Element>,
+    ) -> Vec<R::Element> {
         match &self.outputs {
             Outputs::Unknowns => x,
             Outputs::Sums(sums) => sums
@@ -113,7 +126,8 @@ impl Problem {
             let (r, c) = self.equations[e].0[i];
             table[r][c]
         });
-        let b = DVector::from_iterator(m, self.equations.iter().map(|(_, t)| t.value(&Float, table, targets)));
+        let b =
+            DVector::from_iterator(m, self.equations.iter().map(|(_, t)| t.value(&Float, table, targets)));
         let qr = a.clone().qr();
         let (q, r) = (qr.q(), qr.r());
         let x = r.solve_upper_triangular(&(q.transpose() * &b))?;
@@ -126,8 +140,7 @@ impl Problem {
     pub fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> System {
         let cell = |&(r, c): &Place| table[r][c].clone();
         let matrix = self.equations.iter().map(|(places, _)| places.iter().map(cell).collect()).collect();
-        let right =
-            self.equations.iter().map(|(_, t)| t.value(&Text, table, targets)).collect();
+        let right = self.equations.iter().map(|(_, t)| t.value(&Text, table, targets)).collect();
         let outputs = match &self.outputs {
             Outputs::Unknowns => Vec::new(),
             Outputs::Sums(sums) => sums.iter().map(|places| places.iter().map(cell).collect()).collect(),
@@ -143,9 +156,10 @@ mod tests {
     #[test]
     fn one_problem_in_two_rings() {
         let f = Field::new((1 << 60) + 33);
-        let table = vec![vec![1i64, 2, 0], vec![0, 1, 1], vec![1, 0, 1]];
+        let table = [vec![1i64, 2, 0], vec![0, 1, 1], vec![1, 0, 1]];
         let floats: Vec<Vec<f64>> = table.iter().map(|r| r.iter().map(|&a| a as f64).collect()).collect();
-        let images: Vec<Vec<u64>> = table.iter().map(|r| r.iter().map(|&a| f.from_i64(a)).collect()).collect();
+        let images: Vec<Vec<u64>> =
+            table.iter().map(|r| r.iter().map(|&a| f.from_i64(a)).collect()).collect();
         // e_0 = (row0 - 2 row1 + 2 row2) / 3
         let p = Problem::solution(&[0, 1, 2], 3);
         let x = p.solve_in_floats(&floats, &[1.0, 0.0, 0.0]).expect("solvable");

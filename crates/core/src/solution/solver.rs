@@ -42,7 +42,7 @@ pub enum Frame {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verification {
-    /// By exact substitution of the derivatives of Z, and by comparison with the prime fields.
+    /// By exact substitution of the derivatives of Z, and by substitution in two prime fields.
     Symbolic,
     /// By substitution in two prime fields.
     Modular,
@@ -81,8 +81,17 @@ impl Solved {
     }
 }
 
-/// A linear functional of the unknowns: columns and coefficients.
-pub type Functional = Vec<(usize, Coefficient)>;
+/// Columns and their coefficients.
+pub type Sparse = Vec<(usize, Coefficient)>;
+
+/// A linear functional of the unknowns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Functional {
+    /// Columns and coefficients, as printed.
+    pub terms: Sparse,
+    /// Its exact images as rows, one per table in the order of the tables.
+    images: Vec<Vec<u64>>,
+}
 
 /// Place of a term in a solution: (order, component, azimuth, rates, position).
 type Key = (usize, usize, bool, Rates, usize);
@@ -124,7 +133,17 @@ impl<'a> Solver<'a> {
             let rows = rows_at(platform, &point, &tables.observables);
             (point, rows)
         });
-        Self { platform, verdicts, tables, symbols, text, text_point, floats, worker: worker.filter(|_| usable), frame }
+        Self {
+            platform,
+            verdicts,
+            tables,
+            symbols,
+            text,
+            text_point,
+            floats,
+            worker: worker.filter(|_| usable),
+            frame,
+        }
     }
 
     /// Whether formulas in sines and cosines are out of question: too many different angles.
@@ -142,28 +161,48 @@ impl<'a> Solver<'a> {
         self.worker.as_deref_mut()
     }
 
-    fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
-        let k = &table.sample.roots;
-        let number = match &c.number {
-            Number::Radical(r) => r.image(k),
-            Number::Text { raw, .. } => self.symbols.value(raw, &self.verdicts.values[field], &table.sample)?,
-            Number::Decimal(_) => return None,
+    /// The functional with the given exact coefficients; `None` when one of them is a decimal.
+    pub fn functional(&self, terms: Sparse) -> Option<Functional> {
+        let value = |c: &Coefficient, field: usize, table: &Table| {
+            let k = &table.sample.roots;
+            let number = match &c.number {
+                Number::Radical(r) => r.image(k),
+                Number::Text { raw, .. } => {
+                    self.symbols.value(raw, &self.verdicts.values[field], &table.sample)?
+                }
+                Number::Decimal(_) => return None,
+            };
+            Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
         };
-        Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
+        let row = |(field, table): (usize, &Table)| {
+            let mut row = vec![0; self.platform.names().len()];
+            for (column, c) in &terms {
+                row[*column] = value(c, field, table)?;
+            }
+            Some(row)
+        };
+        let images = self.all_tables().map(row).collect::<Option<_>>()?;
+        Some(Functional { terms, images })
     }
 
-    /// The coefficients of a functional as a row of the table's field.
-    pub fn functional_image(&self, functional: &Functional, field: usize, table: &Table) -> Option<Vec<u64>> {
-        let mut row = vec![0; self.platform.names().len()];
-        for (column, c) in functional {
-            row[*column] = self.image(c, field, table)?;
-        }
-        Some(row)
+    /// The functional on `support` whose coefficients are the outputs of `problem`.
+    pub fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
+        let (coefficients, values) = self.coefficients(problem)?;
+        let scatter = |values: &Vec<u64>| {
+            let mut row = vec![0; self.platform.names().len()];
+            for (&column, &value) in support.iter().zip(values) {
+                row[column] = value;
+            }
+            row
+        };
+        let images = values.iter().map(scatter).collect();
+        Some(Functional { terms: support.iter().copied().zip(coefficients).collect(), images })
     }
 
     /// All nine tables with the index of their field.
     fn all_tables(&self) -> impl Iterator<Item = (usize, &Table)> {
-        let main = self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)));
+        let main =
+            self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)));
         main.chain([(0, &self.tables.other_rates)])
     }
 
@@ -199,46 +238,55 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Whether the text has the given images (in the order of `all_tables`, without the last).
+    /// Whether the text solves the system in the prime fields too: it must have the images of the
+    /// solution there (in the order of `all_tables`, without the last).
     fn agrees(&self, text: &str, numbers: &[u64]) -> bool {
-        self.all_tables().zip(numbers).take(8).all(|((i, t), &n)| {
-            self.symbols.value(text, &self.verdicts.values[i], &t.sample) == Some(n)
-        })
+        self.all_tables()
+            .zip(numbers)
+            .take(8)
+            .all(|((i, t), &n)| self.symbols.value(text, &self.verdicts.values[i], &t.sample) == Some(n))
     }
 
     fn text_number(&self, raw: String) -> Number {
         Number::Text { shown: self.symbols.display(&raw), raw }
     }
 
-    /// The outputs of a problem without targets, as coefficients: exact where possible, then decimals,
-    /// then (generic angles) formulas. `None` when nothing of these is at hand.
-    pub fn coefficients(&mut self, problem: &Problem) -> Option<Vec<Coefficient>> {
+    /// The outputs of a problem without targets, as coefficients and as their images in all tables:
+    /// roots where possible, then readable formulas in sines and cosines, then decimals. `None` when
+    /// nothing of these is at hand.
+    pub fn coefficients(&mut self, problem: &Problem) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
         let solve = |(_, t): (usize, &Table)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
         let values: Vec<Vec<u64>> = self.all_tables().map(solve).collect::<Option<_>>()?;
         let split = self.split_rates(&values)?;
-        let exact: Option<Vec<Coefficient>> = split
-            .iter()
-            .map(|(rates, numbers)| {
-                Some(Coefficient { number: Number::Radical(self.recover(numbers)?), rates: *rates })
-            })
-            .collect();
+        let numbers = self.output_numbers(problem, &split)?;
+        let coefficients =
+            numbers.into_iter().zip(&split).map(|(number, (rates, _))| Coefficient { number, rates: *rates });
+        Some((coefficients.collect(), values))
+    }
+
+    fn output_numbers(&mut self, problem: &Problem, split: &[(Rates, Vec<u64>)]) -> Option<Vec<Number>> {
+        let exact: Option<Vec<Number>> =
+            split.iter().map(|(_, numbers)| self.recover(numbers).map(Number::Radical)).collect();
         if exact.is_some() {
             return exact;
         }
-        if let Some((_, rows)) = &self.floats {
-            let numbers = problem.solve_in_floats(rows, &[])?;
-            let pairs = numbers.into_iter().zip(&split);
-            return Some(pairs.map(|(x, (rates, _))| Coefficient { number: Number::Decimal(x), rates: *rates }).collect());
+        let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
+        if let Some(texts) = self.ask_for_outputs(problem) {
+            let fine = |(raw, (_, numbers)): (&String, &(Rates, Vec<u64>))| {
+                self.symbols.display(raw).len() <= limit && self.agrees(raw, numbers)
+            };
+            if texts.iter().zip(split).all(fine) {
+                let pairs = texts.into_iter().zip(split);
+                return Some(pairs.map(|(raw, (_, numbers))| self.simplest(raw, numbers)).collect());
+            }
         }
+        let (_, rows) = self.floats.as_ref()?;
+        Some(problem.solve_in_floats(rows, &[])?.into_iter().map(|x| Number::Decimal(tidy(x))).collect())
+    }
+
+    fn ask_for_outputs(&mut self, problem: &Problem) -> Option<Vec<String>> {
         let request = self.request(problem.to_text(&self.text_or_none()?, &[]), None);
-        let (texts, _) = self.worker.as_deref_mut()?.ask(&request).ok()?;
-        let pairs = texts.into_iter().zip(&split);
-        pairs
-            .map(|(raw, (rates, numbers))| {
-                let fine = raw.len() <= PRINTABLE && self.agrees(&raw, numbers);
-                fine.then(|| Coefficient { number: self.simplest(raw, numbers), rates: *rates })
-            })
-            .collect()
+        Some(self.worker.as_deref_mut()?.ask(&request).ok()?.0)
     }
 
     fn text_or_none(&self) -> Option<Vec<Vec<String>>> {
@@ -253,11 +301,7 @@ impl<'a> Solver<'a> {
     /// `Err` says why there is none to print.
     pub fn solve(&mut self, functional: &Functional, degree: usize) -> Result<Solved, String> {
         const LOST: &str = "its coefficients have no short exact form";
-        let targets: Vec<Vec<u64>> = self
-            .all_tables()
-            .map(|(i, t)| self.functional_image(functional, i, t))
-            .collect::<Option<_>>()
-            .ok_or(LOST)?;
+        let targets = &functional.images;
         let first = self.tables.first();
         let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
         let support = short_support(
@@ -271,7 +315,7 @@ impl<'a> Solver<'a> {
         let problem = Problem::solution(&support, self.platform.names().len());
         let y: Vec<Vec<u64>> = self
             .all_tables()
-            .zip(&targets)
+            .zip(targets)
             .map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target))
             .collect::<Option<_>>()
             .ok_or(LOST)?;
@@ -294,7 +338,9 @@ impl<'a> Solver<'a> {
         let (numbers, verification) = match (symbolic, exact) {
             (Some(texts), exact) => {
                 if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
-                    return Err("the symbolic engine and the prime fields disagree: please report this scheme".into());
+                    return Err(
+                        "its coefficients do not solve the system in the prime fields: please report this scheme".into(),
+                    );
                 }
                 let longest = texts.iter().map(|t| self.symbols.display(t).len()).max().unwrap_or(0);
                 let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
@@ -304,7 +350,8 @@ impl<'a> Solver<'a> {
                     (texts.into_iter().map(|t| self.text_number(t)).collect(), Verification::Symbolic)
                 } else {
                     let decimals = self.decimals(functional, &problem, &plan);
-                    let numbers = decimals.ok_or_else(|| format!("its longest coefficient has {longest} characters"))?;
+                    let numbers = decimals
+                        .ok_or_else(|| format!("its longest coefficient has {longest} characters"))?;
                     (numbers, Verification::Numeric)
                 }
             }
@@ -346,9 +393,11 @@ impl<'a> Solver<'a> {
                     _ => vec![z.component],
                 };
                 for component in printed {
-                    plan.entry((z.order, component, azimuth, rates, position))
-                        .or_default()
-                        .push((j, z.sign, z.component));
+                    plan.entry((z.order, component, azimuth, rates, position)).or_default().push((
+                        j,
+                        z.sign,
+                        z.component,
+                    ));
                 }
             }
         }
@@ -356,7 +405,12 @@ impl<'a> Solver<'a> {
     }
 
     /// `sum sign * x_j * (axis factor)` for every printed term: `Z^n = C_c^n Z^c`.
-    fn term_numbers<R: Ring>(&self, point: &Point<R>, plan: &[(Key, Vec<Contribution>)], x: &[R::Element]) -> Vec<R::Element> {
+    fn term_numbers<R: Ring>(
+        &self,
+        point: &Point<R>,
+        plan: &[(Key, Vec<Contribution>)],
+        x: &[R::Element],
+    ) -> Vec<R::Element> {
         let ring = &point.ring;
         plan.iter()
             .map(|((_, component, azimuth, _, position), contributions)| {
@@ -369,7 +423,14 @@ impl<'a> Solver<'a> {
             .collect()
     }
 
-    fn axis_factor<R: Ring>(&self, point: &Point<R>, position: usize, component: usize, azimuth: bool, in_n: usize) -> R::Element {
+    fn axis_factor<R: Ring>(
+        &self,
+        point: &Point<R>,
+        position: usize,
+        component: usize,
+        azimuth: bool,
+        in_n: usize,
+    ) -> R::Element {
         match self.frame {
             Frame::Platform if !azimuth => {
                 c_n_from_euler(&point.ring, &point.cos_sin[position])[in_n - 1][component - 1].clone()
@@ -378,10 +439,15 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn decimals(&self, functional: &Functional, problem: &Problem, plan: &[(Key, Vec<Contribution>)]) -> Option<Vec<Number>> {
+    fn decimals(
+        &self,
+        functional: &Functional,
+        problem: &Problem,
+        plan: &[(Key, Vec<Contribution>)],
+    ) -> Option<Vec<Number>> {
         let (point, rows) = self.floats.as_ref()?;
         let mut target = vec![0.0; self.platform.names().len()];
-        for (column, c) in functional {
+        for (column, c) in &functional.terms {
             target[*column] = match &c.number {
                 Number::Radical(r) => r.to_f64(),
                 Number::Decimal(x) => *x,
@@ -404,7 +470,7 @@ impl<'a> Solver<'a> {
     ) -> Option<Vec<String>> {
         let text = self.text_or_none()?;
         let mut target = vec![(Text.zero(), Text.one()); self.platform.names().len()];
-        for (column, c) in functional {
+        for (column, c) in &functional.terms {
             let number = match &c.number {
                 Number::Radical(r) => radical_text(r),
                 Number::Text { raw, .. } => raw.clone(),

@@ -44,12 +44,16 @@ mod tests {
     #[test]
     fn takes_the_short_way() {
         let f = Field::new((1 << 60) + 33);
-        let rows: Vec<Vec<u64>> =
-            [[1, 1, 1], [0, 1, 1], [1, 1, 0], [0, 1, 0]].map(|r| r.map(|a: i64| f.from_i64(a)).to_vec()).to_vec();
+        let rows: Vec<Vec<u64>> = [[1, 1, 1], [0, 1, 1], [1, 1, 0], [0, 1, 0]]
+            .map(|r| r.map(|a: i64| f.from_i64(a)).to_vec())
+            .to_vec();
         let e0 = [f.one(), 0, 0];
         let found = short_support(f, &rows, &[0, 1, 2, 3], &e0, |_| 1);
         assert!(found == Some(vec![0, 1]) || found == Some(vec![2, 3]), "{found:?}");
-        assert_eq!(short_support(f, &rows, &[0, 1, 2, 3], &e0, |j| if j < 2 { 5 } else { 1 }), Some(vec![2, 3]));
+        assert_eq!(
+            short_support(f, &rows, &[0, 1, 2, 3], &e0, |j| if j < 2 { 5 } else { 1 }),
+            Some(vec![2, 3])
+        );
         assert_eq!(short_support(f, &rows, &[1], &e0, |_| 1), None);
     }
 }

@@ -63,7 +63,8 @@ impl Symbols {
 
     /// Algebraic symbols with their squares, for the worker: the cosines and the square roots.
     pub fn generators(&self) -> Vec<(String, String)> {
-        let roots = if self.radicals { vec![("r_2".into(), "2".into()), ("r_3".into(), "3".into())] } else { vec![] };
+        let roots =
+            if self.radicals { vec![("r_2".into(), "2".into()), ("r_3".into(), "3".into())] } else { vec![] };
         let cosines = (0..self.bases.len()).map(|i| {
             let suffix = self.suffix(i);
             (format!("c_{suffix}"), format!("1-s_{suffix}^2"))
@@ -128,7 +129,7 @@ impl Symbols {
         }
     }
 
-    /// Replaces the symbols by what they stand for: `sin(alpha)`, `cos(25)`, `sqrt(2)`.
+    /// Replaces the symbols by what they stand for: `sin(alpha)`, `cos(25 deg)`, `sqrt(2)`.
     pub fn display(&self, text: &str) -> String {
         let mut out = String::new();
         let mut rest = text;
@@ -158,7 +159,7 @@ impl Symbols {
         let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
         Some(match &self.bases[i] {
             Base::Name(name) => format!("{function}({name})"),
-            Base::Constant(nanodeg) => format!("{function}({})", format_decimal(*nanodeg)),
+            Base::Constant(nanodeg) => format!("{function}({} deg)", format_decimal(*nanodeg)),
         })
     }
 
@@ -187,7 +188,8 @@ struct SymbolValues<'a> {
 impl Environment for SymbolValues<'_> {
     fn name(&self, name: &str) -> Option<u64> {
         let (k, f) = (&self.sample.roots, self.sample.roots.field);
-        let angle = |nanodeg: i64| k.cos_sin(k.unit_circle(Angle::from_nanodeg(nanodeg).turn()).unwrap_or(f.one()));
+        let angle =
+            |nanodeg: i64| k.cos_sin(k.unit_circle(Angle::from_nanodeg(nanodeg).turn()).unwrap_or(f.one()));
         match name {
             "wN" => return Some(self.sample.point.w_n),
             "wU" => return Some(self.sample.point.w_u),
@@ -226,7 +228,16 @@ mod tests {
     /// The text of every cosine and sine has the value that the sample has.
     #[test]
     fn texts_have_the_values_of_the_sample() {
-        let attitudes = ["0,15,30", "45,60,75", "90,105,120", "-135,150,-165", "25,65,-115", "12.5,102.5,347.5", "alpha,-alpha,beta+15", "180-beta,alpha+25,270"];
+        let attitudes = [
+            "0,15,30",
+            "45,60,75",
+            "90,105,120",
+            "-135,150,-165",
+            "25,65,-115",
+            "12.5,102.5,347.5",
+            "alpha,-alpha,beta+15",
+            "180-beta,alpha+25,270",
+        ];
         let scheme = Scheme::of_angles(attitudes.map(|a| parse_attitude(a).expect("an attitude")));
         let platform = Platform::new(scheme).expect("valid");
         let symbols = Symbols::of(&platform);
@@ -240,6 +251,6 @@ mod tests {
                 assert_eq!(symbols.value(&t.1, &values, &sample), Some(v.1), "{}", t.1);
             }
         }
-        assert_eq!(symbols.display("-s_alpha*c_0^2/r_3"), "-sin(alpha)*cos(25)^2/sqrt(3)");
+        assert_eq!(symbols.display("-s_alpha*c_0^2/r_3"), "-sin(alpha)*cos(25 deg)^2/sqrt(3)");
     }
 }

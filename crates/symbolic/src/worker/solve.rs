@@ -2,14 +2,18 @@
 
 use symbolica::prelude::*;
 
+use super::JobError;
 use super::derive::derivatives;
 use super::tower::{Element, Tower, atom};
-use super::JobError;
 use crate::protocol::{Check, System};
 
 /// Solves the system and answers with `x` or `P x` as text, and whether the check was made (it fails
 /// the job when it does not hold).
-pub(crate) fn solve(tower: &Tower, system: &System, check: Option<&Check>) -> Result<(Vec<String>, bool), JobError> {
+pub(crate) fn solve(
+    tower: &Tower,
+    system: &System,
+    check: Option<&Check>,
+) -> Result<(Vec<String>, bool), JobError> {
     let unknowns = system.matrix.first().map_or(0, Vec::len);
     shape("right side", system.right.len(), system.matrix.len())?;
     let mut rows: Vec<Vec<Element>> = Vec::new();
@@ -86,7 +90,7 @@ fn verify(tower: &Tower, x: &[Element], check: &Check) -> Result<(), JobError> {
     let unknowns: Vec<_> = check.unknowns.iter().map(|s| atom(s)).collect::<Result<_, _>>()?;
     let mut rest: Vec<Element> = Vec::new();
     for (number, factor) in &check.target {
-        let factor = tower.from_scalar(tower.scalar(factor)?);
+        let factor = tower.lift(tower.scalar(factor)?);
         rest.push(tower.neg(&tower.mul(&tower.element(number)?, &factor)));
     }
     for (value, terms) in x.iter().zip(&check.terms) {
@@ -96,7 +100,7 @@ fn verify(tower: &Tower, x: &[Element], check: &Check) -> Result<(), JobError> {
                 expression = expression.replace(state.clone()).with(atom(text)?);
             }
             let expression = expression.expand();
-            let factor = tower.mul(value, &tower.from_scalar(tower.scalar(&t.factor)?));
+            let factor = tower.mul(value, &tower.lift(tower.scalar(&t.factor)?));
             for (slot, unknown) in rest.iter_mut().zip(&unknowns) {
                 let coefficient = expression.coefficient(unknown.clone());
                 *slot = tower.add(slot, &tower.mul(&factor, &tower.element_of(&coefficient)?));

@@ -41,7 +41,8 @@ impl Tower {
         let ids = symbols.iter().chain(&names).map(|s| symbol!(s)).collect();
         let mut tower = Self { symbols: symbol_map, ids, symbol_scalars: vec![], squares: vec![], names };
         tower.symbol_scalars = symbols.iter().map(|s| tower.scalar(s)).collect::<Result<_, _>>()?;
-        tower.squares = generators.iter().map(|(_, square)| tower.scalar(square)).collect::<Result<_, _>>()?;
+        tower.squares =
+            generators.iter().map(|(_, square)| tower.scalar(square)).collect::<Result<_, _>>()?;
         Ok(tower)
     }
 
@@ -66,7 +67,7 @@ impl Tower {
         Element(vec![self.zero_scalar(); self.size()])
     }
 
-    pub(crate) fn from_scalar(&self, s: Scalar) -> Element {
+    pub(crate) fn lift(&self, s: Scalar) -> Element {
         let mut e = self.zero();
         e.0[0] = s;
         e
@@ -85,7 +86,7 @@ impl Tower {
         let wrong = || JobError::NotAnElement { text: view.to_owned().to_string() };
         match view {
             AtomView::Num(n) => {
-                Ok(self.from_scalar(n.as_view().to_owned().to_rational_polynomial(&Q, &Z, self.symbols.clone())))
+                Ok(self.lift(n.as_view().to_owned().to_rational_polynomial(&Q, &Z, self.symbols.clone())))
             }
             AtomView::Var(v) => {
                 let known = self.ids.iter().position(|s| *s == v.get_symbol()).ok_or_else(wrong)?;
@@ -106,12 +107,12 @@ impl Tower {
                     }
                     base = self.inv(&base);
                 }
-                let one = self.from_scalar(self.one_scalar());
+                let one = self.lift(self.one_scalar());
                 Ok((0..exponent.unsigned_abs()).fold(one, |product, _| self.mul(&product, &base)))
             }
-            AtomView::Mul(m) => m
-                .iter()
-                .try_fold(self.from_scalar(self.one_scalar()), |product, x| Ok(self.mul(&product, &self.element_of_view(x)?))),
+            AtomView::Mul(m) => m.iter().try_fold(self.lift(self.one_scalar()), |product, x| {
+                Ok(self.mul(&product, &self.element_of_view(x)?))
+            }),
             AtomView::Add(a) => {
                 a.iter().try_fold(self.zero(), |sum, x| Ok(self.add(&sum, &self.element_of_view(x)?)))
             }
@@ -149,7 +150,7 @@ impl Tower {
 
     /// `1 / a` for `a != 0`: multiplies by the conjugate in the last generator until it is gone.
     pub(crate) fn inv(&self, a: &Element) -> Element {
-        let mut numerator = self.from_scalar(self.zero_scalar());
+        let mut numerator = self.lift(self.zero_scalar());
         numerator.0[0] = self.one_scalar();
         let mut norm = a.clone();
         for k in (0..self.squares.len()).rev() {
@@ -214,11 +215,11 @@ impl Tower {
             let product = (0..self.names.len())
                 .filter(|k| i & (1 << k) != 0)
                 .fold(x.to_expression(), |product, k| product * generator(k));
-            numerator = numerator + product;
+            numerator += product;
         }
         let mut result = numerator.factor() / denominator.to_expression().factor();
         for (k, power) in powers.into_iter().enumerate() {
-            result = result * generator(k).pow(i64::from(power));
+            result *= generator(k).pow(i64::from(power));
         }
         result.to_string()
     }

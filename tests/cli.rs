@@ -1,0 +1,290 @@
+//! The program end to end: real processes, real files.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+
+use serde_json::Value;
+
+fn obsdeg(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn run(arguments: &[&str]) -> Output {
+    obsdeg(arguments).output().expect("it runs")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).expect("UTF-8")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).expect("UTF-8")
+}
+
+const P1P2: [&str; 5] = ["analyze", "--angles", "0,0,0", "--angles", "180,0,0"];
+
+fn json(arguments: &[&str]) -> Value {
+    let output = run(arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+#[test]
+fn the_main_job_as_json() {
+    let a = json(&[&P1P2[..], &["--format", "json"]].concat());
+    assert_eq!(a["schema"], "obsdeg.analysis/1");
+    assert_eq!(a["carry"], "platform");
+    assert_eq!(a["latitude_deg"], Value::Null);
+    assert_eq!(a["rank"], 8);
+    assert_eq!(a["rank_profile"], serde_json::json!([2, 6, 8]));
+    assert_eq!(a["unknowns"].as_array().map(Vec::len), Some(15));
+    assert_eq!(a["positions"][1]["angles_deg"], serde_json::json!([180.0, 0.0, 0.0]));
+    let quantity = |name: &str| {
+        let list = a["quantities"].as_array().expect("a list");
+        list.iter().find(|q| q["name"] == name).expect("it is there").clone()
+    };
+    assert_eq!(quantity("D_FX")["degree"], 1);
+    assert_eq!(quantity("D_FX")["solution"]["text"], "1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]");
+    assert_eq!(quantity("psi_y")["status"], "inseparable");
+    assert_eq!(quantity("psi_y")["partners"], serde_json::json!(["D_FZ"]));
+    assert_eq!(quantity("D_IX")["status"], "not_excited");
+    assert_eq!(a["combinations"][0]["expression"], "D_FZ - wN*psi_y");
+    assert_eq!(a["null_space"][0][1], serde_json::json!({"name": "D_FZ", "coefficient": "wN"}));
+    let carries: Vec<&Value> = a["carries"].as_array().expect("a list").iter().map(|c| &c["carry"]).collect();
+    assert_eq!(carries, ["inertial", "reset"]);
+    assert!(a["certainty"]["error_bound"].as_f64().expect("a number") < 1e-20);
+}
+
+/// The paper's case word by word, with and without the symbolic engine.
+#[test]
+fn the_main_job_as_text() {
+    for format in ["table", "markdown", "csv", "latex"] {
+        let output = run(&[&P1P2[..], &["--format", format, "--solutions", "off"]].concat());
+        assert!(output.status.success() && output.stderr.is_empty());
+        insta::assert_snapshot!(format!("p1p2_{format}"), stdout(&output));
+    }
+}
+
+/// The solutions of the paper's case, from the references, when the symbolic engine is not to be had: a
+/// limit of zero seconds stops it before its first answer.
+#[test]
+fn without_the_engine_solutions_are_reconstructed_and_it_is_said() {
+    let refused = json(&[&P1P2[..], &["--format", "json", "--symbolic-limit", "0"]].concat());
+    let list = refused["quantities"].as_array().expect("a list");
+    let d_fx = list.iter().find(|q| q["name"] == "D_FX").expect("it is there");
+    assert_eq!(d_fx["solution"]["text"], "1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]");
+    assert_eq!(d_fx["solution"]["form"], "exact");
+    assert_eq!(d_fx["solution"]["verification"], "modular");
+    let note = refused["notes"].to_string();
+    let reason = if cfg!(feature = "symbolica") { "longer than 0 s" } else { "built without" };
+    assert!(note.contains(reason), "{note}");
+}
+
+#[test]
+fn eight_at_once_all_succeed_with_clean_output() {
+    let children: Vec<Child> = (0..8)
+        .map(|_| {
+            let mut command = obsdeg(&[&P1P2[..], &["--format", "json"]].concat());
+            command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
+        })
+        .collect();
+    let outputs: Vec<Output> = children.into_iter().map(|c| c.wait_with_output().expect("it ends")).collect();
+    for output in &outputs {
+        assert!(output.status.success(), "{}", stderr(output));
+        assert_eq!(output.stdout, outputs[0].stdout);
+        let a: Value = serde_json::from_slice(&output.stdout).expect("JSON and nothing else");
+        if cfg!(feature = "symbolica") {
+            assert_eq!(a["quantities"][2]["solution"]["verification"], "symbolic");
+        }
+    }
+}
+
+#[test]
+fn solutions_off_never_starts_the_engine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let with = |switch: &str| {
+        let arguments = [&P1P2[..], &["--solutions", switch]].concat();
+        let output = obsdeg(&arguments).env("XDG_RUNTIME_DIR", folder.path()).output().expect("it runs");
+        assert!(output.status.success());
+        output
+    };
+    let off = with("off");
+    assert!(off.stderr.is_empty());
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
+}
+
+fn refused(arguments: &[&str], expected: &[&str]) {
+    let output = run(arguments);
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    for part in expected {
+        assert!(message.contains(part), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn bad_input_is_refused_by_name() {
+    let angles = |text: &'static str| ["analyze", "--angles", text];
+    refused(&angles("0,0"), &["0,0", "2 angle(s)", "expected three"]);
+    refused(&angles("0,0,0,0"), &["4 angle(s)", "expected three"]);
+    refused(&angles(""), &["0 angle(s)"]);
+    refused(&angles("0,x y,0"), &["beta", "`x y` is not a number"]);
+    refused(&angles("nan,0,0"), &["alpha", "`nan` is not finite"]);
+    refused(&angles("0,0,-inf"), &["gamma", "is not finite"]);
+    refused(&angles("0,0.1234567891,0"), &["10 decimals", "at most 9"]);
+    refused(&angles("0,,0"), &["beta", "an angle is missing"]);
+    refused(&angles("1e9,0,0"), &["is not a number"]);
+    refused(&angles("2000000,0,0"), &["out of range"]);
+    refused(&angles("NUW"), &["`NUW` is not an attitude", "right-handed"]);
+    refused(&angles("--carry"), &["expected three angles", "`--carry`"]);
+    refused(&[&P1P2[..], &["--carry", "sideways"]].concat(), &["`sideways`", "platform, inertial or reset"]);
+    refused(&[&P1P2[..], &["--latitude", "91"]].concat(), &["latitude 91", "-90 to 90"]);
+    refused(&[&P1P2[..], &["--latitude", "nan"]].concat(), &["latitude", "not finite"]);
+    refused(&[&P1P2[..], &["--terms", "F,Q"]].concat(), &["`Q` is not a term"]);
+    refused(&[&P1P2[..], &["--terms", "drift"]].concat(), &["single position", "found 2"]);
+    refused(&[&P1P2[..], &["--format", "xml"]].concat(), &["`xml` is not a format"]);
+    refused(&[&P1P2[..], &["--combination", "D_FZ - D_IW"]].concat(), &["`D_IW`", "did you mean", "^^^^"]);
+    refused(&[&P1P2[..], &["--combination", "D_FX*D_FY"]].concat(), &["not linear"]);
+    refused(&[&P1P2[..], &["--combination", "D_FX +"]].concat(), &["end of the expression"]);
+    refused(&["analyze", "--scheme", "no/such/file.toml"], &["no/such/file.toml"]);
+    refused(&["analyze"], &["--scheme"]);
+    refused(&["analyze", "--angles", "0,0,0", "--scheme", "x.toml"], &["cannot be used with"]);
+    refused(&["frobnicate"], &["unrecognized subcommand"]);
+}
+
+#[test]
+fn negative_angles_names_and_directions_are_accepted() {
+    let a = json(&[
+        "analyze",
+        "--angles",
+        "-90,0,0",
+        "--latitude",
+        "-28.2",
+        "--format",
+        "json",
+        "--solutions",
+        "off",
+    ]);
+    assert_eq!(a["positions"][0]["angles_deg"], serde_json::json!([-90.0, 0.0, 0.0]));
+    assert_eq!(a["latitude_deg"], -28.2);
+    let a =
+        json(&["analyze", "--angles", "NUE", "--angles", "NDW", "--format", "json", "--solutions", "off"]);
+    assert_eq!(a["rank_profile"], serde_json::json!([2, 6, 8]));
+    let a = json(&["analyze", "--angles", "-alpha,0,gamma+90", "--format", "json", "--solutions", "off"]);
+    assert_eq!(a["positions"][0]["angles_deg"], serde_json::json!(["-alpha", 0.0, "gamma+90"]));
+    let a =
+        json(&[&P1P2[..], &["--terms", "F,I,O,S,SS,IS", "--format", "json", "--solutions", "off"]].concat());
+    assert_eq!(a["unknowns"].as_array().map(Vec::len), Some(21));
+}
+
+#[test]
+fn four_hundred_positions_and_duplicates() {
+    let list: Vec<String> =
+        (0..400).map(|i| format!("{},{},{}", i % 90 * 4, i % 7 * 50, i / 2 % 36 * 10)).collect();
+    let mut arguments = vec!["analyze", "--solutions", "off", "--format", "json"];
+    for angles in &list {
+        arguments.extend(["--angles", angles]);
+    }
+    assert_eq!(json(&arguments)["rank"], 15);
+}
+
+fn scratch() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("verdicts.json");
+    (folder, file)
+}
+
+fn write_to(file: &Path, more: &[&str]) -> Output {
+    let path = file.to_string_lossy();
+    run(&[&P1P2[..], &["--solutions", "off", "--format", "json", "-o", &path], more].concat())
+}
+
+#[test]
+fn files_are_written_whole_and_replaced_only_on_demand() {
+    let (folder, file) = scratch();
+    let output = write_to(&file, &[]);
+    assert!(output.status.success() && output.stdout.is_empty());
+    let first = std::fs::read(&file).expect("written");
+    std::fs::write(&file, "mine").expect("writable");
+    let output = write_to(&file, &[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--force"));
+    assert_eq!(std::fs::read(&file).expect("kept"), b"mine");
+    assert!(write_to(&file, &["--force"]).status.success());
+    assert_eq!(std::fs::read(&file).expect("replaced"), first);
+    // bad input writes nothing, and no temporary file is left
+    let missing = folder.path().join("other.json");
+    assert_eq!(write_to(&missing, &["--latitude", "91"]).status.code(), Some(2));
+    let unwritable = folder.path().join("no/such/folder/x.json");
+    assert_eq!(write_to(&unwritable, &[]).status.code(), Some(2));
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
+}
+
+#[test]
+fn same_command_same_bytes() {
+    let arguments = [&P1P2[..], &["--format", "markdown"]].concat();
+    assert_eq!(run(&arguments).stdout, run(&arguments).stdout);
+}
+
+#[test]
+fn the_paper_is_audited() {
+    let output = run(&["paper", "--format", "csv"]);
+    assert!(output.status.success());
+    insta::assert_snapshot!("paper", stdout(&output));
+    let a = json(&["paper", "--format", "json", "--seed", "5"]);
+    assert_eq!(a["schema"], "obsdeg.audit/1");
+    let find = |place: &str| {
+        let lines = a["lines"].as_array().expect("a list");
+        lines.iter().find(|l| l["place"] == place).expect("a line")["finding"].clone()
+    };
+    assert_eq!(
+        (find("(20)"), find("(21)"), find("conclusion 2")),
+        ("agree".into(), "disagree".into(), "agree".into())
+    );
+    for format in ["table", "markdown", "latex"] {
+        assert!(stdout(&run(&["paper", "--format", format])).contains("eps"));
+    }
+}
+
+#[test]
+fn schemas_help_completions_and_manual() {
+    for kind in ["analysis", "audit", "scheme"] {
+        insta::assert_snapshot!(format!("schema_{kind}"), stdout(&run(&["schema", kind])));
+    }
+    let help = stdout(&run(&["analyze", "--help"]));
+    assert!(help.contains("obsdeg analyze --angles 0,0,0 --angles 180,0,0") && help.contains("Exit codes"));
+    assert!(!stdout(&run(&["--help"])).contains("symbolic-worker"));
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(stdout(&run(&["completions", shell])).contains("obsdeg"));
+    }
+    let manual = stdout(&run(&["man"]));
+    assert!(manual.contains(".TH obsdeg") && manual.contains("obsdeg\\-analyze"), "{manual}");
+}
+
+/// Solutions and degenerate angles that only the symbolic engine gives.
+#[cfg(feature = "symbolica")]
+#[test]
+fn generic_angles_with_the_engine() {
+    let output =
+        run(&["analyze", "--scheme", "examples/generic-angles/scheme.toml", "--formulas", "--quiet"]);
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
+    insta::assert_snapshot!("generic_angles", stdout(&output));
+    let arguments = ["analyze", "--angles", "25,0,0", "--angles", "NUE", "--frame", "platform", "--quiet"];
+    insta::assert_snapshot!("constant_angle_platform_frame", stdout(&run(&arguments)));
+    let arguments = ["analyze", "--angles", "15,0,0", "--angles", "0,0,45", "--quiet", "--format", "csv"];
+    insta::assert_snapshot!("radicals", stdout(&run(&arguments)));
+}
+
+/// The licence notice of the engine goes to stderr, and --quiet keeps it away.
+#[cfg(feature = "symbolica")]
+#[test]
+fn the_banner_stays_off_stdout() {
+    let plain = run(&P1P2);
+    assert!(!stdout(&plain).contains("restricted"));
+    let quiet = run(&[&P1P2[..], &["--quiet"]].concat());
+    assert_eq!(stdout(&plain), stdout(&quiet));
+    assert!(quiet.stderr.is_empty());
+}
