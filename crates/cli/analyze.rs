@@ -10,6 +10,7 @@ use obsdeg_symbolic::{Worker, WorkerConfig};
 
 use crate::arguments::{OutputArguments, SchemeArguments};
 use crate::failure::Failure;
+use crate::progress::Spinner;
 use crate::{lock, output};
 
 const AFTER_HELP: &str = "\
@@ -59,8 +60,8 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Seconds that the symbolic engine may take
-    #[arg(long, value_name = "SECONDS", default_value_t = 20)]
+    /// Seconds that the symbolic engine may take for one formula
+    #[arg(long, value_name = "SECONDS", default_value_t = 5)]
     symbolic_limit: u64,
 
     #[command(flatten)]
@@ -77,7 +78,10 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         frame: if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform },
     };
     let mut worker = worker(a.symbolic_limit)?;
-    let analysis = analyze(&scheme, options, worker.as_mut()).map_err(|e| match e {
+    let spinner = Spinner::start("solving symbolically (--solutions off leaves it out)", a.output.quiet);
+    let analysed = analyze(&scheme, options, worker.as_mut());
+    drop(spinner);
+    let analysis = analysed.map_err(|e| match e {
         AnalysisError::Combination { text, reason, span } => {
             Failure::at(&format!("combination: {reason}"), "--combination", &text, span)
         }

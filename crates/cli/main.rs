@@ -8,6 +8,7 @@ mod failure;
 mod lock;
 mod output;
 mod paper;
+mod progress;
 mod schema;
 
 use std::process::ExitCode;

@@ -462,7 +462,7 @@ fn engine_note(built: bool, solver: &mut Solver<'_>) -> Option<String> {
     }
     let failure = solver.worker().and_then(|w| w.failure().cloned())?;
     Some(format!(
-        "no symbolic engine ({failure}): coefficients are reconstructed from the prime fields where they are \
+        "formulas were given up ({failure}): coefficients are reconstructed from the prime fields where they are \
          rationals and square roots, and decimals elsewhere"
     ))
 }

@@ -20,7 +20,7 @@ pub struct WorkerConfig {
     pub lock_file: PathBuf,
     /// How long to wait for the lock.
     pub lock_limit: Duration,
-    /// How long all answers together may take.
+    /// How long one answer may take.
     pub time_limit: Duration,
 }
 
@@ -78,7 +78,6 @@ struct Running {
     child: Child,
     input: Option<ChildStdin>,
     lines: Receiver<String>,
-    deadline: Instant,
     _lock: File,
 }
 
@@ -86,7 +85,7 @@ impl Drop for Running {
     fn drop(&mut self) {
         self.input.take(); // end of input: the worker leaves by itself
         let patience = Instant::now() + Duration::from_millis(500);
-        while Instant::now() < patience.min(self.deadline) {
+        while Instant::now() < patience {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
                 return;
             }
@@ -98,19 +97,19 @@ impl Drop for Running {
     }
 }
 
-/// A worker that starts with the first request. After a failure of the process it stays down and
-/// repeats the reason.
+/// A worker that starts with the first request. After a time-out it starts afresh with the next one;
+/// after any other failure of the process it stays down and repeats the reason.
 pub struct Worker {
     config: WorkerConfig,
     running: Option<Running>,
-    down: Option<WorkerError>,
+    failure: Option<WorkerError>,
     banner: Vec<String>,
 }
 
 impl Worker {
     /// A worker that is not started yet.
     pub fn new(config: WorkerConfig) -> Self {
-        Self { config, running: None, down: None, banner: Vec::new() }
+        Self { config, running: None, failure: None, banner: Vec::new() }
     }
 
     /// What the engine printed besides its answers.
@@ -118,9 +117,9 @@ impl Worker {
         &self.banner
     }
 
-    /// Why the process is down, if it failed.
+    /// The last failure of the process.
     pub fn failure(&self) -> Option<&WorkerError> {
-        self.down.as_ref()
+        self.failure.as_ref()
     }
 
     /// Sends one request and waits for its answer: the expressions, and whether a check held.
@@ -128,8 +127,9 @@ impl Worker {
     /// # Errors
     /// [`WorkerError::Failed`] when the job failed; anything else when the process did, now or before.
     pub fn ask(&mut self, request: &Request) -> Result<(Vec<String>, bool), WorkerError> {
-        if let Some(reason) = &self.down {
-            return Err(reason.clone());
+        match &self.failure {
+            None | Some(WorkerError::TimedOut { .. }) => {}
+            Some(reason) => return Err(reason.clone()),
         }
         match self.exchange(request) {
             Ok(Response::Values { values, verified }) => Ok((values, verified)),
@@ -139,7 +139,7 @@ impl Worker {
                     let _ = running.child.kill(); // already failing: the first error is the one to tell
                 }
                 self.running = None;
-                self.down = Some(error.clone());
+                self.failure = Some(error.clone());
                 Err(error)
             }
         }
@@ -154,8 +154,9 @@ impl Worker {
             serde_json::to_string(request).map_err(|e| WorkerError::Garbled { found: e.to_string() })?;
         let input = running.input.as_mut().ok_or(WorkerError::Ended)?;
         writeln!(input, "{line}").and_then(|()| input.flush()).map_err(|_| WorkerError::Ended)?;
+        let deadline = Instant::now() + self.config.time_limit;
         loop {
-            let left = running.deadline.saturating_duration_since(Instant::now());
+            let left = deadline.saturating_duration_since(Instant::now());
             let line = running.lines.recv_timeout(left).map_err(|e| match e {
                 RecvTimeoutError::Timeout => {
                     WorkerError::TimedOut { seconds: self.config.time_limit.as_secs() }
@@ -193,7 +194,7 @@ fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
             }
         });
     }
-    Ok(Running { child, input, lines, deadline: Instant::now() + config.time_limit, _lock: lock })
+    Ok(Running { child, input, lines, _lock: lock })
 }
 
 fn acquire(config: &WorkerConfig) -> Result<File, WorkerError> {

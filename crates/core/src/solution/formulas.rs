@@ -42,9 +42,7 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
         .map(|b| b.rows.iter().map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()).collect())
         .collect();
     let columns: Vec<Vec<usize>> = platform.blocks(&text_point).into_iter().map(|b| b.columns).collect();
-    let worker = solver.worker().ok_or(
-        "formulas of Z need the symbolic engine and at most three angles that are no multiples of 15 deg",
-    )?;
+    let worker = solver.worker().ok_or("formulas of Z need the symbolic engine")?;
     let request = Request {
         symbols: vec!["wN".into(), "wU".into()],
         generators: vec![],

@@ -297,11 +297,20 @@ fn describe(condition: &Condition) -> String {
         Condition::HalfTurn(name) => return format!("{name} = 180"),
         Condition::Factor(text) => text,
     };
+    let name = |text: &str| -> Option<String> {
+        let name = text.strip_prefix("t_")?;
+        name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_').then(|| name.to_string())
+    };
     for (sign, degrees) in [("", 0), ("-1+", 90), ("1+", -90)] {
-        if let Some(name) = text.strip_prefix(sign).and_then(|rest| rest.strip_prefix("t_"))
-            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-        {
+        if let Some(name) = text.strip_prefix(sign).and_then(name) {
             return format!("{name} = {degrees}");
+        }
+    }
+    for (operator, sign) in [('-', ""), ('+', "-")] {
+        if let Some((a, b)) = text.split_once(operator)
+            && let (Some(a), Some(b)) = (name(a), name(b))
+        {
+            return format!("{a} = {sign}{b}");
         }
     }
     let mut shown = String::new();
@@ -327,6 +336,8 @@ mod tests {
         assert_eq!(factor("t_alpha"), "alpha = 0");
         assert_eq!(factor("-1+t_beta"), "beta = 90");
         assert_eq!(factor("1+t_beta"), "beta = -90");
+        assert_eq!(factor("t_a-t_b"), "a = b");
+        assert_eq!(factor("t_a+t_b"), "a = -b");
         assert_eq!(factor("-1+2*t_a*t_b+t_a^2"), "-1+2*tan(a/2)*tan(b/2)+tan(a/2)^2 = 0");
     }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use obsdeg_exact::Radical;
-use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, Worker, protocol::CheckTerm};
+use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, Worker, WorkerError, protocol::CheckTerm};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -21,7 +21,7 @@ use crate::model::ring::{Float, Ring, Text};
 use crate::solution::local::rows_at;
 
 /// Most angles with symbols of their own for which formulas are attempted.
-const MAX_SYMBOLIC_ANGLES: usize = 3;
+const MAX_SYMBOLIC_ANGLES: usize = 4;
 /// Longest number that is printed when there are no decimals to fall back to.
 const PRINTABLE: usize = 1000;
 /// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
@@ -133,17 +133,7 @@ impl<'a> Solver<'a> {
             let rows = rows_at(platform, &point, &tables.observables);
             (point, rows)
         });
-        Self {
-            platform,
-            verdicts,
-            tables,
-            symbols,
-            text,
-            text_point,
-            floats,
-            worker: worker.filter(|_| usable),
-            frame,
-        }
+        Self { platform, verdicts, tables, symbols, text, text_point, floats, worker, frame }
     }
 
     /// Whether formulas in sines and cosines are out of question: too many different angles.
@@ -156,7 +146,7 @@ impl<'a> Solver<'a> {
         &self.symbols
     }
 
-    /// The worker, if there is one and formulas are in question.
+    /// The worker, if there is one.
     pub fn worker(&mut self) -> Option<&mut Worker> {
         self.worker.as_deref_mut()
     }
@@ -286,7 +276,16 @@ impl<'a> Solver<'a> {
 
     fn ask_for_outputs(&mut self, problem: &Problem) -> Option<Vec<String>> {
         let request = self.request(problem.to_text(&self.text_or_none()?, &[]), None);
-        Some(self.worker.as_deref_mut()?.ask(&request).ok()?.0)
+        Some(self.ask(&request)?.0)
+    }
+
+    /// Asks for a formula; after one that took too long no other is attempted.
+    fn ask(&mut self, request: &Request) -> Option<(Vec<String>, bool)> {
+        let answer = self.worker.as_deref_mut()?.ask(request);
+        if matches!(answer, Err(WorkerError::TimedOut { .. })) {
+            self.text.clear();
+        }
+        answer.ok()
     }
 
     fn text_or_none(&self) -> Option<Vec<Vec<String>>> {
@@ -358,7 +357,12 @@ impl<'a> Solver<'a> {
             (None, Some(exact)) => (exact, Verification::Modular),
             (None, None) => {
                 let numbers = self.decimals(functional, &problem, &plan);
-                (numbers.ok_or("formulas in generic angles need the symbolic engine")?, Verification::Numeric)
+                let missing = if self.too_many_angles() {
+                    format!("formulas in more than {MAX_SYMBOLIC_ANGLES} different angles are not attempted")
+                } else {
+                    "formulas in generic angles need the symbolic engine".into()
+                };
+                (numbers.ok_or(missing)?, Verification::Numeric)
             }
         };
         let mut terms: Vec<Term> = plan
@@ -496,10 +500,7 @@ impl<'a> Solver<'a> {
         debug_assert!(problem.outputs == Outputs::Unknowns);
         let check = self.check(support, rates, target);
         let request = self.request(system, Some(check));
-        match self.worker.as_deref_mut()?.ask(&request) {
-            Ok((texts, true)) => Some(texts),
-            _ => None,
-        }
+        self.ask(&request).filter(|(_, verified)| *verified).map(|(texts, _)| texts)
     }
 
     fn check(&self, support: &[usize], rates: &[Rates], target: Vec<(String, String)>) -> Check {
