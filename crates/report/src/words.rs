@@ -1,6 +1,7 @@
 //! Sentences that several formats share.
 
-use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Status, Verdict};
+use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Solution, Status, Verdict};
+use obsdeg_core::degree::coefficient::Form;
 use obsdeg_core::model::Carry;
 use obsdeg_core::solution::solver::{Frame, Verification};
 
@@ -123,22 +124,25 @@ pub(crate) fn certainty(a: &Analysis) -> String {
         "{} (p = {}, {}; seed {}): a verdict is wrong with probability below {:.0e}",
         c.method, c.primes[0], c.primes[1], c.seed, c.error_bound
     );
-    let solutions: Vec<Verification> = a
+    let solutions: Vec<&Solution> = a
         .quantities
         .iter()
         .filter_map(|q| q.solution.as_ref())
         .chain(a.combinations.iter().filter_map(|c| c.solution.as_ref()))
-        .map(|s| s.verification)
         .collect();
     for (kind, how) in [
         (Verification::Symbolic, "by exact substitution"),
         (Verification::Modular, "by substitution in both prime fields"),
-        (Verification::Numeric, "by substitution in floating point (decimals are rounded to six digits)"),
+        (Verification::Numeric, "by substitution in floating point"),
     ] {
-        let n = solutions.iter().filter(|v| **v == kind).count();
+        let n = solutions.iter().filter(|s| s.verification == kind).count();
         if n > 0 {
             out.push_str(&format!("; {n} solution{} verified {how}", if n == 1 { "" } else { "s" }));
         }
+    }
+    let decimals = solutions.iter().filter(|s| s.form == Form::Decimal).count();
+    if decimals > 0 {
+        out.push_str(&format!("; {decimals} with coefficients as decimals, rounded to six digits"));
     }
     out
 }

@@ -4,7 +4,8 @@ use obsdeg_symbolic::{Job, Request};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::solver::{Solver, dynamics_text};
+use super::ask::dynamics_text;
+use super::solver::Solver;
 use crate::degree::coefficient::linear_combination;
 use crate::model::Platform;
 use crate::model::platform::{LOCAL_NAMES, local_output};

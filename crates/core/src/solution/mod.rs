@@ -1,5 +1,6 @@
 //! How an observable quantity is solved from the derivatives of Z.
 
+pub mod ask;
 pub mod formulas;
 pub mod local;
 pub mod loci;
