@@ -131,10 +131,11 @@ impl Tables {
             let rows = rows_at(platform, &sample.point, &observables);
             Table { sample, rows }
         };
+        // the rates of the verdicts, so that vectors of the stairs are vectors of the first table
         let tables = [0, 1].map(|i| {
             let values = &verdicts.values[i];
-            let rates = rates(values.roots());
-            embeddings(values.roots().order).map(|a| table(values, a, rates))
+            let point = values.sample(scheme, 1).point;
+            embeddings(values.roots().order).map(|a| table(values, a, [point.w_n, point.w_u]))
         });
         let first = &verdicts.values[0];
         let other_rates = table(first, 1, rates(first.roots()));

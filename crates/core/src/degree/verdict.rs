@@ -4,10 +4,11 @@ use obsdeg_exact::Echelon;
 
 use super::coefficient::{Coefficient, linear_combination, readable};
 use super::ensemble::Verdicts;
-use super::sparse::{extend_by_short_vectors, support, vector_on_support};
+use super::sparse::{extend_by_short_vectors, support};
 use crate::model::Platform;
 use crate::solution::problem::Problem;
 use crate::solution::solver::{Functional, Solver, Sparse};
+use crate::solution::support::short_support;
 
 /// A named observable combination.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,31 +81,29 @@ pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solve
     chosen
         .into_iter()
         .map(|(v, degree)| {
-            let support = support(&v);
-            let functional = combination_coefficients(platform, solver, &support, degree);
+            let mut support = support(&v);
+            let lead = lead(platform, &support);
+            support.sort_by_key(|c| *c != lead);
+            let functional = combination_coefficients(platform, solver, &support, v, degree);
             Combination { support, functional, degree }
         })
         .collect()
 }
 
+/// The coefficients of a combination found as `vector`, scaled to one at the first of `support`.
 fn combination_coefficients(
     platform: &Platform,
     solver: &mut Solver<'_>,
     support: &[usize],
+    vector: Vec<u64>,
     degree: usize,
 ) -> Option<Functional> {
-    let lead = lead(platform, support);
     let first = solver.tables.first();
     let field = first.sample.roots.field;
-    // a short set of rows that makes the combination: first as a vector, then by its solution
     let allowed = solver.tables.rows_up_to(degree);
-    let rows: Vec<Vec<u64>> = allowed.iter().map(|&j| first.rows[j].clone()).collect();
-    let vector = vector_on_support(field, &rows, support, lead)?;
-    let used = crate::solution::support::short_support(field, &first.rows, &allowed, &vector, |_| 1)?;
-    let problem = Problem::combination(&used, platform.names().len(), support, lead);
-    let mut functional = solver.functional_of(support, &problem)?;
-    functional.terms.sort_by_key(|(c, _)| *c != lead);
-    Some(functional)
+    let used = short_support(field, &first.rows, &allowed, &vector, |_| 1)?;
+    let problem = Problem::combination(&used, platform.names().len(), support, support[0]);
+    solver.functional_of(support, &problem)
 }
 
 /// A sparse basis of the null space, without the unknowns that are not excited.

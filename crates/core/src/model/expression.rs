@@ -326,6 +326,22 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
     })
 }
 
+/// The value of an expression in floating point, with the names' values from `at`; NaN for functions.
+pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
+    let value = |e: &Expression| evaluate_f64(e, at);
+    match &e.node {
+        Node::Number { mantissa, decimals } => *mantissa as f64 / 10f64.powi(*decimals as i32),
+        Node::Name(n) => at(n),
+        Node::Call { .. } => f64::NAN,
+        Node::Negate(a) => -value(a),
+        Node::Add(a, b) => value(a) + value(b),
+        Node::Subtract(a, b) => value(a) - value(b),
+        Node::Multiply(a, b) => value(a) * value(b),
+        Node::Divide(a, b) => value(a) / value(b),
+        Node::Power(a, k) => value(a).powi(*k),
+    }
+}
+
 /// The known name with the least edit distance, if it is close.
 fn nearest(name: &str, known: &[String]) -> Option<String> {
     let distance = |a: &str, b: &str| {

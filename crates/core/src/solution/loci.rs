@@ -11,7 +11,7 @@ use crate::analysis::{Difference, verdict};
 use crate::degree::ensemble::{Verdicts, staircase};
 use crate::degree::staircase::Degrees;
 use crate::model::Platform;
-use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
+use crate::model::expression::{Environment, Expression, Node, evaluate, evaluate_f64, parse};
 use crate::model::platform::{Point, RandomValues};
 use crate::model::ring::{Ring, Text};
 
@@ -250,20 +250,6 @@ fn degree_in(e: &Expression, name: &str) -> usize {
     }
 }
 
-fn value(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
-    match &e.node {
-        Node::Number { mantissa, decimals } => *mantissa as f64 / 10f64.powi(*decimals as i32),
-        Node::Name(n) => at(n),
-        Node::Call { .. } => f64::NAN,
-        Node::Negate(a) => -value(a, at),
-        Node::Add(a, b) => value(a, at) + value(b, at),
-        Node::Subtract(a, b) => value(a, at) - value(b, at),
-        Node::Multiply(a, b) => value(a, at) * value(b, at),
-        Node::Divide(a, b) => value(a, at) / value(b, at),
-        Node::Power(a, k) => value(a, at).powi(*k),
-    }
-}
-
 /// Whether the polynomial takes both signs, or zero, on a grid of half tangents.
 fn has_real_zero(e: &Expression, names: &[String]) -> bool {
     let steps: usize = if names.len() == 1 { 2001 } else { 61 };
@@ -281,7 +267,7 @@ fn has_real_zero(e: &Expression, names: &[String]) -> bool {
                 Some(k) => tangent((i * (2 * k + 1) + j * (k + 1)) % steps),
                 None => f64::NAN,
             };
-            let v = value(e, &at);
+            let v = evaluate_f64(e, &at);
             if v == 0.0 {
                 return true;
             }

@@ -89,7 +89,7 @@ pub type Sparse = Vec<(usize, Coefficient)>;
 pub struct Functional {
     /// Columns and coefficients, as printed.
     pub terms: Sparse,
-    /// Its exact images as rows, one per table in the order of the tables.
+    /// The exact images of the coefficients, one vector per table in the order of the tables.
     images: Vec<Vec<u64>>,
 }
 
@@ -164,28 +164,16 @@ impl<'a> Solver<'a> {
             };
             Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
         };
-        let row = |(field, table): (usize, &Table)| {
-            let mut row = vec![0; self.platform.names().len()];
-            for (column, c) in &terms {
-                row[*column] = value(c, field, table)?;
-            }
-            Some(row)
+        let image = |(field, table): (usize, &Table)| {
+            terms.iter().map(|(_, c)| value(c, field, table)).collect::<Option<Vec<u64>>>()
         };
-        let images = self.all_tables().map(row).collect::<Option<_>>()?;
+        let images = self.all_tables().map(image).collect::<Option<_>>()?;
         Some(Functional { terms, images })
     }
 
     /// The functional on `support` whose coefficients are the outputs of `problem`.
     pub fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
-        let (coefficients, values) = self.coefficients(problem)?;
-        let scatter = |values: &Vec<u64>| {
-            let mut row = vec![0; self.platform.names().len()];
-            for (&column, &value) in support.iter().zip(values) {
-                row[column] = value;
-            }
-            row
-        };
-        let images = values.iter().map(scatter).collect();
+        let (coefficients, images) = self.coefficients(problem)?;
         Some(Functional { terms: support.iter().copied().zip(coefficients).collect(), images })
     }
 
@@ -274,7 +262,14 @@ impl<'a> Solver<'a> {
     /// `Err` says why there is none to print.
     pub fn solve(&mut self, functional: &Functional, degree: usize) -> Result<Solved, String> {
         const LOST: &str = "its coefficients have no short exact form";
-        let targets = &functional.images;
+        let scatter = |values: &Vec<u64>| {
+            let mut row = vec![0; self.platform.names().len()];
+            for ((column, _), &value) in functional.terms.iter().zip(values) {
+                row[*column] = value;
+            }
+            row
+        };
+        let targets: Vec<Vec<u64>> = functional.images.iter().map(scatter).collect();
         let first = self.tables.first();
         let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
         let support = short_support(
@@ -288,7 +283,7 @@ impl<'a> Solver<'a> {
         let problem = Problem::solution(&support, self.platform.names().len());
         let y: Vec<Vec<u64>> = self
             .all_tables()
-            .zip(targets)
+            .zip(&targets)
             .map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target))
             .collect::<Option<_>>()
             .ok_or(LOST)?;
@@ -331,10 +326,14 @@ impl<'a> Solver<'a> {
             (None, Some(exact)) => (exact, Verification::Modular),
             (None, None) => {
                 let numbers = self.decimals(functional, &problem, &plan);
-                let missing = if self.too_many_angles() {
-                    format!("formulas in more than {MAX_SYMBOLIC_ANGLES} different angles are not attempted")
-                } else {
-                    "formulas in generic angles need the symbolic engine".into()
+                let missing = match &self.worker {
+                    None => "formulas in generic angles need the symbolic engine".into(),
+                    Some(_) if self.too_many_angles() => {
+                        format!(
+                            "formulas in more than {MAX_SYMBOLIC_ANGLES} different angles are not attempted"
+                        )
+                    }
+                    Some(_) => "the symbolic engine gave no formula for it".into(),
                 };
                 (numbers.ok_or(missing)?, Verification::Numeric)
             }
@@ -429,7 +428,7 @@ impl<'a> Solver<'a> {
             target[*column] = match &c.number {
                 Number::Radical(r) => r.to_f64(),
                 Number::Decimal(x) => *x,
-                Number::Text { .. } => return None,
+                Number::Text { raw, .. } => self.symbols.float(raw)?,
             };
         }
         let x = problem.solve_in_floats(rows, &target)?;

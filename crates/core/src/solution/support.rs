@@ -16,13 +16,28 @@ pub fn short_support(
     cost: impl Fn(usize) -> usize,
 ) -> Option<Vec<usize>> {
     let mut best: Option<(usize, usize, Vec<usize>)> = None;
-    let step = allowed.len().div_ceil(ORDERS / 2).max(1);
-    for shift in (0..allowed.len()).step_by(step) {
-        let forward: Vec<usize> = allowed[shift..].iter().chain(&allowed[..shift]).copied().collect();
-        let backward: Vec<usize> = forward.iter().rev().copied().collect();
-        for order in [forward, backward] {
+    // rows that share a column with the target come first, and none is taken once it is in the span
+    let (near, far): (Vec<usize>, Vec<usize>) =
+        allowed.iter().partition(|&&j| rows[j].iter().zip(target).any(|(&x, &t)| x != 0 && t != 0));
+    let rotated = |list: &[usize], k: usize| -> Vec<usize> {
+        let shift = k * list.len().div_ceil(ORDERS / 2);
+        let (head, tail) = list.split_at(shift.min(list.len()));
+        tail.iter().chain(head).copied().collect()
+    };
+    for k in 0..ORDERS / 2 {
+        let (near, far) = (rotated(&near, k), rotated(&far, k));
+        let backward: Vec<usize> = near.iter().rev().chain(far.iter().rev()).copied().collect();
+        for order in [[near, far].concat(), backward] {
             let mut basis = Echelon::new(field, target.len());
-            let independent: Vec<usize> = order.into_iter().filter(|&j| basis.insert(&rows[j])).collect();
+            let mut independent: Vec<usize> = Vec::new();
+            for j in order {
+                if basis.insert(&rows[j]) {
+                    independent.push(j);
+                    if basis.contains(target) {
+                        break;
+                    }
+                }
+            }
             let refs: Vec<&[u64]> = independent.iter().map(|&j| rows[j].as_slice()).collect();
             let y = express(field, &refs, target)?;
             let mut used: Vec<usize> =

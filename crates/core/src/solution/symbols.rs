@@ -1,7 +1,7 @@
 //! The symbols of exact formulas: sines and cosines of angles, square roots of 2 and 3.
 
 use crate::model::angle::{Angle, format_decimal};
-use crate::model::expression::{Environment, evaluate, parse};
+use crate::model::expression::{Environment, evaluate, evaluate_f64, parse};
 use crate::model::platform::{Platform, Point, RandomValues, Sample};
 use crate::model::ring::{Ring, Text};
 
@@ -163,6 +163,24 @@ impl Symbols {
         })
     }
 
+    /// The value of a text in square roots and constant angles; `None` when it has another symbol.
+    pub fn float(&self, text: &str) -> Option<f64> {
+        let at = |name: &str| -> f64 {
+            let value = || -> Option<f64> {
+                let (kind, suffix) = name.split_at_checked(2)?;
+                if kind == "r_" {
+                    return Some(suffix.parse::<f64>().ok()?.sqrt());
+                }
+                let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
+                let Base::Constant(nanodeg) = self.bases[i] else { return None };
+                let (c, s) = Angle::from_nanodeg(nanodeg).turn().cos_sin_f64();
+                Some(if kind == "c_" { c } else { s })
+            };
+            value().unwrap_or(f64::NAN)
+        };
+        Some(evaluate_f64(&parse(text).ok()?, &at)).filter(|x| x.is_finite())
+    }
+
     /// The value of a text in the symbols at a sample; `None` for what has none.
     pub fn value(&self, text: &str, values: &RandomValues, sample: &Sample) -> Option<u64> {
         let env = SymbolValues { symbols: self, values, sample };
@@ -251,6 +269,9 @@ mod tests {
                 assert_eq!(symbols.value(&t.1, &values, &sample), Some(v.1), "{}", t.1);
             }
         }
+        let tangent = symbols.float("s_0/c_0*r_3^2").expect("constants only");
+        assert!((tangent - 3.0 * 25f64.to_radians().tan()).abs() < 1e-14);
+        assert_eq!(symbols.float("s_alpha"), None);
         assert_eq!(symbols.display("-s_alpha*c_0^2/r_3"), "-sin(alpha)*cos(25 deg)^2/sqrt(3)");
     }
 }
