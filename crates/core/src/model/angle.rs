@@ -153,7 +153,7 @@ impl Angle {
         if matches!(name.to_ascii_lowercase().as_str(), "nan" | "inf" | "infinity") {
             return Err(AngleError::NotFinite { found: name.into() });
         }
-        let taken = matches!(name, "wN" | "wU" | "sin" | "cos" | "tan" | "sqrt" | "e" | "i")
+        let taken = matches!(name, "wN" | "wU" | "sin" | "cos" | "tan" | "sqrt" | "deg")
             || ["D_", "psi", "eps", "Z", "r_", "s_", "c_", "t_"].iter().any(|p| name.starts_with(p));
         if taken {
             return Err(AngleError::Reserved { found: name.into() });

@@ -46,17 +46,24 @@ fn shape(what: &'static str, found: usize, expected: usize) -> Result<(), JobErr
     if found == expected { Ok(()) } else { Err(JobError::Shape { what, found, expected }) }
 }
 
-/// Gauss-Jordan elimination of `[M | b]`; the sparsest pivot row first.
+/// Gauss-Jordan elimination of `[M | b]`; the simplest entry is the next pivot, since its inverse keeps
+/// the others short.
 fn eliminate(tower: &Tower, mut rows: Vec<Vec<Element>>, unknowns: usize) -> Result<Vec<Element>, JobError> {
     let entries = |row: &[Element]| row.iter().filter(|e| !tower.is_zero(e)).count();
     let mut solved: Vec<(usize, Vec<Element>)> = Vec::new();
     loop {
         rows.retain(|row| entries(row) > 0);
-        let Some(best) = (0..rows.len()).min_by_key(|&i| entries(&rows[i])) else { break };
-        let mut row = rows.swap_remove(best);
-        let Some(pivot) = (0..unknowns).find(|&c| !tower.is_zero(&row[c])) else {
+        if rows.is_empty() {
+            break;
+        }
+        let best = (0..rows.len())
+            .flat_map(|i| (0..unknowns).map(move |c| (i, c)))
+            .filter(|&(i, c)| !tower.is_zero(&rows[i][c]))
+            .min_by_key(|&(i, c)| (tower.terms(&rows[i][c]), entries(&rows[i])));
+        let Some((best, pivot)) = best else {
             return Err(JobError::NotUnique("inconsistent"));
         };
+        let mut row = rows.swap_remove(best);
         let scale = tower.inv(&row[pivot]);
         for e in row.iter_mut().filter(|e| !tower.is_zero(e)) {
             *e = tower.mul(e, &scale);

@@ -124,6 +124,12 @@ impl Tower {
         a.0.iter().all(Scalar::is_zero)
     }
 
+    /// How many monomials an element has in numerators and denominators.
+    pub(crate) fn terms(&self, a: &Element) -> usize {
+        let of = |x: &Scalar| x.numerator.nterms() + x.denominator.nterms();
+        a.0.iter().filter(|x| !x.is_zero()).map(of).sum()
+    }
+
     pub(crate) fn add(&self, a: &Element, b: &Element) -> Element {
         Element(a.0.iter().zip(&b.0).map(|(x, y)| x + y).collect())
     }
