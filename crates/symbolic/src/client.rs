@@ -227,7 +227,12 @@ mod tests {
     use crate::protocol::Job;
 
     fn request() -> Request {
-        Request { symbols: vec![], generators: vec![], job: Job::MinorFactors { matrix: vec![] } }
+        Request {
+            symbols: vec![],
+            generators: vec![],
+            angles: vec![],
+            job: Job::MinorFactors { matrix: vec![] },
+        }
     }
 
     /// A worker that is a shell script.

@@ -5,14 +5,16 @@ use serde::{Deserialize, Serialize};
 /// Starts every answer of the worker, so that a banner is told from an answer.
 pub const PREFIX: &str = "obsdeg:";
 
-/// A job and the numbers it is about: rational functions of `symbols`, extended by square roots.
+/// A job and the numbers it is about: rational functions of `symbols` and of the cosines and sines of
+/// `angles`, extended by square roots.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
     /// Independent symbols, in the order of the model.
     pub symbols: Vec<String>,
-    /// Algebraic symbols `g` with `g^2` given as a polynomial in the symbols, such as `r_2` with `2`
-    /// or `c_alpha` with `1-s_alpha^2`.
+    /// Square roots `g` with `g^2` given, such as `r_2` with `2`.
     pub generators: Vec<(String, String)>,
+    /// Angles: `alpha` announces `c_alpha` and `s_alpha` (and `t_alpha`, the tangent of its half).
+    pub angles: Vec<String>,
     /// What to do.
     pub job: Job,
 }
@@ -46,7 +48,7 @@ pub enum Job {
 /// A linear system in text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct System {
-    /// `M`, row by row: rational functions of symbols and generators.
+    /// `M`, row by row: rational functions of whatever is announced.
     pub matrix: Vec<Vec<String>>,
     /// `b`.
     pub right: Vec<String>,

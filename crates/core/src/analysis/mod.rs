@@ -5,7 +5,7 @@ mod requested;
 
 use std::ops::Range;
 
-use obsdeg_symbolic::Worker;
+use obsdeg_symbolic::{Worker, WorkerError};
 
 pub use answer::*;
 
@@ -90,8 +90,9 @@ pub fn analyze(
     let mut combinations: Vec<CombinationReport> =
         basis.into_iter().map(|c| basis_report(&platform, c, &mut printer)).collect();
     combinations.extend(requested.into_iter().map(|r| requested_report(r, &mut printer)));
-    let degenerate_loci = loci(&platform, &verdicts, &mut printer.solver, options.seed);
-    let degenerate_loci = printer.noted(degenerate_loci).flatten();
+    let found = loci(&platform, &verdicts, &mut printer.solver, options.seed);
+    let found = printer.noted(found).unwrap_or_default();
+    printer.notes.extend(found.incomplete);
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
     if options.solutions {
@@ -115,7 +116,7 @@ pub fn analyze(
         combinations,
         null_space: null.iter().map(|v| null_report(&platform, v)).collect(),
         carries: carry_reports(&platform, &verdicts, options.seed)?,
-        degenerate_loci,
+        degenerate_loci: found.loci,
         formulas,
         frame: options.frame,
         certainty: Certainty {
@@ -254,9 +255,12 @@ fn engine_note(built: bool, solver: &mut Solver<'_>) -> Option<String> {
         );
     }
     let failure = solver.worker().and_then(|w| w.failure().cloned())?;
+    if matches!(failure, WorkerError::TimedOut { .. }) && !solver.given_up() {
+        return None;
+    }
     Some(format!(
-        "formulas were given up ({failure}): coefficients are reconstructed from the prime fields where they are \
-         rationals and square roots, and decimals elsewhere"
+        "formulas were given up ({failure}): coefficients are reconstructed from the prime fields where they \
+         are rationals and square roots, and decimals elsewhere"
     ))
 }
 

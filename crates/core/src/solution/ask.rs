@@ -15,6 +15,7 @@ impl Solver<'_> {
         Request {
             symbols: self.symbols.independent(),
             generators: self.symbols.generators(),
+            angles: self.symbols.angle_names(),
             job: Job::Solve { system, check },
         }
     }

@@ -47,6 +47,7 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
     let request = Request {
         symbols: vec!["wN".into(), "wU".into()],
         generators: vec![],
+        angles: vec![],
         job: Job::Derive { dynamics, order: ORDER },
     };
     let (texts, _) = worker.ask(&request).map_err(|e| format!("no formulas of Z: {e}"))?;

@@ -26,6 +26,15 @@ pub struct Locus {
     pub changes: Vec<Difference>,
 }
 
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Found {
+    /// The loci; `None` without generic angles or worker.
+    pub loci: Option<Vec<Locus>>,
+    /// Why some may be missing.
+    pub incomplete: Option<String>,
+}
+
 /// Where a generic angle is put.
 #[derive(Debug, Clone)]
 enum Condition {
@@ -39,7 +48,7 @@ enum Condition {
 /// 1 - 1/e.
 const TRIES: usize = 40;
 
-/// The degenerate loci of a scheme with generic angles; `None` without generic angles or worker.
+/// The degenerate loci of a scheme with generic angles.
 ///
 /// Wherever a rank of `V_k`, or of `V_k` without the column of an unknown outside `V_k`, drops, every
 /// maximal minor vanishes. So the factors of one minor each are candidates, and a candidate counts
@@ -52,10 +61,10 @@ pub fn loci(
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
     seed: u64,
-) -> Result<Option<Vec<Locus>>, String> {
+) -> Result<Found, String> {
     let names = platform.scheme().generic_names();
     if names.is_empty() {
-        return Ok(None);
+        return Ok(Found::default());
     }
     let others = platform.scheme().positions.iter().flat_map(|p| &p.angles);
     if !others.clone().all(|a| a.turn().is_multiple_of_deg(90)) {
@@ -64,12 +73,18 @@ pub fn loci(
         );
     }
     let requests = candidate_requests(platform, verdicts, solver, &names);
-    let Some(worker) = solver.worker() else { return Ok(None) };
+    let Some(worker) = solver.worker() else { return Ok(Found::default()) };
     let mut conditions: Vec<Condition> = names.iter().cloned().map(Condition::HalfTurn).collect();
     let mut seen: Vec<String> = Vec::new();
+    let mut incomplete = None;
     for request in requests {
-        let (factors, _) =
-            worker.ask(&request).map_err(|e| format!("degenerate loci were not computed: {e}"))?;
+        let factors = match worker.ask(&request) {
+            Ok((factors, _)) => factors,
+            Err(e) => {
+                incomplete = Some(format!("the list of degenerate angles may lack some: {e}"));
+                break;
+            }
+        };
         for factor in factors.into_iter().filter(|f| !seen.contains(f)).collect::<Vec<_>>() {
             conditions.push(Condition::Factor(factor.clone()));
             seen.push(factor);
@@ -95,7 +110,7 @@ pub fn loci(
         }
         out.push(Locus { condition: describe(&condition), rank_profile: there.rank_profile, changes });
     }
-    Ok(Some(out))
+    Ok(Found { loci: Some(out), incomplete })
 }
 
 /// One request per candidate matrix, over `t_name = tan(name/2)`.
@@ -116,7 +131,7 @@ fn candidate_requests(
         let column: Vec<Vec<String>> =
             text.iter().filter(|row| row[c] != "0").map(|row| vec![row[c].clone()]).collect();
         let job = Job::MinorFactors { matrix: column };
-        out.push(Request { symbols: symbols.clone(), generators: vec![], job });
+        out.push(Request { symbols: symbols.clone(), generators: vec![], angles: vec![], job });
     }
     for k in 0..verdicts.degrees.rank_profile.len() {
         let mut basis = Echelon::new(first.sample.roots.field, n);
@@ -128,8 +143,12 @@ fn candidate_requests(
             let columns: Vec<usize> = (0..n).filter(used).collect();
             let matrix =
                 rows.iter().map(|&j| columns.iter().map(|&c| text[j][c].clone()).collect()).collect();
-            let request =
-                Request { symbols: symbols.clone(), generators: vec![], job: Job::MinorFactors { matrix } };
+            let request = Request {
+                symbols: symbols.clone(),
+                generators: vec![],
+                angles: vec![],
+                job: Job::MinorFactors { matrix },
+            };
             if !out.contains(&request) {
                 out.push(request);
             }

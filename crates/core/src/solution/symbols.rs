@@ -55,21 +55,20 @@ impl Symbols {
         self.radicals
     }
 
-    /// Independent symbols, for the worker: the rates and the sines.
+    /// Independent symbols, for the worker: the rates.
     pub fn independent(&self) -> Vec<String> {
-        let sines = (0..self.bases.len()).map(|i| format!("s_{}", self.suffix(i)));
-        ["wN", "wU"].into_iter().map(String::from).chain(sines).collect()
+        ["wN", "wU"].map(String::from).to_vec()
     }
 
-    /// Algebraic symbols with their squares, for the worker: the cosines and the square roots.
+    /// Square roots with their squares, for the worker.
     pub fn generators(&self) -> Vec<(String, String)> {
-        let roots =
-            if self.radicals { vec![("r_2".into(), "2".into()), ("r_3".into(), "3".into())] } else { vec![] };
-        let cosines = (0..self.bases.len()).map(|i| {
-            let suffix = self.suffix(i);
-            (format!("c_{suffix}"), format!("1-s_{suffix}^2"))
-        });
-        roots.into_iter().chain(cosines).collect()
+        let roots: &[&str] = if self.radicals { &["2", "3"] } else { &[] };
+        roots.iter().map(|n| (format!("r_{n}"), n.to_string())).collect()
+    }
+
+    /// The names of the angles, for the worker.
+    pub fn angle_names(&self) -> Vec<String> {
+        (0..self.bases.len()).map(|i| self.suffix(i)).collect()
     }
 
     /// Names and numbers share no suffix: names start with a letter.

@@ -46,7 +46,8 @@ pub fn serve(input: impl BufRead, mut output: impl Write) -> std::io::Result<()>
 }
 
 fn answer(request: &Request) -> Response {
-    let result = Tower::new(&request.symbols, &request.generators).and_then(|tower| match &request.job {
+    let tower = Tower::new(&request.symbols, &request.generators, &request.angles);
+    let result = tower.and_then(|tower| match &request.job {
         Job::Solve { system, check } => solve::solve(&tower, system, check.as_ref()),
         Job::Derive { dynamics, order } => derive::formulas(dynamics, *order).map(|v| (v, false)),
         Job::MinorFactors { matrix } => factor::minor_factors(&tower, matrix).map(|v| (v, false)),

@@ -1,9 +1,14 @@
-//! Rational functions of some symbols, extended by square roots.
+//! Rational functions of some symbols and of the cosines and sines of some angles, extended by square
+//! roots of constants.
+//!
+//! An angle `a` is carried by `t_a = tan(a/2)`: `c_a = (1-t^2)/(1+t^2)`, `s_a = 2t/(1+t^2)`, so that
+//! `c_a^2 + s_a^2 = 1` needs no rule. Printed, a function of `t_a` is one of `c_a` and `s_a` again.
 
 use std::sync::Arc;
 
 use symbolica::domains::rational_polynomial::RationalPolynomial;
 use symbolica::poly::PolyVariable;
+use symbolica::poly::polynomial::MultivariatePolynomial;
 use symbolica::prelude::*;
 
 use super::JobError;
@@ -15,14 +20,17 @@ pub(crate) type Scalar = RationalPolynomial<IntegerRing, u16>;
 #[derive(Clone)]
 pub(crate) struct Element(pub(crate) Vec<Scalar>);
 
-/// The field of rational functions of the symbols, extended by the square roots `generators`.
+/// The field of rational functions of the symbols and half tangents, extended by the square roots
+/// `generators`.
 pub(crate) struct Tower {
-    symbols: Arc<Vec<PolyVariable>>,
-    /// Symbols, then generators.
-    ids: Vec<Symbol>,
-    symbol_scalars: Vec<Scalar>,
-    squares: Vec<Scalar>,
-    names: Vec<String>,
+    /// Symbols, then half tangents.
+    variables: Arc<Vec<PolyVariable>>,
+    /// Names that stand for scalars: symbols, then cosines, then sines.
+    scalars: Vec<(Symbol, Scalar)>,
+    /// The square roots and their squares.
+    generators: Vec<(Symbol, Scalar)>,
+    /// The names of the angles; their half tangents are the last variables.
+    angles: Vec<String>,
 }
 
 pub(crate) fn atom(text: &str) -> Result<Atom, JobError> {
@@ -35,32 +43,49 @@ fn variable(name: &str) -> PolyVariable {
 
 impl Tower {
     /// Creates the symbols in the order given.
-    pub(crate) fn new(symbols: &[String], generators: &[(String, String)]) -> Result<Self, JobError> {
-        let names: Vec<String> = generators.iter().map(|(name, _)| name.clone()).collect();
-        let symbol_map: Arc<Vec<PolyVariable>> = Arc::new(symbols.iter().map(|s| variable(s)).collect());
-        let ids = symbols.iter().chain(&names).map(|s| symbol!(s)).collect();
-        let mut tower = Self { symbols: symbol_map, ids, symbol_scalars: vec![], squares: vec![], names };
-        tower.symbol_scalars = symbols.iter().map(|s| tower.scalar(s)).collect::<Result<_, _>>()?;
-        tower.squares =
-            generators.iter().map(|(_, square)| tower.scalar(square)).collect::<Result<_, _>>()?;
+    pub(crate) fn new(
+        symbols: &[String],
+        generators: &[(String, String)],
+        angles: &[String],
+    ) -> Result<Self, JobError> {
+        let tangents = angles.iter().map(|a| format!("t_{a}"));
+        let variables = symbols.iter().cloned().chain(tangents).map(|s| variable(&s)).collect();
+        let mut tower = Self {
+            variables: Arc::new(variables),
+            scalars: Vec::new(),
+            generators: Vec::new(),
+            angles: angles.to_vec(),
+        };
+        for s in symbols {
+            tower.scalars.push((symbol!(s), tower.scalar(s)?));
+        }
+        for a in angles {
+            let cosine = tower.scalar(&format!("(1-t_{a}^2)/(1+t_{a}^2)"))?;
+            tower.scalars.push((symbol!(format!("c_{a}")), cosine));
+            let sine = tower.scalar(&format!("2*t_{a}/(1+t_{a}^2)"))?;
+            tower.scalars.push((symbol!(format!("s_{a}")), sine));
+        }
+        for (name, square) in generators {
+            tower.generators.push((symbol!(name), tower.scalar(square)?));
+        }
         Ok(tower)
     }
 
-    /// A rational function of the symbols alone.
+    /// A rational function of the symbols and half tangents alone.
     pub(crate) fn scalar(&self, text: &str) -> Result<Scalar, JobError> {
-        let s: Scalar = atom(text)?.to_rational_polynomial(&Q, &Z, self.symbols.clone());
-        if s.get_variables().len() != self.symbols.len() {
+        let s: Scalar = atom(text)?.to_rational_polynomial(&Q, &Z, self.variables.clone());
+        if s.get_variables().len() != self.variables.len() {
             return Err(JobError::NotAnElement { text: text.into() });
         }
         Ok(s)
     }
 
     fn size(&self) -> usize {
-        1 << self.squares.len()
+        1 << self.generators.len()
     }
 
     fn zero_scalar(&self) -> Scalar {
-        RationalPolynomial::new(&Z, self.symbols.clone())
+        RationalPolynomial::new(&Z, self.variables.clone())
     }
 
     pub(crate) fn zero(&self) -> Element {
@@ -86,15 +111,16 @@ impl Tower {
         let wrong = || JobError::NotAnElement { text: view.to_owned().to_string() };
         match view {
             AtomView::Num(n) => {
-                Ok(self.lift(n.as_view().to_owned().to_rational_polynomial(&Q, &Z, self.symbols.clone())))
+                Ok(self.lift(n.as_view().to_owned().to_rational_polynomial(&Q, &Z, self.variables.clone())))
             }
             AtomView::Var(v) => {
-                let known = self.ids.iter().position(|s| *s == v.get_symbol()).ok_or_else(wrong)?;
-                let mut out = self.zero();
-                match known.checked_sub(self.symbol_scalars.len()) {
-                    None => out.0[0] = self.symbol_scalars[known].clone(),
-                    Some(generator) => out.0[1 << generator] = self.one_scalar(),
+                let name = v.get_symbol();
+                if let Some((_, value)) = self.scalars.iter().find(|(s, _)| *s == name) {
+                    return Ok(self.lift(value.clone()));
                 }
+                let generator = self.generators.iter().position(|(s, _)| *s == name).ok_or_else(wrong)?;
+                let mut out = self.zero();
+                out.0[1 << generator] = self.one_scalar();
                 Ok(out)
             }
             AtomView::Pow(p) => {
@@ -143,7 +169,7 @@ impl Tower {
         for (i, x) in a.0.iter().enumerate().filter(|(_, x)| !x.is_zero()) {
             for (j, y) in b.0.iter().enumerate().filter(|(_, y)| !y.is_zero()) {
                 let mut value = x * y;
-                for (k, square) in self.squares.iter().enumerate() {
+                for (k, (_, square)) in self.generators.iter().enumerate() {
                     if i & j & (1 << k) != 0 {
                         value = &value * square;
                     }
@@ -159,7 +185,7 @@ impl Tower {
         let mut numerator = self.lift(self.zero_scalar());
         numerator.0[0] = self.one_scalar();
         let mut norm = a.clone();
-        for k in (0..self.squares.len()).rev() {
+        for k in (0..self.generators.len()).rev() {
             let mut conjugate = norm.clone();
             for (i, x) in conjugate.0.iter_mut().enumerate() {
                 if i & (1 << k) != 0 {
@@ -174,59 +200,98 @@ impl Tower {
     }
 
     fn one_scalar(&self) -> Scalar {
-        Atom::num(1).to_rational_polynomial(&Q, &Z, self.symbols.clone())
+        Atom::num(1).to_rational_polynomial(&Q, &Z, self.variables.clone())
     }
 
-    /// The element as text, over one factored denominator; squares of generators in symbols, such as
-    /// `1-s^2`, are written as powers of the generator where they divide out.
+    /// The element as text over one denominator, both factored; of two ways to write it, with powers of
+    /// cosines or of sines, the shorter.
     pub(crate) fn print(&self, e: &Element) -> String {
         if self.is_zero(e) {
             return "0".into();
         }
         // common denominator: the product of denominators that do not divide what is there already
-        let one = self.one_scalar();
-        let mut denominator = one.clone();
+        let mut denominator = self.one_scalar();
         for x in e.0.iter().filter(|x| !x.is_zero()) {
-            let d = Scalar::from(x.denominator.clone());
-            let missing = &d * &denominator.clone().inv();
+            let missing = &Scalar::from(x.denominator.clone()) * &denominator.clone().inv();
             denominator = &denominator * &Scalar::from(missing.numerator.clone());
         }
-        let mut parts: Vec<Scalar> = e.0.iter().map(|x| x * &denominator).collect();
-        let mut powers = vec![0i32; self.squares.len()];
-        for (k, square) in self.squares.iter().enumerate().filter(|(_, s)| !s.is_constant()) {
-            let inverse = square.clone().inv();
-            let divides = |x: &Scalar| (x * &inverse).denominator.is_one();
-            while divides(&denominator) {
-                denominator = &denominator * &inverse;
-                powers[k] -= 2;
-            }
-            while parts.iter().all(divides) {
-                parts = parts.iter().map(|x| x * &inverse).collect();
-                powers[k] += 2;
-            }
-            // g out of every part: from its own factor g, or from g^2 = square
-            let has = |i: usize| i & (1 << k) != 0;
-            while powers[k] < 0 && parts.iter().enumerate().all(|(i, x)| has(i) || divides(x)) {
-                powers[k] += 1;
-                let mut moved = vec![self.zero_scalar(); parts.len()];
+        let parts: Vec<Scalar> = e.0.iter().map(|x| x * &denominator).collect();
+        let polynomials = || parts.iter().chain([&denominator]).map(|x| &x.numerator);
+        let first = self.variables.len() - self.angles.len();
+        let halves: Vec<u32> = (first..self.variables.len())
+            .map(|v| polynomials().map(|p| degree(p, v)).max().unwrap_or(0).div_ceil(2))
+            .collect();
+        [Powers::OfSine, Powers::OfCosine]
+            .map(|powers| {
+                let mut numerator = Atom::num(0);
                 for (i, x) in parts.iter().enumerate() {
-                    moved[i ^ (1 << k)] = if has(i) { x.clone() } else { x * &inverse };
+                    let product = (0..self.generators.len())
+                        .filter(|k| i & (1 << k) != 0)
+                        .fold(self.in_angles(&x.numerator, &halves, powers), |product, k| {
+                            product * Atom::var(self.generators[k].0)
+                        });
+                    numerator += product;
                 }
-                parts = moved;
-            }
-        }
-        let generator = |i: usize| atom(&self.names[i]).unwrap_or_else(|_| Atom::num(1));
-        let mut numerator = Atom::num(0);
-        for (i, x) in parts.iter().enumerate() {
-            let product = (0..self.names.len())
-                .filter(|k| i & (1 << k) != 0)
-                .fold(x.to_expression(), |product, k| product * generator(k));
-            numerator += product;
-        }
-        let mut result = numerator.factor() / denominator.to_expression().factor();
-        for (k, power) in powers.into_iter().enumerate() {
-            result *= generator(k).pow(i64::from(power));
-        }
-        result.to_string()
+                let below = self.in_angles(&denominator.numerator, &halves, powers);
+                (numerator.expand().factor() / below.expand().factor()).to_string()
+            })
+            .into_iter()
+            .min_by_key(String::len)
+            .unwrap_or_default()
     }
+
+    /// A polynomial over `product (1 + t_a^2)^half_a` as one in cosines and sines.
+    fn in_angles(&self, p: &Polynomial, halves: &[u32], powers: Powers) -> Atom {
+        let first = self.variables.len() - self.angles.len();
+        let mut sum = Atom::num(0);
+        for term in p {
+            let mut product = Atom::num(term.coefficient.clone());
+            for (v, &exponent) in self.variables[..first].iter().zip(term.exponents) {
+                product *= v.to_atom().pow(i64::from(exponent));
+            }
+            for ((angle, &half), &exponent) in self.angles.iter().zip(halves).zip(&term.exponents[first..]) {
+                product *= trigonometric(angle, u32::from(exponent), half, powers);
+            }
+            sum += product;
+        }
+        sum
+    }
+}
+
+type Polynomial = MultivariatePolynomial<IntegerRing, u16>;
+
+/// Whose powers above one are kept; the other's square is replaced.
+#[derive(Clone, Copy)]
+enum Powers {
+    OfSine,
+    OfCosine,
+}
+
+fn degree(p: &Polynomial, variable: usize) -> u32 {
+    p.into_iter().map(|term| u32::from(term.exponents[variable])).max().unwrap_or(0)
+}
+
+/// `t^j / (1+t^2)^m = cos^(2m-j)(a/2) sin^j(a/2)` in the cosine and sine of `a`, for `j <= 2m`.
+fn trigonometric(angle: &str, j: u32, m: u32, powers: Powers) -> Atom {
+    let (c, s) = (Atom::var(symbol!(format!("c_{angle}"))), Atom::var(symbol!(format!("s_{angle}"))));
+    let half = Atom::num((1, 2));
+    // an odd power is one sine times an even one: sin(a/2) cos(a/2) = s/2
+    let (sine, j, m) = if j % 2 == 1 { (s.clone() * &half, j - 1, m - 1) } else { (Atom::num(1), j, m) };
+    let down = ((Atom::num(1) - &c) * &half).pow(i64::from(j / 2));
+    let up = ((Atom::num(1) + &c) * &half).pow(i64::from(m - j / 2));
+    let in_cosine = (down * up).expand();
+    let in_cosine = match powers {
+        Powers::OfCosine => in_cosine,
+        Powers::OfSine => (0..=i64::from(m)).fold(Atom::num(0), |sum, k| {
+            // the coefficient of c^k, times c^(k mod 2) (1-s^2)^(k/2)
+            let coefficient = match k {
+                0 => in_cosine.replace(c.clone()).with(Atom::num(0)),
+                1 => in_cosine.coefficient(c.clone()),
+                _ => in_cosine.coefficient(c.clone().pow(k)),
+            };
+            let even = (Atom::num(1) - s.clone().pow(2)).pow(k / 2);
+            sum + coefficient * c.clone().pow(k % 2) * even
+        }),
+    };
+    (sine * in_cosine).expand()
 }
