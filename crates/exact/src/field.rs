@@ -167,39 +167,6 @@ impl Field {
         }
         self.reduce(sum)
     }
-
-    /// A square root of `a`, or `None` when `a` is no square (Tonelli-Shanks).
-    pub fn sqrt(&self, a: u64) -> Option<u64> {
-        if a == 0 {
-            return Some(0);
-        }
-        let minus_one = self.neg(self.one);
-        if self.pow(a, (self.p - 1) / 2) == minus_one {
-            return None;
-        }
-        let s = (self.p - 1).trailing_zeros();
-        let q = (self.p - 1) >> s;
-        let non_square =
-            (2..).map(|k| self.from_u64(k)).find(|&k| self.pow(k, (self.p - 1) / 2) == minus_one)?;
-        let mut c = self.pow(non_square, q);
-        let mut t = self.pow(a, q);
-        let mut r = self.pow(a, q.div_ceil(2));
-        let mut m = s;
-        while t != self.one {
-            let mut i = 0;
-            let mut u = t;
-            while u != self.one {
-                u = self.mul(u, u);
-                i += 1;
-            }
-            let b = self.pow(c, 1 << (m - i - 1));
-            r = self.mul(r, b);
-            c = self.mul(b, b);
-            t = self.mul(t, c);
-            m = i;
-        }
-        Some(r)
-    }
 }
 
 #[cfg(test)]
@@ -232,14 +199,6 @@ mod tests {
             let f = Field::new(P);
             let slow = v.iter().fold(s, |acc, &(a, b)| f.add(acc, f.mul(a, b)));
             prop_assert_eq!(f.dot(s, v.iter().copied()), slow);
-        }
-
-        #[test]
-        fn square_roots_square_back(a in 1..P) {
-            let f = Field::new(P);
-            let square = f.mul(a, a);
-            let r = f.sqrt(square).expect("a square has a root");
-            prop_assert_eq!(f.mul(r, r), square);
         }
     }
 

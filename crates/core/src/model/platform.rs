@@ -3,7 +3,7 @@
 use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order};
 
 use super::angle::Angle;
-use super::attitude::{Matrix3, c_n_from_euler, product};
+use super::attitude::{Matrix3, c_n_from_euler};
 use super::geometry::{GYROS, SignedAxis, Unknowns};
 use super::ring::Ring;
 use super::scheme::{Carry, Scheme, SchemeError};
@@ -287,19 +287,4 @@ impl RandomValues {
             .collect();
         Sample { roots, point: Point { ring: f, w_n, w_u, cos_sin } }
     }
-}
-
-/// `C_n^c(i)` of one position: the transpose of (19).
-pub fn c_c_from_n<R: Ring>(point: &Point<R>, position: usize) -> Matrix3<R::Element> {
-    let c = c_n_from_euler(&point.ring, &point.cos_sin[position]);
-    std::array::from_fn(|i| std::array::from_fn(|j| c[j][i].clone()))
-}
-
-/// `C_c^n` of one position times a vector in c.
-pub fn to_n<R: Ring>(point: &Point<R>, position: usize, v: &[R::Element; 3]) -> [R::Element; 3] {
-    let c = c_n_from_euler(&point.ring, &point.cos_sin[position]);
-    let column: Matrix3<R::Element> = std::array::from_fn(|i| {
-        std::array::from_fn(|j| if j == 0 { v[i].clone() } else { point.ring.zero() })
-    });
-    product(&point.ring, &c, &column).map(|row| row[0].clone())
 }

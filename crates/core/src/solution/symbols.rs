@@ -50,11 +50,6 @@ impl Symbols {
         self.bases.len()
     }
 
-    /// Whether square roots of 2 or 3 occur.
-    pub fn has_radicals(&self) -> bool {
-        self.radicals
-    }
-
     /// Independent symbols, for the worker: the rates.
     pub fn independent(&self) -> Vec<String> {
         ["wN", "wU"].map(String::from).to_vec()
