@@ -110,6 +110,7 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         format!("latitude {latitude}"),
         format!("gyros {}; drift terms {}", gyros.join(", "), a.terms),
         format!("observation {z}"),
+        "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g".into(),
     ];
     if a.measured_azimuth {
         out.push("azimuth psi_y^n is measured: Za".into());
