@@ -16,7 +16,7 @@ use crate::degree::coefficient::{
 };
 use crate::degree::ensemble::{Table, Tables, Verdicts};
 use crate::model::attitude::c_n_from_euler;
-use crate::model::platform::{Platform, Point};
+use crate::model::platform::{LOCAL, Platform, Point, local_dynamics, local_output};
 use crate::model::ring::{Float, Ring, Text};
 use crate::solution::local::rows_at;
 
@@ -156,24 +156,65 @@ impl<'a> Solver<'a> {
         self.worker.as_deref_mut()
     }
 
+    /// The image of a coefficient; `None` for a decimal.
+    fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
+        let k = &table.sample.roots;
+        let number = match &c.number {
+            Number::Radical(r) => r.image(k),
+            Number::Text { raw, .. } => {
+                self.symbols.value(raw, &self.verdicts.values[field], &table.sample)?
+            }
+            Number::Decimal(_) => return None,
+        };
+        Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
+    }
+
     /// The functional with the given exact coefficients; `None` when one of them is a decimal.
     pub fn functional(&self, terms: Sparse) -> Option<Functional> {
-        let value = |c: &Coefficient, field: usize, table: &Table| {
-            let k = &table.sample.roots;
-            let number = match &c.number {
-                Number::Radical(r) => r.image(k),
-                Number::Text { raw, .. } => {
-                    self.symbols.value(raw, &self.verdicts.values[field], &table.sample)?
-                }
-                Number::Decimal(_) => return None,
-            };
-            Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
+        let images = |(field, table): (usize, &Table)| {
+            terms.iter().map(|(_, c)| self.image(c, field, table)).collect::<Option<Vec<u64>>>()
         };
-        let image = |(field, table): (usize, &Table)| {
-            terms.iter().map(|(_, c)| value(c, field, table)).collect::<Option<Vec<u64>>>()
-        };
-        let images = self.all_tables().map(image).collect::<Option<_>>()?;
+        let images = self.all_tables().map(images).collect::<Option<_>>()?;
         Some(Functional { terms, images })
+    }
+
+    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z
+    /// is replaced by its row `H F^k S_i`, in all tables. True for decimals, which have their own check.
+    fn holds(&self, terms: &[Term], targets: &[Vec<u64>]) -> bool {
+        if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
+            return true;
+        }
+        let azimuth = self.platform.scheme().measured_azimuth;
+        self.all_tables().zip(targets).all(|((field, table), target)| {
+            let (f, point) = (table.sample.roots.field, &table.sample.point);
+            let (dynamics, output) = (local_dynamics(&f, &point.w_n, &point.w_u), local_output(&f, azimuth));
+            let blocks = self.platform.blocks(point);
+            let mut sum = vec![0; target.len()];
+            for t in terms {
+                let Some(coefficient) = self.image(&t.coefficient, field, table) else { return false };
+                // Z^n as measured, or Z^c = C_n^c Z^n
+                let c = c_n_from_euler(&f, &point.cos_sin[t.position]);
+                let mut row = [0; LOCAL];
+                for (component, h) in &output {
+                    let weight = match self.frame {
+                        Frame::Platform if !t.azimuth && *component != 2 => c[component - 1][t.component - 1],
+                        Frame::Platform if !t.azimuth => 0,
+                        _ if *component == t.component => f.one(),
+                        _ => 0,
+                    };
+                    row = std::array::from_fn(|j| f.add(row[j], f.mul(weight, h[j])));
+                }
+                for _ in 0..t.order {
+                    row = std::array::from_fn(|j| f.dot(0, (0..LOCAL).map(|i| (row[i], dynamics[i][j]))));
+                }
+                let block = &blocks[t.position];
+                for (k, &column) in block.columns.iter().enumerate() {
+                    let entry = f.dot(0, (0..LOCAL).map(|i| (row[i], block.rows[i][k])));
+                    sum[column] = f.add(sum[column], f.mul(coefficient, entry));
+                }
+            }
+            sum == *target
+        })
     }
 
     /// The functional on `support` whose coefficients are the outputs of `problem`.
@@ -355,6 +396,11 @@ impl<'a> Solver<'a> {
             })
             .collect();
         terms.retain(|t| !t.coefficient.is_zero());
+        if !self.holds(&terms, &targets) {
+            return Err(
+                "it did not survive its substitution in the prime fields: please report this scheme".into()
+            );
+        }
         let printed = readable(terms.iter().map(|t| t.coefficient.clone()).collect());
         for (term, coefficient) in terms.iter_mut().zip(printed) {
             term.coefficient = coefficient;
@@ -456,4 +502,49 @@ fn float_point(platform: &Platform, tables: &Tables) -> Point<Float> {
 /// Zero for what rounding left over.
 fn tidy(x: f64) -> f64 {
     if x.abs() < 1e-12 { 0.0 } else { x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::degree::ensemble::judge;
+    use crate::model::scheme::{Scheme, parse_attitude};
+
+    /// In both frames the printed solutions of a scheme survive their substitution, and a wrong sign, a
+    /// wrong position or a wrong order does not.
+    #[test]
+    fn substitution_tells_right_from_wrong() {
+        for (frame, measured_azimuth) in
+            [(Frame::N, false), (Frame::Platform, false), (Frame::Platform, true)]
+        {
+            let angles = ["0,0,0", "180,0,0", "30,45,0"].map(|a| parse_attitude(a).expect("an attitude"));
+            let scheme = Scheme { measured_azimuth, ..Scheme::of_angles(angles) };
+            let platform = Platform::new(scheme).expect("valid");
+            let verdicts = judge(&platform, 1).expect("judged");
+            let mut solver = Solver::new(&platform, &verdicts, 1, frame, None);
+            let d_fx = platform.names().iter().position(|n| n == "D_FX").expect("known");
+            let degree = verdicts.degrees.degree[0].expect("psi_x is observable");
+            let psi_x = solver.functional(vec![(0, Coefficient::one())]).expect("exact");
+            assert!(solver.solve(&psi_x, degree).is_ok());
+            let functional = solver.functional(vec![(d_fx, Coefficient::one())]).expect("exact");
+            let degree = verdicts.degrees.degree[d_fx].expect("D_FX is observable");
+            let solved = solver.solve(&functional, degree).expect("solved");
+            let mut row = vec![0; platform.names().len()];
+            let targets: Vec<Vec<u64>> = functional
+                .images
+                .iter()
+                .map(|v| {
+                    row[d_fx] = v[0];
+                    row.clone()
+                })
+                .collect();
+            assert!(solver.holds(&solved.terms, &targets));
+            let mut wrong = solved.terms.clone();
+            wrong[0].coefficient = wrong[0].coefficient.negated();
+            assert!(!solver.holds(&wrong, &targets));
+            let mut wrong = solved.terms.clone();
+            wrong[0].order += 1;
+            assert!(!solver.holds(&wrong, &targets));
+        }
+    }
 }
