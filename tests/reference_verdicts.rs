@@ -173,3 +173,44 @@ fn fewest_positions() {
         assert!(complete(fewest) && !complete(fewest - 1), "{carry}");
     }
 }
+
+/// Accuracy orders that were derived from information matrices (log-log slopes) independently.
+#[test]
+fn accuracy_orders() {
+    let orders = |n: usize, carry| {
+        let a = judged(&scheme(&S6[..n], carry));
+        let order = |which: fn(&str) -> bool| -> Vec<Option<usize>> {
+            let mut found: Vec<_> =
+                a.quantities.iter().filter(|q| which(&q.name)).map(|q| q.accuracy_order).collect();
+            found.dedup();
+            found
+        };
+        [order(psi), order(input), order(other)]
+    };
+    let one = |k: usize| vec![Some(k)];
+    assert_eq!(orders(4, Carry::Platform), [one(1), one(2), one(2)]);
+    assert_eq!(orders(5, Carry::Platform), [one(0), one(1), one(1)]);
+    assert_eq!(orders(6, Carry::Platform), [one(0), one(1), one(1)]);
+    assert_eq!(orders(5, Carry::Inertial)[1], one(2));
+    assert_eq!(orders(6, Carry::Inertial), [one(1), one(2), one(1)]);
+    for carry in Carry::ALL {
+        let a = judged(&scheme(&["0,0,0", "180,0,0"], carry));
+        assert!(a.quantities.iter().all(|q| q.accuracy_order == q.degree), "{carry}");
+    }
+    // the dwells need not be equal
+    let mut uneven = scheme(&S6, Carry::Platform);
+    for (position, dwell) in uneven.positions.iter_mut().zip(["1000", "333.25", "7", "500", "250.5", "80"]) {
+        position.dwell = Some(dwell.parse().expect("a dwell"));
+    }
+    let a = judged(&uneven);
+    assert!(a.quantities.iter().filter(|q| input(&q.name)).all(|q| q.accuracy_order == Some(1)));
+}
+
+/// At a pole the drift about the vertical moves the azimuth unseen; the next position shows how far.
+#[test]
+fn dwell_shows_more_than_derivatives_at_a_pole() {
+    let tilted =
+        Scheme { latitude: Some("90".parse().expect("a latitude")), ..scheme(&S6[..5], Carry::Platform) };
+    let a = judged(&tilted);
+    assert!(a.quantities.iter().any(|q| q.degree.is_none() && q.accuracy_order == Some(1)), "{a:?}");
+}

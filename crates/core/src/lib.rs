@@ -5,6 +5,7 @@
 //! ([`degree::verdict`]), these into solutions ([`solution`]), and all of it into one plain
 //! [`analysis::Analysis`].
 
+pub mod accuracy;
 pub mod analysis;
 pub mod audit;
 pub mod degree;

@@ -10,6 +10,7 @@
 //! - [`prime`]: random primes `p = 1 mod n` and their roots of unity;
 //! - [`turn`]: cosines and sines of decimal degrees in such a field;
 //! - [`echelon`]: the incremental reduced row-echelon basis;
+//! - [`series`]: truncated power series, and echelon form over them;
 //! - [`radical`]: numbers of `Q(sqrt 2, sqrt 3)` recovered from their images;
 //! - [`polynomial`]: roots of small polynomials in the field;
 //! - [`certainty`]: the bound on the error probability.
@@ -21,6 +22,7 @@ pub mod polynomial;
 pub mod prime;
 pub mod radical;
 pub mod rng;
+pub mod series;
 pub mod turn;
 
 pub use echelon::Echelon;

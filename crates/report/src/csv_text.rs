@@ -16,8 +16,9 @@ pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<Strin
 
 /// One row per unknown, then one per combination.
 pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
-    let header =
-        ["kind", "name", "unit", "status", "degree", "partners", "solution"].map(String::from).to_vec();
+    let header = ["kind", "name", "unit", "status", "degree", "accuracy_order", "partners", "solution"]
+        .map(String::from)
+        .to_vec();
     let degree = |d: Option<usize>| d.map_or_else(String::new, |k| k.to_string());
     let unknowns = a.quantities.iter().map(|q| {
         let solution = q.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
@@ -28,6 +29,7 @@ pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
             q.unit.clone(),
             status,
             degree(q.degree),
+            degree(q.accuracy_order),
             q.partners.join(" "),
             solution,
         ]
@@ -42,6 +44,7 @@ pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
             String::new(),
             status,
             degree(c.degree),
+            degree(c.accuracy_order),
             String::new(),
             solution,
         ]

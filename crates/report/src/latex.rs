@@ -206,7 +206,7 @@ pub(crate) fn analysis(a: &Analysis) -> String {
             }),
         ));
     }
-    let mut lines: Vec<String> = Vec::new();
+    let mut lines: Vec<String> = words::accuracy(a).iter().map(|l| escape(l)).collect();
     for v in &a.null_space {
         let part = |c: &obsdeg_core::analysis::Component| {
             let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| expression(k));

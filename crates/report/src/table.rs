@@ -97,6 +97,13 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
         }
         out.push_str(&trimmed(&combinations));
     }
+    let accuracy = words::accuracy(a);
+    if !accuracy.is_empty() {
+        heading(&mut out, words::ACCURACY, layout);
+        for line in &accuracy {
+            paragraph(&mut out, line, layout);
+        }
+    }
     if !a.null_space.is_empty() {
         heading(&mut out, "Directions that Z does not see (a change along one leaves Z as it is)", layout);
         for v in &a.null_space {

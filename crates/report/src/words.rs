@@ -118,6 +118,29 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     out
 }
 
+/// The accuracy orders that differ from the degrees, a sentence for each pair of them.
+pub(crate) fn accuracy(a: &Analysis) -> Vec<String> {
+    let unknowns = a.quantities.iter().map(|q| (&q.name, q.degree, q.accuracy_order));
+    let combinations = a.combinations.iter().map(|c| (&c.expression, c.degree, c.accuracy_order));
+    let mut groups: Vec<((Option<usize>, usize), Vec<&str>)> = Vec::new();
+    for (name, degree, order) in unknowns.chain(combinations) {
+        let Some(order) = order.filter(|&k| Some(k) != degree) else { continue };
+        match groups.iter_mut().find(|(key, _)| *key == (degree, order)) {
+            Some((_, names)) => names.push(name),
+            None => groups.push(((degree, order), vec![name])),
+        }
+    }
+    let sentence = |((degree, order), names): ((Option<usize>, usize), Vec<&str>)| {
+        let degree = degree.map_or_else(|| "not observable by derivatives".into(), |k| format!("degree {k}"));
+        format!("{}: accuracy order {order} ({degree}), error ~ T^-{order}.5", names.join(", "))
+    };
+    groups.into_iter().map(sentence).collect()
+}
+
+/// Title of the section on accuracy orders.
+pub(crate) const ACCURACY: &str =
+    "Accuracy order where it differs from the degree (dwell T at every position)";
+
 /// How certain the verdicts and solutions are.
 pub(crate) fn certainty(a: &Analysis) -> String {
     let c = &a.certainty;

@@ -120,6 +120,9 @@ pub struct Quantity {
     pub status: Status,
     /// The observable degree; null when it is not observable.
     pub degree: Option<usize>,
+    /// The accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null when no dwell
+    /// makes it observable.
+    pub accuracy_order: Option<usize>,
     /// Unknowns that it cannot be told from.
     pub partners: Vec<String>,
     /// How it is solved.
@@ -164,6 +167,8 @@ pub struct CombinationReport {
     pub status: Status,
     /// Its observable degree.
     pub degree: Option<usize>,
+    /// Its accuracy order.
+    pub accuracy_order: Option<usize>,
     /// How it is solved.
     pub solution: Option<Solution>,
 }

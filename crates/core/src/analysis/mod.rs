@@ -9,6 +9,7 @@ use obsdeg_symbolic::{Worker, WorkerError};
 
 pub use answer::*;
 
+use crate::accuracy::Accuracy;
 use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::{EnsembleError, Verdicts, judge};
 use crate::degree::staircase::Degrees;
@@ -85,7 +86,9 @@ pub fn analyze(
     let null = null_space(&platform, &verdicts, &mut solver);
 
     let names = scheme.positions.iter().map(|p| p.name.clone()).collect();
-    let mut printer = Printer { solver, options, names, notes: Vec::new() };
+    let mut printer = Printer { solver, options, names, accuracy: None, notes: Vec::new() };
+    let accuracy = Accuracy::new(&platform, &verdicts, options.seed);
+    printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
     let quantities = quantities(&platform, &verdicts, &null, &mut printer)?;
     let mut combinations: Vec<CombinationReport> =
         basis.into_iter().map(|c| basis_report(&platform, c, &mut printer)).collect();
@@ -135,6 +138,8 @@ struct Printer<'a> {
     options: Options,
     /// Names of the positions.
     names: Vec<String>,
+    /// The accuracy orders, if they could be computed.
+    accuracy: Option<Accuracy>,
     notes: Vec<String>,
 }
 
@@ -156,6 +161,11 @@ impl Printer<'_> {
                 None
             }
         }
+    }
+
+    /// The accuracy order of a functional in the first field of the verdicts.
+    fn accuracy_order(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
+        self.accuracy.as_ref()?.of_functional(row, degree)
     }
 
     /// The value, or a note.
@@ -195,6 +205,7 @@ fn quantities(
             unit: platform.units()[c].into(),
             status,
             degree,
+            accuracy_order: printer.accuracy.as_ref().and_then(|a| a.order[c]),
             partners: partners[c].iter().map(|&d| platform.names()[d].clone()).collect(),
             solution,
             elsewhere: (degree.is_none() && somewhere).then_some(elsewhere),
@@ -212,11 +223,13 @@ fn basis_report(platform: &Platform, c: Combination, printer: &mut Printer<'_>) 
         requested: false,
         status: Status::Observable,
         degree: Some(c.degree),
+        accuracy_order: printer.accuracy_order(&c.vector, Some(c.degree)),
         solution,
     }
 }
 
-fn requested_report((text, terms, verdict): Requested, printer: &mut Printer<'_>) -> CombinationReport {
+fn requested_report(r: Requested, printer: &mut Printer<'_>) -> CombinationReport {
+    let Requested { text, row, terms, verdict } = r;
     let functional = printer.solver.functional(terms);
     let solution = verdict.degree.and_then(|k| printer.solution(functional.as_ref()?, k, &text));
     CombinationReport {
@@ -224,6 +237,7 @@ fn requested_report((text, terms, verdict): Requested, printer: &mut Printer<'_>
         requested: true,
         status: verdict.status,
         degree: verdict.degree,
+        accuracy_order: printer.accuracy_order(&row, verdict.degree),
         solution,
     }
 }

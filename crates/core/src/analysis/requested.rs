@@ -52,7 +52,17 @@ fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<
     Ok(row)
 }
 
-pub(super) type Requested = (String, Sparse, Verdict);
+/// A combination that was asked for.
+pub(super) struct Requested {
+    /// As written.
+    pub(super) text: String,
+    /// Its coefficients in the first field of the verdicts.
+    pub(super) row: Vec<u64>,
+    /// Its exact coefficients.
+    pub(super) terms: Sparse,
+    /// What the staircase says.
+    pub(super) verdict: Verdict,
+}
 
 /// Reads and judges the combinations that a scheme asks for.
 pub(super) fn requested_combinations(
@@ -81,7 +91,7 @@ pub(super) fn requested_combinations(
                 None => Status::NotExcited,
             };
             let terms = terms_of(&parsed, platform, verdicts).map_err(wrap)?;
-            Ok((text.clone(), terms, Verdict { status, degree }))
+            Ok(Requested { text: text.clone(), row, terms, verdict: Verdict { status, degree } })
         })
         .collect()
 }

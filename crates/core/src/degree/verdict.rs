@@ -13,6 +13,8 @@ use crate::solution::support::short_support;
 /// A named observable combination.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Combination {
+    /// Its coefficients in the first field of the verdicts (up to a factor).
+    pub vector: Vec<u64>,
     /// The columns that occur.
     pub support: Vec<usize>,
     /// Its coefficients (one for the leading unknown), if they could be computed.
@@ -84,8 +86,8 @@ pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solve
             let mut support = support(&v);
             let lead = lead(platform, &support);
             support.sort_by_key(|c| *c != lead);
-            let functional = combination_coefficients(platform, solver, &support, v, degree);
-            Combination { support, functional, degree }
+            let functional = combination_coefficients(platform, solver, &support, &v, degree);
+            Combination { vector: v, support, functional, degree }
         })
         .collect()
 }
@@ -95,13 +97,13 @@ fn combination_coefficients(
     platform: &Platform,
     solver: &mut Solver<'_>,
     support: &[usize],
-    vector: Vec<u64>,
+    vector: &[u64],
     degree: usize,
 ) -> Option<Functional> {
     let first = solver.tables.first();
     let field = first.sample.roots.field;
     let allowed = solver.tables.rows_up_to(degree);
-    let used = short_support(field, &first.rows, &allowed, &vector, |_| 1)?;
+    let used = short_support(field, &first.rows, &allowed, vector, |_| 1)?;
     let problem = Problem::combination(&used, platform.names().len(), support, support[0]);
     solver.functional_of(support, &problem)
 }

@@ -2,6 +2,7 @@
 
 pub mod angle;
 pub mod attitude;
+pub mod dwell;
 pub mod expression;
 pub mod geometry;
 pub mod platform;
@@ -10,6 +11,7 @@ pub mod scheme;
 pub mod scheme_file;
 
 pub use angle::{Angle, AngleError};
+pub use dwell::Dwell;
 pub use geometry::{Geometry, Term, Unknowns};
 pub use platform::Platform;
 pub use scheme::{Carry, Latitude, Position, Scheme, SchemeError};

@@ -1,6 +1,7 @@
 //! The rings in which one and the same model is written out.
 
 use obsdeg_exact::Field;
+use obsdeg_exact::series::SeriesRing;
 
 /// What a model needs of its numbers. The platform is written once over this trait: its images in a
 /// prime field give the verdicts, in `f64` the decimals, as text the exact formulas.
@@ -53,6 +54,35 @@ impl Ring for Field {
     }
     fn is_zero(&self, a: &u64) -> bool {
         *a == 0
+    }
+}
+
+impl Ring for SeriesRing {
+    type Element = Vec<u64>;
+    fn zero(&self) -> Vec<u64> {
+        vec![0; self.precision]
+    }
+    fn one(&self) -> Vec<u64> {
+        self.monomial(self.field.one(), 0)
+    }
+    fn add(&self, a: &Vec<u64>, b: &Vec<u64>) -> Vec<u64> {
+        a.iter().zip(b).map(|(&a, &b)| self.field.add(a, b)).collect()
+    }
+    fn mul(&self, a: &Vec<u64>, b: &Vec<u64>) -> Vec<u64> {
+        SeriesRing::mul(self, a, b)
+    }
+    fn neg(&self, a: &Vec<u64>) -> Vec<u64> {
+        a.iter().map(|&a| self.field.neg(a)).collect()
+    }
+    fn is_zero(&self, a: &Vec<u64>) -> bool {
+        a.iter().all(|&a| a == 0)
+    }
+    fn dot<'a>(&self, terms: impl IntoIterator<Item = (&'a Vec<u64>, &'a Vec<u64>)>) -> Vec<u64> {
+        let mut sum = self.zero();
+        for (a, b) in terms {
+            self.add_product(&mut sum, a, b);
+        }
+        sum
     }
 }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::angle::{Angle, AngleError, format_decimal, parse_decimal};
 use super::attitude::{Euler, cardinal, cardinal_name};
+use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
 
 /// What is carried from one position to the next (the paper does not say).
@@ -119,6 +120,8 @@ pub struct Position {
     pub name: String,
     /// Euler angles.
     pub angles: Euler,
+    /// How long it lasts; `None` where the scheme does not say.
+    pub dwell: Option<Dwell>,
 }
 
 /// Why a text is no attitude.
@@ -247,7 +250,7 @@ impl Scheme {
         let positions = angles
             .into_iter()
             .enumerate()
-            .map(|(i, angles)| Position { name: format!("p{}", i + 1), angles })
+            .map(|(i, angles)| Position { name: format!("p{}", i + 1), angles, dwell: None })
             .collect();
         Self { positions, ..Self::default() }
     }

@@ -8,6 +8,7 @@ use serde_spanned::Spanned;
 
 use super::angle::Angle;
 use super::attitude::Euler;
+use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
 use super::scheme::{Latitude, Position, Scheme, parse_attitude};
 
@@ -65,6 +66,9 @@ pub struct PositionEntry {
     /// Euler angles alpha, beta, gamma in degrees; a string names a generic angle.
     #[schemars(with = "Option<Vec<f64>>")]
     angles_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+    /// How long the position lasts, in seconds.
+    #[schemars(with = "Option<f64>")]
+    dwell_s: Option<Spanned<toml::Value>>,
     /// Directions of X_p, Y_p, Z_p out of N S U D E W, as in "NUE".
     #[schemars(with = "Option<String>")]
     attitude: Option<Spanned<String>>,
@@ -143,7 +147,9 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
                 format!("position name `{name}`; expected letters, digits, `_`, `-`, `.` and blanks"),
             ));
         }
-        scheme.positions.push(Position { name, angles });
+        let dwell =
+            p.dwell_s.as_ref().map(|d| literal(d).parse::<Dwell>().map_err(|e| at(d.span(), e.to_string())));
+        scheme.positions.push(Position { name, angles, dwell: dwell.transpose()? });
     }
     Ok(scheme)
 }

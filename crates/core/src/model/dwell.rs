@@ -1,0 +1,58 @@
+//! How long a position lasts.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::angle::{format_decimal, parse_decimal};
+
+/// The time spent at a position, an exact decimal of seconds.
+///
+/// ```
+/// use obsdeg_core::model::Dwell;
+/// assert_eq!("12.5".parse::<Dwell>()?.seconds(), 12.5);
+/// assert!("0".parse::<Dwell>().is_err());
+/// # Ok::<(), obsdeg_core::model::dwell::DwellError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Dwell {
+    nanoseconds: u64,
+}
+
+/// Why a text is no dwell.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{found}` is not a dwell; expected seconds above 0 and up to 1000000, with at most nine decimals")]
+pub struct DwellError {
+    /// The text found.
+    pub found: String,
+}
+
+impl Dwell {
+    /// The dwell of the paper's positions, 1000 s.
+    pub const PAPER: Self = Self { nanoseconds: 1_000_000_000_000 };
+
+    /// The dwell in 1e-9 s.
+    pub fn nanoseconds(self) -> u64 {
+        self.nanoseconds
+    }
+
+    /// The dwell in seconds.
+    pub fn seconds(self) -> f64 {
+        self.nanoseconds as f64 / 1e9
+    }
+}
+
+impl FromStr for Dwell {
+    type Err = DwellError;
+    fn from_str(text: &str) -> Result<Self, DwellError> {
+        let nanoseconds = parse_decimal(text.trim()).ok().and_then(|n| u64::try_from(n).ok());
+        let nanoseconds = nanoseconds.filter(|&n| n > 0);
+        nanoseconds.map(|nanoseconds| Self { nanoseconds }).ok_or_else(|| DwellError { found: text.into() })
+    }
+}
+
+impl fmt::Display for Dwell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // at most 1e15 ns
+        f.write_str(&format_decimal(self.nanoseconds as i64))
+    }
+}
