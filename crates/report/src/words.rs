@@ -1,5 +1,7 @@
 //! Sentences that several formats share.
 
+use std::collections::BTreeMap;
+
 use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Solution, Status, Verdict};
 use obsdeg_core::degree::coefficient::Form;
 use obsdeg_core::model::Carry;
@@ -122,12 +124,10 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
 pub(crate) fn accuracy(a: &Analysis) -> Vec<String> {
     let unknowns = a.quantities.iter().map(|q| (&q.name, q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (&c.expression, c.degree, c.accuracy_order));
-    let mut groups: Vec<((Option<usize>, usize), Vec<&str>)> = Vec::new();
+    let mut groups: BTreeMap<(Option<usize>, usize), Vec<&str>> = BTreeMap::new();
     for (name, degree, order) in unknowns.chain(combinations) {
-        let Some(order) = order.filter(|&k| Some(k) != degree) else { continue };
-        match groups.iter_mut().find(|(key, _)| *key == (degree, order)) {
-            Some((_, names)) => names.push(name),
-            None => groups.push(((degree, order), vec![name])),
+        if let Some(order) = order.filter(|&k| Some(k) != degree) {
+            groups.entry((degree, order)).or_default().push(name);
         }
     }
     let sentence = |((degree, order), names): ((Option<usize>, usize), Vec<&str>)| {
