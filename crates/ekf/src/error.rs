@@ -1,0 +1,99 @@
+//! What the filter refuses.
+
+use nalgebra::DMatrix;
+
+/// Why an input is refused; `what` names it (`P0`, `R`, `Phi`, ...).
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EkfError {
+    /// A matrix or vector of the wrong shape.
+    #[error("{what} has shape {}x{}; expected {}x{}", found.0, found.1, expected.0, expected.1)]
+    Shape {
+        /// The input.
+        what: &'static str,
+        /// Rows and columns expected.
+        expected: (usize, usize),
+        /// Rows and columns found.
+        found: (usize, usize),
+    },
+    /// NaN or infinity.
+    #[error("{what} has an entry that is not finite: {value} at row {row}, column {column}")]
+    NotFinite {
+        /// The input.
+        what: &'static str,
+        /// The value.
+        value: f64,
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+    },
+    /// Not symmetric.
+    #[error("{what} is not symmetric: entries ({row},{column}) and ({column},{row}) differ")]
+    NotSymmetric {
+        /// The input.
+        what: &'static str,
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+    },
+    /// A covariance that must be invertible is not.
+    #[error("{what} is not positive definite: pivot {pivot:e} in row {row}")]
+    NotPositiveDefinite {
+        /// The input.
+        what: &'static str,
+        /// The pivot found.
+        pivot: f64,
+        /// Row, from 0.
+        row: usize,
+    },
+    /// A covariance has a negative direction.
+    #[error("{what} is not positive semidefinite: pivot {pivot:e} in row {row}")]
+    NotPositiveSemidefinite {
+        /// The input.
+        what: &'static str,
+        /// The pivot found.
+        pivot: f64,
+        /// Row, from 0.
+        row: usize,
+    },
+    /// The information leaves a direction undetermined.
+    #[error("the information is singular: unknown {column} is not determined")]
+    Singular {
+        /// The unknown, from 0.
+        column: usize,
+    },
+}
+
+/// Whether `x` is a number above zero; false for NaN.
+pub(crate) fn is_positive(x: f64) -> bool {
+    x > 0.0
+}
+
+/// Checks the shape of `m` and that all its entries are finite.
+pub(crate) fn check(what: &'static str, m: &DMatrix<f64>, expected: (usize, usize)) -> Result<(), EkfError> {
+    if m.shape() != expected {
+        return Err(EkfError::Shape { what, expected, found: m.shape() });
+    }
+    for (i, &value) in m.iter().enumerate() {
+        if !value.is_finite() {
+            let (row, column) = (i % m.nrows(), i / m.nrows());
+            return Err(EkfError::NotFinite { what, value, row, column });
+        }
+    }
+    Ok(())
+}
+
+/// Checks shape, finiteness and symmetry (to rounding).
+pub(crate) fn check_symmetric(what: &'static str, m: &DMatrix<f64>, n: usize) -> Result<(), EkfError> {
+    check(what, m, (n, n))?;
+    for column in 0..n {
+        for row in column + 1..n {
+            let scale = (m[(row, row)].abs() * m[(column, column)].abs()).sqrt();
+            if (m[(row, column)] - m[(column, row)]).abs() > 1e-9 * scale {
+                return Err(EkfError::NotSymmetric { what, row, column });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,70 @@
+//! From a continuous to a discrete system: Runge-Kutta for any, the matrix exponential for a linear one.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::{EkfError, check, check_symmetric};
+use crate::model::Process;
+
+/// A state after a step, with its transition matrix and the noise of the step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Propagated {
+    /// `x(t + dt)` (shape n).
+    pub x: DVector<f64>,
+    /// `Phi = dx(t + dt)/dx(t)` (n x n).
+    pub phi: DMatrix<f64>,
+    /// Covariance of the noise accumulated over the step (n x n).
+    pub q: DMatrix<f64>,
+}
+
+/// The classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in `substeps` equal parts.
+pub fn runge_kutta(process: &impl Process, t: f64, x: &DVector<f64>, dt: f64, substeps: usize) -> Propagated {
+    let n = process.states();
+    let slope = |t: f64, y: &Propagated| {
+        let f = process.jacobian(t, &y.x);
+        let fq = &f * &y.q;
+        Propagated { x: process.f(t, &y.x), phi: &f * &y.phi, q: &fq + fq.transpose() + process.noise(t) }
+    };
+    let moved = |y: &Propagated, k: &Propagated, h: f64| Propagated {
+        x: &y.x + &k.x * h,
+        phi: &y.phi + &k.phi * h,
+        q: &y.q + &k.q * h,
+    };
+    let mut y = Propagated { x: x.clone(), phi: DMatrix::identity(n, n), q: DMatrix::zeros(n, n) };
+    let h = dt / substeps.max(1) as f64;
+    for i in 0..substeps.max(1) {
+        let t = t + h * i as f64;
+        let k1 = slope(t, &y);
+        let k2 = slope(t + h / 2.0, &moved(&y, &k1, h / 2.0));
+        let k3 = slope(t + h / 2.0, &moved(&y, &k2, h / 2.0));
+        let k4 = slope(t + h, &moved(&y, &k3, h));
+        for (k, weight) in [(k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)] {
+            y = moved(&y, &k, h * weight / 6.0);
+        }
+    }
+    y
+}
+
+/// The exact discretisation of `x' = F x + w` over `dt`: `(Phi, Q_d)` by the exponential of
+/// `[[-F, Q], [0, F^T]] dt` (Van Loan 1978, doi:10.1109/TAC.1978.1101743).
+///
+/// # Errors
+/// [`EkfError`] unless F and Q are square, finite and of one size, and Q is symmetric.
+pub fn van_loan(
+    f: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+    dt: f64,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), EkfError> {
+    let n = f.nrows();
+    check("F", f, (n, n))?;
+    check_symmetric("Q", q, n)?;
+    check("dt", &DMatrix::from_element(1, 1, dt), (1, 1))?;
+    let mut block = DMatrix::zeros(2 * n, 2 * n);
+    block.view_mut((0, 0), (n, n)).copy_from(&(-f * dt));
+    block.view_mut((0, n), (n, n)).copy_from(&(q * dt));
+    block.view_mut((n, n), (n, n)).copy_from(&(f.transpose() * dt));
+    let exponential = block.exp();
+    let phi = exponential.view((n, n), (n, n)).transpose();
+    let q_d = &phi * exponential.view((0, n), (n, n));
+    let symmetric = (&q_d + q_d.transpose()) / 2.0;
+    Ok((phi, symmetric))
+}

@@ -1,0 +1,47 @@
+//! What a filter needs to know of a system: `x' = f(t, x) + w`, `z = h(t, x) + v`.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The dynamics `x' = f(t, x) + w`, w white of spectral density Q. States are in the units of the model,
+/// time in seconds.
+pub trait Process {
+    /// The number n of states.
+    fn states(&self) -> usize;
+    /// `f(t, x)` (shape n).
+    fn f(&self, t: f64, x: &DVector<f64>) -> DVector<f64>;
+    /// `F = df/dx` (n x n).
+    fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64>;
+    /// Spectral density Q of the process noise (n x n), in squared units per second.
+    fn noise(&self, t: f64) -> DMatrix<f64>;
+}
+
+/// The observation `z = h(t, x) + v`, `v ~ N(0, R)`.
+pub trait Measurement {
+    /// The number m of outputs.
+    fn outputs(&self) -> usize;
+    /// `h(t, x)` (shape m).
+    fn h(&self, t: f64, x: &DVector<f64>) -> DVector<f64>;
+    /// `H = dh/dx` (m x n).
+    fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64>;
+    /// Covariance R of the noise (m x m), positive definite.
+    fn noise(&self, t: f64) -> DMatrix<f64>;
+}
+
+/// `df/dx` by central differences with steps `step_i` (shape n): what tests hold a Jacobian against.
+pub fn central_difference(
+    f: impl Fn(&DVector<f64>) -> DVector<f64>,
+    x: &DVector<f64>,
+    step: &DVector<f64>,
+) -> DMatrix<f64> {
+    let columns: Vec<DVector<f64>> = (0..x.len())
+        .map(|j| {
+            let at = |sign: f64| {
+                let mut moved = x.clone();
+                moved[j] += sign * step[j];
+                f(&moved)
+            };
+            (at(1.0) - at(-1.0)) / (2.0 * step[j])
+        })
+        .collect();
+    DMatrix::from_columns(&columns)
+}
