@@ -103,3 +103,23 @@ pub(crate) struct OutputArguments {
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }
+
+/// Where results go when there are figures and series too.
+#[derive(Debug, Args)]
+pub(crate) struct FolderArguments {
+    /// Format on stdout: table, json, markdown, csv or latex
+    #[arg(long, value_name = "FORMAT", default_value_t = Format::Table)]
+    pub(crate) format: Format,
+
+    /// Write summary, series and figures to a folder
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+
+    /// Replace files in an existing folder
+    #[arg(long, requires = "output")]
+    pub(crate) force: bool,
+
+    /// Say nothing on stderr but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}

@@ -4,12 +4,14 @@
 mod analyze;
 mod arguments;
 mod completions;
+mod conditions;
 mod failure;
 mod lock;
 mod output;
 mod paper;
 mod progress;
 mod schema;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -37,6 +39,8 @@ struct Cli {
 enum Command {
     /// The observable degree of every unknown of a torquing scheme, and how it is solved
     Analyze(analyze::Arguments),
+    /// Run a Kalman filter against a simulated truth: the paper's run, or any scheme
+    Simulate(simulate::Arguments),
     /// Recompute every equation and claim of the paper and say where it is wrong
     Paper(paper::Arguments),
     /// Print the completion script of a shell
@@ -53,6 +57,7 @@ enum Command {
 fn run() -> Result<ExitCode, Failure> {
     match Cli::parse().command {
         Command::Analyze(a) => analyze::run(&a),
+        Command::Simulate(a) => simulate::run(&a),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man => completions::man(),

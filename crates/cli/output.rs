@@ -9,13 +9,18 @@ use crate::arguments::OutputArguments;
 use crate::failure::Failure;
 
 /// Columns of a table that does not go to a terminal.
-const WIDTH: u16 = 120;
+const PIPE: Layout = Layout { width: Some(120), color: false };
 
 /// The layout for where the output goes.
 pub(crate) fn layout(out: &OutputArguments) -> Layout {
+    if out.output.is_some() { PIPE } else { terminal() }
+}
+
+/// The layout for stdout.
+pub(crate) fn terminal() -> Layout {
     let stdout = std::io::stdout();
-    if out.output.is_some() || !stdout.is_terminal() {
-        return Layout { width: Some(WIDTH), color: false };
+    if !stdout.is_terminal() {
+        return PIPE;
     }
     Layout {
         width: terminal_size::terminal_size().map(|(w, _)| w.0),

@@ -78,6 +78,11 @@ impl Accuracy {
         Ok(Self { order, error_bound, module: Some(module) })
     }
 
+    /// The rank with dwells; `None` where it is that of the degrees.
+    pub fn rank(&self) -> Option<usize> {
+        self.module.as_ref().map(SeriesEchelon::rank)
+    }
+
     /// The accuracy order of a functional (shape n, in the first field of the verdicts) of a known degree.
     pub fn of_functional(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
         self.module.as_ref().map_or(degree, |m| m.order(row))

@@ -10,4 +10,6 @@ pub mod analysis;
 pub mod audit;
 pub mod degree;
 pub mod model;
+pub mod prediction;
+pub mod simulation;
 pub mod solution;

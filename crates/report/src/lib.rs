@@ -2,8 +2,10 @@
 
 mod audit;
 mod csv_text;
+mod document;
 mod latex;
 mod markdown;
+mod simulation;
 mod table;
 mod words;
 
@@ -12,6 +14,7 @@ use std::str::FromStr;
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
+use obsdeg_core::simulation::Simulation;
 
 /// A text format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -94,6 +97,29 @@ pub fn analysis(a: &Analysis, format: Format, layout: Layout) -> Result<String, 
         Format::Markdown => markdown::analysis(a),
         Format::Csv => csv_text::analysis(a)?,
         Format::Latex => latex::analysis(a),
+    })
+}
+
+/// A run of the filter in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a serializer fails.
+pub fn simulation(s: &Simulation, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(s, &simulation::document(s), format, layout)
+}
+
+fn written(
+    answer: &impl serde::Serialize,
+    document: &document::Document,
+    format: Format,
+    layout: Layout,
+) -> Result<String, ReportError> {
+    Ok(match format {
+        Format::Table => document.table(layout),
+        Format::Json => serde_json::to_string_pretty(answer)? + "\n",
+        Format::Markdown => document.markdown(),
+        Format::Csv => document.csv()?,
+        Format::Latex => document.latex(),
     })
 }
 

@@ -141,6 +141,19 @@ impl Platform {
     }
 }
 
+impl Platform {
+    /// The rows of `eps^n = C E(g) D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
+    /// coefficient; none when the unknowns are the drift itself.
+    pub fn drift_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
+        drift_block(ring, &self.drift, c)
+    }
+
+    /// The number of coefficients.
+    pub fn coefficients(&self) -> usize {
+        self.drift.len()
+    }
+}
+
 /// `eps^n = C_c^n E(g^c) D` (3), (8): three rows, one column per coefficient (term by term, gyro by
 /// gyro). `g^c = C_n^c (0,-1,0)` is minus the second row of `C_c^n`.
 fn drift_block<R: Ring>(ring: &R, terms: &[DriftTerm], c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {

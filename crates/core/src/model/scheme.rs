@@ -10,6 +10,7 @@ use super::angle::{Angle, AngleError, format_decimal, parse_decimal};
 use super::attitude::{Euler, cardinal, cardinal_name};
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
+use crate::simulation::conditions::Settings;
 
 /// What is carried from one position to the next (the paper does not say).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -192,7 +193,7 @@ impl Position {
 }
 
 /// A torquing scheme and the assumptions under which it is judged.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scheme {
     /// The positions, in order.
     pub positions: Vec<Position>,
@@ -208,6 +209,8 @@ pub struct Scheme {
     pub measured_azimuth: bool,
     /// Linear combinations of unknowns to be judged, as written by the user.
     pub combinations: Vec<String>,
+    /// Conditions of a simulation, as far as the scheme gives them.
+    pub simulation: Settings,
 }
 
 /// Why a scheme cannot be analysed.

@@ -11,6 +11,7 @@ use super::attitude::Euler;
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
 use super::scheme::{Latitude, Position, Scheme, parse_attitude};
+use crate::simulation::conditions::Settings;
 
 /// Why a file is no scheme.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -44,6 +45,9 @@ pub struct SchemeFile {
     /// Linear combinations of unknowns to be judged, for instance `"D_IX - D_IY"`.
     #[serde(default)]
     combinations: Vec<String>,
+    /// Conditions of `obsdeg simulate` and `obsdeg crosscheck`.
+    #[serde(default)]
+    simulation: Settings,
     /// The positions in order.
     #[serde(default, rename = "position")]
     #[schemars(with = "Vec<PositionEntry>")]
@@ -91,6 +95,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         geometry: file.geometry.as_ref().map(|g| *g.get_ref()).unwrap_or_default(),
         measured_azimuth: file.measured_azimuth,
         combinations: file.combinations,
+        simulation: file.simulation,
         ..Scheme::default()
     };
     if let Some(geometry) = &file.geometry {

@@ -1,0 +1,107 @@
+//! The conditions of a run, shared by the commands that simulate.
+
+use clap::{Args, ValueEnum};
+use obsdeg_core::model::Scheme;
+use obsdeg_core::simulation::Conditions;
+use obsdeg_core::simulation::conditions::{Assignment, DriftNoise, Propagation, Settings, Truth};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum TruthArgument {
+    Linear,
+    Exact,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PropagationArgument {
+    Exponential,
+    Rk4,
+}
+
+/// A run's conditions; a scheme file may give them too, options come last.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Conditions of the run")]
+pub(crate) struct ConditionArguments {
+    /// linear: the model itself; exact: direction cosines, specific force in the true platform frame [linear]
+    #[arg(long, value_name = "LEVEL", hide_possible_values = true)]
+    truth: Option<TruthArgument>,
+
+    /// Dwell of positions that do not say theirs, in s [1000]
+    #[arg(long, value_name = "S")]
+    dwell: Option<f64>,
+
+    /// Largest sampling step, in s [10]
+    #[arg(long, value_name = "S")]
+    step: Option<f64>,
+
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only [instantaneous]
+    #[arg(long, value_name = "DEG_S")]
+    slew_rate: Option<f64>,
+
+    /// White noise of Z per sample and axis, in g [1e-5]
+    #[arg(long, value_name = "G")]
+    noise: Option<f64>,
+
+    /// Noise of a measured azimuth per sample, in deg [0.001]
+    #[arg(long, value_name = "DEG")]
+    azimuth_noise: Option<f64>,
+
+    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
+    /// [0.01 deg/h]
+    #[arg(long, value_name = "NOISE")]
+    drift_noise: Option<DriftNoise>,
+
+    /// Transition matrix of the filter: exponential or rk4 [exponential]
+    #[arg(long, value_name = "HOW", hide_possible_values = true)]
+    propagation: Option<PropagationArgument>,
+
+    /// True value of an unknown or family in deg, deg/h, deg/h/g: D_FX=11, D_I=5, psi=0.1 (the paper's)
+    #[arg(long, value_name = "NAME=X")]
+    value: Vec<Assignment>,
+
+    /// Initial standard deviation, likewise [psi 0.1, D_F 20, D_I D_O D_S 10, others 1]
+    #[arg(long, value_name = "NAME=X")]
+    prior: Vec<Assignment>,
+
+    /// Initial estimate, likewise [0]
+    #[arg(long, value_name = "NAME=X")]
+    estimate: Vec<Assignment>,
+
+    /// Standard deviation to be reached, likewise [psi 0.01, D 0.1]
+    #[arg(long, value_name = "NAME=X")]
+    target: Vec<Assignment>,
+
+    /// Factor on the true drifts and their priors [1]
+    #[arg(long, value_name = "X")]
+    drift_scale: Option<f64>,
+}
+
+impl ConditionArguments {
+    /// The paper's run, with what the scheme and the options say.
+    pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
+        let mut out = Conditions::default();
+        out.apply(&scheme.simulation);
+        out.apply(&Settings {
+            truth: self.truth.map(|t| match t {
+                TruthArgument::Linear => Truth::Linear,
+                TruthArgument::Exact => Truth::Exact,
+            }),
+            step_s: self.step,
+            dwell_s: self.dwell,
+            slew_rate_deg_s: self.slew_rate,
+            accelerometer_noise_g: self.noise,
+            azimuth_noise_deg: self.azimuth_noise,
+            drift_noise: self.drift_noise,
+            propagation: self.propagation.map(|p| match p {
+                PropagationArgument::Exponential => Propagation::Exponential,
+                PropagationArgument::Rk4 => Propagation::Rk4,
+            }),
+            drift_scale: self.drift_scale,
+            ..Settings::default()
+        });
+        out.values.extend(self.value.iter().cloned());
+        out.priors.extend(self.prior.iter().cloned());
+        out.estimates.extend(self.estimate.iter().cloned());
+        out.targets.extend(self.target.iter().cloned());
+        out
+    }
+}

@@ -1,0 +1,125 @@
+//! What the exact engine says of a scheme, as numbers that a filter can be held against.
+
+use crate::accuracy::{Accuracy, AccuracyError};
+use crate::analysis::{Status, verdict};
+use crate::degree::coefficient::{Coefficient, Number};
+use crate::degree::ensemble::{EnsembleError, judge};
+use crate::degree::verdict::{combinations, expression, null_space, partners};
+use crate::model::Platform;
+use crate::solution::solver::{Frame, Solver, Sparse};
+
+/// A linear combination of unknowns: `(unknown, coefficient)` in SI units.
+pub type Combination = Vec<(usize, f64)>;
+
+/// The verdict on one unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictedUnknown {
+    /// Whether it can be solved.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+    /// The accuracy order: `None` when no dwell makes it observable.
+    pub accuracy_order: Option<usize>,
+    /// Unknowns that it cannot be told from.
+    pub partners: Vec<usize>,
+}
+
+/// An observable combination.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictedCombination {
+    /// In words: `D_FZ - wN*psi_y`.
+    pub expression: String,
+    /// Its coefficients; the first is its leading unknown.
+    pub terms: Combination,
+    /// The observable degree.
+    pub degree: usize,
+    /// The accuracy order.
+    pub accuracy_order: Option<usize>,
+}
+
+/// All of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Per unknown, in model order.
+    pub unknowns: Vec<PredictedUnknown>,
+    /// Observable combinations beyond single unknowns.
+    pub combinations: Vec<PredictedCombination>,
+    /// A basis of the directions that Z does not see, unknowns that are not excited included.
+    pub null_space: Vec<Combination>,
+    /// The rank with dwells: unknowns minus this is the defect of a filter.
+    pub rank: usize,
+    /// Bound on the probability that any of it is wrong.
+    pub error_bound: f64,
+}
+
+/// Why there is no prediction.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PredictionError {
+    /// No verdict.
+    #[error(transparent)]
+    Verdict(#[from] EnsembleError),
+    /// No accuracy order.
+    #[error(transparent)]
+    Accuracy(#[from] AccuracyError),
+}
+
+impl Prediction {
+    /// The prediction for `platform` with the rates `(wN, wU)` in rad/s.
+    ///
+    /// # Errors
+    /// [`PredictionError`].
+    pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
+        let verdicts = judge(platform, seed)?;
+        let accuracy = Accuracy::new(platform, &verdicts, seed)?;
+        let mut solver = Solver::new(platform, &verdicts, seed, Frame::N, None);
+        let null = null_space(platform, &verdicts, &mut solver);
+        let n = platform.names().len();
+        let partners = partners(n, &null);
+        let unknowns: Vec<PredictedUnknown> = partners
+            .into_iter()
+            .enumerate()
+            .map(|(c, partners)| {
+                let v = verdict(&verdicts.degrees, c);
+                let accuracy_order = accuracy.order[c];
+                PredictedUnknown { status: v.status, degree: v.degree, accuracy_order, partners }
+            })
+            .collect();
+        let numbers = |terms: &Sparse| -> Option<Combination> {
+            terms.iter().map(|(c, k)| Some((*c, number(k, rates)?))).collect()
+        };
+        let combinations = combinations(platform, &verdicts, &mut solver)
+            .into_iter()
+            .filter_map(|c| {
+                let functional = c.functional.as_ref()?;
+                Some(PredictedCombination {
+                    expression: expression(platform, &c.support, Some(&functional.terms)),
+                    terms: numbers(&functional.terms)?,
+                    degree: c.degree,
+                    accuracy_order: accuracy.of_functional(&c.vector, Some(c.degree)),
+                })
+            })
+            .collect();
+        // with dwells, a direction may be seen that derivatives do not see (at a pole)
+        let unseen = |v: &Combination| v.iter().all(|(c, _)| unknowns[*c].accuracy_order.is_none());
+        let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).map(|c| vec![(c, 1.0)]);
+        let null_space = null
+            .iter()
+            .filter_map(|v| numbers(v.components.as_ref()?))
+            .chain(silent)
+            .filter(unseen)
+            .collect();
+        let rank = accuracy.rank().unwrap_or_else(|| verdicts.degrees.rank());
+        let error_bound = verdicts.error_bound.max(accuracy.error_bound);
+        Ok(Self { unknowns, combinations, null_space, rank, error_bound })
+    }
+}
+
+/// The value of a coefficient; `None` for one that is only known as a formula.
+fn number(k: &Coefficient, [w_n, w_u]: [f64; 2]) -> Option<f64> {
+    let factor = match &k.number {
+        Number::Radical(r) => r.to_f64(),
+        Number::Decimal(x) => *x,
+        Number::Text { .. } => return None,
+    };
+    Some(factor * w_n.powi(k.rates[0]) * w_u.powi(k.rates[1]))
+}

@@ -1,0 +1,273 @@
+//! A torquing scheme run through the filter: one run against one truth, and what it says.
+
+pub mod answer;
+pub(crate) mod attitude_path;
+pub mod conditions;
+pub mod plan;
+pub mod record;
+pub mod truth;
+
+use obsdeg_ekf::EkfError;
+use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band, ljung_box};
+
+pub use answer::{Simulation, Validity};
+pub use conditions::Conditions;
+pub use plan::Plan;
+pub use record::{Record, Start, run};
+
+use crate::model::{Carry, Scheme, SchemeError};
+use crate::prediction::{Prediction, PredictionError};
+use answer::{ConditionsReport, Consistency, Estimate, Outcome, SCHEMA, TimelineReport};
+use conditions::{resolve, shown_unit, si_per_shown};
+use plan::Kind;
+
+/// Why a scheme cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// A generic angle has no number.
+    #[error("the angle `{name}` is generic; expected numbers for a simulation")]
+    GenericAngle {
+        /// Its name.
+        name: String,
+    },
+    /// Slews carry psi^n.
+    #[error(
+        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or no slew rate)"
+    )]
+    SlewCarry {
+        /// The carry found.
+        carry: Carry,
+    },
+    /// The exact truth turns an attitude by coefficients.
+    #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
+    ExactDrift,
+    /// Too many unknowns for a full covariance.
+    #[error("{found} unknowns; expected at most {} for a simulation", plan::MAX_UNKNOWNS)]
+    TooManyUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
+    /// Too many steps.
+    #[error("{found} steps; expected at most {} (take longer steps)", plan::MAX_STEPS)]
+    TooManySteps {
+        /// Number of steps.
+        found: usize,
+    },
+    /// A condition that must be above zero.
+    #[error("{what} is {found}; expected a number above 0")]
+    NotPositive {
+        /// The condition.
+        what: &'static str,
+        /// The number found.
+        found: f64,
+    },
+    /// A value for something that the scheme does not have.
+    #[error("{what} for `{found}`: no such unknown; expected one of {known}, or psi, D, D_F, D_I, D_O, D_S")]
+    UnknownName {
+        /// Which list.
+        what: &'static str,
+        /// The name found.
+        found: String,
+        /// The unknowns.
+        known: String,
+    },
+    /// The scheme itself.
+    #[error(transparent)]
+    Scheme(#[from] SchemeError),
+    /// No exact verdicts.
+    #[error(transparent)]
+    Prediction(#[from] PredictionError),
+    /// The filter refuses a number.
+    #[error(transparent)]
+    Filter(#[from] EkfError),
+}
+
+/// Simulates `scheme` once: the summary and the time series.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn simulate(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<(Simulation, Record), SimulationError> {
+    let plan = Plan::new(scheme, conditions)?;
+    let start = Start::new(&plan, conditions)?;
+    let rates = [plan.point.w_n, plan.point.w_u];
+    let prediction = Prediction::new(&plan.platform, rates, seed)?;
+    let record = run(&plan, conditions, &start, &prediction, seed)?;
+    let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
+    Ok((summary, record))
+}
+
+fn summary(
+    scheme: &Scheme,
+    plan: &Plan,
+    conditions: &Conditions,
+    prediction: &Prediction,
+    record: &Record,
+    seed: u64,
+) -> Result<Simulation, SimulationError> {
+    let n = plan.unknowns();
+    let units: Vec<&str> = plan.platform.units().to_vec();
+    let targets = resolve("target sigma", &plan.platform, &conditions.targets, f64::NAN)?;
+    let mut quantities = Vec::new();
+    for (c, u) in prediction.unknowns.iter().enumerate() {
+        let scale = si_per_shown(units[c]);
+        let series = &record.series[c];
+        quantities.push(Estimate {
+            status: u.status,
+            degree: u.degree,
+            accuracy_order: u.accuracy_order,
+            ..estimate(&plan.platform.names()[c], units[c], scale, series, record, Some(targets[c]))
+        });
+    }
+    let mut combinations = Vec::new();
+    for (i, c) in prediction.combinations.iter().enumerate() {
+        let unit = units[c.terms[0].0];
+        let series = &record.series[n + i];
+        combinations.push(Estimate {
+            status: crate::analysis::Status::Observable,
+            degree: Some(c.degree),
+            accuracy_order: c.accuracy_order,
+            ..estimate(&c.expression, unit, si_per_shown(unit), series, record, Some(targets[c.terms[0].0]))
+        });
+    }
+    let consistency = consistency(plan, record, &quantities)?;
+    let validity = validity(plan, conditions, record, &targets);
+    Ok(Simulation {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        carry: scheme.carry,
+        conditions: conditions_report(scheme, plan, conditions),
+        timeline: timeline_report(plan),
+        quantities,
+        combinations,
+        consistency,
+        validity,
+        seed,
+    })
+}
+
+/// The conditions as they are reported.
+pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
+    ConditionsReport {
+        truth: conditions.truth,
+        latitude_deg: plan.platform.scheme().latitude.map_or(0.0, |l| l.degrees()),
+        latitude_by_default: scheme.latitude.is_none(),
+        step_s: conditions.step_s,
+        slew_rate_deg_s: conditions.slew_rate_deg_s,
+        accelerometer_noise_g: conditions.accelerometer_noise_g,
+        drift_noise: conditions.drift_noise.to_string(),
+        propagation: conditions.propagation,
+        drift_scale: conditions.drift_scale,
+    }
+}
+
+/// The timeline as it is reported.
+pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
+    let positions = &plan.platform.scheme().positions;
+    let report = |s: &plan::Segment| TimelineReport {
+        position: positions[s.position].name.clone(),
+        slew: matches!(s.kind, Kind::Slew(_)),
+        start_s: s.start_s,
+        end_s: s.start_s + s.dt * s.steps as f64,
+    };
+    plan.segments.iter().map(report).collect()
+}
+
+fn estimate(
+    name: &str,
+    unit: &str,
+    scale: f64,
+    series: &record::Series,
+    record: &Record,
+    target: Option<f64>,
+) -> Estimate {
+    let last = |v: &[f64]| v.last().copied().unwrap_or(0.0) / scale;
+    let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
+    let prior_sigma = series.sigma[0] / scale;
+    let target_sigma = target.filter(|t| !t.is_nan());
+    let reached = target_sigma.and_then(|t| series.sigma.iter().position(|s| s / scale <= t));
+    let error = estimate - truth;
+    let error_over_sigma = if sigma > 0.0 { error / sigma } else { 0.0 };
+    let verdict = if error_over_sigma.abs() > 4.0 {
+        Outcome::Inconsistent
+    } else if sigma > 0.9 * prior_sigma {
+        Outcome::PriorOnly
+    } else if target_sigma.is_none_or(|t| sigma <= t) {
+        Outcome::Reached
+    } else {
+        Outcome::Converging
+    };
+    Estimate {
+        name: name.into(),
+        unit: shown_unit(unit).into(),
+        status: crate::analysis::Status::Observable,
+        degree: None,
+        accuracy_order: None,
+        truth,
+        estimate,
+        error,
+        sigma,
+        error_over_sigma,
+        prior_sigma,
+        target_sigma,
+        time_to_target_s: reached.map(|i| record.time_s[i]),
+        verdict,
+    }
+}
+
+fn consistency(
+    plan: &Plan,
+    record: &Record,
+    quantities: &[Estimate],
+) -> Result<Consistency, SimulationError> {
+    let n = plan.unknowns();
+    let outputs = plan.components.len();
+    let samples = record.whitened.len() / outputs;
+    let nis = record.whitened.iter().map(|v| v * v).sum::<f64>() / samples as f64;
+    let error: Vec<f64> = record.series[..n]
+        .iter()
+        .map(|s| s.estimate.last().copied().unwrap_or(0.0) - s.truth.last().copied().unwrap_or(0.0))
+        .collect();
+    let nees = Nees::new(&record.last_covariance)?.of(&error);
+    let lags = 20.min(samples / 4).max(1);
+    let whiteness = (0..outputs)
+        .map(|j| {
+            let one: Vec<f64> = record.whitened.iter().skip(j).step_by(outputs).copied().collect();
+            ljung_box(&autocorrelation(&one, lags), one.len())
+        })
+        .fold(1.0, f64::min);
+    let strict = chi_square_band(outputs as f64, samples as f64, 0.999);
+    let consistent =
+        nis <= strict.1 && nis >= strict.0 && quantities.iter().all(|q| q.error_over_sigma.abs() <= 4.0);
+    Ok(Consistency {
+        nis,
+        nis_band: chi_square_band(outputs as f64, samples as f64, CONFIDENCE),
+        nees,
+        nees_band: chi_square_band(n as f64, 1.0, CONFIDENCE),
+        whiteness_probability: whiteness,
+        consistent,
+    })
+}
+
+/// The validity of the small-angle model, by the figures that decide it.
+pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, targets: &[f64]) -> Validity {
+    let psi = record.largest_psi;
+    let dph = si_per_shown("deg/h");
+    let sensitive = plan.platform.units().iter().zip(&record.series).filter(|(unit, _)| unit.contains("/g"));
+    let coefficient = sensitive.map(|(_, s)| s.truth[0].abs()).fold(0.0, f64::max) / dph;
+    let smallest =
+        plan.platform.units().iter().zip(targets).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
+    let smallest = smallest.map(|(_, t)| *t).reduce(f64::min);
+    let (neglected_g, neglected_dph) = (psi * psi / 2.0, coefficient * psi);
+    Validity {
+        largest_psi_deg: psi.to_degrees(),
+        neglected_g,
+        accelerometer_noise_g: conditions.accelerometer_noise_g,
+        neglected_dph,
+        smallest_target_dph: smallest,
+        holds: neglected_g <= conditions.accelerometer_noise_g && smallest.is_none_or(|t| neglected_dph <= t),
+    }
+}

@@ -1,0 +1,389 @@
+//! A scheme in numbers: the timeline of positions and slews, and the linear model of each as filter stages.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_ekf::integrate::{runge_kutta, van_loan};
+use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
+
+use super::SimulationError;
+use super::attitude_path::{Slew, apply, times, transpose};
+use super::conditions::{Conditions, Propagation, latitude_of};
+use crate::model::attitude::{Matrix3, c_n_from_euler};
+use crate::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
+use crate::model::ring::Float;
+use crate::model::{Carry, Platform, Scheme, Unknowns};
+
+/// The earth rate in rad/s.
+pub const W_IE: f64 = 7.292115e-5;
+/// Most unknowns of a run: the covariance is a full matrix.
+pub const MAX_UNKNOWNS: usize = 300;
+/// Most steps of a run.
+pub const MAX_STEPS: usize = 1_000_000;
+/// Largest turn of one integration step during a slew, in rad.
+pub(super) const MAX_TURN: f64 = 0.02;
+
+/// What a part of the timeline is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// A position, tracked; Z is sampled at the end of every step.
+    Dwell,
+    /// A turn to the position; Z is not used.
+    Slew(Slew),
+}
+
+/// A part of the timeline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segment {
+    /// The position: where it is spent, or where the slew goes.
+    pub position: usize,
+    /// Position or slew.
+    pub kind: Kind,
+    /// Start in s.
+    pub start_s: f64,
+    /// Number of steps.
+    pub steps: usize,
+    /// Length of a step in s.
+    pub dt: f64,
+}
+
+/// A scheme and its conditions in SI units, ready to be run.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The platform.
+    pub platform: Platform,
+    /// Rates and attitudes.
+    pub point: Point<Float>,
+    /// `C_c^n` of every position.
+    pub attitudes: Vec<Matrix3<f64>>,
+    /// `S_i` of every position.
+    pub blocks: Vec<Block<f64>>,
+    /// Positions and slews in order.
+    pub segments: Vec<Segment>,
+    /// The filter's model of every segment.
+    pub stages: Vec<Stage>,
+    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad).
+    pub noise_roots: Vec<Matrix3<f64>>,
+    /// Components of Z that are used (1, 3, and 2 for a measured azimuth).
+    pub components: Vec<usize>,
+}
+
+impl Plan {
+    /// The plan of `scheme`; a scheme without latitude is put at the default.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for what cannot be run: generic angles, slews without inertial carry, too many unknowns
+    /// or steps, conditions that are not positive.
+    pub fn new(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
+        conditions.validate()?;
+        let scheme = Scheme { latitude: latitude_of(scheme), ..scheme.clone() };
+        if let Some(name) = scheme.generic_names().first() {
+            return Err(SimulationError::GenericAngle { name: name.clone() });
+        }
+        if conditions.slew_rate_deg_s.is_some()
+            && scheme.carry != Carry::Inertial
+            && scheme.positions.len() > 1
+        {
+            return Err(SimulationError::SlewCarry { carry: scheme.carry });
+        }
+        let platform = Platform::new(scheme.clone())?;
+        let n = platform.names().len();
+        if n > MAX_UNKNOWNS {
+            return Err(SimulationError::TooManyUnknowns { found: n });
+        }
+        let point = point_of(&scheme);
+        let attitudes: Vec<_> = point.cos_sin.iter().map(|cs| c_n_from_euler(&Float, cs)).collect();
+        let segments = timeline(&scheme, conditions, &attitudes);
+        let steps: usize = segments.iter().map(|s| s.steps).sum();
+        if steps > MAX_STEPS {
+            return Err(SimulationError::TooManySteps { found: steps });
+        }
+        let blocks = platform.blocks(&point);
+        let outputs = local_output(&Float, scheme.measured_azimuth);
+        let components = outputs.iter().map(|(c, _)| *c).collect();
+        let mut plan = Self {
+            platform,
+            point,
+            attitudes,
+            blocks,
+            segments,
+            stages: Vec::new(),
+            noise_roots: Vec::new(),
+            components,
+        };
+        for i in 0..plan.segments.len() {
+            let (stage, root) = plan.stage(i, conditions)?;
+            plan.stages.push(stage);
+            plan.noise_roots.push(root);
+        }
+        Ok(plan)
+    }
+
+    /// The number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.platform.names().len()
+    }
+
+    /// The total time in s.
+    pub fn duration_s(&self) -> f64 {
+        self.segments.last().map_or(0.0, |s| s.start_s + s.dt * s.steps as f64)
+    }
+
+    /// The psi states of a segment: the first three columns of its block.
+    pub fn psi_columns(&self, segment: usize) -> &[usize] {
+        &self.blocks[self.segments[segment].position].columns[..3]
+    }
+
+    /// `psi^n` of the unknowns `x` at a segment's position (during a slew: psi^n is carried).
+    pub fn psi_n(&self, segment: usize, x: &[f64]) -> [f64; 3] {
+        let block = &self.blocks[self.segments[segment].position];
+        std::array::from_fn(|r| (0..3).map(|k| block.rows[r][k] * x[block.columns[k]]).sum())
+    }
+
+    /// The standard deviation of a component of Z (1, 3: g; 2: the azimuth in rad).
+    pub fn output_sigma(component: usize, conditions: &Conditions) -> f64 {
+        if component == 2 {
+            conditions.azimuth_noise_deg.to_radians()
+        } else {
+            conditions.accelerometer_noise_g
+        }
+    }
+
+    /// The rows of Z at a position (one per component), as functionals of the unknowns.
+    pub fn output_rows(&self, position: usize) -> Vec<Vec<(usize, f64)>> {
+        let block = &self.blocks[position];
+        local_output(&Float, self.components.contains(&2))
+            .iter()
+            .map(|(_, local)| {
+                let entry = |k: usize| (0..LOCAL).map(|r| local[r] * block.rows[r][k]).sum::<f64>();
+                let entries = block.columns.iter().enumerate().map(|(k, &c)| (c, entry(k)));
+                entries.filter(|(_, x)| *x != 0.0).collect()
+            })
+            .collect()
+    }
+
+    fn stage(
+        &self,
+        segment: usize,
+        conditions: &Conditions,
+    ) -> Result<(Stage, Matrix3<f64>), SimulationError> {
+        let s = &self.segments[segment];
+        let held = conditions.drift_noise.held_rad_s(s.dt);
+        let block = &self.blocks[s.position];
+        let n = self.unknowns();
+        let process = PlatformProcess { plan: self, segment };
+        let (phi, q) = match &s.kind {
+            Kind::Dwell => {
+                let phi = match conditions.propagation {
+                    Propagation::Exponential => self.exponential(block, s.dt)?,
+                    Propagation::Rk4 => runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, 1).phi,
+                };
+                (phi, self.held_noise(block, s.dt, held))
+            }
+            Kind::Slew(slew) => {
+                let turn = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * s.dt;
+                let substeps = (turn / MAX_TURN).ceil().max(1.0) as usize;
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, substeps).phi;
+                // the noise of a slew: that of as many steps as it would have
+                let dt = conditions.step_s.min(s.dt);
+                let held = conditions.drift_noise.held_rad_s(dt);
+                let q = self.held_noise(block, dt, held).map(|row| row.map(|x| x * s.dt / dt));
+                (phi, q)
+            }
+        };
+        let columns = &block.columns[..3];
+        let mut full = DMatrix::zeros(n, n);
+        for (i, &r) in columns.iter().enumerate() {
+            for (j, &c) in columns.iter().enumerate() {
+                full[(r, c)] = q[i][j];
+            }
+        }
+        let outputs = match s.kind {
+            Kind::Slew(_) => Vec::new(),
+            Kind::Dwell => self
+                .output_rows(s.position)
+                .into_iter()
+                .zip(&self.components)
+                .map(|(h, &c)| ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) })
+                .collect(),
+        };
+        let stage = Stage {
+            transition: Transition::new(&phi)?,
+            noise: ProcessNoise::new(&full)?,
+            outputs,
+            steps: s.steps,
+        };
+        Ok((stage, cholesky(&q)))
+    }
+
+    /// Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by `S_i`.
+    fn exponential(&self, block: &Block<f64>, dt: f64) -> Result<DMatrix<f64>, SimulationError> {
+        let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
+        let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
+        let (local, _) = van_loan(&f, &DMatrix::zeros(LOCAL, LOCAL), dt)?;
+        let n = self.unknowns();
+        let mut phi = DMatrix::identity(n, n);
+        // psi+ = P^T (A P psi + B E D); in local unknowns (drift alone) P = 1
+        for (i, &row) in block.columns[..3].iter().enumerate() {
+            for (k, &column) in block.columns.iter().enumerate() {
+                phi[(row, column)] = (0..3)
+                    .map(|r| {
+                        let to_n = block.rows[r][i];
+                        to_n * (0..LOCAL).map(|l| local[(r, l)] * block.rows[l][k]).sum::<f64>()
+                    })
+                    .sum();
+            }
+        }
+        Ok(phi)
+    }
+
+    /// The covariance on psi of a drift of standard deviation `held` (rad/s) held over `dt`.
+    fn held_noise(&self, block: &Block<f64>, dt: f64, held: f64) -> Matrix3<f64> {
+        // B = integral of exp(W t): 1 dt + W dt^2/2 up to (w dt)^2
+        let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
+        let b: Matrix3<f64> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| f64::from(u8::from(i == j)) * dt + f[i][j] * dt * dt / 2.0)
+        });
+        let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
+        let to_psi = times(&transpose(&p), &b);
+        times(&to_psi, &transpose(&to_psi)).map(|row| row.map(|x| x * held * held))
+    }
+}
+
+/// Rates and attitudes of a scheme with a latitude and without generic angles.
+fn point_of(scheme: &Scheme) -> Point<Float> {
+    let (c, s) =
+        scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
+    let cos_sin =
+        scheme.positions.iter().map(|p| std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64())).collect();
+    Point { ring: Float, w_n: W_IE * c, w_u: W_IE * s, cos_sin }
+}
+
+fn timeline(scheme: &Scheme, conditions: &Conditions, attitudes: &[Matrix3<f64>]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::new();
+    let mut start_s = 0.0;
+    let mut push = |position, kind, duration: f64, steps: usize| {
+        let dt = duration / steps as f64;
+        segments.push(Segment { position, kind, start_s, steps, dt });
+        start_s += duration;
+    };
+    for (position, p) in scheme.positions.iter().enumerate() {
+        if let (Some(rate), true) = (conditions.slew_rate_deg_s, position > 0) {
+            let slew = Slew::between(&attitudes[position - 1], &attitudes[position], rate.to_radians());
+            if let Some(slew) = slew {
+                let duration = slew.duration_s;
+                push(position, Kind::Slew(slew), duration, 1);
+            }
+        }
+        let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
+        // a hair less, so that 1000 s in steps of 10 s are 100
+        let steps = (dwell / conditions.step_s - 1e-9).ceil().max(1.0) as usize;
+        push(position, Kind::Dwell, dwell, steps);
+    }
+    segments
+}
+
+/// The lower triangular root of a covariance, zero in directions without noise.
+fn cholesky(q: &Matrix3<f64>) -> Matrix3<f64> {
+    let mut l = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..=i {
+            let sum: f64 = q[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            l[i][j] = match (i == j, l[j][j]) {
+                (true, _) => sum.max(0.0).sqrt(),
+                (false, d) if d > 0.0 => sum / d,
+                _ => 0.0,
+            };
+        }
+    }
+    l
+}
+
+/// The linear model of one segment as a process: `psi' = psi x omega + eps` in the axes of the unknowns.
+pub struct PlatformProcess<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// The segment, whose time starts at 0.
+    pub segment: usize,
+}
+
+impl PlatformProcess<'_> {
+    /// The rows of `psi'` in the axes of psi (3 x n).
+    fn rows(&self, t: f64) -> [Vec<f64>; 3] {
+        let plan = self.plan;
+        let segment = &plan.segments[self.segment];
+        let block = &plan.blocks[segment.position];
+        let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
+        let f = local_dynamics(&Float, &plan.point.w_n, &plan.point.w_u);
+        let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j]));
+        let to_psi = transpose(&p);
+        let turning = times(&to_psi, &times(&w, &p));
+        let drift: [Vec<f64>; 3] = match &segment.kind {
+            Kind::Slew(slew) => plan.platform.drift_rows(&Float, &slew.at(t)),
+            Kind::Dwell => std::array::from_fn(|r| block.rows[3 + r][3..].to_vec()),
+        };
+        let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; plan.unknowns()]);
+        for (i, row) in rows.iter_mut().enumerate() {
+            for (k, &c) in block.columns.iter().enumerate() {
+                row[c] = match k {
+                    0..3 => turning[i][k],
+                    _ => (0..3).map(|r| to_psi[i][r] * drift[r][k - 3]).sum(),
+                };
+            }
+        }
+        rows
+    }
+}
+
+impl Process for PlatformProcess<'_> {
+    fn states(&self) -> usize {
+        self.plan.unknowns()
+    }
+
+    fn f(&self, t: f64, x: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(x.len());
+        for (row, &c) in self.rows(t).iter().zip(self.plan.psi_columns(self.segment)) {
+            out[c] = row.iter().zip(x.iter()).map(|(a, b)| a * b).sum();
+        }
+        out
+    }
+
+    fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(x.len(), x.len());
+        for (row, &c) in self.rows(t).iter().zip(self.plan.psi_columns(self.segment)) {
+            for (j, &value) in row.iter().enumerate() {
+                out[(c, j)] = value;
+            }
+        }
+        out
+    }
+
+    /// None: random drift is held over a step and enters as its covariance.
+    fn noise(&self, _: f64) -> DMatrix<f64> {
+        DMatrix::zeros(self.plan.unknowns(), self.plan.unknowns())
+    }
+}
+
+/// `g^n` in g.
+pub(super) const G_N: [f64; 3] = [0.0, -1.0, 0.0];
+
+impl Plan {
+    /// `omega_ie^n` in rad/s.
+    pub fn earth_rate(&self) -> [f64; 3] {
+        [self.point.w_n, self.point.w_u, 0.0]
+    }
+
+    /// The commanded rate in the axes of c, and `C_c^n`, at time `t` of a segment.
+    pub(super) fn command(&self, segment: usize, t: f64) -> ([f64; 3], Matrix3<f64>) {
+        let s = &self.segments[segment];
+        let (c, turn) = match &s.kind {
+            Kind::Dwell => (self.attitudes[s.position], [0.0; 3]),
+            Kind::Slew(slew) => (slew.at(t), slew.rate),
+        };
+        let earth = apply(&transpose(&c), &self.earth_rate());
+        (std::array::from_fn(|i| earth[i] + turn[i]), c)
+    }
+
+    /// Whether the unknowns are coefficients, not the drift itself.
+    pub fn has_coefficients(&self) -> bool {
+        self.platform.scheme().unknowns != Unknowns::Drift
+    }
+}

@@ -1,0 +1,197 @@
+//! One run: truth, filter, and everything that is plotted of it.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_ekf::linear::{covariance_pass, state_pass};
+use obsdeg_ekf::{Covariance, Form};
+
+use super::SimulationError;
+use super::conditions::{Conditions, Truth, resolve, si_per_shown};
+use super::plan::Plan;
+use super::truth::{Noise, TruthModel};
+use crate::prediction::Prediction;
+
+/// Where a run starts, in SI units (shape n each).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// The true unknowns.
+    pub truth: Vec<f64>,
+    /// The initial estimate.
+    pub estimate: Vec<f64>,
+    /// Its standard deviations.
+    pub sigma: Vec<f64>,
+}
+
+impl Start {
+    /// What the conditions say for the unknowns of `plan`.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for unknown names, priors that are not positive, and exact truth without coefficients.
+    pub fn new(plan: &Plan, conditions: &Conditions) -> Result<Self, SimulationError> {
+        if conditions.truth == Truth::Exact && !plan.has_coefficients() {
+            return Err(SimulationError::ExactDrift);
+        }
+        let p = &plan.platform;
+        let si = |values: Vec<f64>, scaled: bool| -> Vec<f64> {
+            let units = p.units().iter();
+            let scale = |u: &str| if scaled && u != "rad" { conditions.drift_scale } else { 1.0 };
+            units.zip(values).map(|(u, v)| v * si_per_shown(u) * scale(u)).collect()
+        };
+        let sigma = resolve("prior sigma", p, &conditions.priors, 1.0)?;
+        if let Some(&found) = sigma.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+            return Err(SimulationError::NotPositive { what: "a prior sigma", found });
+        }
+        Ok(Self {
+            truth: si(resolve("true value", p, &conditions.values, 0.0)?, true),
+            estimate: si(resolve("initial estimate", p, &conditions.estimates, 0.0)?, false),
+            sigma: si(sigma, true),
+        })
+    }
+
+    /// The initial covariance.
+    ///
+    /// # Errors
+    /// [`SimulationError::Filter`].
+    pub fn covariance(&self, form: Form) -> Result<Covariance, SimulationError> {
+        let variances = DVector::from_iterator(self.sigma.len(), self.sigma.iter().map(|s| s * s));
+        Ok(Covariance::new("P0", &DMatrix::from_diagonal(&variances), form)?)
+    }
+}
+
+/// One unknown or combination over time, in SI units, from t = 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// The truth.
+    pub truth: Vec<f64>,
+    /// The estimate.
+    pub estimate: Vec<f64>,
+    /// Its standard deviation.
+    pub sigma: Vec<f64>,
+}
+
+/// A run, sample by sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Names of the series: unknowns, then combinations.
+    pub names: Vec<String>,
+    /// Their units (psi in rad): see [`si_per_shown`].
+    pub units: Vec<String>,
+    /// The times, from 0, in s.
+    pub time_s: Vec<f64>,
+    /// The position of every sample.
+    pub position: Vec<usize>,
+    /// One per name.
+    pub series: Vec<Series>,
+    /// Whitened innovations, one per output and sampled step.
+    pub whitened: Vec<f64>,
+    /// The covariance at the end (n x n).
+    pub last_covariance: DMatrix<f64>,
+    /// Largest `|psi|`, in rad.
+    pub largest_psi: f64,
+}
+
+/// Runs the filter of `plan` against one truth.
+///
+/// # Errors
+/// [`SimulationError::Filter`] when the prior is refused.
+pub fn run(
+    plan: &Plan,
+    conditions: &Conditions,
+    start: &Start,
+    prediction: &Prediction,
+    seed: u64,
+) -> Result<Record, SimulationError> {
+    let n = plan.unknowns();
+    let combinations: Vec<&[(usize, f64)]> = prediction.combinations.iter().map(|c| &c.terms[..]).collect();
+    let mut record = Record {
+        names: plan.platform.names().to_vec(),
+        units: plan.platform.units().iter().map(ToString::to_string).collect(),
+        time_s: vec![0.0],
+        position: vec![0],
+        series: vec![Series::default(); n + combinations.len()],
+        whitened: Vec::new(),
+        last_covariance: DMatrix::zeros(n, n),
+        largest_psi: 0.0,
+    };
+    for c in &prediction.combinations {
+        record.names.push(c.expression.clone());
+        record.units.push(plan.platform.units()[c.terms[0].0].into());
+    }
+    for segment in &plan.segments {
+        for i in 1..=segment.steps {
+            record.time_s.push(segment.start_s + segment.dt * i as f64);
+            record.position.push(segment.position);
+        }
+    }
+    let value = |x: &[f64], i: usize| match i.checked_sub(n) {
+        None => x[i],
+        Some(c) => combinations[c].iter().map(|&(j, k)| k * x[j]).sum(),
+    };
+    let sigmas = |series: &mut [Series], p: &Covariance| {
+        let own = p.sigmas();
+        let full = if combinations.is_empty() { None } else { Some(p.matrix()) };
+        for (i, s) in series.iter_mut().enumerate() {
+            s.sigma.push(match (i.checked_sub(n), &full) {
+                (Some(c), Some(p)) => variance(p, combinations[c]).max(0.0).sqrt(),
+                _ => own[i],
+            });
+        }
+    };
+    let prior = start.covariance(Form::Ud)?;
+    sigmas(&mut record.series, &prior);
+    let (series, last) = (&mut record.series, &mut record.last_covariance);
+    let total = record.time_s.len() - 1;
+    let gains = covariance_pass(&plan.stages, prior, |step, p| {
+        sigmas(series, p);
+        if step + 1 == total {
+            *last = p.matrix();
+        }
+    });
+
+    let mut truth = TruthModel::new(plan, conditions, start.truth.clone());
+    let mut noise = Noise::new(seed, 0);
+    let mut x = start.estimate.clone();
+    for (i, s) in record.series.iter_mut().enumerate() {
+        s.truth.push(value(truth.x(), i));
+        s.estimate.push(value(&x, i));
+    }
+    let first_step = first_steps(plan);
+    let mut truths: Vec<Vec<f64>> = vec![Vec::with_capacity(total); record.series.len()];
+    let (series, whitened) = (&mut record.series, &mut record.whitened);
+    state_pass(
+        &plan.stages,
+        &gains,
+        &mut x,
+        |step, segment, z| {
+            truth.step(segment, step - first_step[segment], &mut noise, z);
+            for (i, t) in truths.iter_mut().enumerate() {
+                t.push(value(truth.x(), i));
+            }
+        },
+        |_, x, innovations| {
+            for (i, s) in series.iter_mut().enumerate() {
+                s.estimate.push(value(x, i));
+            }
+            whitened.extend_from_slice(innovations);
+        },
+    );
+    for (s, t) in record.series.iter_mut().zip(truths) {
+        s.truth.extend(t);
+    }
+    record.largest_psi = truth.largest_psi;
+    Ok(record)
+}
+
+/// The number of the first step of every segment.
+pub(crate) fn first_steps(plan: &Plan) -> Vec<usize> {
+    let starts = plan.segments.iter().scan(0, |next, s| {
+        let first = *next;
+        *next += s.steps;
+        Some(first)
+    });
+    starts.collect()
+}
+
+/// `c P c^T` of a sparse functional.
+pub(crate) fn variance(p: &DMatrix<f64>, c: &[(usize, f64)]) -> f64 {
+    c.iter().map(|&(i, a)| c.iter().map(|&(j, b)| a * b * p[(i, j)]).sum::<f64>()).sum()
+}
