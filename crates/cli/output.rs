@@ -3,9 +3,9 @@
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 
-use obsdeg_report::Layout;
+use obsdeg_report::{File, Layout};
 
-use crate::arguments::OutputArguments;
+use crate::arguments::{FolderArguments, OutputArguments};
 use crate::failure::Failure;
 
 /// Columns of a table that does not go to a terminal.
@@ -66,4 +66,36 @@ fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
+}
+
+/// Refuses early what `write_folder` would refuse.
+pub(crate) fn check_folder(out: &FolderArguments) -> Result<(), Failure> {
+    let Some(path) = &out.output else { return Ok(()) };
+    if path.exists() && !path.is_dir() {
+        return Err(Failure::input(format!("{} is a file; expected a folder", path.display())));
+    }
+    let occupied = std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
+    if occupied && !out.force {
+        return Err(Failure::input(format!("{} is not empty; --force replaces its files", path.display())));
+    }
+    Ok(())
+}
+
+/// Writes all files into the folder of the arguments, if there is one: first beside it, then moved in place.
+pub(crate) fn write_folder(out: &FolderArguments, files: &[File]) -> Result<(), Failure> {
+    let Some(path) = &out.output else { return Ok(()) };
+    check_folder(out)?;
+    let place = || -> std::io::Result<()> {
+        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let new = tempfile::Builder::new().prefix(".obsdeg").tempdir_in(parent)?;
+        for file in files {
+            std::fs::write(new.path().join(&file.name), &file.bytes)?;
+        }
+        std::fs::create_dir_all(path)?;
+        for file in files {
+            std::fs::rename(new.path().join(&file.name), path.join(&file.name))?;
+        }
+        Ok(())
+    };
+    place().map_err(|e| Failure::input(format!("cannot write to {}: {e}", path.display())))
 }

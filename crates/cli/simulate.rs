@@ -3,12 +3,14 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use obsdeg_core::simulation::{SimulationError, simulate};
+use obsdeg_core::simulation::{Record, Simulation, SimulationError, simulate};
+use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
 
 use crate::arguments::{FolderArguments, SchemeArguments};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
 use crate::output;
+use crate::progress::Spinner;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -39,13 +41,31 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    output::check_folder(&a.output)?;
     let scheme = a.scheme.scheme()?;
     let conditions = a.conditions.conditions(&scheme);
-    let (summary, _record) = simulate(&scheme, &conditions, a.seed).map_err(failure)?;
+    let (summary, record) = simulate(&scheme, &conditions, a.seed).map_err(failure)?;
     let text = obsdeg_report::simulation(&summary, a.output.format, output::terminal())
         .map_err(|e| Failure::internal(e.to_string()))?;
+    if a.output.output.is_some() {
+        let _spinner = Spinner::start("drawing figures", a.output.quiet);
+        let files = files(&summary, &record).map_err(|e| Failure::internal(e.to_string()))?;
+        output::write_folder(&a.output, &files)?;
+    }
     output::print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What goes into the folder.
+fn files(summary: &Simulation, record: &Record) -> Result<Vec<File>, ReportError> {
+    let json = obsdeg_report::simulation(summary, Format::Json, Layout::default())?;
+    let mut files = vec![
+        File { name: "summary.json".into(), bytes: json.into_bytes() },
+        File { name: "series.csv".into(), bytes: series_csv(record)?.into_bytes() },
+        File { name: "series.parquet".into(), bytes: series_parquet(record)? },
+    ];
+    files.extend(simulation_figures(record)?);
+    Ok(files)
 }
 
 /// What is wrong with the input, or with the program.

@@ -3,11 +3,18 @@
 mod audit;
 mod csv_text;
 mod document;
+mod figure;
+mod figures;
 mod latex;
 mod markdown;
+mod series;
 mod simulation;
 mod table;
 mod words;
+
+pub use figure::{FigureError, png};
+pub use figures::{File, simulation_figures};
+pub use series::{series_csv, series_parquet};
 
 use std::fmt;
 use std::str::FromStr;
@@ -84,6 +91,12 @@ pub enum ReportError {
     /// CSV.
     #[error("cannot write CSV: {0}")]
     Csv(#[from] csv::Error),
+    /// Parquet.
+    #[error("cannot write Parquet: {0}")]
+    Parquet(#[from] parquet::errors::ParquetError),
+    /// A picture.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
 }
 
 /// An analysis in the given format, ending in a newline.

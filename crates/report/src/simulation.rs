@@ -33,7 +33,10 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
     let mut out = vec![
         format!("truth {truth}"),
         format!("latitude {} deg{by}", c.latitude_deg),
-        format!("noise: Z {} g per sample and axis, random drift {}", c.accelerometer_noise_g, c.drift_noise),
+        format!(
+            "noise: Z {:e} g per sample and axis, random drift {}",
+            c.accelerometer_noise_g, c.drift_noise
+        ),
         format!("steps of at most {} s, filter propagated by {propagation}", c.step_s),
         format!("repositioning {slew}"),
         format!("timeline {}", parts.join(", ")),
@@ -67,7 +70,7 @@ pub(crate) fn validity(v: &Validity) -> Vec<String> {
             "the observation (6) leaves out |psi|^2/2 = {} g, {} times the noise of Z ({} g)",
             number(v.neglected_g),
             number(ratio),
-            v.accelerometer_noise_g
+            format_args!("{:e}", v.accelerometer_noise_g)
         ),
         format!("the drift (3) leaves out D |psi| = {} deg/h{target}", number(v.neglected_dph)),
     ]
@@ -86,6 +89,21 @@ fn row(e: &Estimate) -> Vec<String> {
         optional(e.time_to_target_s),
         e.verdict.to_string(),
     ]
+}
+
+/// `0.1 deg/h`, one for every unit, or by name where they differ.
+fn targets(quantities: &[Estimate]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for q in quantities {
+        let Some(target) = q.target_sigma else { continue };
+        let uniform = quantities.iter().all(|o| o.unit != q.unit || o.target_sigma == q.target_sigma);
+        let text = format!("{target} {}", q.unit);
+        let text = if uniform { text } else { format!("{} {text}", q.name) };
+        if !out.contains(&text) {
+            out.push(text);
+        }
+    }
+    out
 }
 
 pub(crate) fn document(s: &Simulation) -> Document {
@@ -113,7 +131,7 @@ pub(crate) fn document(s: &Simulation) -> Document {
     let mut blocks =
         vec![table("Estimates at the end (degree: exact verdict, - not observable)", &s.quantities)];
     if !s.combinations.is_empty() {
-        blocks.push(table("Observable combinations", &s.combinations));
+        blocks.push(table("Observable combinations (psi: of the end)", &s.combinations));
     }
     let c = &s.consistency;
     let band = |(low, high): (f64, f64)| format!("{}..{}", number(low), number(high));
@@ -132,11 +150,9 @@ pub(crate) fn document(s: &Simulation) -> Document {
         ],
     ));
     blocks.push(list("Validity of the small-angle model", validity(&s.validity)));
-    let targets: Vec<String> =
-        s.quantities.iter().filter_map(|q| Some(format!("{} {}", q.name, number(q.target_sigma?)))).collect();
     let mut assumed = conditions(&s.conditions, &s.timeline);
     assumed.push(format!("carry {}; seed {}", s.carry, s.seed));
-    assumed.push(format!("target sigma {}", targets.join(", ")));
+    assumed.push(format!("target sigma {}", targets(&s.quantities).join(", ")));
     blocks.push(list("Assumed", assumed));
     let positions = s.timeline.iter().filter(|t| !t.slew).count();
     Document {

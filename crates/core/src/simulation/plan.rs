@@ -5,7 +5,7 @@ use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
 
 use super::SimulationError;
-use super::attitude_path::{Slew, apply, times, transpose};
+use super::attitude_path::{Slew, times, transpose};
 use super::conditions::{Conditions, Propagation, latitude_of};
 use crate::model::attitude::{Matrix3, c_n_from_euler};
 use crate::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
@@ -19,7 +19,7 @@ pub const MAX_UNKNOWNS: usize = 300;
 /// Most steps of a run.
 pub const MAX_STEPS: usize = 1_000_000;
 /// Largest turn of one integration step during a slew, in rad.
-pub(super) const MAX_TURN: f64 = 0.02;
+const MAX_TURN: f64 = 0.02;
 
 /// What a part of the timeline is.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,10 +178,8 @@ impl Plan {
                 };
                 (phi, self.held_noise(block, s.dt, held))
             }
-            Kind::Slew(slew) => {
-                let turn = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * s.dt;
-                let substeps = (turn / MAX_TURN).ceil().max(1.0) as usize;
-                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, substeps).phi;
+            Kind::Slew(_) => {
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
                 // the noise of a slew: that of as many steps as it would have
                 let dt = conditions.step_s.min(s.dt);
                 let held = conditions.drift_noise.held_rad_s(dt);
@@ -371,15 +369,25 @@ impl Plan {
         [self.point.w_n, self.point.w_u, 0.0]
     }
 
-    /// The commanded rate in the axes of c, and `C_c^n`, at time `t` of a segment.
-    pub(super) fn command(&self, segment: usize, t: f64) -> ([f64; 3], Matrix3<f64>) {
+    /// The computed attitude `C_c^n` at time `t` of a segment.
+    pub(super) fn attitude(&self, segment: usize, t: f64) -> Matrix3<f64> {
         let s = &self.segments[segment];
-        let (c, turn) = match &s.kind {
-            Kind::Dwell => (self.attitudes[s.position], [0.0; 3]),
-            Kind::Slew(slew) => (slew.at(t), slew.rate),
-        };
-        let earth = apply(&transpose(&c), &self.earth_rate());
-        (std::array::from_fn(|i| earth[i] + turn[i]), c)
+        match &s.kind {
+            Kind::Dwell => self.attitudes[s.position],
+            Kind::Slew(slew) => slew.at(t),
+        }
+    }
+
+    /// Integration steps per step of a segment.
+    pub(super) fn substeps(&self, segment: usize) -> usize {
+        let s = &self.segments[segment];
+        match &s.kind {
+            Kind::Dwell => 1,
+            Kind::Slew(slew) => {
+                let turn = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * s.dt;
+                (turn / MAX_TURN).ceil().max(1.0) as usize
+            }
+        }
     }
 
     /// Whether the unknowns are coefficients, not the drift itself.

@@ -7,7 +7,7 @@ use obsdeg_exact::SplitMix64;
 
 use super::attitude_path::{apply, cross, rotation, rotation_vector, times, transpose};
 use super::conditions::{Conditions, Truth};
-use super::plan::{G_N, Kind, MAX_TURN, Plan};
+use super::plan::{G_N, Plan};
 use crate::model::Carry;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
@@ -40,7 +40,7 @@ pub struct TruthModel<'a> {
     scratch: Vec<f64>,
     /// Standard deviations of the components of Z.
     sigmas: Vec<f64>,
-    /// `C_p^n` and the segment it belongs to, for the exact truth.
+    /// `E = C_p^n C_n^c = exp([psi^n x])` and the segment it belongs to, for the exact truth.
     exact: Option<(Matrix3<f64>, usize)>,
     /// Largest `|psi|` so far, in rad.
     pub largest_psi: f64,
@@ -64,23 +64,15 @@ impl<'a> TruthModel<'a> {
 
     fn restart(&mut self) {
         self.largest_psi = 0.0;
-        self.exact = (self.conditions.truth == Truth::Exact).then(|| {
-            let psi = self.psi_c(0);
-            // C_c^p = exp(-[psi x]), C_p^n = C_c^n (C_c^p)^T
-            (times(&self.plan.attitudes[0], &rotation(&psi)), 0)
-        });
+        // C_c^p = exp(-[psi^c x])
+        self.exact =
+            (self.conditions.truth == Truth::Exact).then(|| (rotation(&self.plan.psi_n(0, &self.x)), 0));
         self.watch(0);
     }
 
     /// The true unknowns, psi of now.
     pub fn x(&self) -> &[f64] {
         &self.x
-    }
-
-    /// psi in c at the position of a segment.
-    fn psi_c(&self, segment: usize) -> [f64; 3] {
-        let c = &self.plan.attitudes[self.plan.segments[segment].position];
-        apply(&transpose(c), &self.plan.psi_n(segment, &self.x))
     }
 
     fn watch(&mut self, segment: usize) {
@@ -117,76 +109,68 @@ impl<'a> TruthModel<'a> {
     fn step_exact(&mut self, segment: usize, step: usize, noise: &mut Noise, z: &mut [f64]) {
         let plan = self.plan;
         let s = &plan.segments[segment];
-        let Some((mut c, before)) = self.exact else { return };
+        let Some((mut e, before)) = self.exact else { return };
         if plan.segments[before].position != s.position {
-            c = self.repositioned(&c, before, segment);
+            e = self.repositioned(&e, before, segment);
         }
         // the drift noise of the step, in platform axes
         let held = self.conditions.drift_noise.held_rad_s(s.dt);
         let kick = [0; 3].map(|_| held * noise.normal());
-        let rate = match &s.kind {
-            Kind::Slew(slew) => slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt(),
-            Kind::Dwell => 0.0,
-        };
-        let substeps = (rate * s.dt / MAX_TURN).ceil().max(1.0) as usize;
+        let substeps = plan.substeps(segment);
         let h = s.dt / substeps as f64;
         for i in 0..substeps {
             let t = step as f64 * s.dt + i as f64 * h;
-            c = self.runge_kutta(segment, t, h, &c, &kick);
+            e = self.runge_kutta(segment, t, h, &e, &kick);
         }
-        self.exact = Some((c, segment));
-        let (_, computed) = plan.command(segment, (step + 1) as f64 * s.dt);
-        // C_c^p = C_n^p C_c^n = exp(-[psi x])
-        let psi_c = rotation_vector(&times(&transpose(&c), &computed)).map(|x| -x);
-        let psi_n = apply(&computed, &psi_c);
+        self.exact = Some((e, segment));
+        let psi_n = rotation_vector(&e);
         let block = &plan.blocks[s.position];
         for (k, &column) in block.columns[..3].iter().enumerate() {
             self.x[column] = (0..3).map(|r| block.rows[r][k] * psi_n[r]).sum();
         }
-        // Z = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p
-        let seen = apply(&computed, &apply(&transpose(&c), &G_N));
+        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n
+        let seen = apply(&transpose(&e), &G_N);
         for (z, &component) in z.iter_mut().zip(&plan.components) {
             *z = if component == 2 { psi_n[1] } else { G_N[component - 1] - seen[component - 1] };
         }
     }
 
-    /// `C_p^n` after an instantaneous change of position, or the same before a slew.
-    fn repositioned(&self, c: &Matrix3<f64>, before: usize, segment: usize) -> Matrix3<f64> {
+    /// E after an instantaneous change of position, or the same before a slew.
+    fn repositioned(&self, e: &Matrix3<f64>, before: usize, segment: usize) -> Matrix3<f64> {
         let plan = self.plan;
-        if matches!(plan.segments[segment].kind, Kind::Slew(_)) {
-            return *c;
-        }
-        let (old, new) = (plan.segments[before].position, plan.segments[segment].position);
-        let (old, new) = (&plan.attitudes[old], &plan.attitudes[new]);
         match plan.platform.scheme().carry {
             // the platform turns by what is commanded, in its own axes
-            Carry::Inertial => times(c, &times(&transpose(old), new)),
+            Carry::Inertial => *e,
             // C_c^p goes on
-            Carry::Platform => times(new, &times(&transpose(old), c)),
-            Carry::Reset => times(new, &rotation(&self.psi_c(segment))),
+            Carry::Platform => {
+                let (old, new) = (plan.segments[before].position, plan.segments[segment].position);
+                let turn = times(&plan.attitudes[new], &transpose(&plan.attitudes[old]));
+                times(&turn, &times(e, &transpose(&turn)))
+            }
+            Carry::Reset => rotation(&plan.psi_n(segment, &self.x)),
         }
     }
 
-    /// One step of `C_p^n' = [omega_np^n x] C_p^n`, `omega_np^n = C_p^n (omega_c + kick) + eps^n - omega_ie^n`.
-    fn runge_kutta(&self, segment: usize, t: f64, h: f64, c: &Matrix3<f64>, kick: &[f64; 3]) -> Matrix3<f64> {
-        let slope = |t: f64, c: &Matrix3<f64>| {
-            let (command, _) = self.plan.command(segment, t);
-            let turned = apply(c, &std::array::from_fn(|i| command[i] + kick[i]));
-            let earth = self.plan.earth_rate();
-            let drift = self.drift_n(c);
-            times(&cross(&std::array::from_fn(|i| turned[i] + drift[i] - earth[i])), c)
+    /// One step of `E' = [(E omega_ie + eps + kick - omega_ie) x] E` in n: the platform turns at the commanded rate
+    /// in its own axes, plus its drift; the commanded rate itself drops out.
+    fn runge_kutta(&self, segment: usize, t: f64, h: f64, e: &Matrix3<f64>, kick: &[f64; 3]) -> Matrix3<f64> {
+        let earth = self.plan.earth_rate();
+        let slope = |t: f64, e: &Matrix3<f64>| {
+            let c = times(e, &self.plan.attitude(segment, t));
+            let (turned, noise, drift) = (apply(e, &earth), apply(&c, kick), self.drift_n(&c));
+            times(&cross(&std::array::from_fn(|i| turned[i] - earth[i] + drift[i] + noise[i])), e)
         };
         let moved = |k: &Matrix3<f64>, h: f64| -> Matrix3<f64> {
-            std::array::from_fn(|i| std::array::from_fn(|j| c[i][j] + h * k[i][j]))
+            std::array::from_fn(|i| std::array::from_fn(|j| e[i][j] + h * k[i][j]))
         };
-        let k1 = slope(t, c);
+        let k1 = slope(t, e);
         let k2 = slope(t + h / 2.0, &moved(&k1, h / 2.0));
         let k3 = slope(t + h / 2.0, &moved(&k2, h / 2.0));
         let k4 = slope(t + h, &moved(&k3, h));
         let next: Matrix3<f64> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| c[i][j] + h / 6.0 * (k1[i][j] + 2.0 * (k2[i][j] + k3[i][j]) + k4[i][j]))
+            std::array::from_fn(|j| e[i][j] + h / 6.0 * (k1[i][j] + 2.0 * (k2[i][j] + k3[i][j]) + k4[i][j]))
         });
-        // back onto the rotations: C (3 - C^T C)/2
+        // back onto the rotations: E (3 - E^T E)/2
         let square = times(&transpose(&next), &next);
         let correction: Matrix3<f64> = std::array::from_fn(|i| {
             std::array::from_fn(|j| 1.5 * f64::from(u8::from(i == j)) - 0.5 * square[i][j])

@@ -1,0 +1,162 @@
+//! Pictures: the only module that names the plotting library. SVG is the master, PNG is made from it.
+
+use std::sync::{Arc, OnceLock};
+
+use kuva::prelude::{BandPlot, Layout, LegendPosition, LinePlot, Plot, ReferenceLine, SvgBackend};
+use kuva::render::figure::Figure as Grid;
+use resvg::{tiny_skia, usvg};
+
+/// Colours that stay apart for colour-blind readers (Okabe and Ito).
+pub(crate) const BLACK: &str = "#000000";
+pub(crate) const BLUE: &str = "#0072B2";
+pub(crate) const SKY: &str = "#56B4E9";
+pub(crate) const GREY: &str = "#999999";
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stroke {
+    Solid,
+    Dashed,
+}
+
+/// A curve.
+#[derive(Debug, Clone)]
+pub(crate) struct Line {
+    /// In the legend; empty for none.
+    pub(crate) label: String,
+    pub(crate) color: &'static str,
+    pub(crate) stroke: Stroke,
+    pub(crate) points: Vec<(f64, f64)>,
+}
+
+/// A filled band around a curve: `(x, low, high)`.
+#[derive(Debug, Clone)]
+pub(crate) struct Band {
+    pub(crate) color: &'static str,
+    pub(crate) points: Vec<(f64, f64, f64)>,
+}
+
+/// Axes with what is drawn between them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Figure {
+    pub(crate) title: String,
+    pub(crate) x_label: String,
+    pub(crate) y_label: String,
+    pub(crate) bands: Vec<Band>,
+    pub(crate) lines: Vec<Line>,
+    /// Vertical lines: boundaries between positions.
+    pub(crate) marks: Vec<f64>,
+    /// Range of the horizontal axis, if not that of the data.
+    pub(crate) x_range: Option<(f64, f64)>,
+    /// Range of the vertical axis, if not that of the data.
+    pub(crate) y_range: Option<(f64, f64)>,
+    /// Both axes logarithmic.
+    pub(crate) log: bool,
+}
+
+/// Width and height of one figure.
+const SIZE: (f64, f64) = (640.0, 400.0);
+const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
+
+impl Figure {
+    fn plots(&self) -> Vec<Plot> {
+        let bands = self.bands.iter().map(|b| {
+            let x: Vec<f64> = b.points.iter().map(|p| p.0).collect();
+            let (low, high): (Vec<f64>, Vec<f64>) = b.points.iter().map(|p| (p.1, p.2)).unzip();
+            Plot::from(BandPlot::new(x, low, high).with_color(b.color).with_opacity(0.25))
+        });
+        let lines = self.lines.iter().map(|l| {
+            let plot = LinePlot::new()
+                .with_data(l.points.iter().copied())
+                .with_color(l.color)
+                .with_stroke_width(if l.stroke == Stroke::Dashed { 1.8 } else { 1.4 });
+            let plot = match l.stroke {
+                Stroke::Solid => plot,
+                Stroke::Dashed => plot.with_dashed(),
+            };
+            Plot::from(if l.label.is_empty() { plot } else { plot.with_legend(l.label.clone()) })
+        });
+        bands.chain(lines).collect()
+    }
+
+    fn layout(&self, plots: &[Plot]) -> Layout {
+        let mut layout = Layout::auto_from_plots(plots)
+            .with_title(self.title.clone())
+            .with_x_label(self.x_label.clone())
+            .with_y_label(self.y_label.clone())
+            .with_width(SIZE.0)
+            .with_height(SIZE.1)
+            .with_font_family(FONT)
+            .with_legend_position(LegendPosition::OutsideBottomCenter)
+            .with_legend_box(false);
+        if self.log {
+            layout = layout.with_log_scale();
+        }
+        if let Some((low, high)) = self.x_range {
+            layout = layout.with_x_axis_min(low).with_x_axis_max(high);
+        }
+        if let Some((low, high)) = self.y_range {
+            layout = layout.with_y_axis_min(low).with_y_axis_max(high);
+        }
+        for &x in &self.marks {
+            layout = layout.with_reference_line(
+                ReferenceLine::vertical(x).with_color(GREY).with_dasharray("2 3").with_stroke_width(1.0),
+            );
+        }
+        layout
+    }
+
+    /// The figure as SVG.
+    pub(crate) fn svg(&self) -> String {
+        let plots = self.plots();
+        let layout = self.layout(&plots);
+        kuva::render_to_svg(plots, layout)
+    }
+}
+
+/// Several figures in rows of `columns`.
+pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
+    let plots: Vec<Vec<Plot>> = figures.iter().map(Figure::plots).collect();
+    let layouts = figures.iter().zip(&plots).map(|(f, p)| f.layout(p)).collect();
+    let scene = Grid::new(figures.len().div_ceil(columns), columns)
+        .with_title(title)
+        .with_plots(plots)
+        .with_layouts(layouts)
+        .with_cell_size(SIZE.0 * 0.75, SIZE.1 * 0.8)
+        .with_shared_legend_bottom()
+        .render();
+    SvgBackend::new().render_scene(&scene)
+}
+
+/// Why a picture could not be drawn.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("cannot draw the picture: {0}")]
+pub struct FigureError(String);
+
+fn fonts() -> Arc<usvg::fontdb::Database> {
+    static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
+    let load = || {
+        let mut fonts = usvg::fontdb::Database::new();
+        fonts.load_font_data(dejavu::sans::regular().to_vec());
+        fonts.load_font_data(dejavu::sans::bold().to_vec());
+        Arc::new(fonts)
+    };
+    FONTS.get_or_init(load).clone()
+}
+
+/// The PNG of an SVG at twice its size.
+///
+/// # Errors
+/// [`FigureError`] when the SVG cannot be read or the picture is too large.
+pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
+    const SCALE: f32 = 2.0;
+    let options =
+        usvg::Options { fontdb: fonts(), font_family: "DejaVu Sans".into(), ..usvg::Options::default() };
+    let tree = usvg::Tree::from_str(svg, &options).map_err(|e| FigureError(e.to_string()))?;
+    let (width, height) = (tree.size().width() * SCALE, tree.size().height() * SCALE);
+    let mut pixels = tiny_skia::Pixmap::new(width.ceil() as u32, height.ceil() as u32)
+        .ok_or_else(|| FigureError(format!("{width} x {height} pixels")))?;
+    pixels.fill(tiny_skia::Color::WHITE);
+    resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixels.as_mut());
+    pixels.encode_png().map_err(|e| FigureError(e.to_string()))
+}

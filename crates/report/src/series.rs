@@ -1,0 +1,91 @@
+//! The time series of a run as CSV and Parquet, with units in the column names.
+
+use std::sync::Arc;
+
+use obsdeg_core::simulation::Record;
+use obsdeg_core::simulation::conditions::{shown_unit, si_per_shown};
+use parquet::basic::{Compression, Type as Physical};
+use parquet::data_type::{DoubleType, Int32Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+
+use crate::ReportError;
+use crate::figures::file_name;
+
+/// `deg/h/g` as a part of a column name.
+fn suffix(unit: &str) -> &'static str {
+    match shown_unit(unit) {
+        "deg" => "deg",
+        "deg/h" => "dph",
+        "deg/h/g" => "dph_per_g",
+        _ => "dph_per_g2",
+    }
+}
+
+/// The columns after the position: name and values.
+fn columns(record: &Record) -> Vec<(String, Vec<f64>)> {
+    let mut out = vec![("t_s".to_string(), record.time_s.clone())];
+    for ((name, unit), series) in record.names.iter().zip(&record.units).zip(&record.series) {
+        let scale = si_per_shown(unit);
+        for (what, values) in
+            [("true", &series.truth), ("estimate", &series.estimate), ("sigma", &series.sigma)]
+        {
+            let column = format!("{}_{what}_{}", file_name(name), suffix(unit));
+            out.push((column, values.iter().map(|x| x / scale).collect()));
+        }
+    }
+    out
+}
+
+/// A run as CSV: one row per sample, the position by its number from 1.
+///
+/// # Errors
+/// [`ReportError::Csv`].
+pub fn series_csv(record: &Record) -> Result<String, ReportError> {
+    let columns = columns(record);
+    let header = std::iter::once("position".to_string()).chain(columns.iter().map(|c| c.0.clone())).collect();
+    let rows = (0..record.time_s.len()).map(|k| {
+        let position = (record.position[k] + 1).to_string();
+        std::iter::once(position).chain(columns.iter().map(|c| c.1[k].to_string())).collect()
+    });
+    crate::csv_text::write(std::iter::once(header).chain(rows))
+}
+
+/// The same as Parquet (snappy).
+///
+/// # Errors
+/// [`ReportError::Parquet`].
+pub fn series_parquet(record: &Record) -> Result<Vec<u8>, ReportError> {
+    let columns = columns(record);
+    let field = |name: &str, kind| {
+        Type::primitive_type_builder(name, kind)
+            .with_repetition(parquet::basic::Repetition::REQUIRED)
+            .build()
+            .map(Arc::new)
+    };
+    let mut fields = vec![field("position", Physical::INT32)?];
+    for (name, _) in &columns {
+        fields.push(field(name, Physical::DOUBLE)?);
+    }
+    let schema = Arc::new(Type::group_type_builder("series").with_fields(fields).build()?);
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .set_created_by(concat!("obsdeg ", env!("CARGO_PKG_VERSION")).into())
+        .build();
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
+    let mut group = writer.next_row_group()?;
+    let positions: Vec<i32> = record.position.iter().map(|&p| p as i32 + 1).collect();
+    if let Some(mut column) = group.next_column()? {
+        column.typed::<Int32Type>().write_batch(&positions, None, None)?;
+        column.close()?;
+    }
+    for (_, values) in &columns {
+        if let Some(mut column) = group.next_column()? {
+            column.typed::<DoubleType>().write_batch(values, None, None)?;
+            column.close()?;
+        }
+    }
+    group.close()?;
+    Ok(writer.into_inner()?)
+}

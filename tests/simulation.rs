@@ -1,0 +1,174 @@
+//! The filter against a simulated truth: the paper's run, other carries, exact truth, slews.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::simulation::answer::{Estimate, Simulation};
+use obsdeg_core::simulation::conditions::{Assignment, Conditions, DriftNoise, Propagation, Truth};
+use obsdeg_core::simulation::plan::{Plan, PlatformProcess};
+use obsdeg_core::simulation::record::Start;
+use obsdeg_core::simulation::truth::{Noise, TruthModel};
+use obsdeg_core::simulation::{SimulationError, simulate};
+use obsdeg_ekf::Process;
+use obsdeg_ekf::model::central_difference;
+
+const W_N_DPH: f64 = 7.292115e-5 * 180.0 / std::f64::consts::PI * 3600.0;
+
+fn scheme(attitudes: &[&str], carry: Carry) -> Scheme {
+    Scheme { carry, ..Scheme::of_angles(attitudes.iter().map(|a| parse_attitude(a).expect("an attitude"))) }
+}
+
+fn paper(carry: Carry) -> Scheme {
+    scheme(&["0,0,0", "180,0,0"], carry)
+}
+
+fn run(carry: Carry, conditions: &Conditions) -> Simulation {
+    simulate(&paper(carry), conditions, 1).expect("simulated").0
+}
+
+fn of<'a>(s: &'a Simulation, name: &str) -> &'a Estimate {
+    s.quantities.iter().find(|q| q.name == name).expect("an unknown")
+}
+
+#[test]
+fn the_papers_run() {
+    let s = run(Carry::Platform, &Conditions::default());
+    let fast = ["D_FX", "D_SX", "D_SZ"].map(|name| of(&s, name));
+    for q in fast {
+        assert!(q.sigma < 0.005 && q.error_over_sigma.abs() < 4.0, "{q:?}");
+    }
+    for slow in ["D_FY", "D_IY"].map(|name| of(&s, name)) {
+        for q in fast {
+            let ratio = slow.sigma / q.sigma;
+            assert!((10.0..1000.0).contains(&ratio), "{} over {}: {ratio}", slow.name, q.name);
+        }
+    }
+    // D_FZ is off by wN psi_y(0), within four sigma of the observable combination
+    let w_n = W_N_DPH * 28.2f64.to_radians().cos();
+    let combination = s.combinations.iter().find(|c| c.name == "D_FZ - wN*psi_y").expect("a combination");
+    let off = w_n * 0.1f64.to_radians();
+    assert!((of(&s, "D_FZ").error + off).abs() < 4.0 * combination.sigma, "{combination:?}");
+    assert!(s.consistency.consistent);
+}
+
+#[test]
+fn inertial_carry_swaps_the_inseparable_coefficient() {
+    let s = run(Carry::Inertial, &Conditions::default());
+    assert!(of(&s, "D_FZ").sigma < 0.005 && of(&s, "D_SZ").sigma > 0.01);
+    let p = run(Carry::Platform, &Conditions::default());
+    assert!(of(&p, "D_SZ").sigma < 0.005 && of(&p, "D_FZ").sigma > 0.01);
+}
+
+#[test]
+fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
+    let exact = Conditions { truth: Truth::Exact, ..Conditions::default() };
+    for carry in [Carry::Platform, Carry::Inertial] {
+        let s = run(carry, &exact);
+        assert!(s.consistency.nis > 20.0 && !s.consistency.consistent && !s.validity.holds, "{carry}");
+        assert!(s.validity.neglected_g > 100.0 * s.validity.accelerometer_noise_g);
+    }
+    assert!(of(&run(Carry::Platform, &exact), "D_FY").error.abs() > 5.0);
+    let small = Conditions { drift_scale: 1e-3, ..exact };
+    let s = run(Carry::Inertial, &small);
+    assert!(s.consistency.consistent && s.validity.holds, "{:?} {:?}", s.consistency, s.validity);
+}
+
+/// Without noise and for tiny angles, exact and linear truth are the same, position by position and through
+/// slews, under every carry: two independent derivations of (2), (6) and of the carries.
+#[test]
+fn exact_truth_is_the_linear_one_for_small_angles() {
+    let attitudes = ["10,25,40", "130,-50,70", "-95,33,-160"];
+    for (carry, slew) in
+        [(Carry::Platform, None), (Carry::Inertial, None), (Carry::Reset, None), (Carry::Inertial, Some(2.0))]
+    {
+        let scheme = scheme(&attitudes, carry);
+        let conditions = |truth| Conditions {
+            truth,
+            slew_rate_deg_s: slew,
+            drift_noise: DriftNoise::OneStep(0.0),
+            accelerometer_noise_g: 1e-30,
+            drift_scale: 1e-4,
+            values: [Conditions::default().values, vec![Assignment { name: "psi".into(), value: 1e-5 }]]
+                .concat(),
+            dwell_s: 500.0,
+            ..Conditions::default()
+        };
+        let (linear, exact) = (conditions(Truth::Linear), conditions(Truth::Exact));
+        let plan = Plan::new(&scheme, &linear).expect("a plan");
+        let start = Start::new(&plan, &linear).expect("a start").truth;
+        let mut truths = [&linear, &exact].map(|c| TruthModel::new(&plan, c, start.clone()));
+        let mut largest = 0f64;
+        for (i, segment) in plan.segments.iter().enumerate() {
+            for step in 0..segment.steps {
+                let mut z = [[0.0; 2]; 2];
+                let outputs = plan.stages[i].outputs.len();
+                for (truth, z) in truths.iter_mut().zip(&mut z) {
+                    truth.step(i, step, &mut Noise::new(1, 0), &mut z[..outputs]);
+                }
+                for (a, b) in z[0].iter().zip(&z[1]) {
+                    assert!((a - b).abs() < 3e-11, "{carry}: Z {a:e} {b:e}");
+                    largest = largest.max(a.abs());
+                }
+                for (a, b) in truths[0].x().iter().zip(truths[1].x()) {
+                    assert!(
+                        (a - b).abs() < 3e-11,
+                        "{carry} {slew:?} segment {i} step {step}: {a:e} {b:e} {:?} {:?}",
+                        truths[0].x(),
+                        truths[1].x()
+                    );
+                }
+            }
+        }
+        assert!(largest > 1e-7, "something moved: {largest:e}");
+    }
+}
+
+#[test]
+fn jacobians_of_the_platform_are_derivatives() {
+    let scheme = scheme(&["10,25,40", "130,-50,70"], Carry::Inertial);
+    let conditions = Conditions { slew_rate_deg_s: Some(1.0), ..Conditions::default() };
+    let plan = Plan::new(&scheme, &conditions).expect("a plan");
+    let n = plan.unknowns();
+    let x = DVector::from_fn(n, |i, _| (i as f64 + 1.0) * 1e-3);
+    let step = DVector::from_element(n, 1e-4);
+    for segment in 0..plan.segments.len() {
+        let process = PlatformProcess { plan: &plan, segment };
+        for t in [0.0, 17.0] {
+            let by_differences = central_difference(|x| process.f(t, x), &x, &step);
+            let difference: DMatrix<f64> = by_differences - process.jacobian(t, &x);
+            assert!(difference.amax() < 1e-9, "segment {segment}");
+        }
+    }
+}
+
+#[test]
+fn runge_kutta_and_the_exponential_agree() {
+    let rk4 = Conditions { propagation: Propagation::Rk4, ..Conditions::default() };
+    let (a, b) = (run(Carry::Platform, &rk4), run(Carry::Platform, &Conditions::default()));
+    for (a, b) in a.quantities.iter().zip(&b.quantities) {
+        assert!(
+            (a.sigma / b.sigma - 1.0).abs() < 1e-6
+                && (a.estimate - b.estimate).abs() < 1e-4 * a.sigma.max(1.0)
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_by_name() {
+    let refused = |scheme: &Scheme, c: &Conditions| simulate(scheme, c, 1).expect_err("refused");
+    let generic = scheme(&["alpha,0,0"], Carry::Platform);
+    assert!(
+        matches!(refused(&generic, &Conditions::default()), SimulationError::GenericAngle { name } if name == "alpha")
+    );
+    let slews = Conditions { slew_rate_deg_s: Some(1.0), ..Conditions::default() };
+    assert!(matches!(refused(&paper(Carry::Platform), &slews), SimulationError::SlewCarry { .. }));
+    let assigned = |name: &str| Conditions {
+        values: vec![Assignment { name: name.into(), value: 1.0 }],
+        ..Conditions::default()
+    };
+    assert!(refused(&paper(Carry::Platform), &assigned("D_FW")).to_string().contains("`D_FW`"));
+    for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let c = Conditions { step_s: wrong, ..Conditions::default() };
+        assert!(refused(&paper(Carry::Platform), &c).to_string().starts_with("step_s"));
+    }
+}
