@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 
+/// A check failed.
+pub(crate) const CHECK: u8 = 1;
 /// Bad input.
 pub(crate) const INPUT: u8 = 2;
 /// A defect of the program.

@@ -5,6 +5,7 @@ mod analyze;
 mod arguments;
 mod completions;
 mod conditions;
+mod crosscheck;
 mod failure;
 mod lock;
 mod output;
@@ -23,6 +24,8 @@ const AFTER_HELP: &str = "\
 Examples:
   obsdeg analyze --angles 0,0,0 --angles 180,0,0
   obsdeg analyze --scheme scheme.toml --carry inertial --format json -o verdicts.json
+  obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
+  obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
   obsdeg paper
 
 Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error.";
@@ -41,6 +44,8 @@ enum Command {
     Analyze(analyze::Arguments),
     /// Run a Kalman filter against a simulated truth: the paper's run, or any scheme
     Simulate(simulate::Arguments),
+    /// Hold the exact verdicts against a filter; exit code 1 when anything disagrees
+    Crosscheck(crosscheck::Arguments),
     /// Recompute every equation and claim of the paper and say where it is wrong
     Paper(paper::Arguments),
     /// Print the completion script of a shell
@@ -58,6 +63,7 @@ fn run() -> Result<ExitCode, Failure> {
     match Cli::parse().command {
         Command::Analyze(a) => analyze::run(&a),
         Command::Simulate(a) => simulate::run(&a),
+        Command::Crosscheck(a) => crosscheck::run(&a),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man => completions::man(),

@@ -2,9 +2,9 @@
 
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// Shows a spinner on a terminal until it is dropped, if that takes longer than a second.
 pub(crate) struct Spinner {
@@ -40,5 +40,39 @@ impl Drop for Spinner {
             // a panic there has said so already
             let _ = thread.join();
         }
+    }
+}
+
+/// A bar on a terminal for work of known length, once it has taken a second.
+pub(crate) struct Bar {
+    bar: ProgressBar,
+    started: Instant,
+    quiet: bool,
+}
+
+impl Bar {
+    /// A bar of `total` steps; silent when `quiet`.
+    pub(crate) fn start(total: u64, message: &'static str, quiet: bool) -> Self {
+        let bar =
+            ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()).with_message(message);
+        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {pos}/{len}, {per_sec}, {eta} left")
+        {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        Self { bar, started: Instant::now(), quiet }
+    }
+
+    /// So much is done.
+    pub(crate) fn at(&self, done: u64) {
+        if !self.quiet && self.bar.is_hidden() && self.started.elapsed() > Duration::from_secs(1) {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        self.bar.set_position(done);
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
     }
 }

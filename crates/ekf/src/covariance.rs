@@ -130,6 +130,20 @@ impl Covariance {
             .collect()
     }
 
+    /// The variance `c P c^T` of a functional, given by its non-zero entries.
+    pub fn variance(&self, c: &[(usize, f64)]) -> f64 {
+        match self.form {
+            Form::Joseph => {
+                let row = |i: usize| c.iter().map(|&(j, b)| b * self.m[j * self.n + i]).sum::<f64>();
+                c.iter().map(|&(i, a)| a * row(i)).sum()
+            }
+            // the columns of U first: large variances cancel there, not in P
+            Form::Ud => (0..self.n)
+                .map(|j| c.iter().map(|&(i, a)| a * self.u(i, j)).sum::<f64>().powi(2) * self.d[j])
+                .sum(),
+        }
+    }
+
     fn u(&self, i: usize, j: usize) -> f64 {
         match i.cmp(&j) {
             std::cmp::Ordering::Less => self.m[j * self.n + i],

@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use kuva::prelude::{BandPlot, Layout, LegendPosition, LinePlot, Plot, ReferenceLine, SvgBackend};
+use kuva::prelude::{
+    BandPlot, Heatmap, Layout, LegendPosition, LinePlot, Plot, ReferenceLine, SvgBackend, TickFormat,
+};
 use kuva::render::figure::Figure as Grid;
 use resvg::{tiny_skia, usvg};
 
@@ -10,6 +12,8 @@ use resvg::{tiny_skia, usvg};
 pub(crate) const BLACK: &str = "#000000";
 pub(crate) const BLUE: &str = "#0072B2";
 pub(crate) const SKY: &str = "#56B4E9";
+pub(crate) const ORANGE: &str = "#D55E00";
+pub(crate) const GREEN: &str = "#009E73";
 pub(crate) const GREY: &str = "#999999";
 
 /// How a line is drawn.
@@ -17,6 +21,7 @@ pub(crate) const GREY: &str = "#999999";
 pub(crate) enum Stroke {
     Solid,
     Dashed,
+    Dotted,
 }
 
 /// A curve.
@@ -73,6 +78,7 @@ impl Figure {
             let plot = match l.stroke {
                 Stroke::Solid => plot,
                 Stroke::Dashed => plot.with_dashed(),
+                Stroke::Dotted => plot.with_dotted(),
             };
             Plot::from(if l.label.is_empty() { plot } else { plot.with_legend(l.label.clone()) })
         });
@@ -90,7 +96,7 @@ impl Figure {
             .with_legend_position(LegendPosition::OutsideBottomCenter)
             .with_legend_box(false);
         if self.log {
-            layout = layout.with_log_scale();
+            layout = layout.with_log_scale().with_y_tick_format(TickFormat::Sci);
         }
         if let Some((low, high)) = self.x_range {
             layout = layout.with_x_axis_min(low).with_x_axis_max(high);
@@ -126,6 +132,40 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
         .with_shared_legend_bottom()
         .render();
     SvgBackend::new().render_scene(&scene)
+}
+
+/// A matrix with entries between -1 and 1, rows and columns named.
+pub(crate) fn heat(title: &str, names: &[String], values: Vec<Vec<f64>>) -> String {
+    // the library stretches colours over the data; here they mean -1 to 1
+    let all = || values.iter().flatten().copied();
+    let (low, high) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    let color = move |t: f64| diverging((low + t * (high - low) + 1.0) / 2.0);
+    let map = Heatmap::new()
+        .with_data(values)
+        .with_labels(names.to_vec(), names.to_vec())
+        .with_color_map(kuva::prelude::ColorMap::Custom(Arc::new(color)));
+    let plots = vec![Plot::from(map)];
+    let side = 180.0 + 30.0 * names.len() as f64;
+    let layout = Layout::auto_from_plots(&plots)
+        .with_title(title)
+        .with_x_categories(names.to_vec())
+        .with_y_categories(names.to_vec())
+        .with_x_tick_rotate(-60.0)
+        .with_width(side)
+        .with_height(side)
+        .with_font_family(FONT);
+    kuva::render_to_svg(plots, layout)
+}
+
+/// Blue over white to orange, for 0 to 1.
+fn diverging(t: f64) -> String {
+    let (from, to, s) = if t < 0.5 {
+        ([0.0, 114.0, 178.0], [255.0; 3], 2.0 * t)
+    } else {
+        ([255.0; 3], [213.0, 94.0, 0.0], 2.0 * t - 1.0)
+    };
+    let [r, g, b] = [0, 1, 2].map(|i: usize| (from[i] + (to[i] - from[i]) * s).round() as u8);
+    format!("rgb({r},{g},{b})")
 }
 
 /// Why a picture could not be drawn.

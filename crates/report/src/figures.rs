@@ -4,7 +4,11 @@ use obsdeg_core::simulation::Record;
 use obsdeg_core::simulation::conditions::{shown_unit, si_per_shown};
 use obsdeg_core::simulation::record::Series;
 
-use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, Line, SKY, Stroke, grid, png};
+use crate::figure::{
+    BLACK, BLUE, Band, Figure, FigureError, GREEN, GREY, Line, ORANGE, SKY, Stroke, grid, heat, png,
+};
+use obsdeg_core::crosscheck::CrossCheck;
+use obsdeg_core::crosscheck::answer::{HistoryPoint, SlopeCurve};
 
 /// A file: its name and its bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -92,5 +96,127 @@ pub fn simulation_figures(record: &Record) -> Result<Vec<File>, FigureError> {
     }
     let unknowns = record.names.iter().filter(|n| !n.contains(' ')).count();
     files.extend(picture("all", grid(&figures[..unknowns.min(30)], 3, "Truth, estimate and +-3 sigma"))?);
+    Ok(files)
+}
+
+/// Colours of the accuracy orders 0, 1, 2 and beyond, and of what is not observable.
+fn order_color(order: Option<usize>) -> &'static str {
+    match order {
+        Some(0) => GREEN,
+        Some(1) => BLUE,
+        Some(_) => ORANGE,
+        None => GREY,
+    }
+}
+
+/// Sigma against the dwell for unknowns of one unit, with a reference slope per order.
+fn slope_figure(curves: &[&SlopeCurve], unit: &str) -> Figure {
+    let mut orders: Vec<Option<usize>> = curves.iter().map(|c| c.accuracy_order).collect();
+    orders.sort_unstable();
+    orders.dedup();
+    let mut lines = Vec::new();
+    for &order in &orders {
+        let label = match order {
+            Some(d) => format!("accuracy order {d}"),
+            None => "not observable (prior)".into(),
+        };
+        let of_order = curves.iter().filter(|c| c.accuracy_order == order);
+        for (i, c) in of_order.enumerate() {
+            lines.push(Line {
+                label: if i == 0 { label.clone() } else { String::new() },
+                color: order_color(order),
+                stroke: Stroke::Solid,
+                points: c.points.clone(),
+            });
+        }
+        // the reference goes through the middle of the first curve
+        let first = curves.iter().find(|c| c.accuracy_order == order).map(|c| &c.points);
+        if let (Some(d), Some(points)) = (order, first) {
+            let (t0, s0) = points[points.len() / 2];
+            let slope = -(d as f64 + 0.5);
+            let reference = points.iter().map(|&(t, _)| (t, 2.0 * s0 * (t / t0).powf(slope)));
+            lines.push(Line {
+                label: format!("slope {slope:.1}"),
+                color: BLACK,
+                stroke: Stroke::Dotted,
+                points: reference.collect(),
+            });
+        }
+    }
+    // what stays at a diffuse prior would squeeze the rest
+    lines.retain(|l| l.color != GREY || lines_are_all_grey(curves));
+    Figure {
+        title: format!("Sigma against dwell [{unit}]"),
+        x_label: "dwell of a position [s]".into(),
+        y_label: format!("sigma [{unit}]"),
+        lines,
+        log: true,
+        ..Figure::default()
+    }
+}
+
+fn lines_are_all_grey(curves: &[&SlopeCurve]) -> bool {
+    curves.iter().all(|c| c.accuracy_order.is_none())
+}
+
+/// A mean over time with the bands in which a right filter's stays.
+fn history_figure(
+    c: &CrossCheck,
+    title: &str,
+    dof: usize,
+    value: impl Fn(&HistoryPoint) -> f64,
+    count: impl Fn(&HistoryPoint) -> usize,
+) -> Figure {
+    let history = &c.monte_carlo.history;
+    let band = |p: &HistoryPoint| {
+        let (low, high) = obsdeg_core::crosscheck::mean_band(dof, count(p));
+        (p.t_s, low, high)
+    };
+    let end = history.last().map_or(1.0, |p| p.t_s);
+    let line = |label: &str, color, stroke, points| Line { label: label.into(), color, stroke, points };
+    Figure {
+        title: title.into(),
+        x_label: "t [s]".into(),
+        y_label: format!("mean {title}"),
+        bands: vec![Band { color: SKY, points: history.iter().map(band).collect() }],
+        lines: vec![
+            line("expected, band of 95 %", BLACK, Stroke::Dotted, vec![(0.0, dof as f64), (end, dof as f64)]),
+            line("measured", BLUE, Stroke::Solid, history.iter().map(|p| (p.t_s, value(p))).collect()),
+        ],
+        marks: c.timeline.iter().skip(1).map(|t| t.start_s).collect(),
+        x_range: Some((0.0, end)),
+        ..Figure::default()
+    }
+}
+
+/// The figures of a cross-check: slopes per unit, NEES and NIS over time, the correlations.
+///
+/// # Errors
+/// [`FigureError`].
+pub fn crosscheck_figures(c: &CrossCheck) -> Result<Vec<File>, FigureError> {
+    let mut files = Vec::new();
+    let mut units: Vec<&str> = c.slopes.iter().map(|s| s.unit.as_str()).collect();
+    units.dedup();
+    units.sort_unstable();
+    units.dedup();
+    let mut figures = Vec::new();
+    for unit in units {
+        let curves: Vec<&SlopeCurve> = c.slopes.iter().filter(|s| s.unit == unit).collect();
+        figures.push(slope_figure(&curves, unit));
+    }
+    files.extend(picture(
+        "slopes",
+        grid(&figures, figures.len().min(3), "Sigma against dwell, no drift noise"),
+    )?);
+    let outputs = c.monte_carlo.statistics.last().map_or(2, |s| s.expected as usize);
+    let n = c.correlation.names.len();
+    let runs = c.monte_carlo.runs;
+    let comparable = c.monte_carlo.statistics.len() > 1;
+    if comparable {
+        files.extend(picture("nees", history_figure(c, "NEES", n, |p| p.nees, |_| runs).svg())?);
+    }
+    files.extend(picture("nis", history_figure(c, "NIS", outputs, |p| p.nis, |p| p.samples).svg())?);
+    let title = "Correlation under a diffuse prior";
+    files.extend(picture("correlation", heat(title, &c.correlation.names, c.correlation.values.clone()))?);
     Ok(files)
 }

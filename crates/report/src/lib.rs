@@ -1,6 +1,7 @@
 //! Results as text: tables, JSON, Markdown, CSV, LaTeX. Pure formatting: nothing is computed here.
 
 mod audit;
+mod crosscheck;
 mod csv_text;
 mod document;
 mod figure;
@@ -13,7 +14,7 @@ mod table;
 mod words;
 
 pub use figure::{FigureError, png};
-pub use figures::{File, simulation_figures};
+pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use series::{series_csv, series_parquet};
 
 use std::fmt;
@@ -21,6 +22,7 @@ use std::str::FromStr;
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
+use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::simulation::Simulation;
 
 /// A text format.
@@ -119,6 +121,25 @@ pub fn analysis(a: &Analysis, format: Format, layout: Layout) -> Result<String, 
 /// [`ReportError`] when a serializer fails.
 pub fn simulation(s: &Simulation, format: Format, layout: Layout) -> Result<String, ReportError> {
     written(s, &simulation::document(s), format, layout)
+}
+
+/// A cross-check in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a serializer fails.
+pub fn crosscheck(c: &CrossCheck, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(c, &crosscheck::document(c), format, layout)
+}
+
+/// The files of a cross-check: `evidence.json` and the figures.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn crosscheck_files(c: &CrossCheck) -> Result<Vec<File>, ReportError> {
+    let json = crosscheck(c, Format::Json, Layout::default())?;
+    let mut files = vec![File { name: "evidence.json".into(), bytes: json.into_bytes() }];
+    files.extend(crosscheck_figures(c)?);
+    Ok(files)
 }
 
 fn written(

@@ -30,6 +30,12 @@ impl Dwell {
     /// The dwell of the paper's positions, 1000 s.
     pub const PAPER: Self = Self { nanoseconds: 1_000_000_000_000 };
 
+    /// The dwell of so many seconds, to 1e-9 s; `None` outside the range.
+    pub fn from_seconds(seconds: f64) -> Option<Self> {
+        let nanoseconds = (seconds * 1e9).round();
+        (1.0..=1e15).contains(&nanoseconds).then_some(Self { nanoseconds: nanoseconds as u64 })
+    }
+
     /// The dwell in 1e-9 s.
     pub fn nanoseconds(self) -> u64 {
         self.nanoseconds

@@ -38,6 +38,9 @@ pub enum SimulationError {
         /// The carry found.
         carry: Carry,
     },
+    /// A filter that does not know of a position knows of no slew to it.
+    #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
+    DroppedSlew,
     /// The exact truth turns an attitude by coefficients.
     #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
     ExactDrift,

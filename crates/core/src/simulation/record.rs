@@ -128,11 +128,10 @@ pub fn run(
     };
     let sigmas = |series: &mut [Series], p: &Covariance| {
         let own = p.sigmas();
-        let full = if combinations.is_empty() { None } else { Some(p.matrix()) };
         for (i, s) in series.iter_mut().enumerate() {
-            s.sigma.push(match (i.checked_sub(n), &full) {
-                (Some(c), Some(p)) => variance(p, combinations[c]).max(0.0).sqrt(),
-                _ => own[i],
+            s.sigma.push(match i.checked_sub(n) {
+                Some(c) => p.variance(combinations[c]).max(0.0).sqrt(),
+                None => own[i],
             });
         }
     };
@@ -189,9 +188,4 @@ pub(crate) fn first_steps(plan: &Plan) -> Vec<usize> {
         Some(first)
     });
     starts.collect()
-}
-
-/// `c P c^T` of a sparse functional.
-pub(crate) fn variance(p: &DMatrix<f64>, c: &[(usize, f64)]) -> f64 {
-    c.iter().map(|&(i, a)| c.iter().map(|&(j, b)| a * b * p[(i, j)]).sum::<f64>()).sum()
 }

@@ -1,0 +1,213 @@
+//! The evidence for and against the exact verdicts: plain data.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::analysis::Status;
+use crate::model::Carry;
+use crate::simulation::answer::{ConditionsReport, TimelineReport, Validity};
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.crosscheck/1";
+
+/// The cross-check of one scheme.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CrossCheck {
+    /// `obsdeg.crosscheck/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// How the filter was made to differ from the truth; null for a right one.
+    pub filter: Option<String>,
+    /// Under which conditions.
+    pub conditions: ConditionsReport,
+    /// The timeline.
+    pub timeline: Vec<TimelineReport>,
+    /// Whether everything agrees.
+    pub passed: bool,
+    /// What disagrees, in words.
+    pub disagreements: Vec<String>,
+    /// Evidence a and b per unknown and combination.
+    pub quantities: Vec<QuantityEvidence>,
+    /// Directions that Z does not see.
+    pub null_space: Vec<NullEvidence>,
+    /// Number of directions that Z does not see.
+    pub defect: Count,
+    /// Evidence c: covariance of the filter against the inverse information.
+    pub covariance: Vec<Difference>,
+    /// Evidence d: Monte Carlo statistics.
+    pub monte_carlo: MonteCarlo,
+    /// Evidence e: rank correlation of predicted and measured orders.
+    pub ranking: Ranking,
+    /// Evidence f: filters that are wrong on purpose.
+    pub controls: Vec<Control>,
+    /// Whether the small-angle model holds for the true values.
+    pub validity: Validity,
+    /// Sigma against dwell, for the plot.
+    pub slopes: Vec<SlopeCurve>,
+    /// Correlation of the estimate under a diffuse prior.
+    pub correlation: Correlation,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Bound on the probability that a prediction is wrong.
+    pub error_bound: f64,
+}
+
+/// A predicted and a measured number.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Check {
+    /// What the exact verdict says.
+    pub predicted: f64,
+    /// What the filter shows; null when it could not be measured.
+    pub measured: Option<f64>,
+    /// Whether they agree.
+    pub pass: bool,
+}
+
+/// Evidence on one unknown or combination.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct QuantityEvidence {
+    /// The unknown or combination.
+    pub name: String,
+    /// The exact verdict.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+    /// The accuracy order.
+    pub accuracy_order: Option<usize>,
+    /// a: log-log slope of sigma against the dwell; 0 when sigma stays at the prior.
+    pub slope: Check,
+    /// b: factor on sigma when the prior variance is multiplied by 100.
+    pub inflation: Check,
+}
+
+/// Evidence on one null vector.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct NullEvidence {
+    /// `psi_y = 1, D_FZ = 6.4e-5` in SI units.
+    pub direction: String,
+    /// How much of it Z sees, relative to the best seen direction: predicted 0.
+    pub seen: Check,
+    /// Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1; null
+    /// when other null vectors share its unknowns, or when it has only one.
+    pub correlation: Option<Check>,
+}
+
+/// A predicted and a measured count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Count {
+    /// By the exact verdicts.
+    pub predicted: usize,
+    /// Singular values of the information below 1e-10 of the largest.
+    pub measured: usize,
+    /// Whether they agree.
+    pub pass: bool,
+}
+
+/// The largest difference of two covariances.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Difference {
+    /// What is compared.
+    pub name: String,
+    /// `max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`.
+    pub difference: f64,
+    /// The limit.
+    pub limit: f64,
+    /// Whether it is kept.
+    pub pass: bool,
+}
+
+/// A statistic with its bands.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Statistic {
+    /// What is averaged.
+    pub name: String,
+    /// Its expectation.
+    pub expected: f64,
+    /// The average.
+    pub measured: f64,
+    /// The band of 95 %.
+    pub band: (f64, f64),
+    /// The band of 99.9 %, in which it must be.
+    pub wide_band: (f64, f64),
+    /// Whether it is.
+    pub pass: bool,
+}
+
+/// Monte Carlo evidence.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct MonteCarlo {
+    /// Number of runs.
+    pub runs: usize,
+    /// ANEES and NIS.
+    pub statistics: Vec<Statistic>,
+    /// Probability that white innovations have autocorrelations as large.
+    pub whiteness_probability: f64,
+    /// Whether that is above 0.001.
+    pub white: bool,
+    /// ANEES and mean NIS over time.
+    pub history: Vec<HistoryPoint>,
+}
+
+/// Averages over the runs at one time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct HistoryPoint {
+    /// Time in s.
+    pub t_s: f64,
+    /// ANEES of all unknowns.
+    pub nees: f64,
+    /// Mean NIS since the point before.
+    pub nis: f64,
+    /// Number of samples in it, all runs together.
+    pub samples: usize,
+}
+
+/// Agreement of the order of all unknowns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Ranking {
+    /// Kendall's tau-b of predicted and measured accuracy orders; null when all are tied.
+    pub kendall_tau: Option<f64>,
+    /// Whether it is 1 (or all are tied on both sides).
+    pub pass: bool,
+}
+
+/// A filter that is wrong on purpose, and must be found out.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Control {
+    /// What is wrong with it.
+    pub name: String,
+    /// How many checks of a and b fail with it.
+    pub failed: usize,
+    /// Out of how many.
+    pub checks: usize,
+    /// Its mean NIS.
+    pub nis: f64,
+    /// The band in which a right filter's would be (99.9 %).
+    pub band: (f64, f64),
+    /// Whether it was found out.
+    pub pass: bool,
+}
+
+/// Sigma against the dwell.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SlopeCurve {
+    /// The unknown or combination.
+    pub name: String,
+    /// Unit of sigma.
+    pub unit: String,
+    /// The accuracy order.
+    pub accuracy_order: Option<usize>,
+    /// `(dwell in s, sigma)`.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A correlation matrix.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Correlation {
+    /// The unknowns.
+    pub names: Vec<String>,
+    /// Row by row.
+    pub values: Vec<Vec<f64>>,
+}

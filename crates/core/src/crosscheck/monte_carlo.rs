@@ -1,0 +1,312 @@
+//! Evidence d: many runs against truths drawn from the prior. The covariance pass runs once; a run is a truth and
+//! a state pass. Runs are summed in a fixed order, so that the result does not depend on the number of threads.
+
+use nalgebra::DMatrix;
+use obsdeg_ekf::consistency::{Nees, chi_square_band};
+use obsdeg_ekf::linear::{covariance_pass, state_pass};
+use obsdeg_ekf::{Form, Gains};
+use rayon::prelude::*;
+
+use super::answer::{HistoryPoint, Statistic};
+use crate::simulation::SimulationError;
+use crate::simulation::conditions::Conditions;
+use crate::simulation::plan::Plan;
+use crate::simulation::record::{Start, first_steps};
+use crate::simulation::truth::{Noise, TruthModel};
+
+/// Times at which NEES is taken.
+const CHECKPOINTS: usize = 20;
+/// Lags of the autocorrelation.
+const LAGS: usize = 10;
+/// Runs that one task does, and tasks between two reports of progress.
+const CHUNK: usize = 8;
+const BATCH: usize = 32;
+
+/// A filter and what it is run against.
+pub struct Experiment<'a> {
+    /// The filter's model.
+    pub filter: &'a Plan,
+    /// The truth's model: the same timeline.
+    pub truth: &'a Plan,
+    /// Conditions of both.
+    pub conditions: &'a Conditions,
+    /// Directions that Z does not see (SI units).
+    pub null_space: &'a [Vec<(usize, f64)>],
+    /// Seed of all streams.
+    pub seed: u64,
+}
+
+/// Sums over runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Totals {
+    /// Number of runs.
+    pub runs: usize,
+    /// NEES of all unknowns at every checkpoint.
+    nees: Vec<f64>,
+    /// NEES of the observable subspace at the end.
+    nees_observable: f64,
+    /// NIS of the samples up to every checkpoint.
+    nis: Vec<f64>,
+    /// Products of whitened innovations at lags 0, 1, ...
+    lagged: [f64; LAGS + 1],
+    /// Largest `|psi|` of all runs.
+    pub largest_psi: f64,
+}
+
+impl Totals {
+    fn none(checkpoints: usize) -> Self {
+        Self {
+            runs: 0,
+            nees: vec![0.0; checkpoints],
+            nees_observable: 0.0,
+            nis: vec![0.0; checkpoints],
+            lagged: [0.0; LAGS + 1],
+            largest_psi: 0.0,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.runs += other.runs;
+        let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        sum(&mut self.nees, &other.nees);
+        sum(&mut self.nis, &other.nis);
+        sum(&mut self.lagged, &other.lagged);
+        self.nees_observable += other.nees_observable;
+        self.largest_psi = self.largest_psi.max(other.largest_psi);
+    }
+}
+
+/// What all runs share: gains and the factors of the covariance at the checkpoints.
+pub struct Prepared<'a> {
+    experiment: Experiment<'a>,
+    gains: Gains,
+    start: Start,
+    truth_start: Start,
+    /// Numbers of the steps after which NEES is taken; the last is the end.
+    checkpoints: Vec<usize>,
+    nees: Vec<Nees>,
+    /// Of the observable subspace at the end: its basis (n x r) and the factor.
+    observable: Option<(DMatrix<f64>, Nees)>,
+    first_step: Vec<usize>,
+}
+
+impl<'a> Prepared<'a> {
+    /// Runs the covariance pass.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    pub fn new(experiment: Experiment<'a>) -> Result<Self, SimulationError> {
+        let (filter, conditions) = (experiment.filter, experiment.conditions);
+        let start = Start::new(filter, conditions)?;
+        let truth_start = Start::new(experiment.truth, conditions)?;
+        let total: usize = filter.segments.iter().map(|s| s.steps).sum();
+        let points = CHECKPOINTS.min(total);
+        let checkpoints: Vec<usize> = (1..=points).map(|i| (i * total).div_ceil(points) - 1).collect();
+        let mut covariances = Vec::with_capacity(points);
+        let gains = covariance_pass(&filter.stages, start.covariance(Form::Ud)?, |step, p| {
+            if checkpoints.binary_search(&step).is_ok() {
+                covariances.push(p.matrix());
+            }
+        });
+        let nees = covariances.iter().map(Nees::new).collect::<Result<_, _>>()?;
+        let basis = observable_basis(&start.sigma, experiment.null_space);
+        let observable = match (covariances.last(), basis.ncols()) {
+            (Some(p), r) if r > 0 => {
+                let nees = Nees::new(&symmetric(basis.transpose() * p * &basis))?;
+                Some((basis, nees))
+            }
+            _ => None,
+        };
+        let first_step = first_steps(experiment.truth);
+        Ok(Self { experiment, gains, start, truth_start, checkpoints, nees, observable, first_step })
+    }
+
+    /// Whether filter and truth have the same unknowns, so that errors can be taken.
+    fn comparable(&self) -> bool {
+        self.experiment.filter.platform.names() == self.experiment.truth.platform.names()
+    }
+
+    /// `runs` runs in parallel; `progress` hears how many are done.
+    pub fn run(&self, runs: usize, progress: &(dyn Fn(usize) + Sync)) -> Totals {
+        let mut totals = Totals::none(self.checkpoints.len());
+        for batch in (0..runs).step_by(CHUNK * BATCH) {
+            let end = runs.min(batch + CHUNK * BATCH);
+            let starts: Vec<usize> = (batch..end).step_by(CHUNK).collect();
+            let chunks: Vec<Totals> =
+                starts.par_iter().map(|&first| self.chunk(first, end.min(first + CHUNK))).collect();
+            for chunk in &chunks {
+                totals.add(chunk);
+            }
+            progress(end);
+        }
+        totals
+    }
+
+    /// The runs `from..to`, one after the other.
+    pub fn chunk(&self, from: usize, to: usize) -> Totals {
+        let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
+        let mut totals = Totals::none(self.checkpoints.len());
+        let mut drawn = self.truth_start.estimate.clone();
+        let mut truth = TruthModel::new(plan, conditions, drawn.clone());
+        let (mut x, mut error) = (self.start.estimate.clone(), self.start.estimate.clone());
+        let comparable = self.comparable();
+        let mut whitened: Vec<f64> = Vec::new();
+        for run in from..to {
+            let mut noise = Noise::new(*seed, run as u64 + 1);
+            for ((x, mean), sigma) in
+                drawn.iter_mut().zip(&self.truth_start.estimate).zip(&self.truth_start.sigma)
+            {
+                *x = mean + sigma * noise.normal();
+            }
+            truth.reset(&drawn);
+            x.copy_from_slice(&self.start.estimate);
+            whitened.clear();
+            let mut next = 0;
+            let truth = std::cell::RefCell::new(&mut truth);
+            state_pass(
+                &filter.stages,
+                &self.gains,
+                &mut x,
+                |step, segment, z| {
+                    truth.borrow_mut().step(segment, step - self.first_step[segment], &mut noise, z);
+                },
+                |step, x, innovations| {
+                    totals.nis[next] += innovations.iter().map(|v| v * v).sum::<f64>();
+                    whitened.extend_from_slice(innovations);
+                    if self.checkpoints[next] == step {
+                        if comparable {
+                            let truth = truth.borrow();
+                            for ((e, a), b) in error.iter_mut().zip(x).zip(truth.x()) {
+                                *e = a - b;
+                            }
+                            totals.nees[next] += self.nees[next].of(&error);
+                        }
+                        next = (next + 1).min(self.checkpoints.len() - 1);
+                    }
+                },
+            );
+            if let (true, Some((basis, nees))) = (comparable, &self.observable) {
+                let projected: Vec<f64> =
+                    basis.column_iter().map(|c| c.iter().zip(&error).map(|(a, e)| a * e).sum()).collect();
+                totals.nees_observable += nees.of(&projected);
+            }
+            let outputs = filter.components.len();
+            for (lag, sum) in totals.lagged.iter_mut().enumerate() {
+                let later = whitened.get(lag * outputs..).unwrap_or(&[]);
+                *sum += whitened.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
+            }
+            totals.largest_psi = totals.largest_psi.max(truth.borrow().largest_psi);
+            totals.runs += 1;
+        }
+        totals
+    }
+
+    /// Samples of Z per run.
+    fn samples(&self) -> usize {
+        self.gains.updates() / self.experiment.filter.components.len()
+    }
+
+    /// ANEES of all unknowns and of the observable subspace, and the mean NIS.
+    pub fn statistics(&self, totals: &Totals) -> Vec<Statistic> {
+        let n = self.start.sigma.len();
+        let outputs = self.experiment.filter.components.len();
+        let runs = totals.runs as f64;
+        let mut out = Vec::new();
+        if self.comparable() {
+            let last = totals.nees.last().copied().unwrap_or(0.0);
+            out.push(statistic(&format!("ANEES, {n} unknowns"), n, last / runs, runs));
+            if let Some((basis, _)) = &self.observable {
+                let r = basis.ncols();
+                let name = format!("ANEES, observable subspace ({r})");
+                out.push(statistic(&name, r, totals.nees_observable / runs, runs));
+            }
+        }
+        let samples = runs * self.samples() as f64;
+        out.push(statistic("NIS", outputs, totals.nis.iter().sum::<f64>() / samples, samples));
+        out
+    }
+
+    /// The probability of autocorrelations as large as those found, for white innovations.
+    pub fn whiteness(&self, totals: &Totals) -> f64 {
+        let count = totals.runs * self.samples() * self.experiment.filter.components.len();
+        let correlations: Vec<f64> = totals.lagged[1..].iter().map(|l| l / totals.lagged[0]).collect();
+        obsdeg_ekf::consistency::ljung_box(&correlations, count)
+    }
+
+    /// Averages over time.
+    pub fn history(&self, totals: &Totals) -> Vec<HistoryPoint> {
+        let plan = self.experiment.filter;
+        // samples up to every step
+        let (mut time, mut seen, mut count) = (Vec::new(), Vec::new(), 0);
+        for (segment, stage) in plan.segments.iter().zip(&plan.stages) {
+            for i in 1..=segment.steps {
+                count += usize::from(!stage.outputs.is_empty());
+                time.push(segment.start_s + segment.dt * i as f64);
+                seen.push(count);
+            }
+        }
+        let mut before = 0;
+        let runs = totals.runs;
+        self.checkpoints
+            .iter()
+            .enumerate()
+            .map(|(i, &step)| {
+                let samples = (seen[step] - before) * runs;
+                before = seen[step];
+                let nis = if samples > 0 { totals.nis[i] / samples as f64 } else { f64::NAN };
+                HistoryPoint { t_s: time[step], nees: totals.nees[i] / runs as f64, nis, samples }
+            })
+            .filter(|p| p.samples > 0)
+            .collect()
+    }
+}
+
+fn statistic(name: &str, dof: usize, measured: f64, count: f64) -> Statistic {
+    let wide_band = chi_square_band(dof as f64, count, 0.999);
+    Statistic {
+        name: name.into(),
+        expected: dof as f64,
+        measured,
+        band: chi_square_band(dof as f64, count, obsdeg_ekf::consistency::CONFIDENCE),
+        wide_band,
+        pass: (wide_band.0..=wide_band.1).contains(&measured),
+    }
+}
+
+fn symmetric(m: DMatrix<f64>) -> DMatrix<f64> {
+    (&m + m.transpose()) / 2.0
+}
+
+/// Functionals that vanish on the null space (n x r), orthonormal in units of the prior.
+fn observable_basis(sigma: &[f64], null_space: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
+    let n = sigma.len();
+    let mut seen: Vec<Vec<f64>> = Vec::new();
+    let reduce = |v: &mut Vec<f64>, basis: &[Vec<f64>]| {
+        // twice: Gram-Schmidt loses digits once
+        for b in basis.iter().chain(basis) {
+            let s: f64 = v.iter().zip(b).map(|(x, y)| x * y).sum();
+            v.iter_mut().zip(b).for_each(|(x, y)| *x -= s * y);
+        }
+        let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        v.iter_mut().for_each(|x| *x /= norm);
+        norm
+    };
+    for vector in null_space {
+        let mut v = vec![0.0; n];
+        for &(i, x) in vector {
+            v[i] = x / sigma[i];
+        }
+        let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        v.iter_mut().for_each(|x| *x /= norm);
+        reduce(&mut v, &seen);
+        seen.push(v);
+    }
+    let hidden = seen.len();
+    for i in 0..n {
+        let mut v: Vec<f64> = (0..n).map(|j| f64::from(u8::from(i == j))).collect();
+        if reduce(&mut v, &seen) > 1e-6 {
+            seen.push(v);
+        }
+    }
+    DMatrix::from_fn(n, seen.len() - hidden, |i, j| seen[hidden + j][i] / sigma[i])
+}
