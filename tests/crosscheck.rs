@@ -1,0 +1,203 @@
+//! The exact verdicts against the filter: what must agree, and what must not.
+
+use std::process::Command;
+
+use obsdeg_core::crosscheck::answer::CrossCheck;
+use obsdeg_core::crosscheck::batch::batch;
+use obsdeg_core::crosscheck::monte_carlo::{Experiment, Prepared};
+use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::{Carry, Scheme, Unknowns};
+use obsdeg_core::simulation::conditions::{Conditions, Truth};
+use obsdeg_core::simulation::plan::Plan;
+use obsdeg_ekf::SquareRootInformation;
+use proptest::prelude::*;
+use proptest::test_runner::Config;
+
+const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
+
+fn scheme(attitudes: &[&str], carry: Carry) -> Scheme {
+    Scheme { carry, ..Scheme::of_angles(attitudes.iter().map(|a| parse_attitude(a).expect("an attitude"))) }
+}
+
+fn paper(carry: Carry) -> Scheme {
+    scheme(&["0,0,0", "180,0,0"], carry)
+}
+
+fn check(scheme: &Scheme, conditions: &Conditions, filter: FilterChange) -> CrossCheck {
+    crosscheck(scheme, conditions, &Options { runs: 200, seed: 1, filter }, &|_| {}).expect("checked")
+}
+
+fn right(scheme: &Scheme) -> CrossCheck {
+    check(scheme, &Conditions::default(), FilterChange::default())
+}
+
+/// The measured slope of every unknown, as predicted by its accuracy order, which the test knows by itself.
+fn slopes(c: &CrossCheck, which: &str) -> Vec<f64> {
+    let of = |name: &str| name.starts_with(which) && !name.contains(' ');
+    c.quantities.iter().filter(|q| of(&q.name)).filter_map(|q| q.slope.measured).collect()
+}
+
+fn all_near(found: &[f64], expected: f64) -> bool {
+    !found.is_empty() && found.iter().all(|s| (s - expected).abs() < 0.1)
+}
+
+#[test]
+fn slopes_are_those_of_the_accuracy_orders() {
+    for carry in [Carry::Platform, Carry::Inertial] {
+        for n in [4, 5, 6] {
+            let c = right(&scheme(&S6[..n], carry));
+            assert!(c.passed, "{n} positions, {carry}: {:?}", c.disagreements);
+            match (carry, n) {
+                (Carry::Platform, 4) => assert!(all_near(&slopes(&c, "psi"), -1.5)),
+                (Carry::Platform, _) => assert!(all_near(&slopes(&c, "D_I"), -1.5)),
+                (_, 6) => assert!(all_near(&slopes(&c, "D_I"), -2.5)),
+                _ => {}
+            }
+        }
+        let c = right(&paper(carry));
+        assert!(c.passed, "{:?}", c.disagreements);
+        for (name, slope) in [("psi_x", -0.5), ("D_FX", -1.5), ("D_SX", -1.5), ("D_FY", -2.5), ("D_IY", -2.5)]
+        {
+            assert!(all_near(&slopes(&c, name), slope), "{name}");
+        }
+        let swapped = if carry == Carry::Platform { ["D_SZ", "D_FZ"] } else { ["D_FZ", "D_SZ"] };
+        assert!(all_near(&slopes(&c, swapped[0]), -1.5) && all_near(&slopes(&c, swapped[1]), 0.0));
+    }
+}
+
+#[test]
+fn the_papers_case_is_consistent() {
+    let c = right(&paper(Carry::Platform));
+    let statistic =
+        |name: &str| c.monte_carlo.statistics.iter().find(|s| s.name.starts_with(name)).expect("there");
+    let all = statistic("ANEES, 15");
+    assert!((all.band.0 - 14.25).abs() < 0.01 && (all.band.1 - 15.77).abs() < 0.01);
+    for s in &c.monte_carlo.statistics {
+        assert!(s.measured >= s.band.0 && s.measured <= s.band.1, "{s:?}");
+    }
+    assert_eq!(statistic("ANEES, observable").expected, 8.0);
+    assert!(c.covariance.iter().any(|d| d.limit == 1e-6 && d.pass), "{:?}", c.covariance);
+    assert_eq!((c.defect.predicted, c.defect.measured), (7, 7));
+    assert_eq!(c.ranking.kendall_tau, Some(1.0));
+}
+
+/// One position: the best variance of psi_z, eps_x and eps_y, when what their solution needs is unknown and the rest of the
+/// drift is known, is 1, 12 and 720 times sigma^2 dt / T^(2k+1) (over wN^2 for eps_y, which enters psi_z'' by wN).
+#[test]
+fn variance_constants_of_a_single_position() {
+    let single = Scheme { unknowns: Unknowns::Drift, ..scheme(&["0,0,0"], Carry::Platform) };
+    let (sigma, dt, time) = (1e-5, 2.0, 200.0);
+    let conditions = Conditions {
+        step_s: dt,
+        dwell_s: time,
+        accelerometer_noise_g: sigma,
+        drift_noise: "0 deg/h".parse().expect("a drift noise"),
+        ..Conditions::default()
+    };
+    let plan = Plan::new(&single, &conditions).expect("a plan");
+    let names = plan.platform.names();
+    let w_n = plan.point.w_n;
+    let known = |name: &str| name.starts_with("eps") || name == "psi_y^n";
+    for (name, unknown, k, constant, gain) in [
+        ("psi_z^n", vec![], 0, 1.0, 1.0),
+        ("eps_x^n", vec!["eps_x^n"], 1, 12.0, 1.0),
+        ("eps_y^n", vec!["eps_x^n", "eps_y^n", "eps_z^n"], 2, 720.0, 1.0 / w_n),
+    ] {
+        let prior: Vec<f64> = names
+            .iter()
+            .map(|n| if known(n) && !unknown.contains(&n.as_str()) { 1e-15 } else { 1e6 })
+            .collect();
+        let prior = SquareRootInformation::prior(&prior).expect("a prior");
+        let sigmas = batch(&plan, prior).expect("a batch").information.sigmas().expect("regular");
+        let found = sigmas[names.iter().position(|n| n == name).expect("an unknown")] / gain;
+        let predicted = constant * sigma * sigma * dt / f64::powi(time, 2 * k + 1);
+        assert!((found * found / predicted - 1.0).abs() < 0.02, "{name}: {}", found * found / predicted);
+    }
+}
+
+#[test]
+fn wrong_filters_are_found_out() {
+    let none = FilterChange::default;
+    for change in [
+        FilterChange { carry: Some(Carry::Inertial), ..none() },
+        FilterChange { carry: Some(Carry::Reset), ..none() },
+        FilterChange { latitude: "90".parse().ok(), ..none() },
+        FilterChange { dropped: Some(1), ..none() },
+        FilterChange { dropped: Some(0), ..none() },
+    ] {
+        let c = check(&paper(Carry::Platform), &Conditions::default(), change.clone());
+        assert!(!c.passed && !c.disagreements.is_empty(), "{change:?}");
+        // by the data too, not only by the model
+        assert!(c.monte_carlo.statistics.iter().any(|s| s.name == "NIS" && !s.pass), "{change:?}");
+    }
+    let c = right(&paper(Carry::Platform));
+    assert!(c.controls.len() == 3 && c.controls.iter().all(|k| k.pass && k.failed > 0 && k.nis > 100.0));
+}
+
+#[test]
+fn exact_truth_fails_at_the_papers_drifts_and_passes_at_a_thousandth() {
+    let exact = Conditions { truth: Truth::Exact, ..Conditions::default() };
+    let c = check(&paper(Carry::Platform), &exact, FilterChange::default());
+    let nis = c.monte_carlo.statistics.iter().find(|s| s.name == "NIS").expect("NIS");
+    assert!(!c.passed && nis.measured > 100.0 && !c.validity.holds);
+    let small = Conditions { drift_scale: 1e-3, ..exact };
+    let c = check(&paper(Carry::Inertial), &small, FilterChange::default());
+    assert!(c.passed && c.validity.holds, "{:?}", c.disagreements);
+}
+
+/// Same seed, same bytes, whatever the number of threads; and the bar hears of every run.
+#[test]
+fn threads_do_not_change_the_sums() {
+    let conditions = Conditions::default();
+    let plan = Plan::new(&paper(Carry::Platform), &conditions).expect("a plan");
+    let experiment =
+        || Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: &[], seed: 7 };
+    let prepared = Prepared::new(experiment()).expect("prepared");
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let heard = std::sync::atomic::AtomicUsize::new(0);
+        let totals = pool
+            .install(|| prepared.run(300, &|done| heard.store(done, std::sync::atomic::Ordering::Relaxed)));
+        (totals, heard.into_inner())
+    };
+    let (one, heard) = run(1);
+    assert_eq!(heard, 300);
+    assert_eq!(one, run(3).0);
+}
+
+proptest! {
+    #![proptest_config(Config { cases: 12, ..Config::default() })]
+    /// Random schemes of whole degrees: model evidence a, b, c and the ranking agree with the exact verdicts.
+    #[test]
+    fn random_schemes_agree(
+        angles in prop::collection::vec(prop::array::uniform3(-18i32..18), 1..6),
+        carry in prop::sample::select(Carry::ALL.to_vec()),
+    ) {
+        let attitudes: Vec<String> =
+            angles.iter().map(|[a, b, c]| format!("{},{},{}", a * 10, b * 10, c * 10)).collect();
+        let attitudes: Vec<&str> = attitudes.iter().map(String::as_str).collect();
+        let scheme = scheme(&attitudes, carry);
+        let options = Options { runs: 8, seed: 1, filter: FilterChange::default() };
+        let c = crosscheck(&scheme, &Conditions::default(), &options, &|_| {}).expect("checked");
+        prop_assert!(c.passed, "{attitudes:?} {carry}: {:?}", c.disagreements);
+    }
+}
+
+#[test]
+fn exit_codes_and_the_same_bytes() {
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+        command.args(["crosscheck", "--angles", "0,0,0", "--angles", "180,0,0", "--runs", "40"]);
+        command.args(arguments).output().expect("it runs")
+    };
+    let (first, second) = (run(&["--format", "json"]), run(&["--format", "json"]));
+    assert_eq!(first.status.code(), Some(0));
+    assert_eq!(first.stdout, second.stdout);
+    assert!(first.stderr.is_empty());
+    assert_eq!(run(&["--filter-carry", "inertial"]).status.code(), Some(1));
+    assert_eq!(run(&["--truth", "exact"]).status.code(), Some(1));
+    assert_eq!(run(&["--filter-drop", "p9"]).status.code(), Some(2));
+    assert_eq!(run(&["--value", "D_FW=1"]).status.code(), Some(2));
+    assert_eq!(run(&["--drift-noise", "0.01"]).status.code(), Some(2));
+}
