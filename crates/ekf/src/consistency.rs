@@ -1,10 +1,11 @@
 //! Whether a filter's errors are what its covariance says: NEES, NIS, whiteness, with chi-square bands
 //! (Bar-Shalom, Li, Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 5.4).
 
-use nalgebra::{Cholesky, DMatrix, Dyn};
+use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::error::{EkfError, check_symmetric, is_positive};
+use crate::covariance::{Covariance, Form};
+use crate::error::EkfError;
 
 /// The probability that a statistic of a right model lies in its band.
 pub const CONFIDENCE: f64 = 0.95;
@@ -22,36 +23,46 @@ pub fn chi_square_band(dof: f64, count: f64, confidence: f64) -> (f64, f64) {
     (chi.inverse_cdf(tail) / count, chi.inverse_cdf(1.0 - tail) / count)
 }
 
-/// `e^T P^-1 e` of a fixed covariance for any number of errors.
-#[derive(Debug, Clone)]
+/// `e^T P^-1 e` of a fixed covariance for any number of errors, by `P = U diag(d) U^T`.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Nees {
-    /// `L^-1 diag(1/scale)`, row by row, lower triangular.
-    rows: Vec<Vec<f64>>,
+    /// U above its diagonal, column by column.
+    u: Vec<f64>,
+    d: Vec<f64>,
 }
 
 impl Nees {
-    /// The factor of `p`, whose rows and columns are scaled to unit variance first.
+    /// The factors of `p`.
     ///
     /// # Errors
-    /// [`EkfError`] unless `p` is positive definite.
+    /// [`EkfError`] unless `p` is symmetric and positive definite.
     pub fn new(p: &DMatrix<f64>) -> Result<Self, EkfError> {
-        let n = p.nrows();
-        check_symmetric("P", p, n)?;
-        if let Some(row) = (0..n).find(|&i| !is_positive(p[(i, i)])) {
-            return Err(EkfError::NotPositiveDefinite { what: "P", pivot: p[(row, row)], row });
-        }
-        let scale: Vec<f64> = (0..n).map(|i| 1.0 / p[(i, i)].sqrt()).collect();
-        let scaled = DMatrix::from_fn(n, n, |i, j| p[(i, j)] * scale[i] * scale[j]);
-        let refuse = || EkfError::NotPositiveDefinite { what: "P", pivot: 0.0, row: n - 1 };
-        let l = Cholesky::<f64, Dyn>::new(scaled).ok_or_else(refuse)?.l();
-        let inverse = l.solve_lower_triangular(&DMatrix::identity(n, n)).ok_or_else(refuse)?;
-        let rows = (0..n).map(|i| (0..=i).map(|j| inverse[(i, j)] * scale[j]).collect()).collect();
-        Ok(Self { rows })
+        Self::of_covariance(&Covariance::new("P", p, Form::Ud)?)
     }
 
-    /// `e^T P^-1 e`, chi-square with n degrees of freedom when `e ~ N(0, P)`.
-    pub fn of(&self, e: &[f64]) -> f64 {
-        self.rows.iter().map(|row| crate::transition::dot(row, e).powi(2)).sum()
+    /// The factors of the covariance of a filter; nothing is computed in the UD form.
+    ///
+    /// # Errors
+    /// [`EkfError::NotPositiveDefinite`].
+    pub fn of_covariance(p: &Covariance) -> Result<Self, EkfError> {
+        let (u, d) = p.factors()?;
+        Ok(Self { u, d })
+    }
+
+    /// `e^T P^-1 e`, chi-square with n degrees of freedom when `e ~ N(0, P)`; `e` is used up.
+    pub fn of(&self, e: &mut [f64]) -> f64 {
+        let n = self.d.len();
+        let mut sum = 0.0;
+        // y = U^-1 e from the last component up
+        for j in (0..n).rev() {
+            let (above, y) = e.split_at_mut(j);
+            let y = y[0];
+            sum += y * y / self.d[j];
+            for (x, u) in above.iter_mut().zip(&self.u[j * n..j * n + j]) {
+                *x -= u * y;
+            }
+        }
+        sum
     }
 }
 

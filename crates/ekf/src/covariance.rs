@@ -190,50 +190,62 @@ impl Covariance {
         }
     }
 
-    /// Thornton's modified weighted Gram-Schmidt orthogonalisation of `[Phi U, G]` with weights `[d, d_q]`.
+    /// Thornton's modified weighted Gram-Schmidt orthogonalisation of `[Phi U, G]` with weights `[d, d_q]`. States
+    /// behind the last one that changes keep their rows of U and their d; in their columns the changed rows of
+    /// `Phi U` are those of the new U, and the orthogonalisation is left with the block before them.
     fn propagate_ud(&mut self, phi: &Transition, noise: &ProcessNoise) {
-        let (n, q) = (self.n, noise.factors.len());
-        let width = n + q;
-        // row i of W; Phi U differs from U in the active rows only
-        let mut w = vec![0.0; n * width];
-        for i in 0..n {
-            for j in i..n {
-                w[i * width + j] = self.u(i, j);
-            }
-        }
-        for (a, &i) in phi.active().iter().enumerate() {
+        let n = self.n;
+        let Some(last) = phi.active().iter().chain(&noise.states).max() else { return };
+        let (lead, width) = (last + 1, last + 1 + noise.factors.len());
+        let mut buffer = std::mem::take(&mut self.scratch);
+        buffer.clear();
+        buffer.resize((lead + 2) * width + phi.active().len() * n, 0.0);
+        let (w, rest) = buffer.split_at_mut(lead * width);
+        let (weights, rest) = rest.split_at_mut(width);
+        let (weighted, products) = rest.split_at_mut(width);
+        // the changed rows of Phi U; U is unit upper triangular
+        for (a, product) in products.chunks_exact_mut(n).enumerate() {
             let row = phi.row(a);
-            for j in 0..n {
-                w[i * width + j] = row[j] + dot(&row[..j], &self.m[j * n..j * n + j]);
+            for (j, x) in product.iter_mut().enumerate() {
+                *x = row[j] + dot(&row[..j], &self.m[j * n..j * n + j]);
             }
         }
-        let mut weights = self.d.clone();
+        for (i, row) in w.chunks_exact_mut(width).enumerate() {
+            row[i] = 1.0;
+            for (j, x) in row.iter_mut().enumerate().take(lead).skip(i + 1) {
+                *x = self.m[j * n + i];
+            }
+        }
+        for (&i, product) in phi.active().iter().zip(products.chunks_exact(n)) {
+            w[i * width..i * width + lead].copy_from_slice(&product[..lead]);
+            for (j, &x) in product.iter().enumerate().skip(lead) {
+                self.m[j * n + i] = x;
+            }
+        }
+        weights[..lead].copy_from_slice(&self.d[..lead]);
         for (k, (d, g)) in noise.factors.iter().enumerate() {
-            weights.push(*d);
+            weights[lead + k] = *d;
             for (&i, &x) in noise.states.iter().zip(g) {
-                w[i * width + n + k] = x;
+                w[i * width + lead + k] = x;
             }
         }
-        let mut weighted = vec![0.0; width];
-        for j in (0..n).rev() {
+        for j in (0..lead).rev() {
             let (above, row) = w.split_at_mut(j * width);
             let row = &row[..width];
-            for ((x, &y), &d) in weighted.iter_mut().zip(row).zip(&weights) {
+            for ((x, &y), &d) in weighted.iter_mut().zip(row).zip(weights.iter()) {
                 *x = y * d;
             }
-            let d = dot(&weighted, row);
+            let d = dot(weighted, row);
             self.d[j] = d;
-            for i in 0..j {
-                let upper = &mut above[i * width..(i + 1) * width];
-                let u = if d > 0.0 { dot(upper, &weighted) / d } else { 0.0 };
+            for (i, upper) in above.chunks_exact_mut(width).enumerate() {
+                let u = if d > 0.0 { dot(upper, weighted) / d } else { 0.0 };
                 self.m[j * n + i] = u;
-                if u != 0.0 {
-                    for (x, &y) in upper.iter_mut().zip(row) {
-                        *x -= u * y;
-                    }
+                for (x, &y) in upper.iter_mut().zip(row) {
+                    *x -= u * y;
                 }
             }
         }
+        self.scratch = buffer;
     }
 
     /// The update by one scalar measurement; the gain goes to `gain` (its `k` is resized to n).
@@ -289,30 +301,49 @@ impl Covariance {
 
     fn update_bierman(&mut self, output: &ScalarOutput, gain: &mut Gain) {
         let n = self.n;
-        // f = U^T h, g = D f
-        let mut f = vec![0.0; n];
-        for (j, x) in f.iter_mut().enumerate() {
-            *x = output.h.iter().map(|&(i, c)| c * self.u(i, j)).sum();
-        }
         let mut alpha = output.r;
-        for (j, &fj) in f.iter().enumerate() {
-            let g = self.d[j] * fj;
+        for j in 0..n {
+            let column = &mut self.m[j * n..j * n + j];
+            // f = U^T h, g = D f
+            let f: f64 = output
+                .h
+                .iter()
+                .map(|&(i, c)| match i.cmp(&j) {
+                    std::cmp::Ordering::Less => c * column[i],
+                    std::cmp::Ordering::Equal => c,
+                    std::cmp::Ordering::Greater => 0.0,
+                })
+                .sum();
+            let g = self.d[j] * f;
             let before = alpha;
-            alpha += fj * g;
-            if alpha > 0.0 {
-                self.d[j] *= before / alpha;
-            }
-            let lambda = if before > 0.0 { -fj / before } else { 0.0 };
-            for i in 0..j {
-                let u = self.m[j * n + i];
-                self.m[j * n + i] = u + lambda * gain.k[i];
-                gain.k[i] += u * g;
+            alpha += f * g;
+            self.d[j] *= before / alpha;
+            let lambda = -f / before;
+            for (u, k) in column.iter_mut().zip(gain.k.iter_mut()) {
+                let old = *u;
+                *u += lambda * *k;
+                *k += old * g;
             }
             gain.k[j] = g;
         }
         gain.s = alpha;
+        let inverse = 1.0 / alpha;
         for k in &mut gain.k {
-            *k /= alpha;
+            *k *= inverse;
+        }
+    }
+
+    /// `(U, d)` with `P = U diag(d) U^T`: U column by column, only above the diagonal.
+    ///
+    /// # Errors
+    /// [`EkfError::NotPositiveDefinite`] when P itself has lost it.
+    pub(crate) fn factors(&self) -> Result<(Vec<f64>, Vec<f64>), EkfError> {
+        match self.form {
+            Form::Ud => Ok((self.m.clone(), self.d.clone())),
+            Form::Joseph => {
+                let (u, d) = ud_factors("P", &self.matrix(), true)?;
+                Ok((u.as_slice().to_vec(), d))
+            }
         }
     }
 }

@@ -110,6 +110,37 @@ proptest! {
         prop_assert!(close(&step.phi, &phi, 1e-8) && close(&step.q, &q, 1e-8));
     }
 
+    /// A transition that changes some states only, with noise on some only: both forms against the formula, and NEES
+    /// against the inverse.
+    #[test]
+    fn partial_transitions(
+        e in prop::collection::vec(-1.0f64..1.0, 60),
+        moving in prop::collection::vec(any::<bool>(), 5),
+        noisy in prop::collection::vec(any::<bool>(), 5),
+    ) {
+        let n = 5;
+        let p0 = definite(n, &e[..25]);
+        let full = DMatrix::from_column_slice(n, n, &e[25..50]);
+        let identity: DMatrix<f64> = DMatrix::identity(n, n);
+        let phi = DMatrix::from_fn(n, n, |i, j| identity[(i, j)] + if moving[i] { full[(i, j)] } else { 0.0 });
+        let q = DMatrix::from_fn(n, n, |i, j| {
+            if noisy[i] && noisy[j] { e[50 + i] * e[50 + j] + 0.5 * identity[(i, j)] } else { 0.0 }
+        });
+        let expected = &phi * &p0 * phi.transpose() + &q;
+        for form in [Form::Joseph, Form::Ud] {
+            let mut p = Covariance::new("P0", &p0, form).expect("valid");
+            let noise = ProcessNoise::new(&q).expect("valid");
+            p.propagate(&Transition::new(&phi).expect("valid"), &noise);
+            prop_assert!(close(&p.matrix(), &expected, 1e-10), "{form:?}");
+            let error = DVector::from_column_slice(&e[55..]);
+            if let (Some(inverse), Ok(nees)) = (expected.clone().try_inverse(), Nees::of_covariance(&p)) {
+                let direct = (error.transpose() * inverse * &error)[(0, 0)];
+                let found = nees.of(&mut error.as_slice().to_vec());
+                prop_assert!((found - direct).abs() < 1e-6 * direct.abs().max(1.0), "{found} {direct}");
+            }
+        }
+    }
+
     /// Stages are the same filter: information and covariance agree, and nothing depends on the data.
     #[test]
     fn covariance_pass_is_the_inverse_information(e in prop::collection::vec(-1.0f64..1.0, 40)) {
@@ -226,8 +257,8 @@ fn a_right_model_gives_consistent_errors_and_white_innovations() {
                 nis += seen.nis() / f64::from(steps);
                 white.push(seen.whitened[0]);
             }
-            let error = (&truth - filter.x()).as_slice().to_vec();
-            nees += Nees::new(&filter.covariance().matrix()).expect("definite").of(&error);
+            let mut error = (&truth - filter.x()).as_slice().to_vec();
+            nees += Nees::of_covariance(filter.covariance()).expect("definite").of(&mut error);
         }
         let runs = runs as f64;
         let (low, high) = chi_square_band(2.0, runs, 0.999);

@@ -98,21 +98,22 @@ impl<'a> Prepared<'a> {
     pub fn new(experiment: Experiment<'a>) -> Result<Self, SimulationError> {
         let (filter, conditions) = (experiment.filter, experiment.conditions);
         let start = Start::new(filter, conditions)?;
-        let truth_start = Start::new(experiment.truth, conditions)?;
+        let same = filter.platform.names() == experiment.truth.platform.names();
+        let truth_start = if same { start.clone() } else { Start::new(experiment.truth, conditions)? };
         let total: usize = filter.segments.iter().map(|s| s.steps).sum();
         let points = CHECKPOINTS.min(total);
         let checkpoints: Vec<usize> = (1..=points).map(|i| (i * total).div_ceil(points) - 1).collect();
         let mut covariances = Vec::with_capacity(points);
         let gains = covariance_pass(&filter.stages, start.covariance(Form::Ud)?, |step, p| {
             if checkpoints.binary_search(&step).is_ok() {
-                covariances.push(p.matrix());
+                covariances.push(p.clone());
             }
         });
-        let nees = covariances.iter().map(Nees::new).collect::<Result<_, _>>()?;
+        let nees = covariances.iter().map(Nees::of_covariance).collect::<Result<_, _>>()?;
         let basis = observable_basis(&start.sigma, experiment.null_space);
         let observable = match (covariances.last(), basis.ncols()) {
             (Some(p), r) if r > 0 => {
-                let nees = Nees::new(&symmetric(basis.transpose() * p * &basis))?;
+                let nees = Nees::new(&symmetric(basis.transpose() * p.matrix() * &basis))?;
                 Some((basis, nees))
             }
             _ => None,
@@ -179,16 +180,18 @@ impl<'a> Prepared<'a> {
                             for ((e, a), b) in error.iter_mut().zip(x).zip(truth.x()) {
                                 *e = a - b;
                             }
-                            totals.nees[next] += self.nees[next].of(&error);
+                            totals.nees[next] += self.nees[next].of(&mut error);
                         }
                         next = (next + 1).min(self.checkpoints.len() - 1);
                     }
                 },
             );
             if let (true, Some((basis, nees))) = (comparable, &self.observable) {
-                let projected: Vec<f64> =
-                    basis.column_iter().map(|c| c.iter().zip(&error).map(|(a, e)| a * e).sum()).collect();
-                totals.nees_observable += nees.of(&projected);
+                let truth = truth.borrow();
+                let errors = || x.iter().zip(truth.x()).map(|(a, b)| a - b);
+                let mut projected: Vec<f64> =
+                    basis.column_iter().map(|c| c.iter().zip(errors()).map(|(a, e)| a * e).sum()).collect();
+                totals.nees_observable += nees.of(&mut projected);
             }
             let outputs = filter.components.len();
             for (lag, sum) in totals.lagged.iter_mut().enumerate() {

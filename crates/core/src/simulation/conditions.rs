@@ -274,14 +274,17 @@ pub fn latitude_of(scheme: &crate::model::Scheme) -> Option<Latitude> {
 fn concerns(pattern: &str, name: &str) -> bool {
     let base = name.split('@').next().unwrap_or(name);
     let base = base.strip_suffix("^n").unwrap_or(base);
-    let family = match base.split_once('_') {
-        Some(("D", rest)) => {
-            rest.get(..rest.len().saturating_sub(1)).is_some_and(|f| pattern == format!("D_{f}"))
-        }
-        _ => false,
-    };
+    let family = base.strip_prefix("D_").zip(pattern.strip_prefix("D_"));
+    let family = family.is_some_and(|(own, asked)| own.len() == asked.len() + 1 && own.starts_with(asked));
     let kind = base.split_once('_').is_some_and(|(kind, _)| kind == pattern);
     pattern == name || pattern == base || family || kind
+}
+
+/// Whether a gyro model may have it, even if the scheme at hand does not.
+fn is_family(name: &str) -> bool {
+    let letters = name.strip_prefix("D_").unwrap_or("");
+    let letters = letters.strip_suffix(['X', 'Y', 'Z']).unwrap_or(letters);
+    ["psi", "eps", "D"].contains(&name) || crate::model::Term::ALL.iter().any(|t| t.letters() == letters)
 }
 
 /// One number per unknown of `platform`, in the unit of the unknown (psi in deg): `default` where nothing is
@@ -298,11 +301,7 @@ pub fn resolve(
 ) -> Result<Vec<f64>, SimulationError> {
     let mut out = vec![default; platform.names().len()];
     for a in assignments {
-        let mut found = ["psi", "eps", "D"].contains(&a.name.as_str());
-        found |= crate::model::Term::ALL.iter().any(|t| {
-            let family = format!("D_{}", t.letters());
-            a.name == family || a.name.strip_prefix(&family).is_some_and(|g| ["X", "Y", "Z"].contains(&g))
-        });
+        let mut found = is_family(&a.name);
         for (slot, name) in out.iter_mut().zip(platform.names()) {
             if concerns(&a.name, name) {
                 *slot = a.value;
@@ -337,6 +336,13 @@ mod tests {
         assert!(concerns("D_I", "D_IX") && !concerns("D_I", "D_IIX") && concerns("D_II", "D_IIX"));
         assert!(concerns("psi", "psi_x@2") && concerns("psi_x", "psi_x@2") && concerns("psi_x@2", "psi_x@2"));
         assert!(!concerns("psi_x@1", "psi_x@2") && concerns("eps_x", "eps_x^n") && !concerns("D_", "D_FX"));
+        assert!(
+            is_family("D_SS")
+                && is_family("D_FX")
+                && is_family("D")
+                && !is_family("D_FW")
+                && !is_family("D_")
+        );
     }
 
     #[test]

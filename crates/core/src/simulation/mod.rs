@@ -230,11 +230,11 @@ fn consistency(
     let outputs = plan.components.len();
     let samples = record.whitened.len() / outputs;
     let nis = record.whitened.iter().map(|v| v * v).sum::<f64>() / samples as f64;
-    let error: Vec<f64> = record.series[..n]
+    let mut error: Vec<f64> = record.series[..n]
         .iter()
         .map(|s| s.estimate.last().copied().unwrap_or(0.0) - s.truth.last().copied().unwrap_or(0.0))
         .collect();
-    let nees = Nees::new(&record.last_covariance)?.of(&error);
+    let nees = Nees::of_covariance(&record.last_covariance)?.of(&mut error);
     let lags = 20.min(samples / 4).max(1);
     let whiteness = (0..outputs)
         .map(|j| {

@@ -83,8 +83,8 @@ pub struct Record {
     pub series: Vec<Series>,
     /// Whitened innovations, one per output and sampled step.
     pub whitened: Vec<f64>,
-    /// The covariance at the end (n x n).
-    pub last_covariance: DMatrix<f64>,
+    /// The covariance at the end.
+    pub last_covariance: Covariance,
     /// Largest `|psi|`, in rad.
     pub largest_psi: f64,
 }
@@ -109,7 +109,7 @@ pub fn run(
         position: vec![0],
         series: vec![Series::default(); n + combinations.len()],
         whitened: Vec::new(),
-        last_covariance: DMatrix::zeros(n, n),
+        last_covariance: start.covariance(Form::Ud)?,
         largest_psi: 0.0,
     };
     for c in &prediction.combinations {
@@ -135,14 +135,14 @@ pub fn run(
             });
         }
     };
-    let prior = start.covariance(Form::Ud)?;
+    let prior = record.last_covariance.clone();
     sigmas(&mut record.series, &prior);
     let (series, last) = (&mut record.series, &mut record.last_covariance);
     let total = record.time_s.len() - 1;
     let gains = covariance_pass(&plan.stages, prior, |step, p| {
         sigmas(series, p);
         if step + 1 == total {
-            *last = p.matrix();
+            last.clone_from(p);
         }
     });
 
