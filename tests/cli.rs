@@ -251,10 +251,14 @@ fn the_paper_is_audited() {
 
 #[test]
 fn schemas_help_completions_and_manual() {
-    for kind in ["analysis", "audit", "scheme"] {
+    for kind in ["analysis", "audit", "simulation", "crosscheck", "scheme"] {
         insta::assert_snapshot!(format!("schema_{kind}"), stdout(&run(&["schema", kind])));
     }
     let help = stdout(&run(&["analyze", "--help"]));
+    for command in ["simulate", "crosscheck"] {
+        let help = stdout(&run(&[command, "--help"]));
+        assert!(help.contains(&format!("obsdeg {command} --angles 0,0,0")) && help.contains("Exit codes"));
+    }
     assert!(help.contains("obsdeg analyze --angles 0,0,0 --angles 180,0,0") && help.contains("Exit codes"));
     assert!(!stdout(&run(&["--help"])).contains("symbolic-worker"));
     for shell in ["bash", "zsh", "fish"] {

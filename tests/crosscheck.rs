@@ -25,7 +25,7 @@ fn paper(carry: Carry) -> Scheme {
 }
 
 fn check(scheme: &Scheme, conditions: &Conditions, filter: FilterChange) -> CrossCheck {
-    crosscheck(scheme, conditions, &Options { runs: 200, seed: 1, filter }, &|_| {}).expect("checked")
+    crosscheck(scheme, conditions, &Options { runs: 200, seed: 1, filter }, &|_| true).expect("checked")
 }
 
 fn right(scheme: &Scheme) -> CrossCheck {
@@ -157,8 +157,12 @@ fn threads_do_not_change_the_sums() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         let heard = std::sync::atomic::AtomicUsize::new(0);
-        let totals = pool
-            .install(|| prepared.run(300, &|done| heard.store(done, std::sync::atomic::Ordering::Relaxed)));
+        let totals = pool.install(|| {
+            prepared.run(300, &|done| {
+                heard.store(done, std::sync::atomic::Ordering::Relaxed);
+                true
+            })
+        });
         (totals, heard.into_inner())
     };
     let (one, heard) = run(1);
@@ -179,7 +183,7 @@ proptest! {
         let attitudes: Vec<&str> = attitudes.iter().map(String::as_str).collect();
         let scheme = scheme(&attitudes, carry);
         let options = Options { runs: 8, seed: 1, filter: FilterChange::default() };
-        let c = crosscheck(&scheme, &Conditions::default(), &options, &|_| {}).expect("checked");
+        let c = crosscheck(&scheme, &Conditions::default(), &options, &|_| true).expect("checked");
         prop_assert!(c.passed, "{attitudes:?} {carry}: {:?}", c.disagreements);
     }
 }
@@ -200,4 +204,48 @@ fn exit_codes_and_the_same_bytes() {
     assert_eq!(run(&["--filter-drop", "p9"]).status.code(), Some(2));
     assert_eq!(run(&["--value", "D_FW=1"]).status.code(), Some(2));
     assert_eq!(run(&["--drift-noise", "0.01"]).status.code(), Some(2));
+}
+
+/// The paper's case word by word; figures that are rounding are left out.
+#[test]
+fn the_papers_case_word_by_word() {
+    let output = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+        .args(["crosscheck", "--angles", "0,0,0", "--angles", "180,0,0"])
+        .output()
+        .expect("it runs");
+    assert!(output.status.success() && output.stderr.is_empty());
+    insta::with_settings!({
+        omit_expression => true,
+        prepend_module_to_snapshot => false,
+        filters => vec![(r" *\d\.\de-?\d+   ", "   [rounding]   ")],
+    }, {
+        insta::assert_snapshot!("crosscheck_p1p2_table", String::from_utf8_lossy(&output.stdout));
+    });
+}
+
+/// Figures of the evidence, and nothing else, are written.
+#[test]
+fn the_folder_of_a_crosscheck() {
+    let place = tempfile::tempdir().expect("a folder");
+    let folder = place.path().join("evidence");
+    let arguments =
+        ["crosscheck", "--angles", "0,0,0", "--angles", "180,0,0", "--runs", "16", "--quiet", "-o"];
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_obsdeg")).args(arguments).arg(&folder).output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .expect("the folder")
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    let pictures = ["correlation", "nees", "nis", "slopes"]
+        .iter()
+        .flat_map(|n| [format!("{n}.png"), format!("{n}.svg")]);
+    let mut expected: Vec<String> = pictures.chain(["evidence.json".into()]).collect();
+    expected.sort();
+    assert_eq!(names, expected);
+    let slopes = std::fs::read_to_string(folder.join("slopes.svg")).expect("readable");
+    for text in ["slope -0.5", "slope -1.5", "slope -2.5", "dwell of a position [s]", "sigma [deg/h/g]"] {
+        assert!(slopes.contains(text), "{text}");
+    }
 }

@@ -1,5 +1,7 @@
 //! The filter against a simulated truth: the paper's run, other carries, exact truth, slews.
 
+use std::process::{Command, Output};
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme};
@@ -11,6 +13,8 @@ use obsdeg_core::simulation::truth::{Noise, TruthModel};
 use obsdeg_core::simulation::{SimulationError, simulate};
 use obsdeg_ekf::Process;
 use obsdeg_ekf::model::central_difference;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::RowAccessor;
 
 const W_N_DPH: f64 = 7.292115e-5 * 180.0 / std::f64::consts::PI * 3600.0;
 
@@ -170,5 +174,131 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let c = Conditions { step_s: wrong, ..Conditions::default() };
         assert!(refused(&paper(Carry::Platform), &c).to_string().starts_with("step_s"));
+    }
+}
+
+fn obsdeg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_obsdeg")).args(arguments).output().expect("it runs")
+}
+
+const P1P2: [&str; 5] = ["simulate", "--angles", "0,0,0", "--angles", "180,0,0"];
+
+#[test]
+fn the_papers_run_word_by_word() {
+    let output = obsdeg(&P1P2);
+    assert!(output.status.success() && output.stderr.is_empty());
+    insta::with_settings!({ omit_expression => true, prepend_module_to_snapshot => false }, {
+        insta::assert_snapshot!("simulate_p1p2_table", String::from_utf8_lossy(&output.stdout));
+    });
+}
+
+/// The folder: a figure per unknown as SVG and PNG, all of them in one, CSV and Parquet with the same numbers, the same
+/// bytes each time, and nothing overwritten unless asked.
+#[test]
+fn the_folder_of_a_run() {
+    let place = tempfile::tempdir().expect("a folder");
+    let folder = |name: &str| place.path().join(name).display().to_string();
+    let (one, two) = (folder("one"), folder("two"));
+    for target in [&one, &two] {
+        let output = obsdeg(&[&P1P2[..], &["-o", target, "--quiet"]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    let files = |folder: &str| -> Vec<(String, Vec<u8>)> {
+        let entries = std::fs::read_dir(folder).expect("the folder").map(|e| e.expect("an entry").path());
+        let mut all: Vec<_> = entries
+            .map(|p| {
+                (
+                    p.file_name().expect("a name").to_string_lossy().into_owned(),
+                    std::fs::read(&p).expect("readable"),
+                )
+            })
+            .collect();
+        all.sort();
+        all
+    };
+    let written = files(&one);
+    assert_eq!(written, files(&two));
+    let file = |name: &str| &written.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("{name}")).1;
+    // the paper's figures 2-10, the rest of the unknowns, and the grid
+    for name in ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ", "D_OX", "all"] {
+        let svg = String::from_utf8_lossy(file(&format!("{name}.svg")));
+        assert!(svg.starts_with("<svg") && svg.contains("[deg") && svg.contains("t [s]"), "{name}");
+        let png = file(&format!("{name}.png"));
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 10_000, "{name}");
+    }
+    let svg = String::from_utf8_lossy(file("D_FY.svg"));
+    assert!(svg.contains("D_FY [deg/h]") && svg.contains("truth") && svg.contains("3 sigma"));
+    assert!(svg.contains("stroke-dasharray"), "the estimate is dashed, boundaries are dotted");
+
+    let mut csv = csv::Reader::from_reader(&file("series.csv")[..]);
+    let header: Vec<String> = csv.headers().expect("a header").iter().map(String::from).collect();
+    assert_eq!(header[..3], ["position", "t_s", "psi_x_true_deg"]);
+    assert!(header.contains(&"D_SX_sigma_dph_per_g".into()) && header.contains(&"D_FX_estimate_dph".into()));
+    let rows: Vec<Vec<f64>> = csv
+        .records()
+        .map(|r| r.expect("a row").iter().map(|x| x.parse().expect("a number")).collect())
+        .collect();
+    assert_eq!((rows.len(), rows[0][1], rows[200][1], rows[200][0]), (201, 0.0, 2000.0, 2.0));
+
+    let parquet = bytes::Bytes::from(file("series.parquet").clone());
+    let reader = SerializedFileReader::new(parquet).expect("Parquet");
+    let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
+    let names: Vec<String> = columns.iter().map(|c| c.name().to_string()).collect();
+    assert_eq!(names, header);
+    for (row, expected) in reader.get_row_iter(None).expect("rows").zip(&rows) {
+        let row = row.expect("a row");
+        for (i, x) in expected.iter().enumerate() {
+            let found = if i == 0 {
+                f64::from(row.get_int(0).expect("an int"))
+            } else {
+                row.get_double(i).expect("a double")
+            };
+            assert_eq!(found, *x, "{}", names[i]);
+        }
+    }
+
+    let summary: serde_json::Value = serde_json::from_slice(file("summary.json")).expect("JSON");
+    assert_eq!(summary["schema"], "obsdeg.simulation/1");
+    let refused = obsdeg(&[&P1P2[..], &["-o", &one]].concat());
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));
+    assert!(obsdeg(&[&P1P2[..], &["-o", &one, "--force", "--seed", "2"]].concat()).status.success());
+    assert_ne!(files(&one), written);
+    let nowhere = obsdeg(&[&P1P2[..], &["-o", &folder("no/such/place")]].concat());
+    assert_eq!(nowhere.status.code(), Some(2));
+    assert_eq!(std::fs::read_dir(place.path()).expect("the place").count(), 2, "nothing is left behind");
+}
+
+#[test]
+fn wrong_arguments_name_the_place() {
+    for (arguments, expected) in [
+        (&["--step", "0"][..], "step_s"),
+        (&["--value", "D_FX"], "NAME=NUMBER"),
+        (&["--value", "D_FW=1"], "`D_FW`"),
+        (&["--prior", "psi=0"], "prior sigma"),
+        (&["--drift-noise", "0.01"], "unit"),
+        (&["--slew-rate", "1"], "inertial"),
+        (&["--truth", "rough"], "linear"),
+        (&["--combination", "D_FX +"], "combination"),
+        (&["--angles", "alpha,0,0"], "alpha"),
+        (&["--dwell", "1e9"], "steps"),
+    ] {
+        let output = obsdeg(&[&P1P2[..], arguments].concat());
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(expected) && output.stdout.is_empty(), "{arguments:?}: {stderr}");
+    }
+}
+
+/// Every format says the verdict; JSON is as the schema says.
+#[test]
+fn formats() {
+    for format in ["markdown", "latex", "csv", "json"] {
+        let output = obsdeg(&[&P1P2[..], &["--format", format]].concat());
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(
+            output.status.success() && text.contains("FX") && text.contains("reached"),
+            "{format}: {text}"
+        );
     }
 }

@@ -106,6 +106,7 @@ pub(crate) struct OutputArguments {
 
 /// Where results go when there are figures and series too.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct FolderArguments {
     /// Format on stdout: table, json, markdown, csv or latex
     #[arg(long, value_name = "FORMAT", default_value_t = Format::Table)]

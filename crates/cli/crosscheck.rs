@@ -1,6 +1,7 @@
 //! `obsdeg crosscheck`: the exact verdicts against a filter.
 
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 
 use clap::Args;
 use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
@@ -9,6 +10,7 @@ use obsdeg_core::model::{Carry, Latitude, Scheme};
 use crate::arguments::{FolderArguments, SchemeArguments};
 use crate::conditions::ConditionArguments;
 use crate::failure::{CHECK, Failure};
+use crate::interrupt;
 use crate::output;
 use crate::progress::Bar;
 use crate::simulate::failure;
@@ -65,9 +67,17 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let filter = FilterChange { carry: a.filter_carry, latitude: a.filter_latitude, dropped };
     let options = Options { runs: a.runs as usize, seed: a.seed, filter };
     let bar = Bar::start(u64::from(a.runs), "Monte Carlo", a.output.quiet);
-    let checked = crosscheck(&scheme, &conditions, &options, &|done| bar.at(done as u64));
+    let interrupted = interrupt::flag()?;
+    let checked = crosscheck(&scheme, &conditions, &options, &|done| {
+        bar.at(done as u64);
+        !interrupted.load(Ordering::Relaxed)
+    });
     drop(bar);
     let evidence = checked.map_err(failure)?;
+    if evidence.monte_carlo.runs < options.runs {
+        let (done, asked) = (evidence.monte_carlo.runs, options.runs);
+        eprintln!("interrupted: {done} of {asked} runs are reported");
+    }
     let internal = |e: obsdeg_report::ReportError| Failure::internal(e.to_string());
     let text = obsdeg_report::crosscheck(&evidence, a.output.format, output::terminal()).map_err(internal)?;
     if a.output.output.is_some() {

@@ -7,6 +7,7 @@ mod completions;
 mod conditions;
 mod crosscheck;
 mod failure;
+mod interrupt;
 mod lock;
 mod output;
 mod paper;

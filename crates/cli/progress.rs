@@ -55,8 +55,7 @@ impl Bar {
     pub(crate) fn start(total: u64, message: &'static str, quiet: bool) -> Self {
         let bar =
             ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()).with_message(message);
-        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {pos}/{len}, {per_sec}, {eta} left")
-        {
+        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {pos}/{len}, {eta} left") {
             bar.set_style(style.progress_chars("=> "));
         }
         Self { bar, started: Instant::now(), quiet }

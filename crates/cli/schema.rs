@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
+use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::model::scheme_file::SchemeFile;
+use obsdeg_core::simulation::Simulation;
 use schemars::schema_for;
 
 use crate::failure::Failure;
@@ -17,6 +19,10 @@ enum Kind {
     Analysis,
     /// The JSON of `obsdeg paper`
     Audit,
+    /// The JSON of `obsdeg simulate`
+    Simulation,
+    /// The JSON of `obsdeg crosscheck`
+    Crosscheck,
     /// Scheme files
     Scheme,
 }
@@ -31,6 +37,8 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let schema = match a.kind {
         Kind::Analysis => schema_for!(Analysis),
         Kind::Audit => schema_for!(Audit),
+        Kind::Simulation => schema_for!(Simulation),
+        Kind::Crosscheck => schema_for!(CrossCheck),
         Kind::Scheme => schema_for!(SchemeFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;

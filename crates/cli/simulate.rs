@@ -3,6 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use obsdeg_core::analysis::AnalysisError;
+use obsdeg_core::prediction::PredictionError;
 use obsdeg_core::simulation::{Record, Simulation, SimulationError, simulate};
 use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
 
@@ -71,6 +73,11 @@ fn files(summary: &Simulation, record: &Record) -> Result<Vec<File>, ReportError
 /// What is wrong with the input, or with the program.
 pub(crate) fn failure(e: SimulationError) -> Failure {
     match e {
+        SimulationError::Prediction(PredictionError::Analysis(AnalysisError::Combination {
+            text,
+            reason,
+            span,
+        })) => Failure::at(&format!("combination: {reason}"), "--combination", &text, span),
         SimulationError::Prediction(_) | SimulationError::Filter(_) => Failure::internal(e.to_string()),
         _ => Failure::input(e.to_string()),
     }

@@ -1,9 +1,10 @@
 //! What the exact engine says of a scheme, as numbers that a filter can be held against.
 
 use crate::accuracy::{Accuracy, AccuracyError};
-use crate::analysis::{Status, verdict};
+use crate::analysis::requested::requested_combinations;
+use crate::analysis::{AnalysisError, Status, verdict};
 use crate::degree::coefficient::{Coefficient, Number};
-use crate::degree::ensemble::{EnsembleError, judge};
+use crate::degree::ensemble::judge;
 use crate::degree::verdict::{combinations, expression, null_space, partners};
 use crate::model::Platform;
 use crate::solution::solver::{Frame, Solver, Sparse};
@@ -24,15 +25,17 @@ pub struct PredictedUnknown {
     pub partners: Vec<usize>,
 }
 
-/// An observable combination.
+/// An observable combination, or one that was asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictedCombination {
     /// In words: `D_FZ - wN*psi_y`.
     pub expression: String,
     /// Its coefficients; the first is its leading unknown.
     pub terms: Combination,
+    /// Whether it can be solved.
+    pub status: Status,
     /// The observable degree.
-    pub degree: usize,
+    pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
 }
@@ -42,7 +45,7 @@ pub struct PredictedCombination {
 pub struct Prediction {
     /// Per unknown, in model order.
     pub unknowns: Vec<PredictedUnknown>,
-    /// Observable combinations beyond single unknowns.
+    /// Observable combinations beyond single unknowns, and those that the scheme asks for.
     pub combinations: Vec<PredictedCombination>,
     /// A basis of the directions that Z does not see, unknowns that are not excited included.
     pub null_space: Vec<Combination>,
@@ -55,9 +58,9 @@ pub struct Prediction {
 /// Why there is no prediction.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PredictionError {
-    /// No verdict.
+    /// No verdict, or a combination that is none.
     #[error(transparent)]
-    Verdict(#[from] EnsembleError),
+    Analysis(#[from] AnalysisError),
     /// No accuracy order.
     #[error(transparent)]
     Accuracy(#[from] AccuracyError),
@@ -69,7 +72,8 @@ impl Prediction {
     /// # Errors
     /// [`PredictionError`].
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
-        let verdicts = judge(platform, seed)?;
+        let verdicts = judge(platform, seed).map_err(AnalysisError::from)?;
+        let requested = requested_combinations(platform, &verdicts)?;
         let accuracy = Accuracy::new(platform, &verdicts, seed)?;
         let mut solver = Solver::new(platform, &verdicts, seed, Frame::N, None);
         let null = null_space(platform, &verdicts, &mut solver);
@@ -87,6 +91,15 @@ impl Prediction {
         let numbers = |terms: &Sparse| -> Option<Combination> {
             terms.iter().map(|(c, k)| Some((*c, number(k, rates)?))).collect()
         };
+        let asked = requested.into_iter().filter_map(|r| {
+            Some(PredictedCombination {
+                terms: numbers(&r.terms).filter(|t| !t.is_empty())?,
+                status: r.verdict.status,
+                degree: r.verdict.degree,
+                accuracy_order: accuracy.of_functional(&r.row, r.verdict.degree),
+                expression: r.text,
+            })
+        });
         let combinations = combinations(platform, &verdicts, &mut solver)
             .into_iter()
             .filter_map(|c| {
@@ -94,10 +107,12 @@ impl Prediction {
                 Some(PredictedCombination {
                     expression: expression(platform, &c.support, Some(&functional.terms)),
                     terms: numbers(&functional.terms)?,
-                    degree: c.degree,
+                    status: Status::Observable,
+                    degree: Some(c.degree),
                     accuracy_order: accuracy.of_functional(&c.vector, Some(c.degree)),
                 })
             })
+            .chain(asked)
             .collect();
         // with dwells, a direction may be seen that derivatives do not see (at a pole)
         let unseen = |v: &Combination| v.iter().all(|(c, _)| unknowns[*c].accuracy_order.is_none());

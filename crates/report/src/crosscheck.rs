@@ -16,7 +16,8 @@ fn band((low, high): (f64, f64)) -> String {
 }
 
 fn measured(c: &Check) -> String {
-    c.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}"))
+    let text = c.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}"));
+    if text == "-0.000" { "0.000".into() } else { text }
 }
 
 pub(crate) fn document(c: &CrossCheck) -> Document {

@@ -131,7 +131,7 @@ pub(crate) fn document(s: &Simulation) -> Document {
     let mut blocks =
         vec![table("Estimates at the end (degree: exact verdict, - not observable)", &s.quantities)];
     if !s.combinations.is_empty() {
-        blocks.push(table("Observable combinations (psi: of the end)", &s.combinations));
+        blocks.push(table("Combinations (psi: of the end)", &s.combinations));
     }
     let c = &s.consistency;
     let band = |(low, high): (f64, f64)| format!("{}..{}", number(low), number(high));

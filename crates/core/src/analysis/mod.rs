@@ -1,7 +1,7 @@
 //! The main job: everything that is said about one scheme, as plain data.
 
 mod answer;
-mod requested;
+pub(crate) mod requested;
 
 use std::ops::Range;
 

@@ -53,19 +53,19 @@ fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<
 }
 
 /// A combination that was asked for.
-pub(super) struct Requested {
+pub(crate) struct Requested {
     /// As written.
-    pub(super) text: String,
+    pub(crate) text: String,
     /// Its coefficients in the first field of the verdicts.
-    pub(super) row: Vec<u64>,
+    pub(crate) row: Vec<u64>,
     /// Its exact coefficients.
-    pub(super) terms: Sparse,
+    pub(crate) terms: Sparse,
     /// What the staircase says.
-    pub(super) verdict: Verdict,
+    pub(crate) verdict: Verdict,
 }
 
 /// Reads and judges the combinations that a scheme asks for.
-pub(super) fn requested_combinations(
+pub(crate) fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
 ) -> Result<Vec<Requested>, AnalysisError> {

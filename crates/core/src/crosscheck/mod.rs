@@ -20,7 +20,6 @@ use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 pub use answer::CrossCheck;
 pub use ranking::kendall_tau_b;
 
-use crate::analysis::Status;
 use crate::model::{Carry, Latitude, Scheme};
 use crate::prediction::{Combination, Prediction};
 use crate::simulation::conditions::{DriftNoise, resolve, shown_unit, si_per_shown};
@@ -103,7 +102,8 @@ pub struct Options {
     pub filter: FilterChange,
 }
 
-/// Holds the exact verdicts on `scheme` against a filter. `progress` hears how many of the runs are done.
+/// Holds the exact verdicts on `scheme` against a filter. `progress` hears how many of the
+/// runs are done and says whether to go on: when it does not, those done are what is reported.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -111,7 +111,7 @@ pub fn crosscheck(
     scheme: &Scheme,
     conditions: &Conditions,
     options: &Options,
-    progress: &(dyn Fn(usize) + Sync),
+    progress: &dyn Fn(usize) -> bool,
 ) -> Result<CrossCheck, SimulationError> {
     let truth = Plan::new(scheme, conditions)?;
     let filter_scheme = options.filter.apply(scheme);
@@ -135,7 +135,7 @@ pub fn crosscheck(
     let totals = prepared.run(options.runs, progress);
     let whiteness_probability = prepared.whiteness(&totals);
     let monte_carlo = MonteCarlo {
-        runs: options.runs,
+        runs: totals.runs,
         statistics: prepared.statistics(&totals),
         whiteness_probability,
         white: whiteness_probability > 1e-3,
@@ -296,7 +296,7 @@ fn quantities(
 ) -> Vec<QuantityEvidence> {
     let unknowns = prediction.unknowns.iter().map(|u| (u.status, u.degree, u.accuracy_order));
     let combinations = prediction.combinations.iter();
-    let combinations = combinations.map(|c| (Status::Observable, Some(c.degree), c.accuracy_order));
+    let combinations = combinations.map(|c| (c.status, c.degree, c.accuracy_order));
     let mut measured = slopes.iter().zip(ratios);
     names
         .iter()
@@ -456,7 +456,7 @@ fn controls(
         let (failed, checks) = structure(&truth, prediction, &filter_scheme, conditions)?.failures();
         let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: &[], seed };
         let prepared = Prepared::new(experiment)?;
-        let statistics = prepared.statistics(&prepared.run(CONTROL_RUNS, &|_| {}));
+        let statistics = prepared.statistics(&prepared.run(CONTROL_RUNS, &|_| true));
         let Some(nis) = statistics.last() else { continue };
         out.push(Control {
             name: format!("filter {}", change.words(scheme)),

@@ -127,8 +127,8 @@ impl<'a> Prepared<'a> {
         self.experiment.filter.platform.names() == self.experiment.truth.platform.names()
     }
 
-    /// `runs` runs in parallel; `progress` hears how many are done.
-    pub fn run(&self, runs: usize, progress: &(dyn Fn(usize) + Sync)) -> Totals {
+    /// `runs` runs in parallel; `progress` hears how many are done and says whether to go on.
+    pub fn run(&self, runs: usize, progress: &dyn Fn(usize) -> bool) -> Totals {
         let mut totals = Totals::none(self.checkpoints.len());
         for batch in (0..runs).step_by(CHUNK * BATCH) {
             let end = runs.min(batch + CHUNK * BATCH);
@@ -138,7 +138,9 @@ impl<'a> Prepared<'a> {
             for chunk in &chunks {
                 totals.add(chunk);
             }
-            progress(end);
+            if !progress(end) {
+                break;
+            }
         }
         totals
     }

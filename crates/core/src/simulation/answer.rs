@@ -121,7 +121,7 @@ pub enum Outcome {
 impl std::fmt::Display for Outcome {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Reached => "target reached",
+            Self::Reached => "reached",
             Self::Converging => "converging",
             Self::PriorOnly => "prior only",
             Self::Inconsistent => "inconsistent",

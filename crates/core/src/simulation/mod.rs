@@ -130,8 +130,8 @@ fn summary(
         let unit = units[c.terms[0].0];
         let series = &record.series[n + i];
         combinations.push(Estimate {
-            status: crate::analysis::Status::Observable,
-            degree: Some(c.degree),
+            status: c.status,
+            degree: c.degree,
             accuracy_order: c.accuracy_order,
             ..estimate(&c.expression, unit, si_per_shown(unit), series, record, Some(targets[c.terms[0].0]))
         });
