@@ -93,6 +93,7 @@ impl Figure {
             .with_width(SIZE.0)
             .with_height(SIZE.1)
             .with_font_family(FONT)
+            .with_y_label_offset(-7.0, 0.0)
             .with_legend_position(LegendPosition::OutsideBottomCenter)
             .with_legend_box(false);
         if self.log {
