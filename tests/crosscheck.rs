@@ -12,7 +12,7 @@ use obsdeg_core::simulation::conditions::{Conditions, Truth};
 use obsdeg_core::simulation::plan::Plan;
 use obsdeg_ekf::SquareRootInformation;
 use proptest::prelude::*;
-use proptest::test_runner::Config;
+use proptest::test_runner::{Config, RngSeed};
 
 const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
 
@@ -171,8 +171,8 @@ fn threads_do_not_change_the_sums() {
 }
 
 proptest! {
-    #![proptest_config(Config { cases: 12, ..Config::default() })]
-    /// Random schemes of whole degrees: model evidence a, b, c and the ranking agree with the exact verdicts.
+    #![proptest_config(Config { cases: 24, rng_seed: RngSeed::Fixed(1), ..Config::default() })]
+    /// Random schemes of whole degrees (the same ones each time: one in three hundred right filters leaves a band of 99.9 %): model evidence a, b, c and the ranking agree with the exact verdicts.
     #[test]
     fn random_schemes_agree(
         angles in prop::collection::vec(prop::array::uniform3(-18i32..18), 1..6),

@@ -9,10 +9,13 @@ use crate::simulation::SimulationError;
 use crate::simulation::conditions::{Conditions, DriftNoise};
 use crate::simulation::plan::Plan;
 
-/// The dwells at which the slope is measured, in s: short against the earth's turn, long against rounding.
-const MEASURED: [f64; 5] = [20.0, 35.6, 63.2, 112.0, 200.0];
+/// The dwells at which the slope is measured, in s: so short that the highest order outweighs the lower ones, long against
+/// rounding.
+const MEASURED: [f64; 5] = [2.0, 3.56, 6.32, 11.2, 20.0];
 /// More dwells for the plot.
-const SHOWN: [f64; 8] = [5.0, 10.0, 355.0, 632.0, 1120.0, 2000.0, 3550.0, 6320.0];
+const SHOWN: [f64; 6] = [63.2, 200.0, 632.0, 1120.0, 2000.0, 6320.0];
+/// How much looser the prior is than that of the inflation: the dwells are that much shorter.
+const LOOSER: f64 = 100.0;
 /// Samples per position: the noise of a sample is scaled so that its density stays.
 const SAMPLES: f64 = 50.0;
 
@@ -42,7 +45,8 @@ pub fn slopes(
     for &dwell in &dwells {
         let (scheme, conditions) = scaled(scheme, conditions, dwell);
         let plan = Plan::new(&scheme, &conditions)?;
-        let prior = SquareRootInformation::prior(&diffuse_prior(&plan))?;
+        let prior: Vec<f64> = diffuse_prior(&plan).iter().map(|s| s * LOOSER).collect();
+        let prior = SquareRootInformation::prior(&prior)?;
         let root = batch(&plan, prior)?.information.inverse_root()?;
         for (s, functional) in sigmas.iter_mut().zip(functionals) {
             // c S^-1: large variances cancel here, not in the covariance
