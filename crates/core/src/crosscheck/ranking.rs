@@ -19,5 +19,5 @@ pub fn kendall_tau_b(a: &[i64], b: &[i64]) -> Option<f64> {
             in_b += t.abs();
         }
     }
-    (in_a > 0 && in_b > 0).then(|| balance as f64 / ((in_a as f64).sqrt() * (in_b as f64).sqrt()))
+    (in_a > 0 && in_b > 0).then(|| balance as f64 / ((in_a * in_b) as f64).sqrt())
 }
