@@ -285,11 +285,13 @@ fn from_text(in_n: bool, attitudes: &[&str], carry: Carry, seed: u64) -> (Vec<us
     let states: Vec<String> =
         ["psi_x", "psi_y", "psi_z"].map(String::from).into_iter().chain(d_names).collect();
     let n = platform.names().len();
-    let matrices: Vec<[[u64; 3]; 3]> = sample
-        .point
-        .cos_sin
+    let matrices: Vec<[[u64; 3]; 3]> = platform
+        .scheme()
+        .positions
         .iter()
-        .map(|&[(ca, sa), (cb, sb), (cg, sg)]| {
+        .map(|p| {
+            let [(ca, sa), (cb, sb), (cg, sg)] =
+                p.angles.each_ref().map(|angle| values.angle_cos_sin(&sample.roots, angle));
             let m = |xs: &[u64]| xs.iter().fold(f.one(), |p, &x| f.mul(p, x));
             [
                 [m(&[cb, cg]), m(&[cb, sg]), f.neg(sb)],

@@ -3,7 +3,7 @@
 use std::process::{Command, Output};
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::scheme::{Rotation, parse_attitude};
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_core::simulation::answer::{Estimate, Simulation};
 use obsdeg_core::simulation::conditions::{Assignment, Conditions, DriftNoise, Propagation, Truth};
@@ -85,7 +85,9 @@ fn exact_truth_is_the_linear_one_for_small_angles() {
     for (carry, slew) in
         [(Carry::Platform, None), (Carry::Inertial, None), (Carry::Reset, None), (Carry::Inertial, Some(2.0))]
     {
-        let scheme = scheme(&attitudes, carry);
+        let mut scheme = scheme(&attitudes, carry);
+        // the middle one turns
+        scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
         let conditions = |truth| Conditions {
             truth,
             slew_rate_deg_s: slew,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use obsdeg_core::model::attitude::Euler;
-use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::scheme::{Rotation, parse_attitude};
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns, scheme_file};
 use obsdeg_report::Format;
 
@@ -14,7 +14,8 @@ use crate::failure::Failure;
 #[derive(Debug, Args)]
 pub(crate) struct SchemeArguments {
     /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz); once per position.
-    /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE)
+    /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE). A,B,G@X_p:360 turns from there, at a constant
+    /// rate for its dwell, about a platform axis (X_p, Y_p, Z_p) or a geographic one (N, U, E)
     #[arg(long, value_name = "A,B,G", allow_hyphen_values = true, value_parser = attitude, conflicts_with = "scheme")]
     angles: Vec<EulerArgument>,
 
@@ -45,13 +46,21 @@ pub(crate) struct SchemeArguments {
 
 /// Three Euler angles (a type of its own: clap would take a list for several values).
 #[derive(Debug, Clone)]
-struct EulerArgument(Euler);
+struct EulerArgument(Euler, Option<Rotation>);
 
 fn attitude(text: &str) -> Result<EulerArgument, String> {
     if text.starts_with("--") {
         return Err(format!("expected three angles such as 180,0,0, found the option `{text}`"));
     }
-    parse_attitude(text).map(EulerArgument).map_err(|e| e.to_string())
+    let (start, rotation) = text.split_once('@').map_or((text, None), |(a, r)| (a, Some(r)));
+    let rotation = rotation.map(|r| {
+        let (about, angle) = r.split_once(':').ok_or_else(|| {
+            format!("expected an axis and an angle after @, as in 0,0,0@X_p:360, found `{r}`")
+        })?;
+        Rotation::new(about, angle).map_err(|e| e.to_string())
+    });
+    let euler = parse_attitude(start).map_err(|e| e.to_string())?;
+    Ok(EulerArgument(euler, rotation.transpose()?))
 }
 
 impl SchemeArguments {
@@ -67,7 +76,13 @@ impl SchemeArguments {
                     None => Failure::input(format!("{name}: {}", e.message)),
                 })?
             }
-            None => Scheme::of_angles(self.angles.iter().map(|a| a.0.clone())),
+            None => {
+                let mut scheme = Scheme::of_angles(self.angles.iter().map(|a| a.0.clone()));
+                for (position, a) in scheme.positions.iter_mut().zip(&self.angles) {
+                    position.rotation.clone_from(&a.1);
+                }
+                scheme
+            }
         };
         if let Some(carry) = self.carry {
             scheme.carry = carry;

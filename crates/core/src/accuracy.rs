@@ -37,6 +37,9 @@ pub enum AccuracyError {
     /// The largest power of T is beyond the series.
     #[error("accuracy orders beyond {} were not computed", PRECISIONS[2] / 2 - 1)]
     Precision,
+    /// Along a rotation psi moves while the attitude does.
+    #[error("accuracy orders are computed for positions, not for rotating segments")]
+    Rotation,
     /// The two fields do not agree.
     #[error("two random primes disagreed on the accuracy orders: try another seed")]
     Disagreement,
@@ -52,6 +55,9 @@ impl Accuracy {
         if scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift {
             let order = verdicts.degrees.degree.clone();
             return Ok(Self { order, error_bound: verdicts.error_bound, module: None });
+        }
+        if scheme.rotates() {
+            return Err(AccuracyError::Rotation);
         }
         let dwells = dwell_ratios(scheme);
         let mut rng = SplitMix64::new(seed ^ 0x00d0_3e11_00d0_3e11);

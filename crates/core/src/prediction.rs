@@ -19,7 +19,7 @@ pub struct PredictedUnknown {
     pub status: Status,
     /// The observable degree.
     pub degree: Option<usize>,
-    /// The accuracy order: `None` when no dwell makes it observable.
+    /// The accuracy order: `None` when no dwell makes it observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
     /// Unknowns that it cannot be told from.
     pub partners: Vec<usize>,
@@ -74,7 +74,10 @@ impl Prediction {
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
         let verdicts = judge(platform, seed).map_err(AnalysisError::from)?;
         let requested = requested_combinations(platform, &verdicts)?;
-        let accuracy = Accuracy::new(platform, &verdicts, seed)?;
+        let accuracy = match Accuracy::new(platform, &verdicts, seed) {
+            Err(AccuracyError::Rotation) => None,
+            other => Some(other?),
+        };
         let mut solver = Solver::new(platform, &verdicts, seed, Frame::N, None);
         let null = null_space(platform, &verdicts, &mut solver);
         let n = platform.names().len();
@@ -84,19 +87,21 @@ impl Prediction {
             .enumerate()
             .map(|(c, partners)| {
                 let v = verdict(&verdicts.degrees, c);
-                let accuracy_order = accuracy.order[c];
+                let accuracy_order = accuracy.as_ref().and_then(|a| a.order[c]);
                 PredictedUnknown { status: v.status, degree: v.degree, accuracy_order, partners }
             })
             .collect();
         let numbers = |terms: &Sparse| -> Option<Combination> {
             terms.iter().map(|(c, k)| Some((*c, number(k, rates)?))).collect()
         };
+        let of_functional =
+            |row: &[u64], degree| accuracy.as_ref().and_then(|a| a.of_functional(row, degree));
         let asked = requested.into_iter().filter_map(|r| {
             Some(PredictedCombination {
                 terms: numbers(&r.terms).filter(|t| !t.is_empty())?,
                 status: r.verdict.status,
                 degree: r.verdict.degree,
-                accuracy_order: accuracy.of_functional(&r.row, r.verdict.degree),
+                accuracy_order: of_functional(&r.row, r.verdict.degree),
                 expression: r.text,
             })
         });
@@ -109,13 +114,14 @@ impl Prediction {
                     terms: numbers(&functional.terms)?,
                     status: Status::Observable,
                     degree: Some(c.degree),
-                    accuracy_order: accuracy.of_functional(&c.vector, Some(c.degree)),
+                    accuracy_order: of_functional(&c.vector, Some(c.degree)),
                 })
             })
             .chain(asked)
             .collect();
         // with dwells, a direction may be seen that derivatives do not see (at a pole)
-        let unseen = |v: &Combination| v.iter().all(|(c, _)| unknowns[*c].accuracy_order.is_none());
+        let seen = |c: usize| unknowns[c].accuracy_order.is_some() && unknowns[c].degree.is_none();
+        let unseen = |v: &Combination| !v.iter().any(|(c, _)| seen(*c));
         let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).map(|c| vec![(c, 1.0)]);
         let null_space = null
             .iter()
@@ -123,8 +129,8 @@ impl Prediction {
             .chain(silent)
             .filter(unseen)
             .collect();
-        let rank = accuracy.rank().unwrap_or_else(|| verdicts.degrees.rank());
-        let error_bound = verdicts.error_bound.max(accuracy.error_bound);
+        let rank = accuracy.as_ref().and_then(Accuracy::rank).unwrap_or_else(|| verdicts.degrees.rank());
+        let error_bound = accuracy.map_or(verdicts.error_bound, |a| verdicts.error_bound.max(a.error_bound));
         Ok(Self { unknowns, combinations, null_space, rank, error_bound })
     }
 }

@@ -168,7 +168,8 @@ pub(crate) fn analysis(a: &Analysis) -> String {
         &["position", "$\\alpha, \\beta, \\gamma$ [deg]", "$X_p\\,Y_p\\,Z_p$"],
         a.positions.iter().map(|p| {
             let angles: Vec<String> = p.angles_deg.iter().map(|x| escape(&x.to_string())).collect();
-            vec![escape(&p.name), angles.join(", "), p.attitude.clone().unwrap_or_default()]
+            let angles = words::turned(&angles.join(", "), p.rotation.as_deref().map(escape).as_deref());
+            vec![escape(&p.name), angles, p.attitude.clone().unwrap_or_default()]
         }),
     ));
     out.push_str(&table(

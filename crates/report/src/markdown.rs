@@ -36,7 +36,11 @@ pub(crate) fn analysis(a: &Analysis) -> String {
         &["position", "alpha, beta, gamma [deg]", "X_p Y_p Z_p"],
         a.positions.iter().map(|p| {
             let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
-            vec![escape(&p.name), escape(&angles.join(", ")), p.attitude.clone().unwrap_or_default()]
+            vec![
+                escape(&p.name),
+                escape(&words::turned(&angles.join(", "), p.rotation.as_deref())),
+                p.attitude.clone().unwrap_or_default(),
+            ]
         }),
     ));
     out.push_str("\n## Unknowns\n\n");

@@ -65,7 +65,8 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
     for p in &a.positions {
         let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
         let g = p.g_c.map_or_else(String::new, |g| g.map(short).join(", "));
-        positions.add_row(vec![p.name.clone(), angles.join(", "), p.attitude.clone().unwrap_or_default(), g]);
+        let angles = words::turned(&angles.join(", "), p.rotation.as_deref());
+        positions.add_row(vec![p.name.clone(), angles, p.attitude.clone().unwrap_or_default(), g]);
     }
     out.push_str(&trimmed(&positions));
 

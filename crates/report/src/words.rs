@@ -114,10 +114,25 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         format!("observation {z}"),
         "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g".into(),
     ];
+    if a.positions.iter().any(|p| p.rotation.is_some()) {
+        out.push(
+            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \
+             goes on through it; p1+45 is p1 after 45 deg"
+                .into(),
+        );
+    }
     if a.measured_azimuth {
         out.push("azimuth psi_y^n is measured: Za".into());
     }
     out
+}
+
+/// The angles of a position, with the rotation that starts there.
+pub(crate) fn turned(angles: &str, rotation: Option<&str>) -> String {
+    match rotation.and_then(|r| r.split_once(':')) {
+        Some((about, angle)) => format!("{angles}, turned by {angle} about {about}"),
+        None => angles.into(),
+    }
 }
 
 /// The accuracy orders that differ from the degrees, a sentence for each pair of them.

@@ -86,7 +86,9 @@ pub struct PositionReport {
     pub angles_deg: [AngleReport; 3],
     /// Where X_p, Y_p, Z_p point, for a cardinal attitude.
     pub attitude: Option<String>,
-    /// Gravity in platform axes, in g; null for generic angles.
+    /// The rotation that starts there, such as `X_p:360`.
+    pub rotation: Option<String>,
+    /// Gravity in platform axes (at the start of a rotation), in g; null for generic angles.
     pub g_c: Option<[f64; 3]>,
 }
 

@@ -17,6 +17,7 @@ use crate::degree::verdict::{Combination, NullVector, combinations, expression, 
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::Platform;
 use crate::model::ring::Float;
+use crate::model::scheme::Station;
 use crate::model::{Angle, Carry, Scheme, SchemeError, Unknowns};
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
@@ -85,7 +86,7 @@ pub fn analyze(
     let basis = combinations(&platform, &verdicts, &mut solver);
     let null = null_space(&platform, &verdicts, &mut solver);
 
-    let names = scheme.positions.iter().map(|p| p.name.clone()).collect();
+    let names = scheme.stations().iter().map(Station::name).collect();
     let mut printer = Printer { solver, options, names, accuracy: None, notes: Vec::new() };
     let accuracy = Accuracy::new(&platform, &verdicts, options.seed);
     printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
@@ -321,6 +322,7 @@ fn position_reports(scheme: &Scheme) -> Vec<PositionReport> {
                 name: p.name.clone(),
                 angles_deg: std::array::from_fn(|k| report(&p.angles[k])),
                 attitude: p.cardinal(),
+                rotation: p.rotation.as_ref().map(ToString::to_string),
                 g_c: constant.then(|| std::array::from_fn(|j| 0.0 - c[1][j])),
             }
         })

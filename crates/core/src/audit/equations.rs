@@ -5,7 +5,6 @@ use obsdeg_exact::{Field, RootField, SplitMix64};
 use super::{Line, finding};
 use crate::analysis::AnalysisError;
 use crate::degree::ensemble::EnsembleError;
-use crate::model::attitude::c_n_from_euler;
 use crate::model::expression::{Environment, evaluate, parse};
 use crate::model::platform::{LOCAL, Platform, RandomValues, local_dynamics, local_output};
 use crate::model::scheme::{Scheme, parse_attitude};
@@ -51,7 +50,7 @@ fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
     put("wU", w_u);
     put("t", f.from_u64(rng.next_u64()));
     put("q", f.from_u64(rng.next_u64()));
-    let c = c_n_from_euler(&f, &sample.point.cos_sin[0]);
+    let c = &sample.point.attitudes[0];
     let g: [u64; 3] = std::array::from_fn(|j| f.neg(c[1][j]));
     for (name, value) in ["gx", "gy", "gz"].into_iter().zip(g) {
         put(name, value);
@@ -82,7 +81,14 @@ fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
     for (name, value) in ["Zcx", "Zcy", "Zcz"].into_iter().zip(to_c(z_n)) {
         put(name, value);
     }
-    Ok(At { field: f, angles: sample.point.cos_sin[0], names })
+    Ok(At {
+        field: f,
+        angles: platform.scheme().positions[0]
+            .angles
+            .each_ref()
+            .map(|a| values.angle_cos_sin(&sample.roots, a)),
+        names,
+    })
 }
 
 /// Whether `left = right` at random points of two fields, at the attitude given (`alpha,beta,gamma`

@@ -113,6 +113,9 @@ pub fn crosscheck(
     options: &Options,
     progress: &dyn Fn(usize) -> bool,
 ) -> Result<CrossCheck, SimulationError> {
+    if scheme.rotates() {
+        return Err(SimulationError::CrosscheckRotation);
+    }
     let truth = Plan::new(scheme, conditions)?;
     let filter_scheme = options.filter.apply(scheme);
     let filter = Plan::new(&filter_scheme, conditions)?;

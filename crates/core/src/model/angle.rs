@@ -129,6 +129,11 @@ impl Angle {
         Self::from_nanodeg(i64::from(deg) * 1_000_000_000)
     }
 
+    /// The constant part in 1e-9 degrees, as given.
+    pub fn nanodeg(&self) -> i64 {
+        self.nanodeg
+    }
+
     /// The constant part, modulo a turn.
     pub fn turn(&self) -> Turn {
         Turn::from_nanodeg(self.nanodeg)

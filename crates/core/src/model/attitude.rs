@@ -33,6 +33,32 @@ pub fn c_n_from_euler<R: Ring>(ring: &R, cs: &[(R::Element, R::Element); 3]) -> 
     product(ring, &product(ring, &m[0], &m[1]), &m[2])
 }
 
+/// A turn about one axis.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Turned {
+    /// 0, 1, 2: X_p, Y_p, Z_p or N, U, E.
+    pub axis: usize,
+    /// About a geographic axis, not one of the platform.
+    pub geographic: bool,
+    /// By this angle, right-handed.
+    pub angle: Angle,
+}
+
+/// `C_c^n` of Euler angles, then turned: `C exp([a x] t)` about a platform axis, `exp([b x] t) C` about a geographic
+/// one; `exp([a x] t)` is the transpose of the passive elementary matrix.
+pub fn c_n<R: Ring>(
+    ring: &R,
+    euler: &Euler,
+    turned: Option<&Turned>,
+    cos_sin: impl Fn(&Angle) -> (R::Element, R::Element),
+) -> Matrix3<R::Element> {
+    let c = c_n_from_euler(ring, &std::array::from_fn(|k| cos_sin(&euler[k])));
+    let Some(t) = turned else { return c };
+    let (cos, sin) = cos_sin(&t.angle);
+    let turn = elementary(ring, t.axis, &(cos, ring.neg(&sin)));
+    if t.geographic { product(ring, &turn, &c) } else { product(ring, &c, &turn) }
+}
+
 /// The geographic directions and their components (North, Up, East).
 const DIRECTIONS: [(char, [i32; 3]); 6] = [
     ('N', [1, 0, 0]),

@@ -223,6 +223,11 @@ impl Term {
             .collect()
     }
 
+    /// The number of g factors.
+    pub fn order(self) -> usize {
+        if self == Self::F { 0 } else { self.letters().len() }
+    }
+
     /// The unit of its coefficient.
     pub fn unit(self) -> &'static str {
         match self.letters().len() {

@@ -3,7 +3,7 @@
 use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order};
 
 use super::angle::Angle;
-use super::attitude::{Matrix3, c_n_from_euler};
+use super::attitude::{Matrix3, product};
 use super::geometry::{GYROS, SignedAxis, Unknowns};
 use super::ring::Ring;
 use super::scheme::{Carry, Scheme, SchemeError};
@@ -38,8 +38,8 @@ pub struct Point<R: Ring> {
     pub w_n: R::Element,
     /// Up component of the earth rate.
     pub w_u: R::Element,
-    /// `(cos, sin)` of alpha, beta, gamma of each position.
-    pub cos_sin: Vec<[(R::Element, R::Element); 3]>,
+    /// `C_c^n` of every station of the scheme.
+    pub attitudes: Vec<Matrix3<R::Element>>,
 }
 
 /// `S_i`: how the local unknowns of one position depend on the unknowns of the scheme.
@@ -109,7 +109,7 @@ impl Platform {
         &self.units
     }
 
-    /// `S_i` of every position (section 4 of the method: the psi block depends on the carry).
+    /// `S_i` of every station: of every position, and several of a rotation (section 4 of the method: the psi block depends on the carry).
     pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
         if self.scheme.unknowns == Unknowns::Drift {
@@ -119,25 +119,38 @@ impl Platform {
             return vec![Block { columns: (0..LOCAL).collect(), rows }];
         }
         let first_d = self.names.len() - self.drift.len();
-        let c_first = c_n_from_euler(ring, &point.cos_sin[0]);
-        point
-            .cos_sin
-            .iter()
-            .enumerate()
-            .map(|(i, cs)| {
-                let c = c_n_from_euler(ring, cs);
-                let psi_first = if self.scheme.carry == Carry::Reset { 3 * i } else { 0 };
-                let psi_block = if self.scheme.carry == Carry::Inertial { &c_first } else { &c };
-                let drift = drift_block(ring, &self.drift, &c);
-                let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
-                let rows = std::array::from_fn(|r| match r {
-                    0..3 => psi_block[r].iter().cloned().chain(zeros(self.drift.len())).collect(),
-                    _ => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
-                });
-                let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
-                Block { columns, rows }
-            })
-            .collect()
+        // psi^n as a function of psi at the start of the scheme, and psi in platform axes where a rotation ended
+        let mut psi_block = &point.attitudes[0];
+        let mut composed;
+        let mut handed_on: Option<Matrix3<R::Element>> = None;
+        let stations = self.scheme.stations();
+        let mut out = Vec::with_capacity(stations.len());
+        for (i, (station, c)) in stations.iter().zip(&point.attitudes).enumerate() {
+            if !station.continues {
+                psi_block = match (self.scheme.carry, &handed_on) {
+                    (Carry::Inertial, _) => &point.attitudes[0],
+                    (Carry::Platform, Some(k)) => {
+                        composed = product(ring, c, k);
+                        &composed
+                    }
+                    _ => c,
+                };
+            } else if stations.get(i + 1).is_none_or(|next| !next.continues) {
+                let back: Matrix3<R::Element> =
+                    std::array::from_fn(|r| std::array::from_fn(|k| c[k][r].clone()));
+                handed_on = Some(product(ring, &back, psi_block));
+            }
+            let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
+            let drift = drift_block(ring, &self.drift, c);
+            let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
+            let rows = std::array::from_fn(|r| match r {
+                0..3 => psi_block[r].iter().cloned().chain(zeros(self.drift.len())).collect(),
+                _ => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
+            });
+            let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
+            out.push(Block { columns, rows });
+        }
+        out
     }
 }
 
@@ -224,7 +237,8 @@ impl RandomValues {
     /// # Errors
     /// [`PrimeError`] never for a validated scheme.
     pub fn draw(scheme: &Scheme, rng: &mut SplitMix64) -> Result<Self, PrimeError> {
-        let angles = scheme.positions.iter().flat_map(|p| &p.angles).map(Angle::turn);
+        let stations = scheme.stations();
+        let angles = stations.iter().flat_map(super::scheme::Station::angles).map(Angle::turn);
         let latitude = scheme.latitude.map(|l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()));
         let roots = RootField::random(common_order(angles.chain(latitude)), rng)?;
         let p = roots.field.modulus();
@@ -262,6 +276,19 @@ impl RandomValues {
         self.generic.iter_mut().find(|(n, _)| n == name).map(|(_, z)| *z = minus_one).is_some()
     }
 
+    /// `(cos, sin)` of an angle in a conjugate of the field. The imaginary unit may have gone to its negative there: then
+    /// exp(i angle) at a fixed tangent is inverted.
+    pub fn angle_cos_sin(&self, roots: &RootField, angle: &Angle) -> (u64, u64) {
+        let f = roots.field;
+        let flip = roots.imaginary_unit() != self.roots.imaginary_unit();
+        let constant = roots.unit_circle(angle.turn()).unwrap_or(f.one());
+        let generic = angle.generic().and_then(|(name, minus)| {
+            let z = self.generic.iter().find(|(n, _)| n == name)?.1;
+            Some(if minus != flip { f.inv(z) } else { z })
+        });
+        roots.cos_sin(f.mul(constant, generic.unwrap_or(f.one())))
+    }
+
     /// `(cos, sin)` of a generic angle at a sample of these values.
     pub fn generic_cos_sin(&self, name: &str, sample: &Sample) -> Option<(u64, u64)> {
         let z = self.generic.iter().find(|(n, _)| n == name)?.1;
@@ -275,16 +302,6 @@ impl RandomValues {
     pub fn sample(&self, scheme: &Scheme, a: u64) -> Sample {
         let roots = self.roots.conjugate(a);
         let f = roots.field;
-        // the imaginary unit goes to i^a, so exp(i angle) at a fixed tangent is inverted for a = 3 mod 4
-        let flip = a % 4 == 3;
-        let unit = |angle: &Angle| {
-            let constant = roots.unit_circle(angle.turn()).unwrap_or(f.one());
-            let generic = angle.generic().and_then(|(name, minus)| {
-                let z = self.generic.iter().find(|(n, _)| n == name)?.1;
-                Some(if minus != flip { f.inv(z) } else { z })
-            });
-            f.mul(constant, generic.unwrap_or(f.one()))
-        };
         let (w_n, w_u) = match scheme.latitude {
             None => self.rates,
             Some(latitude) => {
@@ -293,11 +310,11 @@ impl RandomValues {
                 (f.mul(self.rates.0, c), f.mul(self.rates.0, s))
             }
         };
-        let cos_sin = scheme
-            .positions
+        let attitudes = scheme
+            .stations()
             .iter()
-            .map(|p| std::array::from_fn(|k| roots.cos_sin(unit(&p.angles[k]))))
+            .map(|station| station.attitude(&f, |angle| self.angle_cos_sin(&roots, angle)))
             .collect();
-        Sample { roots, point: Point { ring: f, w_n, w_u, cos_sin } }
+        Sample { roots, point: Point { ring: f, w_n, w_u, attitudes } }
     }
 }

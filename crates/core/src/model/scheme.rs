@@ -7,9 +7,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::angle::{Angle, AngleError, format_decimal, parse_decimal};
-use super::attitude::{Euler, cardinal, cardinal_name};
+use super::attitude::{Euler, Matrix3, Turned, c_n, cardinal, cardinal_name};
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
+use super::ring::Ring;
 use crate::simulation::conditions::Settings;
 
 /// What is carried from one position to the next (the paper does not say).
@@ -123,6 +124,108 @@ pub struct Position {
     pub angles: Euler,
     /// How long it lasts; `None` where the scheme does not say.
     pub dwell: Option<Dwell>,
+    /// Turns at a constant rate while Z is observed; the angles are those at its start.
+    pub rotation: Option<Rotation>,
+}
+
+/// A rotating segment: psi^n goes on through it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rotation {
+    /// 0, 1, 2: X_p, Y_p, Z_p or N, U, E.
+    pub axis: usize,
+    /// About a geographic axis, not one of the platform.
+    pub geographic: bool,
+    /// The whole angle, right-handed; constant and not zero.
+    pub angle: Angle,
+}
+
+/// Why a text is no rotation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RotationError {
+    /// Not an axis.
+    #[error(
+        "`{found}` is not an axis to turn about; expected X_p, Y_p, Z_p (platform) or N, U, E (geographic)"
+    )]
+    About {
+        /// The text found.
+        found: String,
+    },
+    /// Not an angle.
+    #[error("`{found}` is no angle to turn by; expected decimal degrees of at least 0.001 in magnitude")]
+    Angle {
+        /// The text found.
+        found: String,
+    },
+}
+
+impl Rotation {
+    const AXES: [(&'static str, usize, bool); 6] = [
+        ("X_p", 0, false),
+        ("Y_p", 1, false),
+        ("Z_p", 2, false),
+        ("N", 0, true),
+        ("U", 1, true),
+        ("E", 2, true),
+    ];
+
+    /// A rotation about a named axis by decimal degrees.
+    ///
+    /// # Errors
+    /// [`RotationError`].
+    pub fn new(about: &str, angle: &str) -> Result<Self, RotationError> {
+        let axis = Self::AXES.into_iter().find(|(name, ..)| *name == about.trim());
+        let (_, axis, geographic) = axis.ok_or_else(|| RotationError::About { found: about.into() })?;
+        let wrong = || RotationError::Angle { found: angle.into() };
+        let nanodeg = parse_decimal(angle.trim()).map_err(|_| wrong())?;
+        if nanodeg.abs() < MIN_ROTATION {
+            return Err(wrong());
+        }
+        Ok(Self { axis, geographic, angle: Angle::from_nanodeg(nanodeg) })
+    }
+}
+
+impl fmt::Display for Rotation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::AXES.iter().find(|(_, axis, g)| (*axis, *g) == (self.axis, self.geographic));
+        write!(f, "{}:{}", name.map_or("", |n| n.0), self.angle)
+    }
+}
+
+/// An attitude at which derivative rows are taken: a position, or a point of a rotating segment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Station<'a> {
+    /// The position or segment.
+    pub position: &'a Position,
+    /// Its index.
+    pub index: usize,
+    /// How far the segment has turned.
+    pub turned: Option<Turned>,
+    /// psi^n goes on from the station before, whatever the carry.
+    pub continues: bool,
+}
+
+impl Station<'_> {
+    /// `p1`, or `p1+45` after a turn of 45 degrees.
+    pub fn name(&self) -> String {
+        match &self.turned {
+            Some(t) if self.continues => format!("{}+{}", self.position.name, t.angle),
+            _ => self.position.name.clone(),
+        }
+    }
+
+    /// All its angles.
+    pub fn angles(&self) -> impl Iterator<Item = &Angle> {
+        self.position.angles.iter().chain(self.turned.iter().map(|t| &t.angle))
+    }
+
+    /// `C_c^n` there.
+    pub fn attitude<R: Ring>(
+        &self,
+        ring: &R,
+        cos_sin: impl Fn(&Angle) -> (R::Element, R::Element),
+    ) -> Matrix3<R::Element> {
+        c_n(ring, &self.position.angles, self.turned.as_ref(), cos_sin)
+    }
 }
 
 /// Why a text is no attitude.
@@ -239,10 +342,23 @@ pub enum SchemeError {
         /// Number of positions.
         found: usize,
     },
+    /// A rotation that is none.
+    #[error("the rotation of `{name}` is too small or generic; expected at least 0.001 degrees")]
+    Rotation {
+        /// The segment.
+        name: String,
+    },
     /// An impossible mounting.
     #[error(transparent)]
     Geometry(#[from] super::geometry::GeometryError),
 }
+
+/// Smallest rotation in 1e-9 degrees.
+const MIN_ROTATION: i64 = 1_000_000;
+/// A turn in 1e-9 degrees.
+const FULL_TURN: i64 = 360_000_000_000;
+/// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of them.
+const STATION_STEPS: i64 = 8;
 
 /// Most positions that a scheme may have.
 pub const MAX_POSITIONS: usize = 1000;
@@ -253,7 +369,7 @@ impl Scheme {
         let positions = angles
             .into_iter()
             .enumerate()
-            .map(|(i, angles)| Position { name: format!("p{}", i + 1), angles, dwell: None })
+            .map(|(i, angles)| Position { name: format!("p{}", i + 1), angles, dwell: None, rotation: None })
             .collect();
         Self { positions, ..Self::default() }
     }
@@ -275,10 +391,53 @@ impl Scheme {
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(SchemeError::DuplicateName { name: pair[0].into() });
         }
-        if self.unknowns == Unknowns::Drift && found > 1 {
+        if let Some(p) = self.positions.iter().find(|p| {
+            p.rotation
+                .as_ref()
+                .is_some_and(|r| r.angle.generic().is_some() || r.angle.nanodeg().abs() < MIN_ROTATION)
+        }) {
+            return Err(SchemeError::Rotation { name: p.name.clone() });
+        }
+        if self.unknowns == Unknowns::Drift && (found > 1 || self.rotates()) {
             return Err(SchemeError::DriftPositions { found });
         }
         Ok(self.geometry.validate()?)
+    }
+
+    /// Whether a segment rotates.
+    pub fn rotates(&self) -> bool {
+        self.positions.iter().any(|p| p.rotation.is_some())
+    }
+
+    /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric polynomials of its
+    /// angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for each component of g^c): any
+    /// 2m+1 different angles of the arc span what all of it spans. The end is added, where psi is handed on.
+    pub fn stations(&self) -> Vec<Station<'_>> {
+        let degree = 1 + match &self.unknowns {
+            Unknowns::Coefficients(terms) => terms.iter().map(|t| t.order()).max().unwrap_or(0),
+            Unknowns::Drift => 0,
+        };
+        let mut out = Vec::with_capacity(self.positions.len());
+        for (index, position) in self.positions.iter().enumerate() {
+            let Some(r) = &position.rotation else {
+                out.push(Station { position, index, turned: None, continues: false });
+                continue;
+            };
+            let whole = r.angle.nanodeg();
+            let step = whole.clamp(-FULL_TURN, FULL_TURN) / STATION_STEPS;
+            let angles = (0..=2 * degree as i64).map(|k| k * step).chain([whole]);
+            out.extend(angles.map(|angle| Station {
+                position,
+                index,
+                turned: Some(Turned {
+                    axis: r.axis,
+                    geographic: r.geographic,
+                    angle: Angle::from_nanodeg(angle),
+                }),
+                continues: angle != 0,
+            }));
+        }
+        out
     }
 
     /// The names of generic angles, in order of appearance.

@@ -10,7 +10,7 @@ use super::angle::Angle;
 use super::attitude::Euler;
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
-use super::scheme::{Latitude, Position, Scheme, parse_attitude};
+use super::scheme::{Latitude, Position, Rotation, RotationError, Scheme, parse_attitude};
 use crate::simulation::conditions::Settings;
 
 /// Why a file is no scheme.
@@ -73,9 +73,24 @@ pub struct PositionEntry {
     /// How long the position lasts, in seconds.
     #[schemars(with = "Option<f64>")]
     dwell_s: Option<Spanned<toml::Value>>,
+    /// Makes the position a rotating segment that starts there; dwell_s is how long it turns.
+    #[schemars(with = "Option<RotationEntry>")]
+    rotation: Option<Spanned<RotationEntry>>,
     /// Directions of X_p, Y_p, Z_p out of N S U D E W, as in "NUE".
     #[schemars(with = "Option<String>")]
     attitude: Option<Spanned<String>>,
+}
+
+/// A rotation at a constant rate.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotationEntry {
+    /// X_p, Y_p, Z_p (platform) or N, U, E (geographic).
+    #[schemars(with = "String")]
+    about: Spanned<String>,
+    /// The whole angle in degrees, right-handed.
+    #[schemars(with = "f64")]
+    angle_deg: Spanned<toml::Value>,
 }
 
 /// Reads a scheme.
@@ -152,9 +167,22 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
                 format!("position name `{name}`; expected letters, digits, `_`, `-`, `.` and blanks"),
             ));
         }
+        let rotation = p.rotation.as_ref().map(|r| {
+            let (about, angle) = (&r.get_ref().about, &r.get_ref().angle_deg);
+            let text = literal(angle);
+            Rotation::new(about.get_ref(), &text).map_err(|e| match e {
+                RotationError::About { .. } => at(about.span(), e.to_string()),
+                RotationError::Angle { .. } => at(angle.span(), e.to_string()),
+            })
+        });
         let dwell =
             p.dwell_s.as_ref().map(|d| literal(d).parse::<Dwell>().map_err(|e| at(d.span(), e.to_string())));
-        scheme.positions.push(Position { name, angles, dwell: dwell.transpose()? });
+        scheme.positions.push(Position {
+            name,
+            angles,
+            dwell: dwell.transpose()?,
+            rotation: rotation.transpose()?,
+        });
     }
     Ok(scheme)
 }
@@ -209,6 +237,14 @@ attitude = "NDW"
         assert_eq!(place("[[position]]\nangles_deg=[0,0,nan]").0.as_deref(), Some("nan"));
         assert_eq!(place("latitude_deg = 91\n[[position]]\nattitude=\"NUE\"").0.as_deref(), Some("91"));
         assert!(place("[[position]]\nangels_deg=[0,0,0]").1.contains("unknown field"));
+        let rotation = |about: &str, angle: &str| {
+            place(&format!(
+                "[[position]]\nattitude=\"NUE\"\nrotation={{about=\"{about}\",angle_deg={angle}}}"
+            ))
+            .0
+        };
+        assert_eq!(rotation("X", "90").as_deref(), Some("\"X\""));
+        assert_eq!(rotation("X_p", "0.0").as_deref(), Some("0.0"));
         assert!(place("carry = ").0.is_some());
         assert_eq!(place("").0, None);
     }

@@ -2,6 +2,7 @@
 
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
+use crate::model::scheme::Rotation;
 
 /// `a b` in floating point.
 pub(crate) fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
@@ -81,6 +82,14 @@ impl Slew {
         }
         let duration_s = angle / rate_rad_s;
         Some(Self { from: *from, rate: v.map(|x| x / duration_s), duration_s })
+    }
+
+    /// A rotating segment from `from` that takes `duration_s`.
+    pub fn about(from: &Matrix3<f64>, rotation: &Rotation, duration_s: f64) -> Self {
+        let rate = (rotation.angle.nanodeg() as f64 / 1e9).to_radians() / duration_s;
+        let axis = std::array::from_fn(|i| if i == rotation.axis { rate } else { 0.0 });
+        let rate = if rotation.geographic { apply(&transpose(from), &axis) } else { axis };
+        Self { from: *from, rate, duration_s }
     }
 
     /// `C_c^n` after `t` seconds.

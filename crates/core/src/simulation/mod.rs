@@ -41,6 +41,9 @@ pub enum SimulationError {
     /// A filter that does not know of a position knows of no slew to it.
     #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
     DroppedSlew,
+    /// The accuracy orders of a rotation are not known.
+    #[error("the cross-check takes positions; found a rotating segment")]
+    CrosscheckRotation,
     /// The exact truth turns an attitude by coefficients.
     #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
     ExactDrift,
@@ -170,13 +173,17 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
 /// The timeline as it is reported.
 pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     let positions = &plan.platform.scheme().positions;
-    let report = |s: &plan::Segment| TimelineReport {
-        position: positions[s.position].name.clone(),
-        slew: matches!(s.kind, Kind::Slew(_)),
-        start_s: s.start_s,
-        end_s: s.start_s + s.dt * s.steps as f64,
-    };
-    plan.segments.iter().map(report).collect()
+    let mut out: Vec<TimelineReport> = Vec::new();
+    for s in &plan.segments {
+        let (slew, end_s) = (matches!(s.kind, Kind::Slew(_)), s.start_s + s.dt * s.steps as f64);
+        let position = &positions[s.position].name;
+        match out.last_mut() {
+            // a rotation is one segment per step
+            Some(last) if last.position == *position && last.slew == slew => last.end_s = end_s,
+            _ => out.push(TimelineReport { position: position.clone(), slew, start_s: s.start_s, end_s }),
+        }
+    }
+    out
 }
 
 fn estimate(

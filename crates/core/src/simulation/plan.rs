@@ -7,9 +7,10 @@ use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
 use super::SimulationError;
 use super::attitude_path::{Slew, times, transpose};
 use super::conditions::{Conditions, Propagation, latitude_of};
-use crate::model::attitude::{Matrix3, c_n_from_euler};
+use crate::model::attitude::Matrix3;
 use crate::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
 use crate::model::ring::Float;
+use crate::model::scheme::Station;
 use crate::model::{Carry, Platform, Scheme, Unknowns};
 
 /// The earth rate in rad/s.
@@ -28,6 +29,8 @@ pub enum Kind {
     Dwell,
     /// A turn to the position; Z is not used.
     Slew(Slew),
+    /// A step of a rotating segment; Z is sampled at its end.
+    Rotation(Slew),
 }
 
 /// A part of the timeline.
@@ -52,9 +55,11 @@ pub struct Plan {
     pub platform: Platform,
     /// Rates and attitudes.
     pub point: Point<Float>,
-    /// `C_c^n` of every position.
+    /// `C_c^n` at the start of every position.
     pub attitudes: Vec<Matrix3<f64>>,
-    /// `S_i` of every position.
+    /// `C_c^n` at the end of every position.
+    pub ends: Vec<Matrix3<f64>>,
+    /// `S_i` at the start of every position.
     pub blocks: Vec<Block<f64>>,
     /// Positions and slews in order.
     pub segments: Vec<Segment>,
@@ -90,19 +95,30 @@ impl Plan {
             return Err(SimulationError::TooManyUnknowns { found: n });
         }
         let point = point_of(&scheme);
-        let attitudes: Vec<_> = point.cos_sin.iter().map(|cs| c_n_from_euler(&Float, cs)).collect();
-        let segments = timeline(&scheme, conditions, &attitudes);
+        let stations = scheme.stations();
+        // the attitude at the first station of every position, and at the last
+        let bounds: Vec<(usize, usize)> = (0..scheme.positions.len())
+            .filter_map(|p| {
+                let of = |s: &Station<'_>| s.index == p;
+                Some((stations.iter().position(of)?, stations.iter().rposition(of)?))
+            })
+            .collect();
+        let attitudes: Vec<_> = bounds.iter().map(|b| point.attitudes[b.0]).collect();
+        let ends: Vec<_> = bounds.iter().map(|b| point.attitudes[b.1]).collect();
+        let segments = timeline(&scheme, conditions, &attitudes, &ends);
         let steps: usize = segments.iter().map(|s| s.steps).sum();
         if steps > MAX_STEPS {
             return Err(SimulationError::TooManySteps { found: steps });
         }
-        let blocks = platform.blocks(&point);
+        let mut blocks: Vec<Option<Block<f64>>> = platform.blocks(&point).into_iter().map(Some).collect();
+        let blocks: Vec<_> = bounds.iter().filter_map(|b| blocks[b.0].take()).collect();
         let outputs = local_output(&Float, scheme.measured_azimuth);
         let components = outputs.iter().map(|(c, _)| *c).collect();
         let mut plan = Self {
             platform,
             point,
             attitudes,
+            ends,
             blocks,
             segments,
             stages: Vec::new(),
@@ -178,6 +194,10 @@ impl Plan {
                 };
                 (phi, self.held_noise(block, s.dt, held))
             }
+            Kind::Rotation(_) => {
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
+                (phi, self.held_noise(block, s.dt, held))
+            }
             Kind::Slew(_) => {
                 let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
                 // the noise of a slew: that of as many steps as it would have
@@ -196,7 +216,7 @@ impl Plan {
         }
         let outputs = match s.kind {
             Kind::Slew(_) => Vec::new(),
-            Kind::Dwell => self
+            Kind::Dwell | Kind::Rotation(_) => self
                 .output_rows(s.position)
                 .into_iter()
                 .zip(&self.components)
@@ -250,12 +270,17 @@ impl Plan {
 fn point_of(scheme: &Scheme) -> Point<Float> {
     let (c, s) =
         scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
-    let cos_sin =
-        scheme.positions.iter().map(|p| std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64())).collect();
-    Point { ring: Float, w_n: W_IE * c, w_u: W_IE * s, cos_sin }
+    let attitudes =
+        scheme.stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
+    Point { ring: Float, w_n: W_IE * c, w_u: W_IE * s, attitudes }
 }
 
-fn timeline(scheme: &Scheme, conditions: &Conditions, attitudes: &[Matrix3<f64>]) -> Vec<Segment> {
+fn timeline(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    attitudes: &[Matrix3<f64>],
+    ends: &[Matrix3<f64>],
+) -> Vec<Segment> {
     let mut segments: Vec<Segment> = Vec::new();
     let mut start_s = 0.0;
     let mut push = |position, kind, duration: f64, steps: usize| {
@@ -265,7 +290,7 @@ fn timeline(scheme: &Scheme, conditions: &Conditions, attitudes: &[Matrix3<f64>]
     };
     for (position, p) in scheme.positions.iter().enumerate() {
         if let (Some(rate), true) = (conditions.slew_rate_deg_s, position > 0) {
-            let slew = Slew::between(&attitudes[position - 1], &attitudes[position], rate.to_radians());
+            let slew = Slew::between(&ends[position - 1], &attitudes[position], rate.to_radians());
             if let Some(slew) = slew {
                 let duration = slew.duration_s;
                 push(position, Kind::Slew(slew), duration, 1);
@@ -274,7 +299,17 @@ fn timeline(scheme: &Scheme, conditions: &Conditions, attitudes: &[Matrix3<f64>]
         let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
         // a hair less, so that 1000 s in steps of 10 s are 100
         let steps = (dwell / conditions.step_s - 1e-9).ceil().max(1.0) as usize;
-        push(position, Kind::Dwell, dwell, steps);
+        match p.rotation.as_ref() {
+            None => push(position, Kind::Dwell, dwell, steps),
+            Some(r) => {
+                let dt = dwell / steps as f64;
+                let whole = Slew::about(&attitudes[position], r, dwell);
+                for k in 0..steps {
+                    let from = whole.at(k as f64 * dt);
+                    push(position, Kind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }), dt, 1);
+                }
+            }
+        }
     }
     segments
 }
@@ -315,7 +350,7 @@ impl PlatformProcess<'_> {
         let to_psi = transpose(&p);
         let turning = times(&to_psi, &times(&w, &p));
         let drift: [Vec<f64>; 3] = match &segment.kind {
-            Kind::Slew(slew) => plan.platform.drift_rows(&Float, &slew.at(t)),
+            Kind::Slew(slew) | Kind::Rotation(slew) => plan.platform.drift_rows(&Float, &slew.at(t)),
             Kind::Dwell => std::array::from_fn(|r| block.rows[3 + r][3..].to_vec()),
         };
         let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; plan.unknowns()]);
@@ -374,7 +409,7 @@ impl Plan {
         let s = &self.segments[segment];
         match &s.kind {
             Kind::Dwell => self.attitudes[s.position],
-            Kind::Slew(slew) => slew.at(t),
+            Kind::Slew(slew) | Kind::Rotation(slew) => slew.at(t),
         }
     }
 
@@ -383,7 +418,7 @@ impl Plan {
         let s = &self.segments[segment];
         match &s.kind {
             Kind::Dwell => 1,
-            Kind::Slew(slew) => {
+            Kind::Slew(slew) | Kind::Rotation(slew) => {
                 let turn = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * s.dt;
                 (turn / MAX_TURN).ceil().max(1.0) as usize
             }

@@ -144,7 +144,7 @@ impl<'a> TruthModel<'a> {
             // C_c^p goes on
             Carry::Platform => {
                 let (old, new) = (plan.segments[before].position, plan.segments[segment].position);
-                let turn = times(&plan.attitudes[new], &transpose(&plan.attitudes[old]));
+                let turn = times(&plan.attitudes[new], &transpose(&plan.ends[old]));
                 times(&turn, &times(e, &transpose(&turn)))
             }
             Carry::Reset => rotation(&plan.psi_n(segment, &self.x)),

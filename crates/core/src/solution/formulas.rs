@@ -59,7 +59,7 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
             out.push(Formula { position: None, left: format!("{name}{}", "'".repeat(k)), right });
         }
     }
-    for ((position, rows), columns) in platform.scheme().positions.iter().zip(display).zip(columns) {
+    for ((station, rows), columns) in platform.scheme().stations().iter().zip(display).zip(columns) {
         for (name, row) in LOCAL_NAMES.iter().zip(rows) {
             let terms: Vec<String> = row
                 .iter()
@@ -80,7 +80,7 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
                 right.push_str(magnitude);
             }
             let right = if right.is_empty() { linear_combination([]) } else { right };
-            out.push(Formula { position: Some(position.name.clone()), left: (*name).into(), right });
+            out.push(Formula { position: Some(station.name()), left: (*name).into(), right });
         }
     }
     Ok(out)

@@ -14,6 +14,7 @@ use crate::model::Platform;
 use crate::model::expression::{Environment, Expression, Node, evaluate, evaluate_f64, parse};
 use crate::model::platform::{Point, RandomValues};
 use crate::model::ring::{Ring, Text};
+use crate::model::scheme::Station;
 
 /// A condition and what it does.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -66,8 +67,8 @@ pub fn loci(
     if names.is_empty() {
         return Ok(Found::default());
     }
-    let others = platform.scheme().positions.iter().flat_map(|p| &p.angles);
-    if !others.clone().all(|a| a.turn().is_multiple_of_deg(90)) {
+    let stations = platform.scheme().stations();
+    if !stations.iter().flat_map(Station::angles).all(|a| a.turn().is_multiple_of_deg(90)) {
         return Err(
             "degenerate loci are computed when all other angles and offsets are multiples of 90 deg".into()
         );
@@ -173,12 +174,7 @@ fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
         ring: Text,
         w_n: rate(solver.tables.zeros.w_n),
         w_u: rate(solver.tables.zeros.w_u),
-        cos_sin: platform
-            .scheme()
-            .positions
-            .iter()
-            .map(|p| std::array::from_fn(|k| cos_sin(&p.angles[k])))
-            .collect(),
+        attitudes: platform.scheme().stations().iter().map(|s| s.attitude(&Text, cos_sin)).collect(),
     }
 }
 

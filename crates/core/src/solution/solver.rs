@@ -15,7 +15,6 @@ use crate::degree::coefficient::{
     Coefficient, Form, Image, Number, READABLE, Rates, power, rates_between, readable, recover_radical,
 };
 use crate::degree::ensemble::{Table, Tables, Verdicts};
-use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::{LOCAL, Platform, Point, local_dynamics, local_output};
 use crate::model::ring::{Float, Ring, Text};
 use crate::solution::local::rows_at;
@@ -193,7 +192,7 @@ impl<'a> Solver<'a> {
             for t in terms {
                 let Some(coefficient) = self.image(&t.coefficient, field, table) else { return false };
                 // Z^n as measured, or Z^c = C_n^c Z^n
-                let c = c_n_from_euler(&f, &point.cos_sin[t.position]);
+                let c = &point.attitudes[t.position];
                 let mut row = [0; LOCAL];
                 for (component, h) in &output {
                     let weight = match self.frame {
@@ -460,9 +459,7 @@ impl<'a> Solver<'a> {
         in_n: usize,
     ) -> R::Element {
         match self.frame {
-            Frame::Platform if !azimuth => {
-                c_n_from_euler(&point.ring, &point.cos_sin[position])[in_n - 1][component - 1].clone()
-            }
+            Frame::Platform if !azimuth => point.attitudes[position][in_n - 1][component - 1].clone(),
             _ => point.ring.one(),
         }
     }
@@ -488,15 +485,11 @@ impl<'a> Solver<'a> {
 }
 
 fn float_point(platform: &Platform, tables: &Tables) -> Point<Float> {
-    let cos_sin = platform
-        .scheme()
-        .positions
-        .iter()
-        .map(|p| std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64()))
-        .collect();
+    let attitudes =
+        platform.scheme().stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
     let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
     let (w_n, w_u) = (rate(tables.zeros.w_n, FLOAT_RATES.0), rate(tables.zeros.w_u, FLOAT_RATES.1));
-    Point { ring: Float, w_n, w_u, cos_sin }
+    Point { ring: Float, w_n, w_u, attitudes }
 }
 
 /// Zero for what rounding left over.

@@ -4,6 +4,7 @@ use crate::model::angle::{Angle, format_decimal};
 use crate::model::expression::{Environment, evaluate, evaluate_f64, parse};
 use crate::model::platform::{Platform, Point, RandomValues, Sample};
 use crate::model::ring::{Ring, Text};
+use crate::model::scheme::Station;
 
 /// An angle whose sine and cosine stay symbols.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +27,7 @@ impl Symbols {
     /// multiple of 15 degrees, up to sign, complement and supplement.
     pub fn of(platform: &Platform) -> Self {
         let mut out = Self::default();
-        for angle in platform.scheme().positions.iter().flat_map(|p| &p.angles) {
+        for angle in platform.scheme().stations().iter().flat_map(Station::angles) {
             if let Some((name, _)) = angle.generic() {
                 out.add(Base::Name(name.into()));
             }
@@ -76,13 +77,9 @@ impl Symbols {
 
     /// The platform as text, with rates 1 (or 0): coefficients are homogeneous in them.
     pub fn point(&self, platform: &Platform, w_n: &str, w_u: &str) -> Point<Text> {
-        let cos_sin = platform
-            .scheme()
-            .positions
-            .iter()
-            .map(|p| std::array::from_fn(|k| self.cos_sin(&p.angles[k])))
-            .collect();
-        Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), cos_sin }
+        let attitudes =
+            platform.scheme().stations().iter().map(|s| s.attitude(&Text, |a| self.cos_sin(a))).collect();
+        Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), attitudes }
     }
 
     fn cos_sin(&self, angle: &Angle) -> (String, String) {
@@ -255,10 +252,10 @@ mod tests {
         let symbols = Symbols::of(&platform);
         assert_eq!(symbols.angles(), 4);
         let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(2)).expect("fits");
-        let text = symbols.point(&platform, "wN", "wU");
         for a in obsdeg_exact::radical::embeddings(values.roots().order) {
             let sample = values.sample(platform.scheme(), a);
-            for (t, v) in text.cos_sin.iter().flatten().zip(sample.point.cos_sin.iter().flatten()) {
+            for angle in platform.scheme().positions.iter().flat_map(|p| &p.angles) {
+                let (t, v) = (symbols.cos_sin(angle), values.angle_cos_sin(&sample.roots, angle));
                 assert_eq!(symbols.value(&t.0, &values, &sample), Some(v.0), "{}", t.0);
                 assert_eq!(symbols.value(&t.1, &values, &sample), Some(v.1), "{}", t.1);
             }
