@@ -21,36 +21,36 @@ enum PropagationArgument {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Conditions of the run")]
 pub(crate) struct ConditionArguments {
-    /// linear: the model itself; exact: direction cosines, specific force in the true platform frame [linear]
+    /// linear: the model itself; exact: direction cosines, specific force in the true platform frame (default: linear)
     #[arg(long, value_name = "LEVEL", hide_possible_values = true)]
     truth: Option<TruthArgument>,
 
-    /// Dwell of positions that do not say theirs, in s [1000]
+    /// Dwell of positions that do not say theirs, in s (default: 1000)
     #[arg(long, value_name = "S")]
     dwell: Option<f64>,
 
-    /// Largest sampling step, in s [10]
+    /// Largest sampling step, in s (default: 10)
     #[arg(long, value_name = "S")]
     step: Option<f64>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only [instantaneous]
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous)
     #[arg(long, value_name = "DEG_S")]
     slew_rate: Option<f64>,
 
-    /// White noise of Z per sample and axis, in g [1e-5]
+    /// White noise of Z per sample and axis, in g (default: 1e-5)
     #[arg(long, value_name = "G")]
     noise: Option<f64>,
 
-    /// Noise of a measured azimuth per sample, in deg [0.001]
+    /// Noise of a measured azimuth per sample, in deg (default: 0.001)
     #[arg(long, value_name = "DEG")]
     azimuth_noise: Option<f64>,
 
     /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
-    /// [0.01 deg/h]
+    /// (default: 0.01 deg/h)
     #[arg(long, value_name = "NOISE")]
     drift_noise: Option<DriftNoise>,
 
-    /// Transition matrix of the filter: exponential or rk4 [exponential]
+    /// Transition matrix of the filter: exponential or rk4 (default: exponential)
     #[arg(long, value_name = "HOW", hide_possible_values = true)]
     propagation: Option<PropagationArgument>,
 
@@ -58,19 +58,19 @@ pub(crate) struct ConditionArguments {
     #[arg(long, value_name = "NAME=X")]
     value: Vec<Assignment>,
 
-    /// Initial standard deviation, likewise [psi 0.1, D_F 20, D_I D_O D_S 10, others 1]
+    /// Initial standard deviation, likewise (default: psi 0.1, D_F 20, D_I D_O D_S 10, others 1)
     #[arg(long, value_name = "NAME=X")]
     prior: Vec<Assignment>,
 
-    /// Initial estimate, likewise [0]
+    /// Initial estimate, likewise (default: 0)
     #[arg(long, value_name = "NAME=X")]
     estimate: Vec<Assignment>,
 
-    /// Standard deviation to be reached, likewise [psi 0.01, D 0.1]
+    /// Standard deviation to be reached, likewise (default: psi 0.01, D 0.1)
     #[arg(long, value_name = "NAME=X")]
     target: Vec<Assignment>,
 
-    /// Factor on the true drifts and their priors [1]
+    /// Factor on the true drifts and their priors (default: 1)
     #[arg(long, value_name = "X")]
     drift_scale: Option<f64>,
 }
