@@ -1,6 +1,6 @@
 //! Arguments that several commands share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use obsdeg_core::model::attitude::Euler;
@@ -67,15 +67,7 @@ impl SchemeArguments {
     /// The scheme: from the file or the angles, with whatever options override.
     pub(crate) fn scheme(&self) -> Result<Scheme, Failure> {
         let mut scheme = match &self.scheme {
-            Some(path) => {
-                let name = path.display().to_string();
-                let text = std::fs::read_to_string(path)
-                    .map_err(|e| Failure::input(format!("cannot read the scheme file {name}: {e}")))?;
-                scheme_file::read(&text).map_err(|e| match e.span {
-                    Some(span) => Failure::at(&e.message, &name, &text, span),
-                    None => Failure::input(format!("{name}: {}", e.message)),
-                })?
-            }
+            Some(path) => read_scheme(path)?,
             None => {
                 let mut scheme = Scheme::of_angles(self.angles.iter().map(|a| a.0.clone()));
                 for (position, a) in scheme.positions.iter_mut().zip(&self.angles) {
@@ -97,6 +89,17 @@ impl SchemeArguments {
         scheme.combinations.extend(self.combination.iter().cloned());
         Ok(scheme)
     }
+}
+
+/// The scheme of a file.
+pub(crate) fn read_scheme(path: &Path) -> Result<Scheme, Failure> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Failure::input(format!("cannot read the scheme file {name}: {e}")))?;
+    scheme_file::read(&text).map_err(|e| match e.span {
+        Some(span) => Failure::at(&e.message, &name, &text, span),
+        None => Failure::input(format!("{name}: {}", e.message)),
+    })
 }
 
 /// Where and how results are written.

@@ -30,6 +30,12 @@ impl Failure {
         Self { message: format!("internal error: {message}"), code: INTERNAL }
     }
 
+    /// The same failure, with the scheme it came from.
+    pub(crate) fn in_file(mut self, name: &str) -> Self {
+        self.message = format!("{} (in {name})", self.message);
+        self
+    }
+
     /// The input is wrong at a place of a text, which is drawn.
     pub(crate) fn at(message: &str, name: &str, text: &str, span: Range<usize>) -> Self {
         let end = span.end.min(text.len());

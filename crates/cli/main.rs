@@ -3,6 +3,7 @@
 
 mod analyze;
 mod arguments;
+mod compare;
 mod completions;
 mod conditions;
 mod crosscheck;
@@ -27,6 +28,7 @@ Examples:
   obsdeg analyze --scheme scheme.toml --carry inertial --format json -o verdicts.json
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
+  obsdeg compare a.toml b.toml
   obsdeg paper
 
 Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error.";
@@ -47,6 +49,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Hold the exact verdicts against a filter; exit code 1 when anything disagrees
     Crosscheck(crosscheck::Arguments),
+    /// Judge schemes side by side: verdicts, predicted accuracy, what each position is for
+    Compare(compare::Arguments),
     /// Recompute every equation and claim of the paper and say where it is wrong
     Paper(paper::Arguments),
     /// Print the completion script of a shell
@@ -65,6 +69,7 @@ fn run() -> Result<ExitCode, Failure> {
         Command::Analyze(a) => analyze::run(&a),
         Command::Simulate(a) => simulate::run(&a),
         Command::Crosscheck(a) => crosscheck::run(&a),
+        Command::Compare(a) => compare::run(&a),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man => completions::man(),

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
+use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::simulation::Simulation;
@@ -23,6 +24,8 @@ enum Kind {
     Simulation,
     /// The JSON of `obsdeg crosscheck`
     Crosscheck,
+    /// The JSON of `obsdeg compare`
+    Comparison,
     /// Scheme files
     Scheme,
 }
@@ -39,6 +42,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Audit => schema_for!(Audit),
         Kind::Simulation => schema_for!(Simulation),
         Kind::Crosscheck => schema_for!(CrossCheck),
+        Kind::Comparison => schema_for!(Comparison),
         Kind::Scheme => schema_for!(SchemeFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;

@@ -8,6 +8,7 @@
 pub mod accuracy;
 pub mod analysis;
 pub mod audit;
+pub mod compare;
 pub mod crosscheck;
 pub mod degree;
 pub mod model;

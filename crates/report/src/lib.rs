@@ -1,6 +1,7 @@
 //! Results as text: tables, JSON, Markdown, CSV, LaTeX. Pure formatting: nothing is computed here.
 
 mod audit;
+mod compare;
 mod crosscheck;
 mod csv_text;
 mod document;
@@ -22,6 +23,7 @@ use std::str::FromStr;
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
+use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::simulation::Simulation;
 
@@ -129,6 +131,14 @@ pub fn simulation(s: &Simulation, format: Format, layout: Layout) -> Result<Stri
 /// [`ReportError`] when a serializer fails.
 pub fn crosscheck(c: &CrossCheck, format: Format, layout: Layout) -> Result<String, ReportError> {
     written(c, &crosscheck::document(c), format, layout)
+}
+
+/// A comparison in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a serializer fails.
+pub fn comparison(c: &Comparison, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(c, &compare::document(c), format, layout)
 }
 
 /// The files of a cross-check: `evidence.json` and the figures.

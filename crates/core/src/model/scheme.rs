@@ -342,6 +342,12 @@ pub enum SchemeError {
         /// Number of positions.
         found: usize,
     },
+    /// A dwell out of range.
+    #[error("a dwell of {found} s; expected above 0 and up to 1000000 s")]
+    Dwell {
+        /// The seconds found.
+        found: String,
+    },
     /// A rotation that is none.
     #[error("the rotation of `{name}` is too small or generic; expected at least 0.001 degrees")]
     Rotation {

@@ -1,0 +1,76 @@
+//! `obsdeg compare`: schemes side by side.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use obsdeg_core::compare::{Entry, compare};
+use obsdeg_core::model::{Carry, Latitude};
+
+use crate::arguments::{OutputArguments, read_scheme};
+use crate::conditions::ConditionArguments;
+use crate::failure::Failure;
+use crate::output;
+use crate::progress::Spinner;
+use crate::simulate::failure;
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg compare examples/five-positions/scheme.toml examples/six-positions/scheme.toml
+  obsdeg compare a.toml b.toml --carry inertial --target D=0.05 --format markdown -o review.md
+
+Requirements are the targets of a scheme file, [simulation] targets, or --target.
+Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error.";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub(crate) struct Arguments {
+    /// Scheme files (TOML)
+    #[arg(value_name = "FILE", required = true)]
+    schemes: Vec<PathBuf>,
+
+    /// What is carried between positions, for all schemes: platform, inertial or reset
+    #[arg(long, value_name = "CARRY")]
+    carry: Option<Carry>,
+
+    /// Latitude in degrees, for all schemes (default: that of the file, or 28.2)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<Latitude>,
+
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    #[command(flatten)]
+    output: OutputArguments,
+
+    #[command(flatten)]
+    conditions: ConditionArguments,
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    output::check(&a.output)?;
+    let mut entries = Vec::with_capacity(a.schemes.len());
+    for path in &a.schemes {
+        let mut scheme = read_scheme(path)?;
+        scheme.carry = a.carry.unwrap_or(scheme.carry);
+        scheme.latitude = a.latitude.or(scheme.latitude);
+        let conditions = a.conditions.conditions(&scheme);
+        entries.push(Entry { name: name(path), scheme, conditions });
+    }
+    let spinner = Spinner::start("judging schemes", a.output.quiet);
+    let compared = compare(&entries, a.seed);
+    drop(spinner);
+    let comparison = compared.map_err(|(name, e)| failure(e).in_file(&name))?;
+    let text = obsdeg_report::comparison(&comparison, a.output.format, output::layout(&a.output))
+        .map_err(|e| Failure::internal(e.to_string()))?;
+    output::write(&a.output, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The file's name without its ending; the folder's for a `scheme.toml`.
+fn name(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
+    let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "scheme");
+    folder.unwrap_or(stem).to_string_lossy().into_owned()
+}

@@ -1,0 +1,106 @@
+//! Schemes side by side: plain data.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::analysis::Status;
+use crate::model::Carry;
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.comparison/1";
+
+/// Several schemes, judged alike.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Comparison {
+    /// `obsdeg.comparison/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The schemes in the order given.
+    pub schemes: Vec<Review>,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// One scheme.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Review {
+    /// Its name: the file's.
+    pub name: String,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// Latitude in degrees.
+    pub latitude_deg: f64,
+    /// Its positions.
+    pub positions: Vec<String>,
+    /// Total time with slews, in s.
+    pub total_s: f64,
+    /// The rank and the number of unknowns.
+    pub rank: [usize; 2],
+    /// Per unknown.
+    pub quantities: Vec<Quantity>,
+    /// The largest sigma of a coefficient; null when one is not observable.
+    pub worst: Option<Worst>,
+    /// Whether every coefficient with a requirement meets it.
+    pub meets_requirements: bool,
+    /// What happens without each of the positions.
+    pub drop_one: Vec<DropOne>,
+    /// The worst sigma under other conditions.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// One unknown of a scheme.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Quantity {
+    /// Its name.
+    pub name: String,
+    /// Unit of sigma.
+    pub unit: String,
+    /// The exact verdict.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+    /// The accuracy order.
+    pub accuracy_order: Option<usize>,
+    /// Standard deviation by the information of all samples, without prior and drift noise; null when not observable.
+    pub sigma: Option<f64>,
+    /// The largest sigma allowed.
+    pub requirement: Option<f64>,
+    /// Requirement over sigma: above 1 is met.
+    pub margin: Option<f64>,
+    /// Per position: how it moves the drift there, as a product of components of g (1 for D_F); empty for psi.
+    pub excitation: Vec<f64>,
+    /// Positions without which it is not observable.
+    pub carried_by: Vec<String>,
+}
+
+/// The largest sigma of a coefficient.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Worst {
+    /// The coefficient.
+    pub name: String,
+    /// Its sigma in deg/h (per g).
+    pub sigma_dph: f64,
+}
+
+/// A scheme without one of its positions.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DropOne {
+    /// The position left out.
+    pub position: String,
+    /// Unknowns that are not observable without it.
+    pub lost: Vec<String>,
+    /// The worst sigma without it.
+    pub worst: Option<Worst>,
+}
+
+/// The worst sigma under another condition.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Sensitivity {
+    /// The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`.
+    pub condition: String,
+    /// The rank and the number of unknowns there.
+    pub rank: [usize; 2],
+    /// The worst sigma there.
+    pub worst: Option<Worst>,
+}

@@ -1,0 +1,218 @@
+//! Schemes side by side, for design reviews: verdicts, predicted accuracy, what each position is for, what the
+//! assumptions are worth.
+
+pub mod answer;
+
+use obsdeg_ekf::SquareRootInformation;
+
+pub use answer::Comparison;
+
+use crate::analysis::Status;
+use crate::crosscheck::batch::batch;
+use crate::crosscheck::slopes::diffuse_prior;
+use crate::model::ring::Float;
+use crate::model::{Carry, Dwell, Platform, Scheme, SchemeError};
+use crate::prediction::Prediction;
+use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
+use crate::simulation::{Plan, SimulationError};
+use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Worst};
+
+/// Latitudes of the sweep, in degrees.
+const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
+/// Factors on the dwells.
+const DWELLS: [f64; 2] = [0.5, 2.0];
+
+/// A scheme to be compared, with its name and conditions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Its name in the comparison.
+    pub name: String,
+    /// The scheme.
+    pub scheme: Scheme,
+    /// Its conditions; targets are the requirements.
+    pub conditions: Conditions,
+}
+
+/// Compares schemes.
+///
+/// # Errors
+/// The name of the scheme that cannot be judged, and why.
+pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, SimulationError)> {
+    let schemes = entries.iter().map(|e| review(e, seed).map_err(|error| (e.name.clone(), error)));
+    Ok(Comparison {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        schemes: schemes.collect::<Result<_, _>>()?,
+        seed,
+    })
+}
+
+/// The verdicts and the accuracy of one scheme.
+struct Judged {
+    plan: Plan,
+    prediction: Prediction,
+    /// Per unknown, in its own unit; `None` when it is not observable.
+    sigmas: Vec<Option<f64>>,
+}
+
+impl Judged {
+    fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
+        let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions.clone() };
+        let plan = Plan::new(scheme, &still)?;
+        let prediction = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
+        let prior = SquareRootInformation::prior(&diffuse_prior(&plan))?;
+        let sigmas = batch(&plan, prior)?.information.sigmas()?;
+        let units = plan.platform.units().iter();
+        let sigmas = sigmas
+            .iter()
+            .zip(units)
+            .zip(&prediction.unknowns)
+            .map(|((s, unit), u)| {
+                let observable = u.degree.is_some() || u.accuracy_order.is_some();
+                observable.then(|| s / si_per_shown(unit))
+            })
+            .collect();
+        Ok(Self { plan, prediction, sigmas })
+    }
+
+    fn platform(&self) -> &Platform {
+        &self.plan.platform
+    }
+
+    fn rank(&self) -> [usize; 2] {
+        [self.prediction.rank, self.platform().names().len()]
+    }
+
+    /// The largest sigma of a coefficient, if all are observable.
+    fn worst(&self) -> Option<Worst> {
+        let units = self.platform().units();
+        let drifts = (0..units.len()).filter(|&c| units[c] != "rad");
+        let mut worst: Option<Worst> = None;
+        for c in drifts {
+            let sigma_dph = self.sigmas[c]?;
+            if worst.as_ref().is_none_or(|w| sigma_dph > w.sigma_dph) {
+                worst = Some(Worst { name: self.platform().names()[c].clone(), sigma_dph });
+            }
+        }
+        worst
+    }
+}
+
+fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
+    let Entry { name, scheme, conditions } = entry;
+    let judged = Judged::new(scheme, conditions, seed)?;
+    let drop_one = drop_one(scheme, conditions, &judged, seed)?;
+    let quantities = quantities(&judged, conditions, &drop_one)?;
+    let met = |q: &Quantity| q.requirement.is_none() || q.margin.is_some_and(|m| m >= 1.0);
+    Ok(Review {
+        name: name.clone(),
+        carry: scheme.carry,
+        latitude_deg: judged.platform().scheme().latitude.map_or(0.0, |l| l.degrees()),
+        positions: scheme.positions.iter().map(|p| p.name.clone()).collect(),
+        total_s: judged.plan.duration_s(),
+        rank: judged.rank(),
+        meets_requirements: quantities.iter().filter(|q| !q.name.starts_with("psi")).all(met),
+        quantities,
+        worst: judged.worst(),
+        drop_one,
+        sensitivity: sensitivity(scheme, conditions, seed)?,
+    })
+}
+
+fn quantities(
+    judged: &Judged,
+    conditions: &Conditions,
+    drop_one: &[DropOne],
+) -> Result<Vec<Quantity>, SimulationError> {
+    let platform = judged.platform();
+    let requirements = resolve("target sigma", platform, &conditions.targets, f64::NAN)?;
+    let first_d = platform.names().len() - platform.coefficients();
+    // eps^n = C E(g) D: the columns of C are orthonormal, so the length of a column is the excitation
+    let columns: Vec<[Vec<f64>; 3]> =
+        judged.plan.attitudes.iter().map(|c| platform.drift_rows(&Float, c)).collect();
+    let excitation = |c: usize| -> Vec<f64> {
+        let Some(d) = c.checked_sub(first_d) else { return Vec::new() };
+        columns.iter().map(|rows| rows.iter().map(|r| r[d] * r[d]).sum::<f64>().sqrt()).collect()
+    };
+    let of_unknown = |(c, u): (usize, &crate::prediction::PredictedUnknown)| {
+        let name = &platform.names()[c];
+        let requirement = Some(requirements[c]).filter(|r| !r.is_nan());
+        let sigma = judged.sigmas[c];
+        let carries = drop_one.iter().filter(|d| d.lost.contains(name));
+        Quantity {
+            name: name.clone(),
+            unit: shown_unit(platform.units()[c]).into(),
+            status: u.status,
+            degree: u.degree,
+            accuracy_order: u.accuracy_order,
+            sigma,
+            requirement,
+            margin: requirement.zip(sigma).map(|(r, s)| r / s),
+            excitation: excitation(c),
+            carried_by: carries.map(|d| d.position.clone()).collect(),
+        }
+    };
+    Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
+}
+
+/// The scheme without each of its positions in turn.
+fn drop_one(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    whole: &Judged,
+    seed: u64,
+) -> Result<Vec<DropOne>, SimulationError> {
+    if scheme.positions.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let observable = |j: &Judged, name: &String| {
+        let c = j.platform().names().iter().position(|n| n == name);
+        c.is_some_and(|c| j.prediction.unknowns[c].status == Status::Observable || j.sigmas[c].is_some())
+    };
+    (0..scheme.positions.len())
+        .map(|i| {
+            let mut rest = scheme.clone();
+            let position = rest.positions.remove(i).name;
+            let judged = Judged::new(&rest, conditions, seed)?;
+            let names = whole.platform().names().iter();
+            // under reset carry every position has a psi of its own
+            let names = names.filter(|n| !n.contains('@'));
+            let lost = names.filter(|n| observable(whole, n) && !observable(&judged, n)).cloned().collect();
+            Ok(DropOne { position, lost, worst: judged.worst() })
+        })
+        .collect()
+}
+
+/// The worst sigma at other latitudes, dwells and carries.
+fn sensitivity(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<Vec<Sensitivity>, SimulationError> {
+    let mut out = Vec::new();
+    let mut add =
+        |condition: String, scheme: &Scheme, conditions: &Conditions| -> Result<(), SimulationError> {
+            let judged = Judged::new(scheme, conditions, seed)?;
+            out.push(Sensitivity { condition, rank: judged.rank(), worst: judged.worst() });
+            Ok(())
+        };
+    for latitude in LATITUDES {
+        let other = Scheme { latitude: latitude.parse().ok(), ..scheme.clone() };
+        add(format!("latitude {latitude} deg"), &other, conditions)?;
+    }
+    for factor in DWELLS {
+        let mut other = scheme.clone();
+        for p in &mut other.positions {
+            let seconds = p.dwell.map_or(conditions.dwell_s, Dwell::seconds) * factor;
+            let found = seconds.to_string();
+            p.dwell = Some(Dwell::from_seconds(seconds).ok_or(SchemeError::Dwell { found })?);
+        }
+        add(format!("dwell x {factor}"), &other, conditions)?;
+    }
+    for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
+        // slews carry psi^n: without them another carry can be asked for
+        let still = Conditions { slew_rate_deg_s: None, ..conditions.clone() };
+        add(format!("{carry} carry"), &Scheme { carry, ..scheme.clone() }, &still)?;
+    }
+    Ok(out)
+}

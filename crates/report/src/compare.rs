@@ -1,0 +1,151 @@
+//! Schemes side by side.
+
+use obsdeg_core::compare::Comparison;
+use obsdeg_core::compare::answer::{Quantity, Review, Worst};
+
+use crate::document::{Block, Document, number, optional};
+use crate::words;
+
+fn worst(w: Option<&Worst>) -> String {
+    w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
+}
+
+fn list(items: &[String]) -> String {
+    if items.is_empty() { "-".into() } else { items.join(" ") }
+}
+
+/// One row per scheme.
+fn overview(schemes: &[Review]) -> Block {
+    let row = |r: &Review| {
+        let carried = r.drop_one.iter().filter(|d| d.lost.is_empty() && d.worst.is_some());
+        vec![
+            r.name.clone(),
+            r.carry.to_string(),
+            r.positions.len().to_string(),
+            number(r.total_s),
+            format!("{} of {}", r.rank[0], r.rank[1]),
+            worst(r.worst.as_ref()),
+            if r.meets_requirements { "met" } else { "NOT met" }.into(),
+            list(&carried.map(|d| d.position.clone()).collect::<Vec<_>>()),
+        ]
+    };
+    Block::Table {
+        heading: "Side by side".into(),
+        header: vec![
+            "scheme",
+            "carry",
+            "positions",
+            "total [s]",
+            "rank",
+            "worst sigma(D)",
+            "targets",
+            "redundant",
+        ],
+        numbers: vec![false, false, true, true, true, false, false, false],
+        rows: schemes.iter().map(row).collect(),
+    }
+}
+
+/// One row per unknown: degree, accuracy order and sigma in every scheme.
+fn by_unknown(schemes: &[Review]) -> Block {
+    let mut names: Vec<&String> = Vec::new();
+    for q in schemes.iter().flat_map(|r| &r.quantities) {
+        if !names.contains(&&q.name) {
+            names.push(&q.name);
+        }
+    }
+    let mut rows = Vec::new();
+    for name in names {
+        for r in schemes {
+            let Some(q) = r.quantities.iter().find(|q| q.name == *name) else { continue };
+            rows.push(vec![
+                name.clone(),
+                r.name.clone(),
+                words::degree(q.degree),
+                words::degree(q.accuracy_order),
+                optional(q.sigma),
+                q.unit.clone(),
+                optional(q.requirement),
+                optional(q.margin),
+                excitation(q),
+                if q.carried_by.len() == r.positions.len() { "all".into() } else { list(&q.carried_by) },
+            ]);
+        }
+    }
+    Block::Table {
+        heading: "By unknown (sigma: information of all samples, no prior, no drift noise; margin: target over sigma)"
+            .into(),
+        header: vec![
+            "unknown", "scheme", "degree", "accuracy", "sigma", "unit", "target", "margin", "excitation per position",
+            "only by",
+        ],
+        numbers: vec![false, false, true, true, true, false, true, true, false, false],
+        rows,
+    }
+}
+
+/// `1 0.7 0`.
+fn excitation(q: &Quantity) -> String {
+    let short = |x: &f64| {
+        let text = format!("{x:.2}");
+        text.trim_end_matches('0').trim_end_matches('.').to_string()
+    };
+    q.excitation.iter().map(short).collect::<Vec<_>>().join(" ")
+}
+
+pub(crate) fn document(c: &Comparison) -> Document {
+    let mut blocks = vec![overview(&c.schemes), by_unknown(&c.schemes)];
+    let drop_rows = c.schemes.iter().flat_map(|r| {
+        r.drop_one
+            .iter()
+            .map(|d| vec![r.name.clone(), d.position.clone(), list(&d.lost), worst(d.worst.as_ref())])
+    });
+    blocks.push(Block::Table {
+        heading: "Without one position".into(),
+        header: vec!["scheme", "without", "not observable any more", "worst sigma(D)"],
+        numbers: vec![false; 4],
+        rows: drop_rows.collect(),
+    });
+    let conditions = c.schemes.first().map_or(&[][..], |r| &r.sensitivity);
+    let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
+    for s in c.schemes.iter().flat_map(|r| &r.sensitivity) {
+        if !names.contains(&&s.condition) {
+            names.push(&s.condition);
+        }
+    }
+    let mut rows = Vec::new();
+    for name in names {
+        for r in &c.schemes {
+            if let Some(s) = r.sensitivity.iter().find(|s| s.condition == *name) {
+                rows.push(vec![
+                    name.clone(),
+                    r.name.clone(),
+                    format!("{} of {}", s.rank[0], s.rank[1]),
+                    worst(s.worst.as_ref()),
+                ]);
+            }
+        }
+    }
+    blocks.push(Block::Table {
+        heading: "Sensitivity of the worst sigma(D)".into(),
+        header: vec!["condition", "scheme", "rank", "worst sigma(D)"],
+        numbers: vec![false, false, true, false],
+        rows,
+    });
+    let lines = c
+        .schemes
+        .iter()
+        .map(|r| format!("{}: latitude {} deg, positions {}", r.name, r.latitude_deg, r.positions.join(", ")))
+        .chain([
+            "sigma(D) in deg/h, deg/h/g; - where an unknown is not observable".into(),
+            "redundant: without it every unknown stays observable; only by: positions without which it does not".into(),
+            format!("seed {}", c.seed),
+        ]);
+    blocks.push(Block::List { heading: "Assumed".into(), lines: lines.collect() });
+    let n = c.schemes.len();
+    Document {
+        title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
+        lead: Vec::new(),
+        blocks,
+    }
+}
