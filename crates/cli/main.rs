@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod conditions;
 mod crosscheck;
+mod design;
 mod failure;
 mod interrupt;
 mod lock;
@@ -29,6 +30,7 @@ Examples:
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
   obsdeg compare a.toml b.toml
+  obsdeg design --positions 5 --carry inertial
   obsdeg paper
 
 Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error.";
@@ -51,6 +53,8 @@ enum Command {
     Crosscheck(crosscheck::Arguments),
     /// Judge schemes side by side: verdicts, predicted accuracy, what each position is for
     Compare(compare::Arguments),
+    /// Find schemes: the fewest positions, or the best of a number of them
+    Design(design::Arguments),
     /// Recompute every equation and claim of the paper and say where it is wrong
     Paper(paper::Arguments),
     /// Print the completion script of a shell
@@ -70,6 +74,7 @@ fn run() -> Result<ExitCode, Failure> {
         Command::Simulate(a) => simulate::run(&a),
         Command::Crosscheck(a) => crosscheck::run(&a),
         Command::Compare(a) => compare::run(&a),
+        Command::Design(a) => design::run(&a),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man => completions::man(),

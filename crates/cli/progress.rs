@@ -61,6 +61,15 @@ impl Bar {
         Self { bar, started: Instant::now(), quiet }
     }
 
+    /// So much of so much is done, with the best found so far.
+    pub(crate) fn best(&self, done: u64, total: u64, best: f64) {
+        self.bar.set_length(total);
+        if best.is_finite() {
+            self.bar.set_message(format!("searching, best {best:.4} deg/h"));
+        }
+        self.at(done);
+    }
+
     /// So much is done.
     pub(crate) fn at(&self, done: u64) {
         if !self.quiet && self.bar.is_hidden() && self.started.elapsed() > Duration::from_secs(1) {

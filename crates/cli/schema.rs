@@ -7,6 +7,7 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
 use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
+use obsdeg_core::design::Design;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::simulation::Simulation;
 use schemars::schema_for;
@@ -26,6 +27,8 @@ enum Kind {
     Crosscheck,
     /// The JSON of `obsdeg compare`
     Comparison,
+    /// The JSON of `obsdeg design`
+    Design,
     /// Scheme files
     Scheme,
 }
@@ -43,6 +46,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Simulation => schema_for!(Simulation),
         Kind::Crosscheck => schema_for!(CrossCheck),
         Kind::Comparison => schema_for!(Comparison),
+        Kind::Design => schema_for!(Design),
         Kind::Scheme => schema_for!(SchemeFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;

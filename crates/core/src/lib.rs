@@ -11,6 +11,7 @@ pub mod audit;
 pub mod compare;
 pub mod crosscheck;
 pub mod degree;
+pub mod design;
 pub mod model;
 pub mod prediction;
 pub mod simulation;

@@ -4,6 +4,7 @@ mod audit;
 mod compare;
 mod crosscheck;
 mod csv_text;
+mod design;
 mod document;
 mod figure;
 mod figures;
@@ -25,6 +26,7 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::audit::Audit;
 use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
+use obsdeg_core::design::Design;
 use obsdeg_core::simulation::Simulation;
 
 /// A text format.
@@ -139,6 +141,14 @@ pub fn crosscheck(c: &CrossCheck, format: Format, layout: Layout) -> Result<Stri
 /// [`ReportError`] when a serializer fails.
 pub fn comparison(c: &Comparison, format: Format, layout: Layout) -> Result<String, ReportError> {
     written(c, &compare::document(c), format, layout)
+}
+
+/// A design in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a serializer fails.
+pub fn design(d: &Design, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(d, &design::document(d), format, layout)
 }
 
 /// The files of a cross-check: `evidence.json` and the figures.

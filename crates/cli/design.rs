@@ -1,0 +1,165 @@
+//! `obsdeg design`: the fewest positions, and the best of a number of positions.
+
+use std::fmt::Write;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use obsdeg_core::design::{Design, DesignError, Options, design};
+use obsdeg_core::model::attitude::{cardinal, cardinal_names};
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
+
+use crate::arguments::{OutputArguments, read_scheme};
+use crate::conditions::ConditionArguments;
+use crate::failure::Failure;
+use crate::progress::Bar;
+use crate::{interrupt, output};
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg design --minimum --carry inertial
+  obsdeg design --positions 5 --carry inertial
+  obsdeg design --positions 12 --dwell 417 --carry inertial --winner scheme.toml
+  obsdeg design --positions 4 --candidates attitudes.toml
+
+Candidates are the 24 cardinal attitudes, or the positions of a scheme file. Up to 50 million sequences are searched
+exhaustively, which proves the best; beyond, coordinate exchange from random starts. Ctrl-C ends with the best so far.
+Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error.";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub(crate) struct Arguments {
+    /// Find the best scheme of so many positions
+    #[arg(long, value_name = "K", required_unless_present = "minimum")]
+    positions: Option<usize>,
+
+    /// Only find the fewest positions that make every coefficient observable, with the proof
+    #[arg(long, conflicts_with = "positions")]
+    minimum: bool,
+
+    /// Positions of this scheme file to choose from; its carry, latitude, geometry and terms hold too (default: the 24
+    /// cardinal attitudes)
+    #[arg(long, value_name = "FILE")]
+    candidates: Option<std::path::PathBuf>,
+
+    /// What is carried between positions: platform (the paper), inertial or reset
+    #[arg(long, value_name = "CARRY")]
+    carry: Option<Carry>,
+
+    /// Latitude in degrees (default: 28.2)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<Latitude>,
+
+    /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS
+    #[arg(long, value_name = "TERMS")]
+    terms: Option<Unknowns>,
+
+    /// How many schemes are listed
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    keep: u16,
+
+    /// Restarts of the exchange
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..))]
+    restarts: u64,
+
+    /// Seed of all random choices; the result does not depend on the number of threads
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Write the best scheme to a scheme file
+    #[arg(long, value_name = "FILE", requires = "positions")]
+    winner: Option<std::path::PathBuf>,
+
+    #[command(flatten)]
+    output: OutputArguments,
+
+    #[command(flatten)]
+    conditions: ConditionArguments,
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    output::check(&a.output)?;
+    if let Some(path) = a.winner.as_ref().filter(|p| p.exists() && !a.output.force) {
+        return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
+    }
+    let mut base = a.candidates.as_deref().map(read_scheme).transpose()?.unwrap_or_default();
+    base.carry = a.carry.unwrap_or(base.carry);
+    base.latitude = a.latitude.or(base.latitude);
+    if let Some(terms) = &a.terms {
+        base.unknowns = terms.clone();
+    }
+    let conditions = a.conditions.conditions(&base);
+    conditions.validate().map_err(|e| Failure::input(e.to_string()))?;
+    let (names, candidates) = if base.positions.is_empty() {
+        let named = cardinal_names().into_iter().filter_map(|n| cardinal(&n).map(|c| (n, c)));
+        named.unzip()
+    } else {
+        base.positions.iter().map(|p| (p.name.clone(), p.angles.clone())).unzip()
+    };
+    let options = Options {
+        names,
+        candidates,
+        positions: a.positions,
+        dwell_s: conditions.dwell_s,
+        keep: a.keep.into(),
+        restarts: a.restarts,
+        seed: a.seed,
+    };
+    let bar = Bar::start(1, "searching", a.output.quiet);
+    let interrupted = interrupt::flag()?;
+    let designed = design(&base, &conditions, &options, &|done, total, best| {
+        bar.best(done, total, best);
+        !interrupted.load(Ordering::Relaxed)
+    });
+    drop(bar);
+    let found = designed.map_err(|e| match e {
+        DesignError::Verdict(_) | DesignError::Analysis(_) | DesignError::Filter(_) => {
+            Failure::internal(e.to_string())
+        }
+        _ => Failure::input(e.to_string()),
+    })?;
+    let text = obsdeg_report::design(&found, a.output.format, output::layout(&a.output))
+        .map_err(|e| Failure::internal(e.to_string()))?;
+    if let Some(path) = &a.winner {
+        output::write_file(path, &scheme_file(&found, &base, &options))
+            .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
+    }
+    output::write(&a.output, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The best scheme as a file that `obsdeg analyze --scheme` reads.
+fn scheme_file(found: &Design, base: &Scheme, options: &Options) -> String {
+    let mut out = String::new();
+    let Some(best) = found.found.first() else { return out };
+    let proven = if found.proven { "proven best" } else { "best found" };
+    // writing to a String does not fail
+    let _ = writeln!(
+        out,
+        "# {proven}: worst sigma(D) {:.4} deg/h (per g), seed {}",
+        best.worst_sigma_dph, found.seed
+    );
+    let _ = writeln!(out, "carry = \"{}\"\nlatitude_deg = {}", found.carry, found.latitude_deg);
+    let terms: Vec<String> = base.unknowns.to_string().split(',').map(|t| format!("\"{t}\"")).collect();
+    let _ = writeln!(out, "terms = [{}]", terms.join(", "));
+    for (letter, g) in ["X", "Y", "Z"].iter().zip(base.geometry.gyros()) {
+        let _ = writeln!(out, "geometry.{letter} = {{ I = \"{}\", O = \"{}\", S = \"{}\" }}", g.I, g.O, g.S);
+    }
+    if base.measured_azimuth {
+        out.push_str("measured_azimuth = true\n");
+    }
+    for (i, name) in best.positions.iter().enumerate() {
+        let place = options.names.iter().position(|n| n == name);
+        let angles = place.map(|c| options.candidates[c].each_ref().map(ToString::to_string).join(", "));
+        let angles = angles.unwrap_or_default();
+        let attitude = parse_attitude(name).map_or("", |_| name.as_str());
+        let _ = writeln!(
+            out,
+            "\n[[position]] # {attitude}\nname = \"p{}\"\nangles_deg = [{angles}]\ndwell_s = {}",
+            i + 1,
+            found.dwell_s
+        );
+    }
+    out
+}

@@ -1,0 +1,74 @@
+//! Schemes that were found.
+
+use obsdeg_core::design::Design;
+
+use crate::document::{Block, Document, number};
+
+pub(crate) fn document(d: &Design) -> Document {
+    let mut blocks = Vec::new();
+    let proof = match &d.minimum {
+        None => vec!["all candidates together do not make every coefficient observable".to_string()],
+        Some(m) => {
+            let mut lines = vec![
+                format!("{} positions: {}", m.positions, m.witness.join(" ")),
+                format!("fewer than {} cannot do: too few derivative rows", m.counting_bound),
+            ];
+            for [size, sets] in &m.none_of {
+                lines.push(format!(
+                    "none of the {sets} sets of {size} does (exact ranks, every set examined)"
+                ));
+            }
+            lines
+        }
+    };
+    if !d.found.is_empty() {
+        let rows = d.found.iter().enumerate().map(|(i, f)| {
+            vec![
+                (i + 1).to_string(),
+                f.positions.join(" "),
+                number(f.worst_sigma_dph),
+                f.rank.map_or_else(|| "-".into(), |[r, n]| format!("{r} of {n}")),
+            ]
+        });
+        blocks.push(Block::Table {
+            heading: "Best schemes (worst sigma(D): information of all samples, no prior, no drift noise, no slews)".into(),
+            header: vec!["", "positions in order", "worst sigma(D) [deg/h, /g]", "rank"],
+            numbers: vec![true, false, true, true],
+            rows: rows.collect(),
+        });
+        let order = if d.order_matters {
+            "orders of the same positions are different schemes: the dwell lets psi move in between"
+        } else {
+            "the order of positions does not matter under reset carry"
+        };
+        let how = if d.proven {
+            format!(
+                "the first is proven to be the best: all {} sequences of observable sets were examined",
+                d.examined
+            )
+        } else if d.interrupted {
+            format!("interrupted after {} sequences: the best so far", d.examined)
+        } else {
+            format!("not proven: coordinate exchange from random starts, {} sequences examined", d.examined)
+        };
+        blocks.push(Block::List { heading: "How".into(), lines: vec![how, order.into()] });
+    }
+    blocks.push(Block::List {
+        heading: "Fewest positions that make every coefficient observable".into(),
+        lines: proof,
+    });
+    blocks.push(Block::List {
+        heading: "Assumed".into(),
+        lines: vec![
+            format!(
+                "{} carry, latitude {} deg, {} s at each position; seed {}",
+                d.carry, d.latitude_deg, d.dwell_s, d.seed
+            ),
+            format!("candidates {}", d.candidates.join(" ")),
+        ],
+    });
+    let what = d
+        .positions
+        .map_or_else(|| "fewest positions".into(), |k| format!("{k} of {} positions", d.candidates.len()));
+    Document { title: format!("Design: {what}, {} carry", d.carry), lead: Vec::new(), blocks }
+}
