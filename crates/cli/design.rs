@@ -4,11 +4,14 @@ use std::fmt::Write;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use obsdeg_core::design::information::Criterion;
 use obsdeg_core::design::{Design, DesignError, Options, design};
 use obsdeg_core::model::attitude::{cardinal, cardinal_names};
 use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
+use obsdeg_core::model::{Carry, Latitude, Platform, Scheme, Unknowns};
+use obsdeg_core::simulation::Conditions;
+use obsdeg_core::simulation::conditions::resolve;
 
 use crate::arguments::{OutputArguments, read_scheme};
 use crate::conditions::ConditionArguments;
@@ -22,10 +25,20 @@ Examples:
   obsdeg design --positions 5 --carry inertial
   obsdeg design --positions 12 --dwell 417 --carry inertial --winner scheme.toml
   obsdeg design --positions 4 --candidates attitudes.toml
+  obsdeg design --positions 6 --criterion margin --target D=0.05 --target D_F=0.01
 
 Candidates are the 24 cardinal attitudes, or the positions of a scheme file. Up to 50 million sequences are searched
 exhaustively, which proves the best; beyond, coordinate exchange from random starts. Ctrl-C ends with the best so far.
 Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error.";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CriterionArgument {
+    Worst,
+    A,
+    D,
+    E,
+    Margin,
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
@@ -54,6 +67,10 @@ pub(crate) struct Arguments {
     /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS
     #[arg(long, value_name = "TERMS")]
     terms: Option<Unknowns>,
+
+    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --target)
+    #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true)]
+    criterion: CriterionArgument,
 
     /// How many schemes are listed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -102,6 +119,13 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         candidates,
         positions: a.positions,
         dwell_s: conditions.dwell_s,
+        criterion: match a.criterion {
+            CriterionArgument::Worst => Criterion::Worst,
+            CriterionArgument::A => Criterion::A,
+            CriterionArgument::D => Criterion::D,
+            CriterionArgument::E => Criterion::E,
+            CriterionArgument::Margin => Criterion::Margin(targets(&base, &conditions)?),
+        },
         keep: a.keep.into(),
         restarts: a.restarts,
         seed: a.seed,
@@ -127,6 +151,27 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     }
     output::write(&a.output, &text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The target of every coefficient.
+fn targets(base: &Scheme, conditions: &Conditions) -> Result<Vec<f64>, Failure> {
+    let positions = Scheme::of_angles(cardinal("NUE")).positions;
+    let scheme = Scheme { positions, combinations: Vec::new(), ..base.clone() };
+    let platform = Platform::new(scheme).map_err(|e| Failure::input(e.to_string()))?;
+    let all = resolve("target sigma", &platform, &conditions.targets, f64::NAN);
+    let all = all.map_err(|e| Failure::input(e.to_string()))?;
+    let drifts =
+        platform.names().iter().zip(platform.units()).zip(all).filter(|((_, unit), _)| **unit != "rad");
+    let mut out = Vec::new();
+    for ((name, _), target) in drifts {
+        if !(target.is_finite() && target > 0.0) {
+            return Err(Failure::input(format!(
+                "the target of {name} is {target}; expected a sigma above 0"
+            )));
+        }
+        out.push(target);
+    }
+    Ok(out)
 }
 
 /// The best scheme as a file that `obsdeg analyze --scheme` reads.

@@ -2,7 +2,7 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use obsdeg_core::design::information::Evaluator;
+use obsdeg_core::design::information::{Criterion, Evaluator};
 use obsdeg_core::design::observability::Rows;
 use obsdeg_core::design::{Options, design};
 use obsdeg_core::model::attitude::{Euler, cardinal, cardinal_names};
@@ -36,15 +36,25 @@ fn sigma_of_five(bencher: Bencher<'_, '_>) {
     let candidates = cardinals().1;
     let evaluator = Evaluator::new(&base(Carry::Inertial), &candidates, &Conditions::default(), 1000.0)
         .expect("an evaluator");
-    bencher.counter(ItemsCount::new(1usize)).bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10])));
+    bencher
+        .counter(ItemsCount::new(1usize))
+        .bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10]), &Criterion::Worst));
 }
 
 /// The best five of 24 in all orders, proven, on all cores; items are sequences.
 #[divan::bench(sample_count = 3)]
 fn best_five_of_24(bencher: Bencher<'_, '_>) {
     let (names, candidates) = cardinals();
-    let options =
-        Options { names, candidates, positions: Some(5), dwell_s: 1000.0, keep: 10, restarts: 1, seed: 1 };
+    let options = Options {
+        names,
+        candidates,
+        positions: Some(5),
+        dwell_s: 1000.0,
+        criterion: Criterion::Worst,
+        keep: 10,
+        restarts: 1,
+        seed: 1,
+    };
     bencher.counter(ItemsCount::new(2_897_280usize)).bench(|| {
         design(&base(Carry::Inertial), &Conditions::default(), &options, &|_, _, _| true).expect("designed")
     });

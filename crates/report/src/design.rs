@@ -26,14 +26,15 @@ pub(crate) fn document(d: &Design) -> Document {
             vec![
                 (i + 1).to_string(),
                 f.positions.join(" "),
+                number(f.value),
                 number(f.worst_sigma_dph),
-                f.rank.map_or_else(|| "-".into(), |[r, n]| format!("{r} of {n}")),
+                format!("{} of {}", f.rank[0], f.rank[1]),
             ]
         });
         blocks.push(Block::Table {
             heading: "Best schemes (worst sigma(D): information of all samples, no prior, no drift noise, no slews)".into(),
-            header: vec!["", "positions in order", "worst sigma(D) [deg/h, /g]", "rank"],
-            numbers: vec![true, false, true, true],
+            header: vec!["", "positions in order", "criterion", "worst sigma(D) [deg/h, /g]", "rank"],
+            numbers: vec![true, false, true, true, true],
             rows: rows.collect(),
         });
         let order = if d.order_matters {
@@ -51,7 +52,15 @@ pub(crate) fn document(d: &Design) -> Document {
         } else {
             format!("not proven: coordinate exchange from random starts, {} sequences examined", d.examined)
         };
-        blocks.push(Block::List { heading: "How".into(), lines: vec![how, order.into()] });
+        let criterion = match d.criterion.as_str() {
+            "A" => "A: root of the mean variance of the coefficients",
+            "D" => "D: geometric mean of the principal sigmas of the coefficients",
+            "E" => "E: largest principal sigma of the coefficients",
+            "margin" => "margin: largest sigma of a coefficient over its target; below 1 all targets are met",
+            _ => "worst: largest sigma of a coefficient",
+        };
+        let lines = vec![how, order.into(), format!("criterion {criterion}")];
+        blocks.push(Block::List { heading: "How".into(), lines });
     }
     blocks.push(Block::List {
         heading: "Fewest positions that make every coefficient observable".into(),

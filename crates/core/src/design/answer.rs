@@ -27,6 +27,8 @@ pub struct Design {
     pub positions: Option<usize>,
     /// Dwell of each, in s.
     pub dwell_s: f64,
+    /// What makes a scheme better: worst, A, D, E or margin.
+    pub criterion: String,
     /// The best schemes, best first.
     pub found: Vec<Found>,
     /// Sequences whose sigma was computed.
@@ -59,8 +61,10 @@ pub struct Minimum {
 pub struct Found {
     /// Its positions in order.
     pub positions: Vec<String>,
+    /// The criterion: a sigma in deg/h (per g), or for margin the largest sigma over its target.
+    pub value: f64,
     /// The largest sigma of a coefficient in deg/h (per g): information of all samples, no prior, no drift noise.
     pub worst_sigma_dph: f64,
     /// Its exact rank and the number of unknowns.
-    pub rank: Option<[usize; 2]>,
+    pub rank: [usize; 2],
 }

@@ -14,6 +14,19 @@ use crate::simulation::plan::{Plan, W_IE};
 /// Most unknowns of a search: psi and the coefficients of ten terms.
 pub const MAX: usize = 33;
 
+impl Criterion {
+    /// worst, A, D, E or margin.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Worst => "worst",
+            Self::A => "A",
+            Self::D => "D",
+            Self::E => "E",
+            Self::Margin(_) => "margin",
+        }
+    }
+}
+
 /// One candidate: its attitude, and how coefficients become drift there.
 #[derive(Debug, Clone)]
 struct Candidate {
@@ -192,60 +205,91 @@ impl Evaluator {
         }
     }
 
-    /// The largest sigma of a coefficient, in deg/h (per g); infinite when one is not determined.
-    pub fn worst_sigma(&self, state: &State, root: &mut Vec<f64>) -> f64 {
-        let n = self.n;
+    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a
+    /// coefficient is not determined. Sigmas are in deg/h
+    /// (per g). `root` is working space.
+    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+        let (n, d) = (self.n, self.n - 3);
         let first = if self.carry == Carry::Reset { 3 } else { 0 };
-        let m = n - first;
-        // Cholesky of the information in reverse order of unknowns: the coefficients come first, psi last
-        root.resize(m * m, 0.0);
+        // Cholesky of the information, psi first: the block of the coefficients is the root of the inverse of their covariance
+        root.resize(n * n, 0.0);
         let l = &mut root[..];
-        let entry = |i: usize, j: usize| {
-            let (a, b) = (n - 1 - i, n - 1 - j);
-            state.information[a.max(b) * n + a.min(b)]
-        };
-        for i in 0..m {
-            let (done, rest) = l.split_at_mut(i * m);
-            let row = &mut rest[..m];
-            for j in 0..i {
-                let other = &done[j * m..j * m + j + 1];
-                let sum: f64 = row[..j].iter().zip(other).map(|(a, b)| a * b).sum();
-                row[j] = (entry(i, j) - sum) / other[j];
+        for i in first..n {
+            let (done, rest) = l.split_at_mut(i * n);
+            let row = &mut rest[..=i];
+            let given = &state.information[i * n..=i * n + i];
+            for j in first..i {
+                let other = &done[j * n..=j * n + j];
+                let sum: f64 = row[first..j].iter().zip(&other[first..j]).map(|(a, b)| a * b).sum();
+                row[j] = (given[j] - sum) / other[j];
             }
-            let diagonal = entry(i, i);
-            let pivot = diagonal - row[..i].iter().map(|a| a * a).sum::<f64>();
+            let pivot = given[i] - row[first..i].iter().map(|a| a * a).sum::<f64>();
             // what rounding leaves of an undetermined direction
-            if pivot <= 1e-13 * diagonal {
+            if pivot <= 1e-13 * given[i] {
                 return f64::INFINITY;
             }
             row[i] = pivot.sqrt();
         }
-        // columns of L^-1: the variance of unknown i is the square of column i
-        let mut worst = 0.0f64;
+        if *criterion == Criterion::D {
+            // the geometric mean of the principal sigmas
+            let logs: f64 = (3..n).map(|i| l[i * n + i].ln()).sum();
+            return (-logs / d as f64).exp() / self.dph;
+        }
+        if *criterion == Criterion::E {
+            let block = DMatrix::from_fn(d, d, |i, j| if j <= i { l[(i + 3) * n + j + 3] } else { 0.0 });
+            let information = &block * block.transpose();
+            return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
+        }
+        // the variance of coefficient i is the square of column i of the inverse root
+        let (mut worst, mut sum) = (0.0f64, 0.0);
         let mut column = [0.0; MAX];
-        for i in 0..n - 3 {
-            column[i] = 1.0 / l[i * m + i];
+        for i in 3..n {
+            column[i] = 1.0 / l[i * n + i];
             let mut variance = column[i] * column[i];
-            for r in i + 1..m {
-                let row = &l[r * m..r * m + r + 1];
-                let sum: f64 = row[i..r].iter().zip(&column[i..r]).map(|(a, b)| a * b).sum();
-                column[r] = -sum / row[r];
+            for r in i + 1..n {
+                let row = &l[r * n..=r * n + r];
+                let product: f64 = row[i..r].iter().zip(&column[i..r]).map(|(a, b)| a * b).sum();
+                column[r] = -product / row[r];
                 variance += column[r] * column[r];
             }
-            worst = worst.max(variance);
+            sum += variance;
+            worst = worst.max(match criterion {
+                Criterion::Margin(targets) => variance / (targets[i - 3] * targets[i - 3]),
+                _ => variance,
+            });
         }
-        worst.sqrt() / self.dph
+        match criterion {
+            Criterion::A => (sum / d as f64).sqrt() / self.dph,
+            // targets are in deg/h already
+            _ => worst.sqrt() / self.dph,
+        }
     }
 
-    /// The worst sigma of a whole sequence.
-    pub fn of_sequence(&self, sequence: &[usize]) -> f64 {
+    /// The criterion of a whole sequence.
+    pub fn of_sequence(&self, sequence: &[usize], criterion: &Criterion) -> f64 {
         let (mut now, mut next) = (self.start(), self.start());
         for &c in sequence {
             self.extend(&now, c, &mut next);
             std::mem::swap(&mut now, &mut next);
         }
-        self.worst_sigma(&now, &mut Vec::new())
+        self.value(&now, criterion, &mut Vec::new())
     }
+}
+
+/// What makes one scheme better than another, all of the coefficients alone.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Criterion {
+    /// The largest sigma.
+    #[default]
+    Worst,
+    /// The root of the mean variance (A-optimal).
+    A,
+    /// The geometric mean of the principal sigmas: the volume of the error ellipsoid (D-optimal).
+    D,
+    /// The largest principal sigma (E-optimal).
+    E,
+    /// The largest sigma over its target (shape d, in deg/h per g).
+    Margin(Vec<f64>),
 }
 
 /// The Schur complement of the first `leading` unknowns of a symmetric matrix (lower triangle); these are set to zero.

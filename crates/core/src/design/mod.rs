@@ -17,12 +17,12 @@ use rayon::prelude::*;
 pub use answer::Design;
 
 use crate::analysis::AnalysisError;
-use crate::degree::ensemble::EnsembleError;
+use crate::degree::ensemble::{EnsembleError, judge};
 use crate::model::attitude::Euler;
 use crate::model::{Carry, Platform, Scheme, SchemeError};
 use crate::simulation::conditions::Conditions;
 use answer::{Found, Minimum, SCHEMA};
-use information::{Evaluator, State};
+use information::{Criterion, Evaluator, State};
 use observability::Rows;
 
 /// Most sequences that are searched exhaustively.
@@ -91,6 +91,8 @@ pub struct Options {
     pub positions: Option<usize>,
     /// Dwell of each position, in s.
     pub dwell_s: f64,
+    /// What makes one scheme better than another.
+    pub criterion: Criterion,
     /// How many schemes are listed.
     pub keep: usize,
     /// Restarts of the exchange, where the space is too large for exhaustion.
@@ -135,6 +137,7 @@ pub fn design(
         minimum,
         positions: options.positions,
         dwell_s: options.dwell_s,
+        criterion: options.criterion.name().into(),
         found: Vec::new(),
         examined: 0,
         proven: false,
@@ -145,7 +148,13 @@ pub fn design(
     let Some(k) = options.positions else { return Ok(out) };
     let evaluator = Evaluator::new(base, &options.candidates, conditions, options.dwell_s)?;
     let space = sequences(found as u64, k as u64, evaluator.ordered());
-    let search = Search { evaluator: &evaluator, progress, done: AtomicU64::new(0), keep: options.keep };
+    let search = Search {
+        evaluator: &evaluator,
+        criterion: &options.criterion,
+        progress,
+        done: AtomicU64::new(0),
+        keep: options.keep,
+    };
     let best = match space {
         Some(total) if total <= EXHAUSTIVE => {
             out.proven = true;
@@ -157,27 +166,30 @@ pub fn design(
     out.examined = search.done.load(Ordering::Relaxed);
     out.interrupted = !progress(out.examined, out.examined, f64::INFINITY) && !best.complete;
     out.proven &= best.complete;
-    let listed = best.found;
-    if listed.is_empty() {
+    for (value, sequence) in best.found {
+        // rounding may call a sequence determined that is not: the exact verdict has the last word
+        let Some(rank) = rank_of(base, options, &sequence)? else { continue };
+        out.found.push(Found {
+            positions: sequence.iter().map(|&c| options.names[c].clone()).collect(),
+            value,
+            worst_sigma_dph: evaluator.of_sequence(&sequence, &Criterion::Worst),
+            rank,
+        });
+    }
+    if out.found.is_empty() {
         return Err(DesignError::Impossible { positions: k });
     }
-    out.found = listed
-        .into_iter()
-        .map(|(sigma, sequence)| Found {
-            positions: sequence.iter().map(|&c| options.names[c].clone()).collect(),
-            worst_sigma_dph: sigma,
-            rank: rank_of(base, options, &sequence),
-        })
-        .collect();
     Ok(out)
 }
 
-/// Rank and number of unknowns of a sequence, exactly.
-fn rank_of(base: &Scheme, options: &Options, sequence: &[usize]) -> Option<[usize; 2]> {
+/// Rank and number of unknowns of a sequence, exactly; `None` when a coefficient is not observable.
+fn rank_of(base: &Scheme, options: &Options, sequence: &[usize]) -> Result<Option<[usize; 2]>, DesignError> {
     let positions = Scheme::of_angles(sequence.iter().map(|&c| options.candidates[c].clone())).positions;
-    let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() }).ok()?;
-    let verdicts = crate::degree::ensemble::judge(&platform, options.seed).ok()?;
-    Some([verdicts.degrees.rank(), platform.names().len()])
+    let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
+    let degrees = judge(&platform, options.seed)?.degrees;
+    let mut coefficients = platform.units().iter().zip(&degrees.degree).filter(|(unit, _)| **unit != "rad");
+    let all = coefficients.all(|(_, degree)| degree.is_some());
+    Ok(all.then(|| [degrees.rank(), platform.names().len()]))
 }
 
 /// The fewest candidates that do, with the proof.
@@ -224,6 +236,7 @@ fn mask(set: &[usize]) -> u64 {
 /// A depth-first walk over sequences.
 struct Walk<'a> {
     evaluator: &'a Evaluator,
+    criterion: &'a Criterion,
     masks: &'a HashSet<u64>,
     candidates: usize,
     k: usize,
@@ -245,7 +258,7 @@ impl Walk<'_> {
     fn visit(&mut self, used: u64) {
         let depth = self.sequence.len();
         if depth == self.k {
-            let sigma = self.evaluator.worst_sigma(&self.states[depth], &mut self.root);
+            let sigma = self.evaluator.value(&self.states[depth], self.criterion, &mut self.root);
             self.examined += 1;
             let full = self.best.len() >= self.keep;
             if sigma.is_finite() && (!full || self.best.last().is_some_and(|b| sigma < b.0)) {
@@ -269,6 +282,7 @@ impl Walk<'_> {
 
 struct Search<'a> {
     evaluator: &'a Evaluator,
+    criterion: &'a Criterion,
     progress: &'a (dyn Fn(u64, u64, f64) -> bool + Sync),
     done: AtomicU64,
     keep: usize,
@@ -303,6 +317,7 @@ impl Search<'_> {
                 .map(|start| {
                     let mut walk = Walk {
                         evaluator: self.evaluator,
+                        criterion: self.criterion,
                         masks: &masks,
                         candidates,
                         k,
@@ -342,7 +357,7 @@ impl Search<'_> {
                 .map(|&restart| {
                     let mut rng = SplitMix64::new(options.seed ^ restart.wrapping_mul(0x9e37_79b9_7f4a_7c15));
                     let mut now: Vec<usize> = (0..k).map(|_| rng.below(candidates as u64) as usize).collect();
-                    let mut sigma = self.evaluator.of_sequence(&now);
+                    let mut sigma = self.evaluator.of_sequence(&now, self.criterion);
                     for _ in 0..ROUNDS {
                         let before = sigma;
                         for place in 0..k {
@@ -350,7 +365,7 @@ impl Search<'_> {
                             let mut best = kept;
                             for c in 0..candidates {
                                 now[place] = c;
-                                let other = self.evaluator.of_sequence(&now);
+                                let other = self.evaluator.of_sequence(&now, self.criterion);
                                 if other < sigma {
                                     (sigma, best) = (other, c);
                                 }
