@@ -10,43 +10,32 @@ pub mod batch;
 pub mod monte_carlo;
 mod ranking;
 pub mod slopes;
+mod structure;
 
-use nalgebra::DMatrix;
 use obsdeg_ekf::consistency::chi_square_band;
-use obsdeg_ekf::decomposition::singular_values;
-use obsdeg_ekf::linear::covariance_pass;
-use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
+use obsdeg_ekf::{Form, SquareRootInformation};
 
 pub use answer::CrossCheck;
 pub use ranking::kendall_tau_b;
 
 use crate::model::{Carry, Latitude, Scheme};
-use crate::prediction::{Combination, Prediction};
-use crate::simulation::conditions::{DriftNoise, resolve, shown_unit, si_per_shown};
+use crate::prediction::Prediction;
+use crate::simulation::conditions::resolve;
 use crate::simulation::record::{Start, run};
 use crate::simulation::{Conditions, Plan, SimulationError, conditions_report, timeline_report, validity};
-use answer::{
-    Check, Control, Correlation, Count, Difference, MonteCarlo, NullEvidence, QuantityEvidence, Ranking,
-    SCHEMA, SlopeCurve,
-};
+use answer::{Control, Difference, MonteCarlo, QuantityEvidence, Ranking, SCHEMA};
 use batch::batch;
 use monte_carlo::{Experiment, Prepared};
-use slopes::{diffuse_prior, slopes};
+use structure::{last_covariance, still, structure};
 
 /// Diffuse prior standard deviation of psi, in rad: with that of the drift in the ratio of the earth rate, so that
 /// a null vector of both is left as loose as either.
 const DIFFUSE_PSI: f64 = 1e6;
 /// Diffuse prior standard deviation of a drift, in rad/s.
 const DIFFUSE_DRIFT: f64 = 1e2;
-/// How far a measured slope may be from the predicted one.
-const SLOPE_TOLERANCE: f64 = 0.1;
-/// How far the factor of an observable unknown may be from 1.
-const INFLATION_TOLERANCE: f64 = 0.01;
 /// Relative difference of covariances that is rounding; P itself holds half the digits of its root.
 const COVARIANCE_LIMITS: [(Form, &str, f64); 2] =
     [(Form::Ud, "UD form", 1e-6), (Form::Joseph, "Joseph form", 1e-4)];
-/// What counts as not seen, relative to the best seen direction.
-const UNSEEN: f64 = 1e-10;
 /// Runs of a control.
 const CONTROL_RUNS: usize = 16;
 
@@ -180,214 +169,6 @@ pub fn crosscheck(
     Ok(out)
 }
 
-/// Evidence a and b: what the filter's model can tell apart.
-struct Structure {
-    quantities: Vec<QuantityEvidence>,
-    null_space: Vec<NullEvidence>,
-    defect: Count,
-    slopes: Vec<SlopeCurve>,
-    correlation: Correlation,
-}
-
-impl Structure {
-    /// The number of checks that fail, and of all checks.
-    fn failures(&self) -> (usize, usize) {
-        let checks = self.quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
-        let null = self
-            .null_space
-            .iter()
-            .flat_map(|v| std::iter::once(v.seen.pass).chain(v.correlation.iter().map(|c| c.pass)));
-        let all: Vec<bool> = checks.chain(null).chain([self.defect.pass]).collect();
-        (all.iter().filter(|pass| !**pass).count(), all.len())
-    }
-}
-
-/// Repositioning is instantaneous here, as in the exact verdicts: a slew moves psi by drifts of its own.
-fn structure(
-    truth: &Plan,
-    prediction: &Prediction,
-    filter_scheme: &Scheme,
-    conditions: &Conditions,
-) -> Result<Structure, SimulationError> {
-    let conditions = &still(conditions);
-    let filter = Plan::new(filter_scheme, conditions)?;
-    let names = names(truth, prediction);
-    let functionals = functionals(truth, &filter, prediction);
-    let known: Vec<Combination> = functionals.iter().flatten().cloned().collect();
-    let measured = slopes(filter_scheme, conditions, &known)?;
-    let inflation = inflation(&filter, &known)?;
-    let (null_space, defect) = null_evidence(truth, &filter, prediction, &inflation.correlation)?;
-    Ok(Structure {
-        quantities: quantities(&names, prediction, &functionals, &measured.slopes, &inflation.ratios),
-        null_space,
-        defect,
-        slopes: curves(truth, prediction, &names, &functionals, &measured),
-        correlation: Correlation {
-            names: filter.platform.names().to_vec(),
-            values: inflation.correlation.row_iter().map(|r| r.iter().copied().collect()).collect(),
-        },
-    })
-}
-
-/// Without drift noise and slews.
-fn still(conditions: &Conditions) -> Conditions {
-    Conditions { drift_noise: DriftNoise::OneStep(0.0), slew_rate_deg_s: None, ..conditions.clone() }
-}
-
-/// Unknowns, then combinations.
-fn names(plan: &Plan, prediction: &Prediction) -> Vec<String> {
-    let combinations = prediction.combinations.iter().map(|c| c.expression.clone());
-    plan.platform.names().iter().cloned().chain(combinations).collect()
-}
-
-/// Each of them as a functional of the filter's unknowns; `None` when the filter does not have them.
-fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Option<Combination>> {
-    let index = |c: usize| {
-        let name = &truth.platform.names()[c];
-        filter.platform.names().iter().position(|n| n == name)
-    };
-    let single = (0..truth.unknowns()).map(|c| vec![(c, 1.0)]);
-    single
-        .chain(prediction.combinations.iter().map(|c| c.terms.clone()))
-        .map(|terms| terms.into_iter().map(|(c, k)| Some((index(c)?, k))).collect())
-        .collect()
-}
-
-/// Evidence b.
-struct Inflation {
-    /// Of every functional: the factor on sigma.
-    ratios: Vec<f64>,
-    /// Correlation under the diffuse prior.
-    correlation: DMatrix<f64>,
-}
-
-fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, SimulationError> {
-    let end = |factor: f64| {
-        let sigma = diffuse_prior(plan).into_iter().map(|s| s * factor).collect();
-        last_covariance(plan, &Start { truth: Vec::new(), estimate: Vec::new(), sigma }, Form::Ud)
-    };
-    let (small, large) = (end(1.0)?, end(10.0)?);
-    let ratio = |c: &Combination| (large.variance(c) / small.variance(c)).sqrt();
-    let ratios = functionals.iter().map(ratio).collect();
-    let n = plan.unknowns();
-    let small = small.matrix();
-    let sigma: Vec<f64> = (0..n).map(|i| small[(i, i)].sqrt()).collect();
-    Ok(Inflation {
-        ratios,
-        correlation: DMatrix::from_fn(n, n, |i, j| small[(i, j)] / (sigma[i] * sigma[j])),
-    })
-}
-
-fn last_covariance(plan: &Plan, start: &Start, form: Form) -> Result<Covariance, SimulationError> {
-    let prior = start.covariance(form)?;
-    let mut last = prior.clone();
-    let total: usize = plan.segments.iter().map(|s| s.steps).sum();
-    covariance_pass(&plan.stages, prior, |step, p| {
-        if step + 1 == total {
-            last = p.clone();
-        }
-    });
-    Ok(last)
-}
-
-fn quantities(
-    names: &[String],
-    prediction: &Prediction,
-    functionals: &[Option<Combination>],
-    slopes: &[f64],
-    ratios: &[f64],
-) -> Vec<QuantityEvidence> {
-    let unknowns = prediction.unknowns.iter().map(|u| (u.status, u.degree, u.accuracy_order));
-    let combinations = prediction.combinations.iter();
-    let combinations = combinations.map(|c| (c.status, c.degree, c.accuracy_order));
-    let mut measured = slopes.iter().zip(ratios);
-    names
-        .iter()
-        .zip(unknowns.chain(combinations))
-        .zip(functionals)
-        .map(|((name, (status, degree, accuracy_order)), functional)| {
-            let (slope, ratio) = match functional.as_ref().and_then(|_| measured.next()) {
-                Some((slope, ratio)) => (Some(*slope), Some(*ratio)),
-                None => (None, None),
-            };
-            let predicted = accuracy_order.map_or(0.0, |d| -(d as f64 + 0.5));
-            let expected = if accuracy_order.is_some() { 1.0 } else { 10.0 };
-            let near = |x: Option<f64>, y: f64, tolerance: f64| x.is_some_and(|x| (x - y).abs() <= tolerance);
-            let tolerance = if accuracy_order.is_some() { INFLATION_TOLERANCE } else { 1.0 };
-            QuantityEvidence {
-                name: name.clone(),
-                status,
-                degree,
-                accuracy_order,
-                slope: Check { predicted, measured: slope, pass: near(slope, predicted, SLOPE_TOLERANCE) },
-                inflation: Check {
-                    predicted: expected,
-                    measured: ratio,
-                    pass: near(ratio, expected, tolerance),
-                },
-            }
-        })
-        .collect()
-}
-
-/// What Z does not see: the predicted null vectors against the information, and their number.
-fn null_evidence(
-    truth: &Plan,
-    filter: &Plan,
-    prediction: &Prediction,
-    correlation: &DMatrix<f64>,
-) -> Result<(Vec<NullEvidence>, Count), SimulationError> {
-    let n = filter.unknowns();
-    let root = batch(filter, SquareRootInformation::none(n))?.information;
-    // columns of unit length, so that units do not matter
-    let norms: Vec<f64> =
-        root.root().column_iter().map(|c| c.norm()).map(|x| if x > 0.0 { x } else { 1.0 }).collect();
-    let scaled = DMatrix::from_fn(n, n, |i, j| root.root()[(i, j)] / norms[j]);
-    let (values, _) = singular_values(&scaled)?;
-    let largest = values.first().copied().unwrap_or(1.0);
-    let measured = values.iter().filter(|s| **s <= UNSEEN * largest).count();
-    let predicted = truth.unknowns() - prediction.rank;
-    let mut evidence = Vec::new();
-    for (k, vector) in prediction.null_space.iter().enumerate() {
-        let names = truth.platform.names();
-        let parts: Vec<String> =
-            vector.iter().map(|(c, x)| format!("{} = {}", names[*c], short(*x))).collect();
-        let comparable = names == filter.platform.names();
-        let seen = comparable.then(|| {
-            let mut v = nalgebra::DVector::zeros(n);
-            for &(c, x) in vector {
-                v[c] = x * norms[c];
-            }
-            (&scaled * &v).norm() / (v.norm() * largest)
-        });
-        let alone = prediction
-            .null_space
-            .iter()
-            .enumerate()
-            .all(|(i, other)| i == k || other.iter().all(|(c, _)| vector.iter().all(|(d, _)| c != d)));
-        let correlation = (comparable && alone && vector.len() > 1).then(|| {
-            let pairs = vector.iter().enumerate().flat_map(|(i, a)| vector[..i].iter().map(move |b| (a, b)));
-            let signed = pairs.map(|(a, b)| correlation[(a.0, b.0)] * (a.1 * b.1).signum());
-            let smallest = signed.fold(1.0, f64::min);
-            Check { predicted: 1.0, measured: Some(smallest), pass: smallest > 0.999 }
-        });
-        evidence.push(NullEvidence {
-            direction: parts.join(", "),
-            seen: Check { predicted: 0.0, measured: seen, pass: seen.is_some_and(|s| s <= UNSEEN) },
-            correlation,
-        });
-    }
-    Ok((evidence, Count { predicted, measured, pass: predicted == measured }))
-}
-
-/// A number in few digits.
-fn short(x: f64) -> String {
-    let text = format!("{x:.4e}");
-    let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    let digits = digits.trim_end_matches('0').trim_end_matches('.');
-    if exponent == "0" { digits.into() } else { format!("{digits}e{exponent}") }
-}
-
 /// Evidence c.
 fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Difference>, SimulationError> {
     let still = still(conditions);
@@ -471,32 +252,6 @@ fn controls(
         });
     }
     Ok(out)
-}
-
-fn curves(
-    truth: &Plan,
-    prediction: &Prediction,
-    names: &[String],
-    functionals: &[Option<Combination>],
-    measured: &slopes::Slopes,
-) -> Vec<SlopeCurve> {
-    let orders = prediction.unknowns.iter().map(|u| u.accuracy_order);
-    let orders = orders.chain(prediction.combinations.iter().map(|c| c.accuracy_order));
-    let leads = (0..truth.unknowns()).chain(prediction.combinations.iter().map(|c| c.terms[0].0));
-    let present = functionals.iter().zip(names).zip(orders.zip(leads)).filter(|((f, _), _)| f.is_some());
-    present
-        .zip(&measured.sigmas)
-        .map(|(((_, name), (accuracy_order, lead)), sigmas)| {
-            let unit = truth.platform.units()[lead];
-            let scale = si_per_shown(unit);
-            SlopeCurve {
-                name: name.clone(),
-                unit: shown_unit(unit).into(),
-                accuracy_order,
-                points: measured.dwells.iter().zip(sigmas).map(|(&t, s)| (t, s / scale)).collect(),
-            }
-        })
-        .collect()
 }
 
 /// Everything that failed, in words.
