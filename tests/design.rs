@@ -221,6 +221,8 @@ fn the_winner_is_a_scheme_file() {
     let (promised, kept) = (promised.as_f64().expect("a number"), kept.as_f64().expect("a number"));
     assert!((promised / kept - 1.0).abs() < 1e-6, "{promised} {kept}");
     assert!(run(&["analyze", "--scheme", &winner, "--solutions", "off"]).status.success());
+    let again = ["design", "--candidates", file, "--positions", "5", "--winner", &winner, "--force"];
+    assert!(run(&again).status.success());
     for (arguments, expected) in [
         (&["design", "--positions", "5", "--winner", &winner][..], "--force"),
         (&["design"], "--positions"),

@@ -114,7 +114,7 @@ pub(crate) struct OutputArguments {
     pub(crate) output: Option<PathBuf>,
 
     /// Replace an existing file
-    #[arg(long, requires = "output")]
+    #[arg(long)]
     pub(crate) force: bool,
 
     /// Say nothing on stderr but errors
@@ -135,7 +135,7 @@ pub(crate) struct FolderArguments {
     pub(crate) output: Option<PathBuf>,
 
     /// Replace files in an existing folder
-    #[arg(long, requires = "output")]
+    #[arg(long)]
     pub(crate) force: bool,
 
     /// Say nothing on stderr but errors
