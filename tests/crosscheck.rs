@@ -3,11 +3,11 @@
 use std::process::Command;
 
 use obsdeg_core::crosscheck::answer::CrossCheck;
-use obsdeg_core::crosscheck::batch::batch;
 use obsdeg_core::crosscheck::monte_carlo::{Experiment, Prepared};
 use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme, Unknowns};
+use obsdeg_core::simulation::batch::batch;
 use obsdeg_core::simulation::conditions::{Conditions, Truth};
 use obsdeg_core::simulation::plan::Plan;
 use obsdeg_ekf::SquareRootInformation;

@@ -3,12 +3,12 @@
 use std::process::Command;
 
 use obsdeg_core::analysis::{Options as AnalysisOptions, analyze};
-use obsdeg_core::crosscheck::batch::batch;
 use obsdeg_core::design::information::{Criterion, Evaluator};
 use obsdeg_core::design::observability::Rows;
 use obsdeg_core::design::{Options, design};
 use obsdeg_core::model::attitude::{Euler, cardinal, cardinal_names};
 use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::simulation::batch::batch;
 use obsdeg_core::simulation::conditions::{Assignment, Conditions};
 use obsdeg_core::simulation::plan::Plan;
 use obsdeg_core::simulation::simulate;

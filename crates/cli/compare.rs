@@ -8,7 +8,7 @@ use obsdeg_core::compare::{Entry, compare};
 use obsdeg_core::model::{Carry, Latitude};
 
 use crate::arguments::{OutputArguments, read_scheme};
-use crate::conditions::ConditionArguments;
+use crate::conditions::MeasurementArguments;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Spinner;
@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     output: OutputArguments,
 
     #[command(flatten)]
-    conditions: ConditionArguments,
+    measurement: MeasurementArguments,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
@@ -55,7 +55,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         let mut scheme = read_scheme(path)?;
         scheme.carry = a.carry.unwrap_or(scheme.carry);
         scheme.latitude = a.latitude.or(scheme.latitude);
-        let conditions = a.conditions.conditions(&scheme);
+        let conditions = a.measurement.conditions(&scheme);
         entries.push(Entry { name: name(path), scheme, conditions });
     }
     let spinner = Spinner::start("judging schemes", a.output.quiet);

@@ -17,14 +17,10 @@ enum PropagationArgument {
     Rk4,
 }
 
-/// A run's conditions; a scheme file may give them too, options come last.
+/// What is measured, and how well it is to be known: all that a prediction by information needs.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Conditions of the run")]
-pub(crate) struct ConditionArguments {
-    /// linear: the model itself; exact: direction cosines, specific force in the true platform frame (default: linear)
-    #[arg(long, value_name = "LEVEL", hide_possible_values = true)]
-    truth: Option<TruthArgument>,
-
+#[command(next_help_heading = "Measurement")]
+pub(crate) struct MeasurementArguments {
     /// Dwell of positions that do not say theirs, in s (default: 1000)
     #[arg(long, value_name = "S")]
     dwell: Option<f64>,
@@ -33,10 +29,6 @@ pub(crate) struct ConditionArguments {
     #[arg(long, value_name = "S")]
     step: Option<f64>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous)
-    #[arg(long, value_name = "DEG_S")]
-    slew_rate: Option<f64>,
-
     /// White noise of Z per sample and axis, in g (default: 1e-5)
     #[arg(long, value_name = "G")]
     noise: Option<f64>,
@@ -44,6 +36,27 @@ pub(crate) struct ConditionArguments {
     /// Noise of a measured azimuth per sample, in deg (default: 0.001)
     #[arg(long, value_name = "DEG")]
     azimuth_noise: Option<f64>,
+
+    /// Standard deviation to be reached by an unknown or family in deg, deg/h, deg/h/g: D=0.05, D_FX=0.01
+    /// (default: psi 0.01, D 0.1)
+    #[arg(long, value_name = "NAME=X")]
+    target: Vec<Assignment>,
+}
+
+/// A run's conditions; a scheme file may give them too, options come last.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Conditions of the run")]
+pub(crate) struct ConditionArguments {
+    #[command(flatten)]
+    measurement: MeasurementArguments,
+
+    /// linear: the model itself; exact: direction cosines, specific force in the true platform frame (default: linear)
+    #[arg(long, value_name = "LEVEL", hide_possible_values = true)]
+    truth: Option<TruthArgument>,
+
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous)
+    #[arg(long, value_name = "DEG_S")]
+    slew_rate: Option<f64>,
 
     /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
     /// (default: 0.01 deg/h)
@@ -66,30 +79,38 @@ pub(crate) struct ConditionArguments {
     #[arg(long, value_name = "NAME=X")]
     estimate: Vec<Assignment>,
 
-    /// Standard deviation to be reached, likewise (default: psi 0.01, D 0.1)
-    #[arg(long, value_name = "NAME=X")]
-    target: Vec<Assignment>,
-
     /// Factor on the true drifts and their priors (default: 1)
     #[arg(long, value_name = "X")]
     drift_scale: Option<f64>,
 }
 
-impl ConditionArguments {
-    /// The paper's run, with what the scheme and the options say.
+impl MeasurementArguments {
+    /// The paper's conditions, with what the scheme and the options say.
     pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::default();
         out.apply(&scheme.simulation);
+        out.apply(&Settings {
+            step_s: self.step,
+            dwell_s: self.dwell,
+            accelerometer_noise_g: self.noise,
+            azimuth_noise_deg: self.azimuth_noise,
+            ..Settings::default()
+        });
+        out.targets.extend(self.target.iter().cloned());
+        out
+    }
+}
+
+impl ConditionArguments {
+    /// The paper's run, with what the scheme and the options say.
+    pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
+        let mut out = self.measurement.conditions(scheme);
         out.apply(&Settings {
             truth: self.truth.map(|t| match t {
                 TruthArgument::Linear => Truth::Linear,
                 TruthArgument::Exact => Truth::Exact,
             }),
-            step_s: self.step,
-            dwell_s: self.dwell,
             slew_rate_deg_s: self.slew_rate,
-            accelerometer_noise_g: self.noise,
-            azimuth_noise_deg: self.azimuth_noise,
             drift_noise: self.drift_noise,
             propagation: self.propagation.map(|p| match p {
                 PropagationArgument::Exponential => Propagation::Exponential,
@@ -101,7 +122,6 @@ impl ConditionArguments {
         out.values.extend(self.value.iter().cloned());
         out.priors.extend(self.prior.iter().cloned());
         out.estimates.extend(self.estimate.iter().cloned());
-        out.targets.extend(self.target.iter().cloned());
         out
     }
 }

@@ -14,7 +14,7 @@ use obsdeg_core::simulation::Conditions;
 use obsdeg_core::simulation::conditions::resolve;
 
 use crate::arguments::{OutputArguments, read_scheme};
-use crate::conditions::ConditionArguments;
+use crate::conditions::MeasurementArguments;
 use crate::failure::Failure;
 use crate::progress::Bar;
 use crate::{interrupt, output};
@@ -92,7 +92,7 @@ pub(crate) struct Arguments {
     output: OutputArguments,
 
     #[command(flatten)]
-    conditions: ConditionArguments,
+    measurement: MeasurementArguments,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
@@ -106,7 +106,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(terms) = &a.terms {
         base.unknowns = terms.clone();
     }
-    let conditions = a.conditions.conditions(&base);
+    let conditions = a.measurement.conditions(&base);
     conditions.validate().map_err(|e| Failure::input(e.to_string()))?;
     let (names, candidates) = if base.positions.is_empty() {
         let named = cardinal_names().into_iter().filter_map(|n| cardinal(&n).map(|c| (n, c)));
@@ -138,9 +138,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     });
     drop(bar);
     let found = designed.map_err(|e| match e {
-        DesignError::Verdict(_) | DesignError::Analysis(_) | DesignError::Filter(_) => {
-            Failure::internal(e.to_string())
-        }
+        DesignError::Verdict(_) | DesignError::Filter(_) => Failure::internal(e.to_string()),
         _ => Failure::input(e.to_string()),
     })?;
     let text = obsdeg_report::design(&found, a.output.format, output::layout(&a.output))

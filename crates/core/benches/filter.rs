@@ -42,7 +42,7 @@ fn covariance(bencher: Bencher<'_, '_>, form: &Form) {
     let start = Start::new(&plan, &conditions).expect("a start");
     bencher.bench(|| {
         let prior = start.covariance(*form).expect("a prior");
-        black_box(covariance_pass(&plan.stages, prior, |_, _| {}))
+        black_box(covariance_pass(&plan.stages, prior, |_, _| {}).expect("shapes"))
     });
 }
 

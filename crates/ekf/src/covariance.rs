@@ -65,6 +65,13 @@ impl ProcessNoise {
     }
 }
 
+impl ProcessNoise {
+    /// The last state that it touches.
+    pub(crate) fn last_state(&self) -> Option<usize> {
+        self.states.last().copied()
+    }
+}
+
 /// What one scalar update did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gain {

@@ -91,7 +91,10 @@ impl Filter {
         substeps: usize,
     ) -> Result<(), EkfError> {
         let n = self.x.len();
+        let f = process.f(t, &self.x);
+        check("f", &DMatrix::from_column_slice(f.len(), 1, f.as_slice()), (n, 1))?;
         check("F", &process.jacobian(t, &self.x), (n, n))?;
+        check_symmetric("Q", &process.noise(t), n)?;
         let next = runge_kutta(process, t, &self.x, dt, substeps);
         check("x", &DMatrix::from_column_slice(n, 1, next.x.as_slice()), (n, 1))?;
         self.covariance.propagate(&Transition::new(&next.phi)?, &ProcessNoise::new(&next.q)?);

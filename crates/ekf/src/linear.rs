@@ -2,6 +2,7 @@
 //! recursion runs once and serves any number of runs.
 
 use crate::covariance::{Covariance, Gain, ProcessNoise, ScalarOutput};
+use crate::error::EkfError;
 use crate::transition::Transition;
 
 /// Equal steps: predict, then update by scalar measurements.
@@ -15,6 +16,24 @@ pub struct Stage {
     pub outputs: Vec<ScalarOutput>,
     /// The number of steps.
     pub steps: usize,
+}
+
+impl Stage {
+    /// Checks that all its parts are of n states.
+    fn check(&self, n: usize) -> Result<(), EkfError> {
+        let refuse = |what, found| Err(EkfError::Shape { what, expected: (n, n), found: (found, found) });
+        if self.transition.states() != n {
+            return refuse("Phi", self.transition.states());
+        }
+        if let Some(state) = self.noise.last_state().filter(|&s| s >= n) {
+            return refuse("Q", state + 1);
+        }
+        let last = self.outputs.iter().flat_map(|o| &o.h).map(|(state, _)| *state).max();
+        match last.filter(|&s| s >= n) {
+            Some(state) => Err(EkfError::Shape { what: "H", expected: (1, n), found: (1, state + 1) }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// The gains of all updates, in order.
@@ -35,13 +54,19 @@ impl Gains {
 }
 
 /// The covariance recursion over `stages`. `on_step` sees the covariance after every step, with its number
-/// from 0. The shapes of the stages must be those of `p`.
+/// from 0.
+///
+/// # Errors
+/// [`EkfError::Shape`] for a stage that is not one of the states of `p`, before anything is computed.
 pub fn covariance_pass(
     stages: &[Stage],
     mut p: Covariance,
     mut on_step: impl FnMut(usize, &Covariance),
-) -> Gains {
+) -> Result<Gains, EkfError> {
     let n = p.states();
+    for stage in stages {
+        stage.check(n)?;
+    }
     let mut gains = Gains { n, ..Gains::default() };
     let mut gain = Gain { k: vec![0.0; n], s: 0.0 };
     let mut step = 0;
@@ -57,7 +82,7 @@ pub fn covariance_pass(
             step += 1;
         }
     }
-    gains
+    Ok(gains)
 }
 
 /// The state recursion: `measure` fills in the measurements of a step (its number, the stage, one number per

@@ -166,7 +166,7 @@ proptest! {
         for form in [Form::Joseph, Form::Ud] {
             let mut last = DMatrix::zeros(n, n);
             let p0 = Covariance::new("P0", &p0, form).expect("valid");
-            covariance_pass(std::slice::from_ref(&stage), p0, |_, p| last = p.matrix());
+            covariance_pass(std::slice::from_ref(&stage), p0, |_, p| last = p.matrix()).expect("shapes");
             prop_assert!(close(&last, &expected, 1e-8), "{form:?}");
         }
     }
@@ -292,7 +292,8 @@ fn state_pass_is_the_filter_step_by_step() {
         std::slice::from_ref(&stage),
         Covariance::new("P0", &p0, Form::Joseph).expect("valid"),
         |_, _| {},
-    );
+    )
+    .expect("shapes");
     let mut x = [0.3, -0.2];
     let fill = |step: usize, _: usize, out: &mut [f64]| (0..2).for_each(|j| out[j] = z(step, j));
     state_pass(std::slice::from_ref(&stage), &gains, &mut x, fill, |_, _, _| {});
@@ -358,6 +359,21 @@ fn wrong_inputs_are_refused_by_name() {
     assert!(refused.to_string().starts_with("R is not positive definite"), "{refused}");
     let refused = filter.update(&wrong, 0.0, &dvector![0.0]).expect_err("refused");
     assert_eq!(refused.to_string(), "z has shape 1x1; expected 2x1");
+    let stage = Stage {
+        transition: Transition::new(&unit).expect("valid"),
+        noise: ProcessNoise::new(&unit).expect("valid"),
+        outputs: vec![ScalarOutput { h: vec![(2, 1.0)], r: 1.0 }],
+        steps: 1,
+    };
+    let pass = |n: usize| {
+        let prior = Covariance::new("P0", &DMatrix::identity(n, n), Form::Ud).expect("valid");
+        covariance_pass(std::slice::from_ref(&stage), prior, |_, _| {}).expect_err("refused").to_string()
+    };
+    assert_eq!(pass(3), "Phi has shape 2x2; expected 3x3");
+    assert_eq!(pass(2), "H has shape 1x3; expected 1x2");
+    let ill = Matrices { q: DMatrix::identity(3, 3), ..wrong };
+    let refused = filter.predict(&ill, 0.0, 1.0, 1).expect_err("refused");
+    assert_eq!(refused.to_string(), "Q has shape 3x3; expected 2x2");
     let singular = SquareRootInformation::none(2).covariance();
     assert_eq!(singular, Err(EkfError::Singular { column: 0 }));
 }

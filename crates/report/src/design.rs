@@ -74,6 +74,10 @@ pub(crate) fn document(d: &Design) -> Document {
                 d.carry, d.latitude_deg, d.dwell_s, d.seed
             ),
             format!("candidates {}", d.candidates.join(" ")),
+            format!(
+                "ranks of sets modulo one random 61-bit prime: an observable set is overlooked with probability below {:.0e}",
+                d.error_bound
+            ),
         ],
     });
     let what = d

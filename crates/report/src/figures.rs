@@ -34,6 +34,9 @@ pub(crate) fn picture(name: &str, svg: String) -> Result<[File; 2], FigureError>
 /// At most this many points a curve: more cannot be seen.
 const POINTS: usize = 1000;
 
+/// At most this many figures in the grid of all.
+const GRID: usize = 30;
+
 /// A name that any file system takes.
 pub(crate) fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || "_-".contains(c) { c } else { '_' };
@@ -95,7 +98,10 @@ pub fn simulation_figures(record: &Record) -> Result<Vec<File>, FigureError> {
         files.extend(picture(&file_name(name), figure.svg())?);
     }
     let unknowns = record.names.iter().filter(|n| !n.contains(' ')).count();
-    files.extend(picture("all", grid(&figures[..unknowns.min(30)], 3, "Truth, estimate and +-3 sigma"))?);
+    let part =
+        if unknowns > GRID { format!(" (the first {GRID} of {unknowns} unknowns)") } else { String::new() };
+    let title = format!("Truth, estimate and +-3 sigma{part}");
+    files.extend(picture("all", grid(&figures[..unknowns.min(GRID)], 3, &title))?);
     Ok(files)
 }
 

@@ -8,11 +8,10 @@ use obsdeg_ekf::SquareRootInformation;
 pub use answer::Comparison;
 
 use crate::analysis::Status;
-use crate::crosscheck::batch::batch;
-use crate::crosscheck::slopes::diffuse_prior;
 use crate::model::ring::Float;
 use crate::model::{Carry, Dwell, Platform, Scheme, SchemeError};
 use crate::prediction::Prediction;
+use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
 use crate::simulation::{Plan, SimulationError};
 use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Worst};

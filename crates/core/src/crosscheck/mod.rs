@@ -6,7 +6,6 @@
 //! f. filters that are wrong on purpose are found out.
 
 pub mod answer;
-pub mod batch;
 pub mod monte_carlo;
 mod ranking;
 pub mod slopes;
@@ -20,19 +19,14 @@ pub use ranking::kendall_tau_b;
 
 use crate::model::{Carry, Latitude, Scheme};
 use crate::prediction::Prediction;
+use crate::simulation::batch::batch;
 use crate::simulation::conditions::resolve;
 use crate::simulation::record::{Start, run};
 use crate::simulation::{Conditions, Plan, SimulationError, conditions_report, timeline_report, validity};
 use answer::{Control, Difference, MonteCarlo, QuantityEvidence, Ranking, SCHEMA};
-use batch::batch;
 use monte_carlo::{Experiment, Prepared};
 use structure::{last_covariance, still, structure};
 
-/// Diffuse prior standard deviation of psi, in rad: with that of the drift in the ratio of the earth rate, so that
-/// a null vector of both is left as loose as either.
-const DIFFUSE_PSI: f64 = 1e6;
-/// Diffuse prior standard deviation of a drift, in rad/s.
-const DIFFUSE_DRIFT: f64 = 1e2;
 /// Relative difference of covariances that is rounding; P itself holds half the digits of its root.
 const COVARIANCE_LIMITS: [(Form, &str, f64); 2] =
     [(Form::Ud, "UD form", 1e-6), (Form::Joseph, "Joseph form", 1e-4)];

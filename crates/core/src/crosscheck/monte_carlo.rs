@@ -108,7 +108,7 @@ impl<'a> Prepared<'a> {
             if checkpoints.binary_search(&step).is_ok() {
                 covariances.push(p.clone());
             }
-        });
+        })?;
         let nees = covariances.iter().map(Nees::of_covariance).collect::<Result<_, _>>()?;
         let basis = observable_basis(&start.sigma, experiment.null_space);
         let observable = match (covariances.last(), basis.ncols()) {

@@ -2,10 +2,9 @@
 
 use obsdeg_ekf::SquareRootInformation;
 
-use super::batch::batch;
-use super::{DIFFUSE_DRIFT, DIFFUSE_PSI};
 use crate::model::{Dwell, Scheme};
 use crate::simulation::SimulationError;
+use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise};
 use crate::simulation::plan::Plan;
 
@@ -57,11 +56,6 @@ pub fn slopes(
     let measured: Vec<usize> = (0..dwells.len()).filter(|&i| MEASURED.contains(&dwells[i])).collect();
     let slope = |s: &Vec<f64>| regression(measured.iter().map(|&i| (dwells[i].ln(), s[i].ln())));
     Ok(Slopes { slopes: sigmas.iter().map(slope).collect(), dwells, sigmas })
-}
-
-/// Standard deviations that say nothing.
-pub fn diffuse_prior(plan: &Plan) -> Vec<f64> {
-    plan.platform.units().iter().map(|u| if *u == "rad" { DIFFUSE_PSI } else { DIFFUSE_DRIFT }).collect()
 }
 
 /// The scheme with its first position lasting `dwell`, the others in proportion.

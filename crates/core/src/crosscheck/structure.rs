@@ -6,10 +6,10 @@ use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 
 use super::answer::{Check, Correlation, Count, NullEvidence, QuantityEvidence, SlopeCurve};
-use super::batch::batch;
-use super::slopes::{self, diffuse_prior, slopes};
+use super::slopes::{self, slopes};
 use crate::model::Scheme;
 use crate::prediction::{Combination, Prediction};
+use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{DriftNoise, shown_unit, si_per_shown};
 use crate::simulation::record::Start;
 use crate::simulation::{Conditions, Plan, SimulationError};
@@ -127,7 +127,7 @@ pub(super) fn last_covariance(plan: &Plan, start: &Start, form: Form) -> Result<
         if step + 1 == total {
             last = p.clone();
         }
-    });
+    })?;
     Ok(last)
 }
 

@@ -39,6 +39,9 @@ pub struct Design {
     pub order_matters: bool,
     /// Whether the search was interrupted.
     pub interrupted: bool,
+    /// Bound on the probability that an observable set was overlooked: sets are judged modulo one random 61-bit prime (the
+    /// schemes listed modulo two).
+    pub error_bound: f64,
     /// Seed of all random choices.
     pub seed: u64,
 }

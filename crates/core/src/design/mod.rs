@@ -16,7 +16,6 @@ use rayon::prelude::*;
 
 pub use answer::Design;
 
-use crate::analysis::AnalysisError;
 use crate::degree::ensemble::{EnsembleError, judge};
 use crate::model::attitude::Euler;
 use crate::model::{Carry, Platform, Scheme, SchemeError};
@@ -72,9 +71,6 @@ pub enum DesignError {
     /// No verdict.
     #[error(transparent)]
     Verdict(#[from] EnsembleError),
-    /// No analysis of a scheme found.
-    #[error(transparent)]
-    Analysis(#[from] AnalysisError),
     /// A number is not finite.
     #[error(transparent)]
     Filter(#[from] EkfError),
@@ -128,6 +124,7 @@ pub fn design(
     }
     let rows = Rows::new(base, &options.candidates, options.seed)?;
     let minimum = minimum(&rows, options);
+    let below = minimum.iter().flat_map(|m| &m.none_of).map(|[_, sets]| *sets as f64).sum::<f64>();
     let mut out = Design {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -143,6 +140,7 @@ pub fn design(
         proven: false,
         order_matters: base.carry != Carry::Reset,
         interrupted: false,
+        error_bound: below * rows.miss,
         seed: options.seed,
     };
     let Some(k) = options.positions else { return Ok(out) };
@@ -158,13 +156,15 @@ pub fn design(
     let best = match space {
         Some(total) if total <= EXHAUSTIVE => {
             out.proven = true;
+            out.error_bound +=
+                sequences(found as u64, k as u64, false).map_or(f64::INFINITY, |s| s as f64) * rows.miss;
             let sets = rows.observable_sets(k);
             search.exhaust(&sets, k)
         }
         _ => search.exchange(found, k, options),
     };
     out.examined = search.done.load(Ordering::Relaxed);
-    out.interrupted = !progress(out.examined, out.examined, f64::INFINITY) && !best.complete;
+    out.interrupted = !best.complete;
     out.proven &= best.complete;
     for (value, sequence) in best.found {
         // rounding may call a sequence determined that is not: the exact verdict has the last word

@@ -18,6 +18,8 @@ pub struct Rows {
     columns: usize,
     /// The columns that must be solved.
     required: Vec<usize>,
+    /// Bound on the probability that one set is taken for less than it is: ranks in a field can only be too small.
+    pub miss: f64,
     /// Of every candidate: its rows.
     rows: Vec<Vec<Vec<u64>>>,
 }
@@ -51,7 +53,9 @@ impl Rows {
             if reset { without_leading(f, rows.collect(), first) } else { rows.collect() }
         });
         let required = (0..n).filter(|&c| platform.units()[c] != "rad").map(|c| c - first).collect();
-        Ok(Self { field: f, columns: n - first, required, rows: rows.collect() })
+        // the bound of two fields is the square of that of one
+        let miss = verdicts.error_bound.sqrt();
+        Ok(Self { field: f, columns: n - first, required, miss, rows: rows.collect() })
     }
 
     /// The number of candidates.

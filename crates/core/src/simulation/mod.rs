@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub(crate) mod attitude_path;
+pub mod batch;
 pub mod conditions;
 pub mod plan;
 pub mod record;

@@ -144,7 +144,7 @@ pub fn run(
         if step + 1 == total {
             last.clone_from(p);
         }
-    });
+    })?;
 
     let mut truth = TruthModel::new(plan, conditions, start.truth.clone());
     let mut noise = Noise::new(seed, 0);

@@ -3,7 +3,13 @@
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
 
-use crate::simulation::plan::Plan;
+use super::plan::Plan;
+
+/// Diffuse prior standard deviation of psi, in rad: with that of the drift in the ratio of the earth rate, so that
+/// a null vector of both is left as loose as either.
+const DIFFUSE_PSI: f64 = 1e6;
+/// Diffuse prior standard deviation of a drift, in rad/s.
+const DIFFUSE_DRIFT: f64 = 1e2;
 
 /// The root of the information on the initial unknowns, and the transition from start to end.
 #[derive(Debug, Clone)]
@@ -42,4 +48,9 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
         }
     }
     Ok(Batch { information, to_end: to_now })
+}
+
+/// Standard deviations that say nothing.
+pub fn diffuse_prior(plan: &Plan) -> Vec<f64> {
+    plan.platform.units().iter().map(|u| if *u == "rad" { DIFFUSE_PSI } else { DIFFUSE_DRIFT }).collect()
 }
