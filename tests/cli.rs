@@ -292,3 +292,38 @@ fn the_banner_stays_off_stdout() {
     assert_eq!(stdout(&plain), stdout(&quiet));
     assert!(quiet.stderr.is_empty());
 }
+
+/// A scheme on the command line and the same scheme in a file are one scheme.
+#[test]
+fn angles_and_a_file_mean_the_same() {
+    let (folder, _) = scratch();
+    let file = folder.path().join("same.toml");
+    let text = r#"
+carry = "inertial"
+latitude_deg = 28.2
+terms = ["F", "I", "S"]
+combinations = ["D_IX - D_IY"]
+[requirements]
+D_F = 0.02
+[[position]]
+angles_deg = [0, 0, 0]
+[[position]]
+angles_deg = [-90, 12.5, 180]
+[[position]]
+attitude = "UEN"
+rotation = { about = "Z_p", angle_deg = -120 }
+"#;
+    std::fs::write(&file, text).expect("written");
+    let file = file.display().to_string();
+    let angles = ["--angles", "0,0,0", "--angles", "-90,12.5,180", "--angles", "UEN@Z_p:-120"];
+    let scheme =
+        ["--carry", "inertial", "--latitude", "28.2", "--terms", "F,I,S", "--combination", "D_IX - D_IY"];
+    for (command, more) in
+        [("analyze", &["--solutions", "off"][..]), ("simulate", &["--requirement", "D_F=0.02"])]
+    {
+        let common = if command == "analyze" { more } else { &[][..] };
+        let by_file = [&[command, "--scheme", &file, "--format", "json"][..], common].concat();
+        let by_angles = [&[command, "--format", "json"][..], &angles, &scheme, more].concat();
+        assert_eq!(json(&by_file), json(&by_angles), "{command}");
+    }
+}

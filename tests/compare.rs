@@ -110,7 +110,7 @@ fn files_are_named_and_wrong_ones_refused() {
         (&["no/such.toml"][..], "no/such.toml"),
         (&["examples/wrong-gyro/scheme.toml"], "wrong-gyro"),
         (&["examples/generic-angles/scheme.toml"], "generic"),
-        (&[files[0], "--target", "D_FW=1"], "D_FW"),
+        (&[files[0], "--requirement", "D_FW=1"], "D_FW"),
         (&[], "FILE"),
     ] {
         let output = run(arguments);

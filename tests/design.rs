@@ -279,7 +279,7 @@ fn criteria_are_those_of_the_covariance() {
         let dph = 1f64.to_radians() / 3600.0;
         let block = covariance.view((first, first), (12, 12)) / (dph * dph);
         let evaluator = Evaluator::new(&base(carry), &candidates, &quiet(), 1000.0).expect("an evaluator");
-        let targets: Vec<f64> = (1..=12).map(|i| 0.01 * f64::from(i)).collect();
+        let requirements: Vec<f64> = (1..=12).map(|i| 0.01 * f64::from(i)).collect();
         let sigmas: Vec<f64> = (0..12).map(|i| block[(i, i)].sqrt()).collect();
         let largest = |it: &mut dyn Iterator<Item = f64>| it.fold(0.0, f64::max);
         for (criterion, expected) in [
@@ -288,8 +288,8 @@ fn criteria_are_those_of_the_covariance() {
             (Criterion::D, block.clone().determinant().powf(1.0 / 24.0)),
             (Criterion::E, block.clone().symmetric_eigenvalues().max().sqrt()),
             (
-                Criterion::Margin(targets.clone()),
-                largest(&mut sigmas.iter().zip(&targets).map(|(s, t)| s / t)),
+                Criterion::Margin(requirements.clone()),
+                largest(&mut sigmas.iter().zip(&requirements).map(|(s, t)| s / t)),
             ),
         ] {
             let found = evaluator.of_sequence(&sequence, &criterion);

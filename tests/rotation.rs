@@ -1,7 +1,8 @@
 //! Rotating segments: all attitudes of an arc at once.
 
 use obsdeg_core::analysis::{Analysis, Options, analyze};
-use obsdeg_core::model::scheme::{Rotation, parse_attitude};
+use obsdeg_core::model::rotation::Rotation;
+use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_core::simulation::conditions::Conditions;
 use obsdeg_core::simulation::simulate;

@@ -3,7 +3,8 @@
 use std::process::{Command, Output};
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::scheme::{Rotation, parse_attitude};
+use obsdeg_core::model::rotation::Rotation;
+use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_core::simulation::answer::{Estimate, Simulation};
 use obsdeg_core::simulation::conditions::{Assignment, Conditions, DriftNoise, Propagation, Truth};

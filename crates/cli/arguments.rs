@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use obsdeg_core::model::attitude::Euler;
-use obsdeg_core::model::scheme::{Rotation, parse_attitude};
+use obsdeg_core::model::rotation::Rotation;
+use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns, scheme_file};
 use obsdeg_report::Format;
 

@@ -17,9 +17,9 @@ use crate::simulate::failure;
 const AFTER_HELP: &str = "\
 Examples:
   obsdeg compare examples/five-positions/scheme.toml examples/six-positions/scheme.toml
-  obsdeg compare a.toml b.toml --carry inertial --target D=0.05 --format markdown -o review.md
+  obsdeg compare a.toml b.toml --carry inertial --requirement D=0.05 --format markdown -o review.md
 
-Requirements are the targets of a scheme file, [simulation] targets, or --target.
+Requirements are those of a scheme file, [requirements], or --requirement.
 Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error.";
 
 #[derive(Debug, Args)]

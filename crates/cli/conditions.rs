@@ -37,10 +37,10 @@ pub(crate) struct MeasurementArguments {
     #[arg(long, value_name = "DEG")]
     azimuth_noise: Option<f64>,
 
-    /// Standard deviation to be reached by an unknown or family in deg, deg/h, deg/h/g: D=0.05, D_FX=0.01
+    /// Largest standard deviation allowed for an unknown or family in deg, deg/h, deg/h/g: D=0.05, D_FX=0.01
     /// (default: psi 0.01, D 0.1)
     #[arg(long, value_name = "NAME=X")]
-    target: Vec<Assignment>,
+    requirement: Vec<Assignment>,
 }
 
 /// A run's conditions; a scheme file may give them too, options come last.
@@ -87,8 +87,7 @@ pub(crate) struct ConditionArguments {
 impl MeasurementArguments {
     /// The paper's conditions, with what the scheme and the options say.
     pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
-        let mut out = Conditions::default();
-        out.apply(&scheme.simulation);
+        let mut out = Conditions::of(scheme);
         out.apply(&Settings {
             step_s: self.step,
             dwell_s: self.dwell,
@@ -96,7 +95,7 @@ impl MeasurementArguments {
             azimuth_noise_deg: self.azimuth_noise,
             ..Settings::default()
         });
-        out.targets.extend(self.target.iter().cloned());
+        out.requirements.extend(self.requirement.iter().cloned());
         out
     }
 }

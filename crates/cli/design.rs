@@ -25,7 +25,7 @@ Examples:
   obsdeg design --positions 5 --carry inertial
   obsdeg design --positions 12 --dwell 417 --carry inertial --winner scheme.toml
   obsdeg design --positions 4 --candidates attitudes.toml
-  obsdeg design --positions 6 --criterion margin --target D=0.05 --target D_F=0.01
+  obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01
 
 Candidates are the 24 cardinal attitudes, or the positions of a scheme file. Up to 50 million sequences are searched
 exhaustively, which proves the best; beyond, coordinate exchange from random starts. Ctrl-C ends with the best so far.
@@ -68,7 +68,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "TERMS")]
     terms: Option<Unknowns>,
 
-    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --target)
+    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement)
     #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true)]
     criterion: CriterionArgument,
 
@@ -124,7 +124,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
             CriterionArgument::A => Criterion::A,
             CriterionArgument::D => Criterion::D,
             CriterionArgument::E => Criterion::E,
-            CriterionArgument::Margin => Criterion::Margin(targets(&base, &conditions)?),
+            CriterionArgument::Margin => Criterion::Margin(requirements(&base, &conditions)?),
         },
         keep: a.keep.into(),
         restarts: a.restarts,
@@ -151,23 +151,23 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The target of every coefficient.
-fn targets(base: &Scheme, conditions: &Conditions) -> Result<Vec<f64>, Failure> {
+/// What is required of every coefficient.
+fn requirements(base: &Scheme, conditions: &Conditions) -> Result<Vec<f64>, Failure> {
     let positions = Scheme::of_angles(cardinal("NUE")).positions;
     let scheme = Scheme { positions, combinations: Vec::new(), ..base.clone() };
     let platform = Platform::new(scheme).map_err(|e| Failure::input(e.to_string()))?;
-    let all = resolve("target sigma", &platform, &conditions.targets, f64::NAN);
+    let all = resolve("required sigma", &platform, &conditions.requirements, f64::NAN);
     let all = all.map_err(|e| Failure::input(e.to_string()))?;
     let drifts =
         platform.names().iter().zip(platform.units()).zip(all).filter(|((_, unit), _)| **unit != "rad");
     let mut out = Vec::new();
-    for ((name, _), target) in drifts {
-        if !(target.is_finite() && target > 0.0) {
+    for ((name, _), required) in drifts {
+        if !(required.is_finite() && required > 0.0) {
             return Err(Failure::input(format!(
-                "the target of {name} is {target}; expected a sigma above 0"
+                "the requirement for {name} is {required}; expected a sigma above 0"
             )));
         }
-        out.push(target);
+        out.push(required);
     }
     Ok(out)
 }

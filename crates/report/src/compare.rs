@@ -38,7 +38,7 @@ fn overview(schemes: &[Review]) -> Block {
             "total [s]",
             "rank",
             "worst sigma(D)",
-            "targets",
+            "requirements",
             "redundant",
         ],
         numbers: vec![false, false, true, true, true, false, false, false],
@@ -73,10 +73,10 @@ fn by_unknown(schemes: &[Review]) -> Block {
         }
     }
     Block::Table {
-        heading: "By unknown (sigma: information of all samples, no prior, no drift noise; margin: target over sigma)"
+        heading: "By unknown (sigma: information of all samples, no prior, no drift noise; margin: required over sigma)"
             .into(),
         header: vec![
-            "unknown", "scheme", "degree", "accuracy", "sigma", "unit", "target", "margin", "excitation per position",
+            "unknown", "scheme", "degree", "accuracy", "sigma", "unit", "required", "margin", "excitation per position",
             "only by",
         ],
         numbers: vec![false, false, true, true, true, false, true, true, false, false],

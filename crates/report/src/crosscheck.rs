@@ -150,7 +150,7 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
     let verdict =
         if c.passed { "filter and exact verdicts agree" } else { "filter and exact verdicts DISAGREE" };
     let mut lead = Vec::new();
-    if c.conditions.slew_rate_deg_s.is_some() {
+    if c.timeline.iter().any(|t| t.slew) {
         lead.push(
             "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \
              drifts of its own; d knows of the slews"

@@ -56,7 +56,9 @@ pub(crate) fn document(d: &Design) -> Document {
             "A" => "A: root of the mean variance of the coefficients",
             "D" => "D: geometric mean of the principal sigmas of the coefficients",
             "E" => "E: largest principal sigma of the coefficients",
-            "margin" => "margin: largest sigma of a coefficient over its target; below 1 all targets are met",
+            "margin" => {
+                "margin: largest sigma of a coefficient over what is required; below 1 all requirements are met"
+            }
             _ => "worst: largest sigma of a coefficient",
         };
         let lines = vec![how, order.into(), format!("criterion {criterion}")];

@@ -14,10 +14,11 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
             "exact: direction cosines, specific force in the true platform frame, drift at the true attitude"
         }
     };
-    let slew = c.slew_rate_deg_s.map_or_else(
-        || "instantaneous".into(),
-        |r| format!("{r} deg/s about the eigenaxis, Z not used meanwhile"),
-    );
+    let slew = match (timeline.iter().any(|t| t.slew), c.slew_rate_deg_s) {
+        (false, _) => "instantaneous".into(),
+        (true, Some(r)) => format!("{r} deg/s unless the position says otherwise, Z not used meanwhile"),
+        (true, None) => "as the positions say, Z not used meanwhile".to_string(),
+    };
     let by = if c.latitude_by_default { " (chosen here: the scheme names none)" } else { "" };
     let propagation = match c.propagation {
         Propagation::Exponential => "matrix exponential",
@@ -55,9 +56,9 @@ fn number_short(x: f64) -> String {
 /// Why the small-angle model holds or does not, with its figures.
 pub(crate) fn validity(v: &Validity) -> Vec<String> {
     let ratio = v.neglected_g / v.accelerometer_noise_g;
-    let target = v
-        .smallest_target_dph
-        .map_or_else(String::new, |t| format!(" against a target of {} deg/h", number(t)));
+    let required = v
+        .smallest_requirement_dph
+        .map_or_else(String::new, |t| format!(" against the required {} deg/h", number(t)));
     let head = if v.holds {
         "the small-angle model holds for these drifts"
     } else {
@@ -72,7 +73,7 @@ pub(crate) fn validity(v: &Validity) -> Vec<String> {
             number(ratio),
             format_args!("{:e}", v.accelerometer_noise_g)
         ),
-        format!("the drift (3) leaves out D |psi| = {} deg/h{target}", number(v.neglected_dph)),
+        format!("the drift (3) leaves out D |psi| = {} deg/h{required}", number(v.neglected_dph)),
     ]
 }
 
@@ -86,18 +87,18 @@ fn row(e: &Estimate) -> Vec<String> {
         number(e.error),
         number(e.sigma),
         format!("{:.2}", e.error_over_sigma),
-        optional(e.time_to_target_s),
+        optional(e.time_to_requirement_s),
         e.verdict.to_string(),
     ]
 }
 
 /// `0.1 deg/h`, one for every unit, or by name where they differ.
-fn targets(quantities: &[Estimate]) -> Vec<String> {
+fn requirements(quantities: &[Estimate]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for q in quantities {
-        let Some(target) = q.target_sigma else { continue };
-        let uniform = quantities.iter().all(|o| o.unit != q.unit || o.target_sigma == q.target_sigma);
-        let text = format!("{target} {}", q.unit);
+        let Some(required) = q.required_sigma else { continue };
+        let uniform = quantities.iter().all(|o| o.unit != q.unit || o.required_sigma == q.required_sigma);
+        let text = format!("{required} {}", q.unit);
         let text = if uniform { text } else { format!("{} {text}", q.name) };
         if !out.contains(&text) {
             out.push(text);
@@ -116,7 +117,7 @@ pub(crate) fn document(s: &Simulation) -> Document {
         "error",
         "sigma",
         "error/sigma",
-        "t to target [s]",
+        "t to required [s]",
         "verdict",
     ];
     let numbers = vec![false, false, true, true, true, true, true, true, true, false];
@@ -152,7 +153,7 @@ pub(crate) fn document(s: &Simulation) -> Document {
     blocks.push(list("Validity of the small-angle model", validity(&s.validity)));
     let mut assumed = conditions(&s.conditions, &s.timeline);
     assumed.push(format!("carry {}; seed {}", s.carry, s.seed));
-    assumed.push(format!("target sigma {}", targets(&s.quantities).join(", ")));
+    assumed.push(format!("required sigma {}", requirements(&s.quantities).join(", ")));
     blocks.push(list("Assumed", assumed));
     let positions = s.timeline.iter().filter(|t| !t.slew).count();
     Document {

@@ -28,7 +28,7 @@ pub struct Entry {
     pub name: String,
     /// The scheme.
     pub scheme: Scheme,
-    /// Its conditions; targets are the requirements.
+    /// Its conditions; requirements are the requirements.
     pub conditions: Conditions,
 }
 
@@ -124,7 +124,7 @@ fn quantities(
     drop_one: &[DropOne],
 ) -> Result<Vec<Quantity>, SimulationError> {
     let platform = judged.platform();
-    let requirements = resolve("target sigma", platform, &conditions.targets, f64::NAN)?;
+    let requirements = resolve("required sigma", platform, &conditions.requirements, f64::NAN)?;
     let first_d = platform.names().len() - platform.coefficients();
     // eps^n = C E(g) D: the columns of C are orthonormal, so the length of a column is the excitation
     let columns: Vec<[Vec<f64>; 3]> =
@@ -170,9 +170,8 @@ fn drop_one(
     };
     (0..scheme.positions.len())
         .map(|i| {
-            let mut rest = scheme.clone();
-            let position = rest.positions.remove(i).name;
-            let judged = Judged::new(&rest, conditions, seed)?;
+            let position = scheme.positions[i].name.clone();
+            let judged = Judged::new(&scheme.without_position(i), conditions, seed)?;
             let names = whole.platform().names().iter();
             // under reset carry every position has a psi of its own
             let names = names.filter(|n| !n.contains('@'));
@@ -210,7 +209,7 @@ fn sensitivity(
     }
     for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
         // slews carry psi^n: without them another carry can be asked for
-        let still = Conditions { slew_rate_deg_s: None, ..conditions.clone() };
+        let still = Conditions { slews: false, ..conditions.clone() };
         add(format!("{carry} carry"), &Scheme { carry, ..scheme.clone() }, &still)?;
     }
     Ok(out)

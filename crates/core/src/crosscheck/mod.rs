@@ -21,6 +21,7 @@ use crate::model::{Carry, Latitude, Scheme};
 use crate::prediction::Prediction;
 use crate::simulation::batch::batch;
 use crate::simulation::conditions::resolve;
+use crate::simulation::plan::Kind;
 use crate::simulation::record::{Start, run};
 use crate::simulation::{Conditions, Plan, SimulationError, conditions_report, timeline_report, validity};
 use answer::{Control, Difference, MonteCarlo, QuantityEvidence, Ranking, SCHEMA};
@@ -100,13 +101,14 @@ pub fn crosscheck(
         return Err(SimulationError::CrosscheckRotation);
     }
     let truth = Plan::new(scheme, conditions)?;
+    let slews = truth.segments.iter().any(|s| matches!(s.kind, Kind::Slew(_)));
+    if slews && options.filter.dropped.is_some() {
+        return Err(SimulationError::DroppedSlew);
+    }
     let filter_scheme = options.filter.apply(scheme);
     let filter = Plan::new(&filter_scheme, conditions)?;
     let rates = [truth.point.w_n, truth.point.w_u];
     let prediction = Prediction::new(&truth.platform, rates, options.seed)?;
-    if filter.segments.len() != truth.segments.len() {
-        return Err(SimulationError::DroppedSlew);
-    }
     let structure = structure(&truth, &prediction, &filter_scheme, conditions)?;
     let covariance = covariances(&filter_scheme, conditions)?;
 
@@ -135,7 +137,7 @@ pub fn crosscheck(
 
     let start = Start::new(&truth, conditions)?;
     let record = run(&truth, conditions, &start, &prediction, options.seed)?;
-    let targets = resolve("target sigma", &truth.platform, &conditions.targets, f64::NAN)?;
+    let requirements = resolve("required sigma", &truth.platform, &conditions.requirements, f64::NAN)?;
     let mut out = CrossCheck {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -153,7 +155,7 @@ pub fn crosscheck(
         covariance,
         monte_carlo,
         controls,
-        validity: validity(&truth, conditions, &record, &targets),
+        validity: validity(&truth, conditions, &record, &requirements),
         correlation: structure.correlation,
         seed: options.seed,
         error_bound: prediction.error_bound,
@@ -212,7 +214,7 @@ fn controls(
     prediction: &Prediction,
     seed: u64,
 ) -> Result<Vec<Control>, SimulationError> {
-    let conditions = &Conditions { slew_rate_deg_s: None, ..conditions.clone() };
+    let conditions = &Conditions { slews: false, ..conditions.clone() };
     let truth = Plan::new(scheme, conditions)?;
     let other = if scheme.carry == Carry::Platform { Carry::Inertial } else { Carry::Platform };
     let elsewhere = if scheme.latitude.is_some_and(Latitude::is_pole) { "0" } else { "90" };

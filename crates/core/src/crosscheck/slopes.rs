@@ -70,7 +70,7 @@ fn scaled(scheme: &Scheme, conditions: &Conditions, dwell: f64) -> (Scheme, Cond
     let conditions = Conditions {
         step_s: step,
         dwell_s: conditions.dwell_s * factor,
-        slew_rate_deg_s: None,
+        slews: false,
         accelerometer_noise_g: conditions.accelerometer_noise_g * (conditions.step_s / step).sqrt(),
         azimuth_noise_deg: conditions.azimuth_noise_deg * (conditions.step_s / step).sqrt(),
         drift_noise: DriftNoise::OneStep(0.0),

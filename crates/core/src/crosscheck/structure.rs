@@ -72,7 +72,7 @@ pub(super) fn structure(
 
 /// Without drift noise and slews.
 pub(super) fn still(conditions: &Conditions) -> Conditions {
-    Conditions { drift_noise: DriftNoise::OneStep(0.0), slew_rate_deg_s: None, ..conditions.clone() }
+    Conditions { drift_noise: DriftNoise::OneStep(0.0), slews: false, ..conditions.clone() }
 }
 
 /// Unknowns, then combinations.

@@ -254,13 +254,13 @@ impl Evaluator {
             }
             sum += variance;
             worst = worst.max(match criterion {
-                Criterion::Margin(targets) => variance / (targets[i - 3] * targets[i - 3]),
+                Criterion::Margin(requirements) => variance / (requirements[i - 3] * requirements[i - 3]),
                 _ => variance,
             });
         }
         match criterion {
             Criterion::A => (sum / d as f64).sqrt() / self.dph,
-            // targets are in deg/h already
+            // requirements are in deg/h already
             _ => worst.sqrt() / self.dph,
         }
     }
@@ -288,7 +288,7 @@ pub enum Criterion {
     D,
     /// The largest principal sigma (E-optimal).
     E,
-    /// The largest sigma over its target (shape d, in deg/h per g).
+    /// The largest sigma over its requirement (shape d, in deg/h per g).
     Margin(Vec<f64>),
 }
 

@@ -2,6 +2,7 @@
 
 use super::angle::Angle;
 use super::ring::Ring;
+use super::rotation::Axis;
 
 /// A 3x3 matrix, row by row.
 pub type Matrix3<E> = [[E; 3]; 3];
@@ -36,10 +37,8 @@ pub fn c_n_from_euler<R: Ring>(ring: &R, cs: &[(R::Element, R::Element); 3]) -> 
 /// A turn about one axis.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Turned {
-    /// 0, 1, 2: X_p, Y_p, Z_p or N, U, E.
-    pub axis: usize,
-    /// About a geographic axis, not one of the platform.
-    pub geographic: bool,
+    /// The axis.
+    pub axis: Axis,
     /// By this angle, right-handed.
     pub angle: Angle,
 }
@@ -55,8 +54,8 @@ pub fn c_n<R: Ring>(
     let c = c_n_from_euler(ring, &std::array::from_fn(|k| cos_sin(&euler[k])));
     let Some(t) = turned else { return c };
     let (cos, sin) = cos_sin(&t.angle);
-    let turn = elementary(ring, t.axis, &(cos, ring.neg(&sin)));
-    if t.geographic { product(ring, &turn, &c) } else { product(ring, &c, &turn) }
+    let turn = elementary(ring, t.axis.index, &(cos, ring.neg(&sin)));
+    if t.axis.geographic { product(ring, &turn, &c) } else { product(ring, &c, &turn) }
 }
 
 /// The geographic directions and their components (North, Up, East).

@@ -5,13 +5,17 @@ pub mod attitude;
 pub mod dwell;
 pub mod expression;
 pub mod geometry;
+pub mod gimbals;
 pub mod platform;
 pub mod ring;
+pub mod rotation;
 pub mod scheme;
 pub mod scheme_file;
 
 pub use angle::{Angle, AngleError};
 pub use dwell::Dwell;
 pub use geometry::{Geometry, Term, Unknowns};
+pub use gimbals::Gimbals;
 pub use platform::Platform;
+pub use rotation::{Rotation, SlewTo};
 pub use scheme::{Carry, Latitude, Position, Scheme, SchemeError};

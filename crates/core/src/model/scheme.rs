@@ -1,5 +1,6 @@
 //! A torquing scheme: positions, carry, latitude, geometry and what is unknown.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -10,7 +11,9 @@ use super::angle::{Angle, AngleError, format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, Turned, c_n, cardinal, cardinal_name};
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
+use super::gimbals::Gimbals;
 use super::ring::Ring;
+use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
 use crate::simulation::conditions::Settings;
 
 /// What is carried from one position to the next (the paper does not say).
@@ -116,7 +119,7 @@ impl fmt::Display for Latitude {
 }
 
 /// One position of a scheme.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Position {
     /// Its name in solutions, `p1`, `p2`, ... unless the scheme file names it.
     pub name: String,
@@ -126,73 +129,12 @@ pub struct Position {
     pub dwell: Option<Dwell>,
     /// Turns at a constant rate while Z is observed; the angles are those at its start.
     pub rotation: Option<Rotation>,
-}
-
-/// A rotating segment: psi^n goes on through it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Rotation {
-    /// 0, 1, 2: X_p, Y_p, Z_p or N, U, E.
-    pub axis: usize,
-    /// About a geographic axis, not one of the platform.
-    pub geographic: bool,
-    /// The whole angle, right-handed; constant and not zero.
-    pub angle: Angle,
-}
-
-/// Why a text is no rotation.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum RotationError {
-    /// Not an axis.
-    #[error(
-        "`{found}` is not an axis to turn about; expected X_p, Y_p, Z_p (platform) or N, U, E (geographic)"
-    )]
-    About {
-        /// The text found.
-        found: String,
-    },
-    /// Not an angle.
-    #[error("`{found}` is no angle to turn by; expected decimal degrees of at least 0.001 in magnitude")]
-    Angle {
-        /// The text found.
-        found: String,
-    },
-}
-
-impl Rotation {
-    const AXES: [(&'static str, usize, bool); 6] = [
-        ("X_p", 0, false),
-        ("Y_p", 1, false),
-        ("Z_p", 2, false),
-        ("N", 0, true),
-        ("U", 1, true),
-        ("E", 2, true),
-    ];
-
-    /// A rotation about a named axis by decimal degrees.
-    ///
-    /// # Errors
-    /// [`RotationError`].
-    pub fn new(about: &str, angle: &str) -> Result<Self, RotationError> {
-        let axis = Self::AXES.into_iter().find(|(name, ..)| *name == about.trim());
-        let (_, axis, geographic) = axis.ok_or_else(|| RotationError::About { found: about.into() })?;
-        let wrong = || RotationError::Angle { found: angle.into() };
-        let nanodeg = parse_decimal(angle.trim()).map_err(|_| wrong())?;
-        if nanodeg.abs() < MIN_ROTATION {
-            return Err(wrong());
-        }
-        Ok(Self { axis, geographic, angle: Angle::from_nanodeg(nanodeg) })
-    }
-}
-
-impl fmt::Display for Rotation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Self::AXES.iter().find(|(_, axis, g)| (*axis, *g) == (self.axis, self.geographic));
-        write!(f, "{}:{}", name.map_or("", |n| n.0), self.angle)
-    }
+    /// How it is reached from the position before, where that is not as the conditions say.
+    pub slew: Option<SlewTo>,
 }
 
 /// An attitude at which derivative rows are taken: a position, or a point of a rotating segment.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Station<'a> {
     /// The position or segment.
     pub position: &'a Position,
@@ -314,6 +256,10 @@ pub struct Scheme {
     pub combinations: Vec<String>,
     /// Conditions of a simulation, as far as the scheme gives them.
     pub simulation: Settings,
+    /// The largest sigma allowed, by unknown or family, in deg, deg/h, deg/h/g.
+    pub requirements: BTreeMap<String, f64>,
+    /// How far the gimbals turn.
+    pub gimbals: Gimbals,
 }
 
 /// Why a scheme cannot be analysed.
@@ -354,13 +300,27 @@ pub enum SchemeError {
         /// The segment.
         name: String,
     },
+    /// A position that the gimbals do not reach.
+    #[error("the gimbals do not reach `{name}` ({attitude}); expected {limits}")]
+    Gimbals {
+        /// The position.
+        name: String,
+        /// Its angles, and how far it has turned.
+        attitude: String,
+        /// The limits.
+        limits: String,
+    },
+    /// A slew to the first position.
+    #[error("`{name}` is the first position; expected no slew to it")]
+    FirstSlew {
+        /// The position.
+        name: String,
+    },
     /// An impossible mounting.
     #[error(transparent)]
     Geometry(#[from] super::geometry::GeometryError),
 }
 
-/// Smallest rotation in 1e-9 degrees.
-const MIN_ROTATION: i64 = 1_000_000;
 /// A turn in 1e-9 degrees.
 const FULL_TURN: i64 = 360_000_000_000;
 /// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of them.
@@ -375,7 +335,13 @@ impl Scheme {
         let positions = angles
             .into_iter()
             .enumerate()
-            .map(|(i, angles)| Position { name: format!("p{}", i + 1), angles, dwell: None, rotation: None })
+            .map(|(i, angles)| Position {
+                name: format!("p{}", i + 1),
+                angles,
+                dwell: None,
+                rotation: None,
+                slew: None,
+            })
             .collect();
         Self { positions, ..Self::default() }
     }
@@ -404,10 +370,28 @@ impl Scheme {
         }) {
             return Err(SchemeError::Rotation { name: p.name.clone() });
         }
+        if let Some(p) = self.positions.first().filter(|p| p.slew.is_some()) {
+            return Err(SchemeError::FirstSlew { name: p.name.clone() });
+        }
+        if let Some((name, attitude)) = self.positions.iter().find_map(|p| self.gimbals.beyond(p)) {
+            return Err(SchemeError::Gimbals { name, attitude, limits: self.gimbals.to_string() });
+        }
         if self.unknowns == Unknowns::Drift && (found > 1 || self.rotates()) {
             return Err(SchemeError::DriftPositions { found });
         }
         Ok(self.geometry.validate()?)
+    }
+
+    /// The scheme without a position; the one behind it is reached from another attitude then, the shortest way.
+    pub fn without_position(&self, index: usize) -> Self {
+        let mut rest = self.clone();
+        rest.positions =
+            self.positions.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, p)| p.clone()).collect();
+        if let Some(next) = rest.positions.get_mut(index) {
+            let rate_deg_s = next.slew.as_ref().and_then(|s| s.rate_deg_s).filter(|_| index > 0);
+            next.slew = rate_deg_s.map(|rate| SlewTo { rate_deg_s: Some(rate), ..SlewTo::default() });
+        }
+        rest
     }
 
     /// Whether a segment rotates.
@@ -435,11 +419,7 @@ impl Scheme {
             out.extend(angles.map(|angle| Station {
                 position,
                 index,
-                turned: Some(Turned {
-                    axis: r.axis,
-                    geographic: r.geographic,
-                    angle: Angle::from_nanodeg(angle),
-                }),
+                turned: Some(Turned { axis: r.axis, angle: Angle::from_nanodeg(angle) }),
                 continues: angle != 0,
             }));
         }

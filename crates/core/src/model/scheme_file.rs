@@ -1,16 +1,18 @@
 //! Scheme files: TOML, with errors that know their place.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_spanned::Spanned;
 
-use super::angle::Angle;
+use super::angle::{Angle, parse_decimal};
 use super::attitude::Euler;
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
-use super::scheme::{Latitude, Position, Rotation, RotationError, Scheme, parse_attitude};
+use super::rotation::{AxisError, MIN_ROTATION, Rotation, SlewTo, whole_angle};
+use super::scheme::{Latitude, Position, Scheme, parse_attitude};
 use crate::simulation::conditions::Settings;
 
 /// Why a file is no scheme.
@@ -48,6 +50,12 @@ pub struct SchemeFile {
     /// Conditions of `obsdeg simulate` and `obsdeg crosscheck`.
     #[serde(default)]
     simulation: Settings,
+    /// The largest sigma allowed by unknown or family, as in D_F = 0.02: deg for psi, deg/h for D_F, deg/h/g for the rest.
+    #[serde(default)]
+    requirements: BTreeMap<String, f64>,
+    /// How far the gimbals turn; freely when left out.
+    #[serde(default)]
+    gimbals: GimbalEntry,
     /// The positions in order.
     #[serde(default, rename = "position")]
     #[schemars(with = "Vec<PositionEntry>")]
@@ -76,6 +84,9 @@ pub struct PositionEntry {
     /// Makes the position a rotating segment that starts there; dwell_s is how long it turns.
     #[schemars(with = "Option<RotationEntry>")]
     rotation: Option<Spanned<RotationEntry>>,
+    /// The way from the position before, with psi^n carried; Z is not used meanwhile.
+    #[schemars(with = "Option<SlewEntry>")]
+    slew: Option<Spanned<SlewEntry>>,
     /// Directions of X_p, Y_p, Z_p out of N S U D E W, as in "NUE".
     #[schemars(with = "Option<String>")]
     attitude: Option<Spanned<String>>,
@@ -88,9 +99,43 @@ pub struct RotationEntry {
     /// X_p, Y_p, Z_p (platform) or N, U, E (geographic).
     #[schemars(with = "String")]
     about: Spanned<String>,
-    /// The whole angle in degrees, right-handed.
-    #[schemars(with = "f64")]
-    angle_deg: Spanned<toml::Value>,
+    /// The whole angle in degrees, right-handed. Two of angle_deg, rate_deg_s and the position's dwell_s say all; angle_deg alone
+    /// goes with the dwell of the conditions.
+    #[schemars(with = "Option<f64>")]
+    angle_deg: Option<Spanned<toml::Value>>,
+    /// The rate in deg/s, right-handed.
+    #[schemars(with = "Option<f64>")]
+    rate_deg_s: Option<Spanned<toml::Value>>,
+}
+
+/// A turn to a position at a constant rate.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SlewEntry {
+    /// The rate in deg/s; slew_rate_deg_s of the simulation when left out.
+    #[schemars(with = "Option<f64>")]
+    rate_deg_s: Option<Spanned<f64>>,
+    /// X_p, Y_p, Z_p (platform) or N, U, E (geographic); the shortest way about any axis when left out.
+    #[schemars(with = "Option<String>")]
+    about: Option<Spanned<String>>,
+    /// The whole angle about that axis in degrees, right-handed; the shorter way when left out.
+    #[schemars(with = "Option<f64>")]
+    angle_deg: Option<Spanned<toml::Value>>,
+}
+
+/// Limits of the Euler angles as [low, high] in degrees.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GimbalEntry {
+    /// Of alpha.
+    #[schemars(with = "Option<[f64; 2]>")]
+    alpha_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+    /// Of beta.
+    #[schemars(with = "Option<[f64; 2]>")]
+    beta_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+    /// Of gamma.
+    #[schemars(with = "Option<[f64; 2]>")]
+    gamma_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
 }
 
 /// Reads a scheme.
@@ -111,6 +156,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         measured_azimuth: file.measured_azimuth,
         combinations: file.combinations,
         simulation: file.simulation,
+        requirements: file.requirements,
         ..Scheme::default()
     };
     if let Some(geometry) = &file.geometry {
@@ -133,6 +179,22 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         };
         let parsed: Result<Unknowns, _> = joined.parse();
         scheme.unknowns = parsed.map_err(|e| at(terms.span(), e.to_string()))?;
+    }
+    let g = &file.gimbals;
+    for (slot, entry) in scheme.gimbals.limits.iter_mut().zip([&g.alpha_deg, &g.beta_deg, &g.gamma_deg]) {
+        let Some(list) = entry else { continue };
+        let limits: Option<Vec<i64>> =
+            list.get_ref().iter().map(|v| parse_decimal(&literal(v)).ok()).collect();
+        match limits.as_deref() {
+            Some(&[low, high]) if low <= high => *slot = Some([low, high]),
+            _ => {
+                let message = format!(
+                    "`{}` are no gimbal limits; expected [low, high] in decimal degrees",
+                    &text[list.span()]
+                );
+                return Err(at(list.span(), message));
+            }
+        }
     }
     if file.positions.is_empty() {
         return Err(SchemeFileError {
@@ -167,24 +229,86 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
                 format!("position name `{name}`; expected letters, digits, `_`, `-`, `.` and blanks"),
             ));
         }
-        let rotation = p.rotation.as_ref().map(|r| {
-            let (about, angle) = (&r.get_ref().about, &r.get_ref().angle_deg);
-            let text = literal(angle);
-            Rotation::new(about.get_ref(), &text).map_err(|e| match e {
-                RotationError::About { .. } => at(about.span(), e.to_string()),
-                RotationError::Angle { .. } => at(angle.span(), e.to_string()),
-            })
-        });
         let dwell =
             p.dwell_s.as_ref().map(|d| literal(d).parse::<Dwell>().map_err(|e| at(d.span(), e.to_string())));
-        scheme.positions.push(Position {
-            name,
-            angles,
-            dwell: dwell.transpose()?,
-            rotation: rotation.transpose()?,
-        });
+        let mut dwell = dwell.transpose()?;
+        let rotation = match &p.rotation {
+            None => None,
+            Some(r) => {
+                let RotationEntry { about, angle_deg, rate_deg_s } = r.get_ref();
+                let axis = about.get_ref().parse().map_err(|e: AxisError| at(about.span(), e.to_string()))?;
+                let angle = |v: &Spanned<toml::Value>| {
+                    whole_angle(&literal(v)).map_err(|e| at(v.span(), e.to_string()))
+                };
+                let angle = match (angle_deg, rate_deg_s, dwell) {
+                    (Some(a), None, _) => angle(a)?,
+                    (Some(a), Some(rate), None) => {
+                        let (angle, seconds) = (angle(a)?, literal(rate).parse::<f64>());
+                        // how long it takes needs no exact number
+                        let seconds = seconds.map_or(f64::NAN, |x| angle.nanodeg() as f64 / 1e9 / x);
+                        let wrong = || {
+                            let message = "expected a rate in deg/s with the sign of angle_deg, that ends within 1000000 s";
+                            at(rate.span(), message.into())
+                        };
+                        dwell = Some(Dwell::from_seconds(seconds).ok_or_else(wrong)?);
+                        angle
+                    }
+                    (None, Some(rate), Some(dwell)) => turned(&literal(rate), dwell).ok_or_else(|| {
+                        let message = format!(
+                            "at `{}` deg/s for {dwell} s there is no exact angle of at least 0.001 degrees; expected a decimal",
+                            literal(rate)
+                        );
+                        at(rate.span(), message)
+                    })?,
+                    _ => {
+                        let message = "expected angle_deg, or rate_deg_s with either angle_deg or dwell_s of the position";
+                        return Err(at(r.span(), message.into()));
+                    }
+                };
+                Some(Rotation { axis, angle })
+            }
+        };
+        let slew = match &p.slew {
+            None => None,
+            Some(s) if i == 0 => {
+                return Err(at(s.span(), "a slew to the first position; expected none".into()));
+            }
+            Some(s) => {
+                let SlewEntry { rate_deg_s, about, angle_deg } = s.get_ref();
+                if let Some(rate) =
+                    rate_deg_s.as_ref().filter(|r| !(r.get_ref().is_finite() && *r.get_ref() > 0.0))
+                {
+                    return Err(at(rate.span(), "expected a rate above 0 deg/s".into()));
+                }
+                if let (Some(angle), None) = (angle_deg, about) {
+                    return Err(at(angle.span(), "an angle without an axis; expected `about` too".into()));
+                }
+                let axis = about
+                    .as_ref()
+                    .map(|a| a.get_ref().parse().map_err(|e: AxisError| at(a.span(), e.to_string())));
+                let angle = angle_deg
+                    .as_ref()
+                    .map(|a| whole_angle(&literal(a)).map_err(|e| at(a.span(), e.to_string())));
+                let rate_deg_s = rate_deg_s.as_ref().map(|r| *r.get_ref());
+                Some(SlewTo { rate_deg_s, axis: axis.transpose()?, angle: angle.transpose()? })
+            }
+        };
+        scheme.positions.push(Position { name, angles, dwell, rotation, slew });
+        if let Some((_, attitude)) = scheme.positions.last().and_then(|p| scheme.gimbals.beyond(p)) {
+            let message = format!("the gimbals do not reach {attitude}; expected {}", scheme.gimbals);
+            return Err(at(entry.span(), message));
+        }
     }
     Ok(scheme)
+}
+
+/// The exact angle of so many deg/s over a dwell, if it is a decimal.
+fn turned(rate: &str, dwell: Dwell) -> Option<Angle> {
+    let rate = i128::from(parse_decimal(rate).ok()?);
+    let product = rate * i128::from(dwell.nanoseconds());
+    let nanodeg = i64::try_from(product / 1_000_000_000).ok().filter(|_| product % 1_000_000_000 == 0)?;
+    let limit = super::angle::MAX_DEGREES * 1_000_000_000;
+    (MIN_ROTATION..=limit).contains(&nanodeg.abs()).then(|| Angle::from_nanodeg(nanodeg))
 }
 
 #[cfg(test)]
@@ -209,6 +333,16 @@ angles_deg = [0, -12.123456789, "alpha"]
 [[position]]
 name = "upside down"
 attitude = "NDW"
+dwell_s = 100
+rotation = { about = "E", rate_deg_s = -0.3 }
+slew = { rate_deg_s = 2, about = "N", angle_deg = 180 }
+[[position]]
+angles_deg = [0, 0, 0]
+rotation = { about = "Z_p", angle_deg = 45, rate_deg_s = 0.5 }
+[requirements]
+D_F = 0.01
+[gimbals]
+alpha_deg = [-180, 180.5]
 "#,
         )
         .expect("a scheme");
@@ -220,6 +354,16 @@ attitude = "NDW"
             (scheme.positions[1].name.as_str(), scheme.positions[1].angles_text().as_str()),
             ("upside down", "180,0,0")
         );
+        let [_, p2, p3] = &scheme.positions[..] else { panic!("three positions") };
+        assert_eq!(p2.rotation.as_ref().map(ToString::to_string), Some("E:-30".into()));
+        assert_eq!(p3.dwell.map(|d| d.seconds()), Some(90.0));
+        let slew = p2.slew.clone().expect("a slew");
+        assert_eq!(
+            (slew.rate_deg_s, slew.axis, slew.angle),
+            (Some(2.0), "N".parse().ok(), "180".parse().ok())
+        );
+        assert_eq!(scheme.requirements["D_F"], 0.01);
+        assert_eq!(scheme.gimbals.limits, [Some([-180_000_000_000, 180_500_000_000]), None, None]);
         assert_eq!(scheme.validate(), Ok(()));
     }
 
@@ -245,6 +389,19 @@ attitude = "NDW"
         };
         assert_eq!(rotation("X", "90").as_deref(), Some("\"X\""));
         assert_eq!(rotation("X_p", "0.0").as_deref(), Some("0.0"));
+        let entry = |keys: &str| place(&format!("[[position]]\nattitude=\"NUE\"\n{keys}"));
+        assert_eq!(entry("rotation={about=\"U\"}").0.as_deref(), Some("{about=\"U\"}"));
+        let third = entry("dwell_s=1\nrotation={about=\"U\",rate_deg_s=0.0001}");
+        assert!(third.0.as_deref() == Some("0.0001") && third.1.contains("no exact angle"), "{third:?}");
+        assert_eq!(entry("rotation={about=\"U\",rate_deg_s=-1,angle_deg=5}").0.as_deref(), Some("-1"));
+        assert!(entry("slew={rate_deg_s=1}").1.contains("first position"));
+        let slew = |keys: &str| entry(&format!("[[position]]\nattitude=\"NDW\"\nslew={{{keys}}}")).0;
+        assert_eq!(slew("rate_deg_s=0").as_deref(), Some("0"));
+        assert_eq!(slew("angle_deg=180").as_deref(), Some("180"));
+        assert_eq!(slew("about=\"X\"").as_deref(), Some("\"X\""));
+        let gimbals = |keys: &str| place(&format!("[[position]]\nangles_deg=[0,90,0]\n[gimbals]\n{keys}"));
+        assert_eq!(gimbals("beta_deg=[80,-80]").0.as_deref(), Some("[80,-80]"));
+        assert!(gimbals("beta_deg=[-80,80]").1.contains("0,90,0; expected beta from -80 to 80 deg"));
         assert!(place("carry = ").0.is_some());
         assert_eq!(place("").0, None);
     }

@@ -46,7 +46,7 @@ pub struct ConditionsReport {
     pub latitude_by_default: bool,
     /// Largest step in s.
     pub step_s: f64,
-    /// Rate of slews in deg/s; null: instantaneous.
+    /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
     pub slew_rate_deg_s: Option<f64>,
     /// Noise of the observation per sample in g.
     pub accelerometer_noise_g: f64,
@@ -97,9 +97,9 @@ pub struct Estimate {
     /// Sigma at the start.
     pub prior_sigma: f64,
     /// The sigma to be reached.
-    pub target_sigma: Option<f64>,
+    pub required_sigma: Option<f64>,
     /// When it was reached, in s.
-    pub time_to_target_s: Option<f64>,
+    pub time_to_requirement_s: Option<f64>,
     /// What came out.
     pub verdict: Outcome,
 }
@@ -108,9 +108,9 @@ pub struct Estimate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Sigma is at or below the target.
+    /// Sigma is at or below what is required.
     Reached,
-    /// Sigma fell, but not to the target.
+    /// Sigma fell, but not to what is required.
     Converging,
     /// Sigma is (nearly) that of the prior: the data say nothing.
     PriorOnly,
@@ -157,8 +157,8 @@ pub struct Validity {
     pub accelerometer_noise_g: f64,
     /// Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: what the drift model (3) leaves out.
     pub neglected_dph: f64,
-    /// The smallest target of a drift coefficient, in deg/h (per g).
-    pub smallest_target_dph: Option<f64>,
+    /// The smallest sigma required of a drift coefficient, in deg/h (per g).
+    pub smallest_requirement_dph: Option<f64>,
     /// Whether both are small.
     pub holds: bool,
 }

@@ -2,7 +2,7 @@
 
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
-use crate::model::scheme::Rotation;
+use crate::model::rotation::{Axis, Rotation, SlewTo};
 
 /// `a b` in floating point.
 pub(crate) fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
@@ -60,6 +60,16 @@ pub(crate) fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
     axis.map(|x| x * std::f64::consts::PI / norm)
 }
 
+/// The unit vector of `axis` in the axes of c.
+fn axis_in_c(from: &Matrix3<f64>, axis: Axis) -> [f64; 3] {
+    let unit = std::array::from_fn(|i| f64::from(u8::from(i == axis.index)));
+    if axis.geographic { apply(&transpose(from), &unit) } else { unit }
+}
+
+/// A turn does not lead to the position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoWay;
+
 /// A turn from one attitude to another about a fixed axis at a constant rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slew {
@@ -72,24 +82,40 @@ pub struct Slew {
 }
 
 impl Slew {
-    /// The shortest turn from `from` to `to` at `rate_rad_s`; `None` when they are the same.
-    pub fn between(from: &Matrix3<f64>, to: &Matrix3<f64>, rate_rad_s: f64) -> Option<Self> {
-        // C(t) = C_0 exp([v x] t/T)
-        let v = rotation_vector(&times(&transpose(from), to));
-        let angle = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if angle < 1e-12 {
-            return None;
-        }
-        let duration_s = angle / rate_rad_s;
-        Some(Self { from: *from, rate: v.map(|x| x / duration_s), duration_s })
-    }
-
     /// A rotating segment from `from` that takes `duration_s`.
     pub fn about(from: &Matrix3<f64>, rotation: &Rotation, duration_s: f64) -> Self {
         let rate = (rotation.angle.nanodeg() as f64 / 1e9).to_radians() / duration_s;
-        let axis = std::array::from_fn(|i| if i == rotation.axis { rate } else { 0.0 });
-        let rate = if rotation.geographic { apply(&transpose(from), &axis) } else { axis };
-        Self { from: *from, rate, duration_s }
+        Self { from: *from, rate: axis_in_c(from, rotation.axis).map(|x| x * rate), duration_s }
+    }
+
+    /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn.
+    ///
+    /// # Errors
+    /// [`NoWay`] when a turn about its axis, or by its angle, does not lead there.
+    pub fn to(
+        from: &Matrix3<f64>,
+        to: &Matrix3<f64>,
+        slew: &SlewTo,
+        rate_rad_s: f64,
+    ) -> Result<Option<Self>, NoWay> {
+        let shortest = rotation_vector(&times(&transpose(from), to));
+        let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let axis = match slew.axis {
+            Some(axis) => axis_in_c(from, axis),
+            None if length(&shortest) < 1e-12 => return Ok(None),
+            None => shortest.map(|x| x / length(&shortest)),
+        };
+        // about a given axis the shorter way; by a given angle whatever it is
+        let along: f64 = shortest.iter().zip(&axis).map(|(x, a)| x * a).sum();
+        let angle = slew.angle.as_ref().map_or(along, |a| (a.nanodeg() as f64 / 1e9).to_radians());
+        let reached = times(from, &rotation(&axis.map(|x| x * angle)));
+        let missed = (0..9).map(|k| (reached[k / 3][k % 3] - to[k / 3][k % 3]).abs()).fold(0.0, f64::max);
+        if missed > 1e-6 {
+            return Err(NoWay);
+        }
+        let duration_s = angle.abs() / rate_rad_s;
+        let rate = axis.map(|x| x * angle / duration_s);
+        Ok((angle.abs() > 1e-12).then_some(Self { from: *from, rate, duration_s }))
     }
 
     /// `C_c^n` after `t` seconds.
@@ -128,8 +154,32 @@ mod tests {
     #[test]
     fn a_slew_ends_where_it_should() {
         let (from, to) = (rotation(&[0.3, -0.2, 1.0]), rotation(&[-1.3, 0.7, 0.4]));
-        let slew = Slew::between(&from, &to, 0.02).expect("a turn");
+        let eigenaxis = SlewTo::default();
+        let slew = Slew::to(&from, &to, &eigenaxis, 0.02).expect("a way").expect("a turn");
         assert!(distance(&slew.at(slew.duration_s), &to) < 1e-12);
-        assert_eq!(Slew::between(&from, &from, 0.02), None);
+        assert_eq!(Slew::to(&from, &from, &eigenaxis, 0.02), Ok(None));
+        // about another axis there is no way
+        let about = SlewTo { axis: "X_p".parse().ok(), ..SlewTo::default() };
+        assert_eq!(Slew::to(&from, &to, &about, 0.02), Err(NoWay));
+    }
+
+    #[test]
+    fn a_slew_about_an_axis_the_long_way() {
+        let unit = rotation(&[0.0; 3]);
+        let to = rotation(&[0.0, 1.0, 0.0].map(|x| x * 70f64.to_radians()));
+        let degrees = |slew: &SlewTo| {
+            let slew = Slew::to(&unit, &to, slew, 0.01).expect("a way").expect("a turn");
+            assert!(distance(&slew.at(slew.duration_s), &to) < 1e-9);
+            (slew.duration_s * 0.01).to_degrees().round() * slew.rate[1].signum()
+        };
+        let about = |angle: Option<i32>| SlewTo {
+            axis: "U".parse().ok(),
+            angle: angle.map(crate::model::Angle::from_degrees),
+            rate_deg_s: None,
+        };
+        assert_eq!(degrees(&about(None)), 70.0);
+        assert_eq!(degrees(&about(Some(-290))), -290.0);
+        assert_eq!(degrees(&about(Some(430))), 430.0);
+        assert_eq!(Slew::to(&unit, &to, &about(Some(71)), 0.01), Err(NoWay));
     }
 }

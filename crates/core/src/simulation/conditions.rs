@@ -1,5 +1,6 @@
 //! The conditions of a run: noise, steps, true values, priors. All in the units of the report.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -7,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SimulationError;
-use crate::model::{Latitude, Platform};
+use crate::model::{Latitude, Platform, Position, Scheme};
 
 /// How the truth is generated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -128,8 +129,10 @@ pub struct Conditions {
     pub step_s: f64,
     /// Dwell of positions that do not say theirs, in s.
     pub dwell_s: f64,
-    /// Rate of the rotations between positions in deg/s; `None`: instantaneous.
+    /// Rate of the rotations between positions in deg/s; `None`: instantaneous, unless the position says otherwise.
     pub slew_rate_deg_s: Option<f64>,
+    /// False: every position is reached at once, whatever it says.
+    pub slews: bool,
     /// White noise of the observation per sample and axis, in g.
     pub accelerometer_noise_g: f64,
     /// Noise of a measured azimuth per sample, in deg.
@@ -146,8 +149,8 @@ pub struct Conditions {
     pub estimates: Vec<Assignment>,
     /// Initial standard deviations.
     pub priors: Vec<Assignment>,
-    /// Standard deviations to be reached.
-    pub targets: Vec<Assignment>,
+    /// The largest standard deviations allowed.
+    pub requirements: Vec<Assignment>,
 }
 
 /// The latitude of a scheme that names none, in degrees (the paper's is not given).
@@ -158,7 +161,7 @@ fn assign(name: &str, value: f64) -> Assignment {
 }
 
 impl Default for Conditions {
-    /// The paper's run; what it does not give (prior, latitude, targets) is chosen here.
+    /// The paper's run; what it does not give (prior, latitude, requirements) is chosen here.
     fn default() -> Self {
         let first_order = |value| ["D_I", "D_O", "D_S"].map(|name| assign(name, value));
         let drift = [("D_FX", 11.0), ("D_FY", 12.0), ("D_FZ", 13.0)].map(|(n, v)| assign(n, v));
@@ -169,6 +172,7 @@ impl Default for Conditions {
             step_s: 10.0,
             dwell_s: 1000.0,
             slew_rate_deg_s: None,
+            slews: true,
             accelerometer_noise_g: 1e-5,
             azimuth_noise_deg: 0.001,
             drift_noise: DriftNoise::OneStep(0.01),
@@ -177,7 +181,7 @@ impl Default for Conditions {
             drift_scale: 1.0,
             estimates: Vec::new(),
             priors: priors.into_iter().chain(first_order(10.0)).collect(),
-            targets: vec![assign("D", 0.1), assign("eps", 0.1), assign("psi", 0.01)],
+            requirements: vec![assign("D", 0.1), assign("eps", 0.1), assign("psi", 0.01)],
         }
     }
 }
@@ -206,20 +210,24 @@ pub struct Settings {
     pub drift_scale: Option<f64>,
     /// True values by unknown or family, as in D_F = 11.
     #[serde(default)]
-    pub values: std::collections::BTreeMap<String, f64>,
+    pub values: BTreeMap<String, f64>,
     /// Initial estimates.
     #[serde(default)]
-    pub estimates: std::collections::BTreeMap<String, f64>,
+    pub estimates: BTreeMap<String, f64>,
     /// Initial standard deviations.
     #[serde(default)]
-    pub priors: std::collections::BTreeMap<String, f64>,
-    /// Standard deviations to be reached.
-    #[serde(default)]
-    pub targets: std::collections::BTreeMap<String, f64>,
+    pub priors: BTreeMap<String, f64>,
+}
+
+/// Families before single unknowns.
+fn by_family(given: &BTreeMap<String, f64>) -> Vec<Assignment> {
+    let mut given: Vec<Assignment> = given.iter().map(|(n, v)| assign(n, *v)).collect();
+    given.sort_by_key(|a| a.name.len());
+    given
 }
 
 impl Conditions {
-    /// Overrides what `settings` gives. Families come before single unknowns.
+    /// Overrides what `settings` gives.
     pub fn apply(&mut self, settings: &Settings) {
         fn set<T: Copy>(slot: &mut T, value: Option<T>) {
             if let Some(value) = value {
@@ -239,12 +247,23 @@ impl Conditions {
             (&mut self.values, &settings.values),
             (&mut self.estimates, &settings.estimates),
             (&mut self.priors, &settings.priors),
-            (&mut self.targets, &settings.targets),
         ] {
-            let mut given: Vec<Assignment> = given.iter().map(|(n, v)| assign(n, *v)).collect();
-            given.sort_by_key(|a| a.name.len());
-            list.extend(given);
+            list.extend(by_family(given));
         }
+    }
+
+    /// The conditions of a scheme: the paper's, with what the scheme gives.
+    pub fn of(scheme: &Scheme) -> Self {
+        let mut out = Self::default();
+        out.apply(&scheme.simulation);
+        out.requirements.extend(by_family(&scheme.requirements));
+        out
+    }
+
+    /// The rate in deg/s at which a position is reached; `None`: at once.
+    pub fn slew_rate(&self, position: &Position) -> Option<f64> {
+        let own = position.slew.as_ref().and_then(|s| s.rate_deg_s);
+        own.or(self.slew_rate_deg_s).filter(|_| self.slews)
     }
 
     /// Checks what the types do not.
@@ -266,7 +285,7 @@ impl Conditions {
 }
 
 /// The latitude of a scheme, or the default.
-pub fn latitude_of(scheme: &crate::model::Scheme) -> Option<Latitude> {
+pub fn latitude_of(scheme: &Scheme) -> Option<Latitude> {
     scheme.latitude.or_else(|| DEFAULT_LATITUDE.parse().ok())
 }
 

@@ -39,6 +39,14 @@ pub enum SimulationError {
         /// The carry found.
         carry: Carry,
     },
+    /// The turn of a slew ends elsewhere.
+    #[error(
+        "the slew to `{name}` does not lead there: expected an axis and angle that turn the position before into it"
+    )]
+    SlewMisses {
+        /// The position.
+        name: String,
+    },
     /// A filter that does not know of a position knows of no slew to it.
     #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
     DroppedSlew,
@@ -117,7 +125,7 @@ fn summary(
 ) -> Result<Simulation, SimulationError> {
     let n = plan.unknowns();
     let units: Vec<&str> = plan.platform.units().to_vec();
-    let targets = resolve("target sigma", &plan.platform, &conditions.targets, f64::NAN)?;
+    let requirements = resolve("required sigma", &plan.platform, &conditions.requirements, f64::NAN)?;
     let mut quantities = Vec::new();
     for (c, u) in prediction.unknowns.iter().enumerate() {
         let scale = si_per_shown(units[c]);
@@ -126,7 +134,7 @@ fn summary(
             status: u.status,
             degree: u.degree,
             accuracy_order: u.accuracy_order,
-            ..estimate(&plan.platform.names()[c], units[c], scale, series, record, Some(targets[c]))
+            ..estimate(&plan.platform.names()[c], units[c], scale, series, record, Some(requirements[c]))
         });
     }
     let mut combinations = Vec::new();
@@ -137,11 +145,18 @@ fn summary(
             status: c.status,
             degree: c.degree,
             accuracy_order: c.accuracy_order,
-            ..estimate(&c.expression, unit, si_per_shown(unit), series, record, Some(targets[c.terms[0].0]))
+            ..estimate(
+                &c.expression,
+                unit,
+                si_per_shown(unit),
+                series,
+                record,
+                Some(requirements[c.terms[0].0]),
+            )
         });
     }
     let consistency = consistency(plan, record, &quantities)?;
-    let validity = validity(plan, conditions, record, &targets);
+    let validity = validity(plan, conditions, record, &requirements);
     Ok(Simulation {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -193,20 +208,20 @@ fn estimate(
     scale: f64,
     series: &record::Series,
     record: &Record,
-    target: Option<f64>,
+    required: Option<f64>,
 ) -> Estimate {
     let last = |v: &[f64]| v.last().copied().unwrap_or(0.0) / scale;
     let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
     let prior_sigma = series.sigma[0] / scale;
-    let target_sigma = target.filter(|t| !t.is_nan());
-    let reached = target_sigma.and_then(|t| series.sigma.iter().position(|s| s / scale <= t));
+    let required_sigma = required.filter(|t| !t.is_nan());
+    let reached = required_sigma.and_then(|t| series.sigma.iter().position(|s| s / scale <= t));
     let error = estimate - truth;
     let error_over_sigma = if sigma > 0.0 { error / sigma } else { 0.0 };
     let verdict = if error_over_sigma.abs() > 4.0 {
         Outcome::Inconsistent
     } else if sigma > 0.9 * prior_sigma {
         Outcome::PriorOnly
-    } else if target_sigma.is_none_or(|t| sigma <= t) {
+    } else if required_sigma.is_none_or(|t| sigma <= t) {
         Outcome::Reached
     } else {
         Outcome::Converging
@@ -223,8 +238,8 @@ fn estimate(
         sigma,
         error_over_sigma,
         prior_sigma,
-        target_sigma,
-        time_to_target_s: reached.map(|i| record.time_s[i]),
+        required_sigma,
+        time_to_requirement_s: reached.map(|i| record.time_s[i]),
         verdict,
     }
 }
@@ -264,13 +279,13 @@ fn consistency(
 }
 
 /// The validity of the small-angle model, by the figures that decide it.
-pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, targets: &[f64]) -> Validity {
+pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, requirements: &[f64]) -> Validity {
     let psi = record.largest_psi;
     let dph = si_per_shown("deg/h");
     let sensitive = plan.platform.units().iter().zip(&record.series).filter(|(unit, _)| unit.contains("/g"));
     let coefficient = sensitive.map(|(_, s)| s.truth[0].abs()).fold(0.0, f64::max) / dph;
     let smallest =
-        plan.platform.units().iter().zip(targets).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
+        plan.platform.units().iter().zip(requirements).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
     let smallest = smallest.map(|(_, t)| *t).reduce(f64::min);
     let (neglected_g, neglected_dph) = (psi * psi / 2.0, coefficient * psi);
     Validity {
@@ -278,7 +293,7 @@ pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, targets: 
         neglected_g,
         accelerometer_noise_g: conditions.accelerometer_noise_g,
         neglected_dph,
-        smallest_target_dph: smallest,
+        smallest_requirement_dph: smallest,
         holds: neglected_g <= conditions.accelerometer_noise_g && smallest.is_none_or(|t| neglected_dph <= t),
     }
 }

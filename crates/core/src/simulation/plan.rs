@@ -83,10 +83,8 @@ impl Plan {
         if let Some(name) = scheme.generic_names().first() {
             return Err(SimulationError::GenericAngle { name: name.clone() });
         }
-        if conditions.slew_rate_deg_s.is_some()
-            && scheme.carry != Carry::Inertial
-            && scheme.positions.len() > 1
-        {
+        let rates = scheme.positions.iter().skip(1).map(|p| conditions.slew_rate(p));
+        if scheme.carry != Carry::Inertial && rates.flatten().next().is_some() {
             return Err(SimulationError::SlewCarry { carry: scheme.carry });
         }
         let platform = Platform::new(scheme.clone())?;
@@ -105,7 +103,7 @@ impl Plan {
             .collect();
         let attitudes: Vec<_> = bounds.iter().map(|b| point.attitudes[b.0]).collect();
         let ends: Vec<_> = bounds.iter().map(|b| point.attitudes[b.1]).collect();
-        let segments = timeline(&scheme, conditions, &attitudes, &ends);
+        let segments = timeline(&scheme, conditions, &attitudes, &ends)?;
         let steps: usize = segments.iter().map(|s| s.steps).sum();
         if steps > MAX_STEPS {
             return Err(SimulationError::TooManySteps { found: steps });
@@ -280,7 +278,7 @@ fn timeline(
     conditions: &Conditions,
     attitudes: &[Matrix3<f64>],
     ends: &[Matrix3<f64>],
-) -> Vec<Segment> {
+) -> Result<Vec<Segment>, SimulationError> {
     let mut segments: Vec<Segment> = Vec::new();
     let mut start_s = 0.0;
     let mut push = |position, kind, duration: f64, steps: usize| {
@@ -289,9 +287,11 @@ fn timeline(
         start_s += duration;
     };
     for (position, p) in scheme.positions.iter().enumerate() {
-        if let (Some(rate), true) = (conditions.slew_rate_deg_s, position > 0) {
-            let slew = Slew::between(&ends[position - 1], &attitudes[position], rate.to_radians());
-            if let Some(slew) = slew {
+        if let (Some(rate), true) = (conditions.slew_rate(p), position > 0) {
+            let how = p.slew.clone().unwrap_or_default();
+            let slew = Slew::to(&ends[position - 1], &attitudes[position], &how, rate.to_radians());
+            let name = || p.name.clone();
+            if let Some(slew) = slew.map_err(|_| SimulationError::SlewMisses { name: name() })? {
                 let duration = slew.duration_s;
                 push(position, Kind::Slew(slew), duration, 1);
             }
@@ -311,7 +311,7 @@ fn timeline(
             }
         }
     }
-    segments
+    Ok(segments)
 }
 
 /// The lower triangular root of a covariance, zero in directions without noise.
