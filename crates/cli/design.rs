@@ -1,19 +1,20 @@
 //! `obsdeg design`: the fewest positions, and the best of a number of positions.
 
 use std::fmt::Write;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use clap::{Args, ValueEnum};
-use obsdeg_core::design::information::Criterion;
-use obsdeg_core::design::{Design, DesignError, Options, design};
-use obsdeg_core::model::attitude::{cardinal, cardinal_names};
-use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Latitude, Platform, Scheme, Unknowns};
+use obsdeg_core::design::answer::Found;
+use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design};
+use obsdeg_core::model::angle::{format_decimal, parse_decimal};
+use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_core::simulation::Conditions;
-use obsdeg_core::simulation::conditions::resolve;
+use obsdeg_core::simulation::conditions::latitude_of;
+use obsdeg_report::{File, Format, Layout, ReportError, design_figures};
 
-use crate::arguments::{OutputArguments, read_scheme};
+use crate::arguments::{FolderArguments, read_scheme};
 use crate::conditions::MeasurementArguments;
 use crate::failure::Failure;
 use crate::progress::Bar;
@@ -23,12 +24,15 @@ const AFTER_HELP: &str = "\
 Examples:
   obsdeg design --minimum --carry inertial
   obsdeg design --positions 5 --carry inertial
-  obsdeg design --positions 12 --dwell 417 --carry inertial --winner scheme.toml
-  obsdeg design --positions 4 --candidates attitudes.toml
-  obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01
+  obsdeg design --positions 12 --dwell 417 --carry inertial -o twelve
+  obsdeg design --positions 5 --carry inertial --slew-rate 1 --max-slew 120 --max-time 5300
+  obsdeg design --positions 6 --observable D_F,D_O,D_S --max-degree 1
+  obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01 --meet
+  obsdeg design --positions 5 --carry inertial --candidates grid:45 --gimbal beta=-60:60 --refine
 
-Candidates are the 24 cardinal attitudes, or the positions of a scheme file. Up to 50 million sequences are searched
-exhaustively, which proves the best; beyond, coordinate exchange from random starts. Ctrl-C ends with the best so far.
+Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. The
+folder of -o holds design.json, winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C
+ends with the best so far.
 Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error.";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -47,14 +51,14 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "K", required_unless_present = "minimum")]
     positions: Option<usize>,
 
-    /// Only find the fewest positions that make every coefficient observable, with the proof
+    /// Only find the fewest positions that make every required coefficient observable, with the proof
     #[arg(long, conflicts_with = "positions")]
     minimum: bool,
 
-    /// Positions of this scheme file to choose from; its carry, latitude, geometry and terms hold too (default: the 24
-    /// cardinal attitudes)
-    #[arg(long, value_name = "FILE")]
-    candidates: Option<std::path::PathBuf>,
+    /// What to choose from: cardinal (the 24 attitudes along North, Up, East, South, Down, West), grid:DEG (Euler angles in steps), or
+    /// the positions of a scheme file, whose carry, latitude, geometry, terms, conditions and gimbal limits hold too
+    #[arg(long, value_name = "WHAT", default_value = "cardinal")]
+    candidates: String,
 
     /// What is carried between positions: platform (the paper), inertial or reset
     #[arg(long, value_name = "CARRY")]
@@ -68,122 +72,184 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "TERMS")]
     terms: Option<Unknowns>,
 
-    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement)
-    #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true)]
-    criterion: CriterionArgument,
-
     /// How many schemes are listed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
     keep: u16,
 
     /// Restarts of the exchange
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     restarts: u64,
+
+    /// Move the angles of the best scheme continuously, to hundredths of a degree
+    #[arg(long)]
+    refine: bool,
+
+    /// Other numbers of positions for the front of total time against the criterion
+    #[arg(long, value_name = "K", value_delimiter = ',')]
+    front: Vec<usize>,
 
     /// Seed of all random choices; the result does not depend on the number of threads
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Write the best scheme to a scheme file
-    #[arg(long, value_name = "FILE", requires = "positions")]
-    winner: Option<std::path::PathBuf>,
-
     #[command(flatten)]
-    output: OutputArguments,
+    wanted: WantedArguments,
 
     #[command(flatten)]
     measurement: MeasurementArguments,
+
+    #[command(flatten)]
+    output: FolderArguments,
+}
+
+/// What a scheme must be.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is wanted")]
+struct WantedArguments {
+    /// Coefficients or families that must be observable and that the criterion is about, such as D_F,D_IX (default: all)
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    observable: Vec<String>,
+
+    /// Largest degree, of all required coefficients or of one or a family: 1, D_F=1
+    #[arg(long, value_name = "[NAME=]K", value_parser = degree_cap)]
+    max_degree: Vec<(Option<String>, usize)>,
+
+    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement);
+    /// a smaller worst degree comes before it
+    #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true)]
+    criterion: CriterionArgument,
+
+    /// Only schemes that meet every requirement
+    #[arg(long)]
+    meet: bool,
+
+    /// Largest total time with slews, in s
+    #[arg(long, value_name = "S")]
+    max_time: Option<f64>,
+
+    /// Longest slew between successive positions, in s
+    #[arg(long, value_name = "S", requires = "slew_rate")]
+    max_slew: Option<f64>,
+
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous)
+    #[arg(long, value_name = "DEG_S")]
+    slew_rate: Option<f64>,
+
+    /// How far a gimbal turns in degrees, as alpha=-180:180, beta=-80:80; attitudes beyond are left out
+    #[arg(long, value_name = "ANGLE=LOW:HIGH", allow_hyphen_values = true)]
+    gimbal: Vec<String>,
+}
+
+fn degree_cap(text: &str) -> Result<(Option<String>, usize), String> {
+    let (name, cap) = text.split_once('=').map_or((None, text), |(name, cap)| (Some(name.trim()), cap));
+    let cap =
+        cap.trim().parse().map_err(|_| format!("expected a degree, as in 1 or D_F=1, found `{text}`"))?;
+    Ok((name.map(Into::into), cap))
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
-    output::check(&a.output)?;
-    if let Some(path) = a.winner.as_ref().filter(|p| p.exists() && !a.output.force) {
-        return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
-    }
-    let mut base = a.candidates.as_deref().map(read_scheme).transpose()?.unwrap_or_default();
+    output::check_folder(&a.output)?;
+    let (mut base, candidates) = candidates(&a.candidates)?;
     base.carry = a.carry.unwrap_or(base.carry);
     base.latitude = a.latitude.or(base.latitude);
     if let Some(terms) = &a.terms {
         base.unknowns = terms.clone();
     }
-    let conditions = a.measurement.conditions(&base);
-    conditions.validate().map_err(|e| Failure::input(e.to_string()))?;
-    let (names, candidates) = if base.positions.is_empty() {
-        let named = cardinal_names().into_iter().filter_map(|n| cardinal(&n).map(|c| (n, c)));
-        named.unzip()
-    } else {
-        base.positions.iter().map(|p| (p.name.clone(), p.angles.clone())).unzip()
-    };
+    for limit in &a.wanted.gimbal {
+        base.gimbals.limit(limit).map_err(|e| Failure::input(format!("--gimbal: {e}")))?;
+    }
+    let mut conditions = a.measurement.conditions(&base);
+    conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
     let options = Options {
-        names,
         candidates,
         positions: a.positions,
-        dwell_s: conditions.dwell_s,
-        criterion: match a.criterion {
-            CriterionArgument::Worst => Criterion::Worst,
-            CriterionArgument::A => Criterion::A,
-            CriterionArgument::D => Criterion::D,
-            CriterionArgument::E => Criterion::E,
-            CriterionArgument::Margin => Criterion::Margin(requirements(&base, &conditions)?),
+        required: a.wanted.observable.clone(),
+        degree_caps: a.wanted.max_degree.clone(),
+        meet: a.wanted.meet,
+        total_s: a.wanted.max_time,
+        slew_s: a.wanted.max_slew,
+        criterion: match a.wanted.criterion {
+            CriterionArgument::Worst => Kind::Worst,
+            CriterionArgument::A => Kind::A,
+            CriterionArgument::D => Kind::D,
+            CriterionArgument::E => Kind::E,
+            CriterionArgument::Margin => Kind::Margin,
         },
         keep: a.keep.into(),
         restarts: a.restarts,
+        refine: a.refine,
+        front: a.front.clone(),
         seed: a.seed,
     };
     let bar = Bar::start(1, "searching", a.output.quiet);
     let interrupted = interrupt::flag()?;
-    let designed = design(&base, &conditions, &options, &|done, total, best| {
-        bar.best(done, total, best);
+    let designed = design(&base, &conditions, &options, &|now| {
+        bar.search(&now);
         !interrupted.load(Ordering::Relaxed)
     });
     drop(bar);
-    let found = designed.map_err(|e| match e {
-        DesignError::Verdict(_) | DesignError::Filter(_) => Failure::internal(e.to_string()),
-        _ => Failure::input(e.to_string()),
-    })?;
-    let text = obsdeg_report::design(&found, a.output.format, output::layout(&a.output))
+    let found = designed.map_err(failure)?;
+    let text = obsdeg_report::design(&found, a.output.format, output::terminal())
         .map_err(|e| Failure::internal(e.to_string()))?;
-    if let Some(path) = &a.winner {
-        output::write_file(path, &scheme_file(&found, &base, &options))
-            .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
+    if a.output.output.is_some() {
+        let files = files(&found, &base, &conditions).map_err(|e| Failure::internal(e.to_string()))?;
+        output::write_folder(&a.output, &files)?;
     }
-    output::write(&a.output, &text)?;
+    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// What is required of every coefficient.
-fn requirements(base: &Scheme, conditions: &Conditions) -> Result<Vec<f64>, Failure> {
-    let positions = Scheme::of_angles(cardinal("NUE")).positions;
-    let scheme = Scheme { positions, combinations: Vec::new(), ..base.clone() };
-    let platform = Platform::new(scheme).map_err(|e| Failure::input(e.to_string()))?;
-    let all = resolve("required sigma", &platform, &conditions.requirements, f64::NAN);
-    let all = all.map_err(|e| Failure::input(e.to_string()))?;
-    let drifts =
-        platform.names().iter().zip(platform.units()).zip(all).filter(|((_, unit), _)| **unit != "rad");
-    let mut out = Vec::new();
-    for ((name, _), required) in drifts {
-        if !(required.is_finite() && required > 0.0) {
-            return Err(Failure::input(format!(
-                "the requirement for {name} is {required}; expected a sigma above 0"
-            )));
-        }
-        out.push(required);
+fn failure(e: DesignError) -> Failure {
+    match e {
+        DesignError::Verdict(_) | DesignError::Filter(_) => Failure::internal(e.to_string()),
+        DesignError::Conditions(e) => crate::simulate::failure(e),
+        _ => Failure::input(e.to_string()),
     }
-    Ok(out)
 }
 
-/// The best scheme as a file that `obsdeg analyze --scheme` reads.
-fn scheme_file(found: &Design, base: &Scheme, options: &Options) -> String {
+/// What to choose from, and the scheme whose assumptions hold.
+fn candidates(text: &str) -> Result<(Scheme, Candidates), Failure> {
+    if text == "cardinal" {
+        return Ok((Scheme::default(), Candidates::cardinals()));
+    }
+    if let Some(step) = text.strip_prefix("grid:") {
+        let wrong =
+            || Failure::input(format!("--candidates {text}: expected a step in degrees, as in grid:45"));
+        let step = parse_decimal(step.trim()).map_err(|_| wrong())?;
+        return Ok((Scheme::default(), Candidates::grid(step).map_err(failure)?));
+    }
+    let scheme = read_scheme(Path::new(text))?;
+    let candidates = Candidates::of_scheme(&scheme).map_err(failure)?;
+    Ok((scheme, candidates))
+}
+
+/// What goes into the folder.
+fn files(found: &Design, base: &Scheme, conditions: &Conditions) -> Result<Vec<File>, ReportError> {
+    let json = obsdeg_report::design(found, Format::Json, Layout::default())?;
+    let mut files = vec![File { name: "design.json".into(), bytes: json.into_bytes() }];
+    if let Some(best) = found.found.first() {
+        let winner = scheme_file(found, best, base, conditions);
+        files.push(File { name: "winner.toml".into(), bytes: winner.into_bytes() });
+    }
+    files.extend(design_figures(found)?);
+    Ok(files)
+}
+
+/// A scheme that was found, as a file that `obsdeg analyze --scheme` reads.
+fn scheme_file(found: &Design, best: &Found, base: &Scheme, conditions: &Conditions) -> String {
     let mut out = String::new();
-    let Some(best) = found.found.first() else { return out };
-    let proven = if found.proven { "proven best" } else { "best found" };
+    let proven = found.search.as_ref().is_some_and(|s| s.proven) && !best.refined;
+    let proven = if proven { "proven best" } else { "best found" };
     // writing to a String does not fail
     let _ = writeln!(
         out,
-        "# {proven}: worst sigma(D) {:.4} deg/h (per g), seed {}",
-        best.worst_sigma_dph, found.seed
+        "# {proven}: worst sigma(D) {:.4} deg/h (per g) in {:.0} s, seed {}",
+        best.worst_sigma_dph, best.total_s, found.seed
     );
-    let _ = writeln!(out, "carry = \"{}\"\nlatitude_deg = {}", found.carry, found.latitude_deg);
+    let _ = writeln!(out, "carry = \"{}\"", found.carry);
+    if let Some(latitude) = latitude_of(base) {
+        let _ = writeln!(out, "latitude_deg = {latitude}");
+    }
     let terms: Vec<String> = base.unknowns.to_string().split(',').map(|t| format!("\"{t}\"")).collect();
     let _ = writeln!(out, "terms = [{}]", terms.join(", "));
     for (letter, g) in ["X", "Y", "Z"].iter().zip(base.geometry.gyros()) {
@@ -192,16 +258,43 @@ fn scheme_file(found: &Design, base: &Scheme, options: &Options) -> String {
     if base.measured_azimuth {
         out.push_str("measured_azimuth = true\n");
     }
-    for (i, name) in best.positions.iter().enumerate() {
-        let place = options.names.iter().position(|n| n == name);
-        let angles = place.map(|c| options.candidates[c].each_ref().map(ToString::to_string).join(", "));
-        let angles = angles.unwrap_or_default();
-        let attitude = parse_attitude(name).map_or("", |_| name.as_str());
+    let _ = writeln!(
+        out,
+        "\n[simulation]\nstep_s = {}\naccelerometer_noise_g = {:e}\nazimuth_noise_deg = {}",
+        conditions.step_s, conditions.accelerometer_noise_g, conditions.azimuth_noise_deg
+    );
+    if let Some(rate) = conditions.slew_rate_deg_s {
+        let _ = writeln!(out, "slew_rate_deg_s = {rate}");
+    }
+    // the defaults come first
+    let given = conditions.requirements.iter().skip(Conditions::default().requirements.len());
+    let mut requirements: Vec<(&str, f64)> = Vec::new();
+    for r in given {
+        requirements.retain(|(name, _)| *name != r.name);
+        requirements.push((&r.name, r.value));
+    }
+    if !requirements.is_empty() {
+        out.push_str("\n[requirements]\n");
+    }
+    for (name, value) in requirements {
+        let _ = writeln!(out, "{name} = {value}");
+    }
+    if !base.gimbals.are_free() {
+        out.push_str("\n[gimbals]\n");
+        for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(base.gimbals.limits) {
+            if let Some([low, high]) = limit {
+                let _ = writeln!(out, "{name}_deg = [{}, {}]", format_decimal(low), format_decimal(high));
+            }
+        }
+    }
+    for (i, (name, angles)) in best.positions.iter().zip(&best.angles).enumerate() {
         let _ = writeln!(
             out,
-            "\n[[position]] # {attitude}\nname = \"p{}\"\nangles_deg = [{angles}]\ndwell_s = {}",
+            "\n[[position]] # {}\nname = \"p{}\"\nangles_deg = [{}]\ndwell_s = {}",
+            name.replace(['\r', '\n'], " "),
             i + 1,
-            found.dwell_s
+            angles.replace(',', ", "),
+            best.dwell_s
         );
     }
     out

@@ -4,7 +4,8 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use obsdeg_core::design::search::Progress;
 
 /// Shows a spinner on a terminal until it is dropped, if that takes longer than a second.
 pub(crate) struct Spinner {
@@ -61,13 +62,13 @@ impl Bar {
         Self { bar, started: Instant::now(), quiet }
     }
 
-    /// So much of so much is done, with the best found so far.
-    pub(crate) fn best(&self, done: u64, total: u64, best: f64) {
-        self.bar.set_length(total);
-        if best.is_finite() {
-            self.bar.set_message(format!("searching, best {best:.4} deg/h"));
-        }
-        self.at(done);
+    /// How far a search is, with its rate and the best so far.
+    pub(crate) fn search(&self, now: &Progress) {
+        self.bar.set_length(now.total);
+        let rate = now.examined as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
+        let best = if now.best.is_finite() { format!(", best {:.4}", now.best) } else { String::new() };
+        self.bar.set_message(format!("searching, {}/s{best}", HumanCount(rate as u64)));
+        self.at(now.done);
     }
 
     /// So much is done.

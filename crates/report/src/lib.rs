@@ -143,6 +143,14 @@ pub fn comparison(c: &Comparison, format: Format, layout: Layout) -> Result<Stri
     written(c, &compare::document(c), format, layout)
 }
 
+/// The front of a design as SVG and PNG.
+///
+/// # Errors
+/// [`ReportError`] when it cannot be drawn.
+pub fn design_figures(d: &Design) -> Result<Vec<File>, ReportError> {
+    Ok(design::figures(d)?)
+}
+
 /// A design in the given format, ending in a newline.
 ///
 /// # Errors

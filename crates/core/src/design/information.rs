@@ -3,141 +3,292 @@
 use nalgebra::DMatrix;
 use obsdeg_ekf::integrate::van_loan;
 
+use rayon::prelude::*;
+
 use super::DesignError;
 use crate::model::attitude::{Euler, Matrix3, c_n};
 use crate::model::platform::{LOCAL, local_dynamics, local_output};
 use crate::model::ring::Float;
-use crate::model::{Carry, Platform, Scheme};
+use crate::model::{Carry, Gimbals, Platform, Scheme, SlewTo};
+use crate::simulation::SimulationError;
+use crate::simulation::attitude_path::Slew;
 use crate::simulation::conditions::{Conditions, latitude_of, si_per_shown};
 use crate::simulation::plan::{Plan, W_IE};
 
 /// Most unknowns of a search: psi and the coefficients of ten terms.
 pub const MAX: usize = 33;
-
-impl Criterion {
-    /// worst, A, D, E or margin.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Worst => "worst",
-            Self::A => "A",
-            Self::D => "D",
-            Self::E => "E",
-            Self::Margin(_) => "margin",
-        }
-    }
-}
+/// Most candidates when it takes time to turn from one to another.
+pub const MAX_TURNING: usize = 256;
+/// Largest turn of an integration step, in rad.
+const TURN_STEP: f64 = 0.05;
 
 /// One candidate: its attitude, and how coefficients become drift there.
 #[derive(Debug, Clone)]
 struct Candidate {
     c: Matrix3<f64>,
-    /// `C E(g)` (3 x d).
+    /// `C E(g)` (3 x d), columns in the order of the evaluator.
+    drift: [Vec<f64>; 3],
+}
+
+/// The turn from one candidate to another.
+#[derive(Debug, Clone)]
+struct Turn {
+    seconds: f64,
+    /// `psi^n` behind it by `psi^n` before.
+    phi: Matrix3<f64>,
+    /// `psi^n` behind it by the coefficients (3 x d).
     drift: [Vec<f64>; 3],
 }
 
 /// What every evaluation shares.
 #[derive(Debug, Clone)]
 pub struct Evaluator {
-    carry: Carry,
+    platform: Platform,
+    conditions: Conditions,
+    /// The column of every coefficient in the order of the evaluator: those that count come last.
+    order: Vec<usize>,
+    /// How many coefficients do not count.
+    pub(super) nuisance: usize,
     /// Unknowns: psi, then d coefficients.
-    n: usize,
+    pub(super) n: usize,
+    /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
+    w: Matrix3<f64>,
+    /// Dwell of each position, in s.
+    dwell_s: f64,
     /// Information of one position on its `(psi^n, eps^n)`.
     local: [[f64; LOCAL]; LOCAL],
     /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
     phi: [[f64; LOCAL]; 3],
     candidates: Vec<Candidate>,
+    /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
+    turns: Vec<Turn>,
     /// deg/h per unit of each coefficient.
-    dph: f64,
+    pub(super) dph: f64,
 }
 
 /// A sequence so far.
 #[derive(Debug, Clone)]
 pub struct State {
     /// Information (n x n), row by row, lower triangle.
-    information: Vec<f64>,
+    pub(super) information: Vec<f64>,
     /// psi in the carried axes as a functional of the unknowns (3 x n).
     psi: [Vec<f64>; 3],
+    /// The candidate it ends with.
+    last: Option<usize>,
+    /// Dwells and turns, in s.
+    pub seconds: f64,
 }
 
 impl Evaluator {
-    /// The evaluator for positions of `dwell_s` each, without drift noise and slews.
+    /// The evaluator for positions of `dwell_s` each, without drift noise. `required` are the coefficients that count (indices
+    /// among the coefficients); the others are estimated with them.
     ///
     /// # Errors
     /// [`DesignError`].
     pub fn new(
         base: &Scheme,
         candidates: &[Euler],
+        required: &[usize],
         conditions: &Conditions,
-        dwell_s: f64,
     ) -> Result<Self, DesignError> {
         let scheme = Scheme {
-            positions: Scheme::of_angles(candidates.iter().cloned()).positions,
+            positions: Scheme::of_angles(candidates.iter().take(1).cloned()).positions,
             latitude: latitude_of(base),
             combinations: Vec::new(),
-            carry: Carry::Platform,
+            gimbals: Gimbals::default(),
             ..base.clone()
         };
         let latitude = scheme
             .latitude
             .map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
+        if conditions.slew_rate_deg_s.is_some() && scheme.carry != Carry::Inertial {
+            return Err(SimulationError::SlewCarry { carry: scheme.carry }.into());
+        }
         let platform = Platform::new(scheme)?;
-        let n = platform.names().len();
-        if n > MAX {
-            return Err(DesignError::TooManyUnknowns { found: n });
+        let d = platform.coefficients();
+        if d + 3 > MAX {
+            return Err(DesignError::TooManyUnknowns { found: d + 3 });
         }
         let f = local_dynamics(&Float, &(W_IE * latitude.0), &(W_IE * latitude.1));
-        let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
-        let steps = (dwell_s / conditions.step_s - 1e-9).ceil().max(1.0) as usize;
+        let counts = |c: &usize| required.contains(c);
+        let order: Vec<usize> = (0..d).filter(|c| !counts(c)).chain((0..d).filter(|c| counts(c))).collect();
+        let empty = Self {
+            platform,
+            conditions: conditions.clone(),
+            nuisance: d - required.len(),
+            order,
+            n: d + 3,
+            w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
+            dwell_s: conditions.dwell_s,
+            local: [[0.0; LOCAL]; LOCAL],
+            phi: [[0.0; LOCAL]; 3],
+            candidates: Vec::new(),
+            turns: Vec::new(),
+            dph: si_per_shown("deg/h"),
+        };
+        let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(attitude).collect();
+        empty.with_dwell(conditions.dwell_s)?.among(&attitudes)
+    }
+
+    /// The same with another dwell.
+    ///
+    /// # Errors
+    /// [`DesignError::Filter`].
+    pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
+        let mut f = DMatrix::zeros(LOCAL, LOCAL);
+        for i in 0..3 {
+            for j in 0..3 {
+                f[(i, j)] = self.w[i][j];
+            }
+            f[(i, i + 3)] = 1.0;
+        }
+        let steps = (dwell_s / self.conditions.step_s - 1e-9).ceil().max(1.0) as usize;
         let none = DMatrix::zeros(LOCAL, LOCAL);
         let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
-        let outputs = local_output(&Float, base.measured_azimuth);
+        let outputs = local_output(&Float, self.platform.scheme().measured_azimuth);
         let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
-        let mut local = [[0.0; LOCAL]; LOCAL];
+        self.local = [[0.0; LOCAL]; LOCAL];
         for _ in 0..steps {
             now = &step * now;
             for (component, h) in &outputs {
-                let weight = 1.0 / Plan::output_sigma(*component, conditions).powi(2);
+                let weight = 1.0 / Plan::output_sigma(*component, &self.conditions).powi(2);
                 let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
                 for i in 0..LOCAL {
                     for j in 0..LOCAL {
-                        local[i][j] += weight * row[i] * row[j];
+                        self.local[i][j] += weight * row[i] * row[j];
                     }
                 }
             }
         }
-        let candidates = candidates
+        self.phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
+        self.dwell_s = dwell_s;
+        Ok(self)
+    }
+
+    /// The same with other candidates.
+    ///
+    /// # Errors
+    /// [`DesignError::Pairs`] when there are too many ways between them.
+    pub fn among(mut self, attitudes: &[Matrix3<f64>]) -> Result<Self, DesignError> {
+        self.candidates = attitudes
             .iter()
-            .map(|euler| {
-                let c = c_n(&Float, euler, None, |a| a.turn().cos_sin_f64());
-                Candidate { drift: platform.drift_rows(&Float, &c), c }
-            })
+            .map(|c| Candidate { drift: self.ordered_columns(self.platform.drift_rows(&Float, c)), c: *c })
             .collect();
-        let phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
-        Ok(Self { carry: base.carry, n, local, phi, candidates, dph: si_per_shown("deg/h") })
+        self.turns.clear();
+        if let Some(rate) = self.conditions.slew_rate_deg_s {
+            let found = attitudes.len();
+            if found > MAX_TURNING {
+                return Err(DesignError::Pairs { found });
+            }
+            let turns = (0..found * found).into_par_iter().map(|k| {
+                let (from, to) = (&attitudes[k / found], &attitudes[k % found]);
+                // there is always a shortest way
+                let slew = Slew::to(from, to, &SlewTo::default(), rate.to_radians()).ok().flatten();
+                slew.map_or_else(|| self.stay(), |slew| self.turn(&slew))
+            });
+            self.turns = turns.collect();
+        }
+        Ok(self)
+    }
+
+    fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
+        rows.map(|row| self.order.iter().map(|&c| row[c]).collect())
+    }
+
+    fn stay(&self) -> Turn {
+        let phi = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+        Turn { seconds: 0.0, phi, drift: std::array::from_fn(|_| vec![0.0; self.n - 3]) }
+    }
+
+    /// `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n behind a turn by psi^n and the coefficients.
+    fn turn(&self, slew: &Slew) -> Turn {
+        let n = self.n;
+        let angle = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * slew.duration_s;
+        let steps = (angle / TURN_STEP).ceil().max(1.0);
+        let dt = slew.duration_s / steps;
+        let drift_at = |t: f64| self.ordered_columns(self.platform.drift_rows(&Float, &slew.at(t)));
+        let slope = |x: &[Vec<f64>; 3], drift: &[Vec<f64>; 3]| -> [Vec<f64>; 3] {
+            std::array::from_fn(|i| {
+                let own = |k: usize| if k < 3 { 0.0 } else { drift[i][k - 3] };
+                (0..n).map(|k| own(k) + (0..3).map(|j| self.w[i][j] * x[j][k]).sum::<f64>()).collect()
+            })
+        };
+        let moved = |x: &[Vec<f64>; 3], k: &[Vec<f64>; 3], h: f64| -> [Vec<f64>; 3] {
+            std::array::from_fn(|i| x[i].iter().zip(&k[i]).map(|(x, k)| x + h * k).collect())
+        };
+        let mut x: [Vec<f64>; 3] =
+            std::array::from_fn(|i| (0..n).map(|k| f64::from(u8::from(i == k))).collect());
+        let mut before = drift_at(0.0);
+        for step in 0..steps as usize {
+            let t = step as f64 * dt;
+            let (middle, after) = (drift_at(t + dt / 2.0), drift_at(t + dt));
+            let k1 = slope(&x, &before);
+            let k2 = slope(&moved(&x, &k1, dt / 2.0), &middle);
+            let k3 = slope(&moved(&x, &k2, dt / 2.0), &middle);
+            let k4 = slope(&moved(&x, &k3, dt), &after);
+            for (k, weight) in [(k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)] {
+                x = moved(&x, &k, weight * dt / 6.0);
+            }
+            before = after;
+        }
+        Turn {
+            seconds: slew.duration_s,
+            phi: std::array::from_fn(|i| std::array::from_fn(|j| x[i][j])),
+            drift: x.map(|row| row[3..].to_vec()),
+        }
     }
 
     /// Nothing yet.
     pub fn start(&self) -> State {
         let unit = |r: usize| (0..self.n).map(|c| f64::from(u8::from(c == r))).collect();
-        State { information: vec![0.0; self.n * self.n], psi: std::array::from_fn(unit) }
+        State {
+            information: vec![0.0; self.n * self.n],
+            psi: std::array::from_fn(unit),
+            last: None,
+            seconds: 0.0,
+        }
     }
 
     /// Whether the order of positions makes a difference.
     pub fn ordered(&self) -> bool {
-        self.carry != Carry::Reset
+        self.carry() != Carry::Reset
+    }
+
+    pub(super) fn carry(&self) -> Carry {
+        self.platform.scheme().carry
+    }
+
+    /// Dwell of each position, in s.
+    pub fn dwell_s(&self) -> f64 {
+        self.dwell_s
+    }
+
+    /// How long it takes to get from one candidate to another, in s.
+    pub fn slew_s(&self, from: usize, to: usize) -> f64 {
+        self.turns.get(from * self.candidates.len() + to).map_or(0.0, |t| t.seconds)
     }
 
     /// Adds a position to `state`; the result goes to `out`.
     pub fn extend(&self, state: &State, candidate: usize, out: &mut State) {
         let n = self.n;
+        let carry = self.carry();
         let Candidate { c, drift } = &self.candidates[candidate];
+        let turn = state.last.and_then(|last| self.turns.get(last * self.candidates.len() + candidate));
         let mut local = [[0.0; MAX]; LOCAL];
         for r in 0..3 {
-            match self.carry {
-                Carry::Inertial => local[r][..n].copy_from_slice(&state.psi[r]),
+            match (carry, turn) {
+                (Carry::Inertial, None) => local[r][..n].copy_from_slice(&state.psi[r]),
+                (Carry::Inertial, Some(turn)) => {
+                    for (j, x) in local[r][..n].iter_mut().enumerate() {
+                        *x = (0..3).map(|k| turn.phi[r][k] * state.psi[k][j]).sum();
+                    }
+                    for (x, y) in local[r][3..n].iter_mut().zip(&turn.drift[r]) {
+                        *x += y;
+                    }
+                }
                 // psi of the position is eliminated below
-                Carry::Reset => local[r][..3].copy_from_slice(&c[r]),
-                Carry::Platform => {
+                (Carry::Reset, _) => local[r][..3].copy_from_slice(&c[r]),
+                (Carry::Platform, _) => {
                     for (j, x) in local[r][..n].iter_mut().enumerate() {
                         *x = (0..3).map(|k| c[r][k] * state.psi[k][j]).sum();
                     }
@@ -145,6 +296,8 @@ impl Evaluator {
             }
             local[3 + r][3..n].copy_from_slice(&drift[r]);
         }
+        out.last = Some(candidate);
+        out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
         // G L, then L^T (G L)
         let mut weighted = [[0.0; MAX]; LOCAL];
         for (i, row) in weighted.iter_mut().enumerate() {
@@ -158,7 +311,7 @@ impl Evaluator {
             }
         }
         out.information.copy_from_slice(&state.information);
-        if self.carry == Carry::Reset {
+        if carry == Carry::Reset {
             let mut own = [[0.0; MAX]; MAX];
             for (i, row) in own[..n].iter_mut().enumerate() {
                 for (l, w) in local.iter().zip(&weighted) {
@@ -183,7 +336,7 @@ impl Evaluator {
                 }
             }
         }
-        if self.carry != Carry::Reset {
+        if carry != Carry::Reset {
             let mut after = [[0.0; MAX]; 3];
             for (row, phi) in after.iter_mut().zip(&self.phi) {
                 for (l, p) in local.iter().zip(phi) {
@@ -193,7 +346,7 @@ impl Evaluator {
                 }
             }
             for (k, row) in out.psi.iter_mut().enumerate() {
-                match self.carry {
+                match carry {
                     Carry::Platform => {
                         for (j, x) in row.iter_mut().enumerate() {
                             *x = (0..3).map(|r| c[r][k] * after[r][j]).sum();
@@ -204,92 +357,11 @@ impl Evaluator {
             }
         }
     }
-
-    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a
-    /// coefficient is not determined. Sigmas are in deg/h
-    /// (per g). `root` is working space.
-    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
-        let (n, d) = (self.n, self.n - 3);
-        let first = if self.carry == Carry::Reset { 3 } else { 0 };
-        // Cholesky of the information, psi first: the block of the coefficients is the root of the inverse of their covariance
-        root.resize(n * n, 0.0);
-        let l = &mut root[..];
-        for i in first..n {
-            let (done, rest) = l.split_at_mut(i * n);
-            let row = &mut rest[..=i];
-            let given = &state.information[i * n..=i * n + i];
-            for j in first..i {
-                let other = &done[j * n..=j * n + j];
-                let sum: f64 = row[first..j].iter().zip(&other[first..j]).map(|(a, b)| a * b).sum();
-                row[j] = (given[j] - sum) / other[j];
-            }
-            let pivot = given[i] - row[first..i].iter().map(|a| a * a).sum::<f64>();
-            // what rounding leaves of an undetermined direction
-            if pivot <= 1e-13 * given[i] {
-                return f64::INFINITY;
-            }
-            row[i] = pivot.sqrt();
-        }
-        if *criterion == Criterion::D {
-            // the geometric mean of the principal sigmas
-            let logs: f64 = (3..n).map(|i| l[i * n + i].ln()).sum();
-            return (-logs / d as f64).exp() / self.dph;
-        }
-        if *criterion == Criterion::E {
-            let block = DMatrix::from_fn(d, d, |i, j| if j <= i { l[(i + 3) * n + j + 3] } else { 0.0 });
-            let information = &block * block.transpose();
-            return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
-        }
-        // the variance of coefficient i is the square of column i of the inverse root
-        let (mut worst, mut sum) = (0.0f64, 0.0);
-        let mut column = [0.0; MAX];
-        for i in 3..n {
-            column[i] = 1.0 / l[i * n + i];
-            let mut variance = column[i] * column[i];
-            for r in i + 1..n {
-                let row = &l[r * n..=r * n + r];
-                let product: f64 = row[i..r].iter().zip(&column[i..r]).map(|(a, b)| a * b).sum();
-                column[r] = -product / row[r];
-                variance += column[r] * column[r];
-            }
-            sum += variance;
-            worst = worst.max(match criterion {
-                Criterion::Margin(requirements) => variance / (requirements[i - 3] * requirements[i - 3]),
-                _ => variance,
-            });
-        }
-        match criterion {
-            Criterion::A => (sum / d as f64).sqrt() / self.dph,
-            // requirements are in deg/h already
-            _ => worst.sqrt() / self.dph,
-        }
-    }
-
-    /// The criterion of a whole sequence.
-    pub fn of_sequence(&self, sequence: &[usize], criterion: &Criterion) -> f64 {
-        let (mut now, mut next) = (self.start(), self.start());
-        for &c in sequence {
-            self.extend(&now, c, &mut next);
-            std::mem::swap(&mut now, &mut next);
-        }
-        self.value(&now, criterion, &mut Vec::new())
-    }
 }
 
-/// What makes one scheme better than another, all of the coefficients alone.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum Criterion {
-    /// The largest sigma.
-    #[default]
-    Worst,
-    /// The root of the mean variance (A-optimal).
-    A,
-    /// The geometric mean of the principal sigmas: the volume of the error ellipsoid (D-optimal).
-    D,
-    /// The largest principal sigma (E-optimal).
-    E,
-    /// The largest sigma over its requirement (shape d, in deg/h per g).
-    Margin(Vec<f64>),
+/// `C_c^n` of Euler angles.
+pub fn attitude(angles: &Euler) -> Matrix3<f64> {
+    c_n(&Float, angles, None, |a| a.turn().cos_sin_f64())
 }
 
 /// The Schur complement of the first `leading` unknowns of a symmetric matrix (lower triangle); these are set to zero.

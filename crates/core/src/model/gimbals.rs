@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::angle::format_decimal;
+use super::angle::{format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, c_n};
 use super::ring::Float;
 use super::scheme::Position;
@@ -25,7 +25,35 @@ pub struct Gimbals {
     pub limits: [Option<[i64; 2]>; 3],
 }
 
+/// Not a limit of a gimbal.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{found}` is no gimbal limit; expected alpha, beta or gamma and degrees, as in beta=-80:80")]
+pub struct GimbalError {
+    /// The text found.
+    pub found: String,
+}
+
+/// The names of the Euler angles.
+const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
+
 impl Gimbals {
+    /// Sets one limit from a text such as `beta=-80:80`.
+    ///
+    /// # Errors
+    /// [`GimbalError`].
+    pub fn limit(&mut self, text: &str) -> Result<(), GimbalError> {
+        let parse = || {
+            let (name, range) = text.split_once('=')?;
+            let (low, high) = range.split_once(':')?;
+            let k = NAMES.iter().position(|n| *n == name.trim())?;
+            let limits = [parse_decimal(low.trim()).ok()?, parse_decimal(high.trim()).ok()?];
+            (limits[0] <= limits[1]).then_some((k, limits))
+        };
+        let (k, limits) = parse().ok_or_else(|| GimbalError { found: text.into() })?;
+        self.limits[k] = Some(limits);
+        Ok(())
+    }
+
     /// Whether nothing is limited.
     pub fn are_free(&self) -> bool {
         self.limits.iter().all(Option::is_none)
@@ -84,7 +112,7 @@ impl Gimbals {
 
 impl fmt::Display for Gimbals {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let limited = ["alpha", "beta", "gamma"].iter().zip(self.limits).filter_map(|(name, limit)| {
+        let limited = NAMES.iter().zip(self.limits).filter_map(|(name, limit)| {
             limit
                 .map(|[low, high]| format!("{name} from {} to {}", format_decimal(low), format_decimal(high)))
         });

@@ -290,7 +290,7 @@ pub fn latitude_of(scheme: &Scheme) -> Option<Latitude> {
 }
 
 /// Whether an assignment to `pattern` concerns the unknown `name`.
-fn concerns(pattern: &str, name: &str) -> bool {
+pub(crate) fn concerns(pattern: &str, name: &str) -> bool {
     let base = name.split('@').next().unwrap_or(name);
     let base = base.strip_suffix("^n").unwrap_or(base);
     let family = base.strip_prefix("D_").zip(pattern.strip_prefix("D_"));

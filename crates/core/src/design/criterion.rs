@@ -1,0 +1,140 @@
+//! Criteria of optimal design, from the information of a sequence.
+
+use nalgebra::DMatrix;
+
+use super::information::{Evaluator, MAX, State};
+use crate::model::Carry;
+
+/// What makes one scheme better than another, of the coefficients that count.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Criterion {
+    /// The largest sigma.
+    #[default]
+    Worst,
+    /// The root of the mean variance (A-optimal).
+    A,
+    /// The geometric mean of the principal sigmas: the volume of the error ellipsoid (D-optimal).
+    D,
+    /// The largest principal sigma (E-optimal).
+    E,
+    /// The largest sigma over its requirement (shape d, in deg/h per g).
+    Margin(Vec<f64>),
+}
+
+impl Criterion {
+    /// worst, A, D, E or margin.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Worst => "worst",
+            Self::A => "A",
+            Self::D => "D",
+            Self::E => "E",
+            Self::Margin(_) => "margin",
+        }
+    }
+}
+
+impl Evaluator {
+    /// The root of the information, psi and the coefficients that do not count first: the block of the others is the root of the
+    /// inverse of their covariance. False when one of them is not determined.
+    fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+        let n = self.n;
+        let first = if self.carry() == Carry::Reset { 3 } else { 0 };
+        root.resize(n * n, 0.0);
+        let l = &mut root[..];
+        for i in first..n {
+            let (done, rest) = l.split_at_mut(i * n);
+            let row = &mut rest[..=i];
+            let given = &state.information[i * n..=i * n + i];
+            for j in first..i {
+                let other = &done[j * n..=j * n + j];
+                let sum: f64 = row[first..j].iter().zip(&other[first..j]).map(|(a, b)| a * b).sum();
+                row[j] = if other[j] > 0.0 { (given[j] - sum) / other[j] } else { 0.0 };
+            }
+            let pivot = given[i] - row[first..i].iter().map(|a| a * a).sum::<f64>();
+            // what rounding leaves of an undetermined direction
+            row[i] = match pivot <= 1e-13 * given[i] {
+                false => pivot.sqrt(),
+                // it couples with nothing that comes later
+                true if i < 3 + self.nuisance => 0.0,
+                true => return false,
+            };
+        }
+        true
+    }
+
+    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient that counts
+    /// is not determined. Sigmas are in deg/h (per g). `root` is working space.
+    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+        if !self.root(state, root) {
+            return f64::INFINITY;
+        }
+        let (n, begin) = (self.n, 3 + self.nuisance);
+        let d = n - begin;
+        let l = &root[..];
+        if *criterion == Criterion::D {
+            // the geometric mean of the principal sigmas
+            let logs: f64 = (begin..n).map(|i| l[i * n + i].ln()).sum();
+            return (-logs / d as f64).exp() / self.dph;
+        }
+        if *criterion == Criterion::E {
+            let block =
+                DMatrix::from_fn(d, d, |i, j| if j <= i { l[(i + begin) * n + j + begin] } else { 0.0 });
+            let information = &block * block.transpose();
+            return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
+        }
+        let (mut worst, mut sum) = (0.0f64, 0.0);
+        for i in begin..n {
+            let variance = self.variance(l, i);
+            sum += variance;
+            worst = worst.max(match criterion {
+                Criterion::Margin(required) => variance / (required[i - begin] * required[i - begin]),
+                _ => variance,
+            });
+        }
+        match criterion {
+            Criterion::A => (sum / d as f64).sqrt() / self.dph,
+            // requirements are in deg/h already
+            _ => worst.sqrt() / self.dph,
+        }
+    }
+
+    /// The variance of unknown `i`: the square of column i of the inverse of the root `l`.
+    fn variance(&self, l: &[f64], i: usize) -> f64 {
+        let n = self.n;
+        let mut column = [0.0; MAX];
+        column[i] = 1.0 / l[i * n + i];
+        let mut variance = column[i] * column[i];
+        for r in i + 1..n {
+            let row = &l[r * n..=r * n + r];
+            let product: f64 = row[i..r].iter().zip(&column[i..r]).map(|(a, b)| a * b).sum();
+            column[r] = -product / row[r];
+            variance += column[r] * column[r];
+        }
+        variance
+    }
+
+    /// The state behind a whole sequence.
+    pub fn state_of(&self, sequence: &[usize]) -> State {
+        let (mut now, mut next) = (self.start(), self.start());
+        for &c in sequence {
+            self.extend(&now, c, &mut next);
+            std::mem::swap(&mut now, &mut next);
+        }
+        now
+    }
+
+    /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not determined.
+    pub fn sigmas(&self, sequence: &[usize]) -> Vec<f64> {
+        let mut root = Vec::new();
+        if !self.root(&self.state_of(sequence), &mut root) {
+            return Vec::new();
+        }
+        (3 + self.nuisance..self.n).map(|i| self.variance(&root, i).sqrt() / self.dph).collect()
+    }
+
+    /// The criterion of a whole sequence.
+    pub fn of_sequence(&self, sequence: &[usize], criterion: &Criterion) -> f64 {
+        self.value(&self.state_of(sequence), criterion, &mut Vec::new())
+    }
+}

@@ -1,0 +1,328 @@
+//! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
+
+use super::answer::{Found, Minimum};
+use super::candidates::{Candidates, MAX_CANDIDATES};
+use super::criterion::Criterion;
+use super::information::{self, Evaluator};
+use super::observability::Rows;
+use super::search::{Best, Constraints, Scored, Search};
+use super::symmetry::Symmetry;
+use super::{Design, DesignError, EXHAUSTIVE, Kind, Options, refine};
+use crate::accuracy::Accuracy;
+use crate::degree::ensemble::judge;
+use crate::model::attitude::Euler;
+use crate::model::{Platform, Scheme, Unknowns};
+use crate::simulation::conditions::{Conditions, concerns, latitude_of, resolve};
+
+/// Most sets whose keys are held.
+const MOST_SETS: u64 = 5_000_000;
+/// Most prefixes and sets that are looked at for the minimum, when it is not what was asked for.
+const MINIMUM_SETS: u64 = 1_000_000;
+/// Factors on the dwell for the front of total time.
+const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
+/// Restarts of the exchange at each of them, besides those from the schemes found.
+const FRONT_RESTARTS: u64 = 8;
+
+/// A search in preparation: names resolved, candidates ordered by orbits.
+pub(super) struct Task<'a> {
+    pub(super) base: &'a Scheme,
+    pub(super) options: &'a Options,
+    pub(super) candidates: Candidates,
+    /// Names of the coefficients that count, and their indices.
+    pub(super) required: Vec<(String, usize)>,
+    pub(super) criterion: Criterion,
+    pub(super) constraints: Constraints,
+    pub(super) rows: Rows,
+    pub(super) symmetry: Symmetry,
+}
+
+impl<'a> Task<'a> {
+    pub(super) fn new(
+        base: &'a Scheme,
+        conditions: &Conditions,
+        options: &'a Options,
+        candidates: Candidates,
+    ) -> Result<Self, DesignError> {
+        conditions.validate()?;
+        let found = candidates.attitudes.len();
+        if !(1..=MAX_CANDIDATES).contains(&found) {
+            return Err(DesignError::Candidates { found });
+        }
+        let counts = options.positions.iter().chain(&options.front);
+        if let Some(&found) = counts.into_iter().find(|k| !(1..=100).contains(*k)) {
+            return Err(DesignError::Positions { found });
+        }
+        if base.unknowns == Unknowns::Drift {
+            return Err(DesignError::Drift);
+        }
+        for (what, limit) in [("a total time", options.total_s), ("a longest slew", options.slew_s)] {
+            if let Some(found) = limit.filter(|l| !(l.is_finite() && *l > 0.0)) {
+                return Err(DesignError::Limit { what, found });
+            }
+        }
+        let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
+        if let Some((name, _)) = generic {
+            return Err(DesignError::GenericAngle { name: name.into() });
+        }
+        let positions = Scheme::of_angles(candidates.attitudes.iter().take(1).cloned()).positions;
+        let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
+        let first = platform.names().len() - platform.coefficients();
+        let all: Vec<(String, usize)> = platform.names()[first..].iter().cloned().zip(0..).collect();
+        let named = |asked: &String| {
+            let known = all.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(", ");
+            let found: Vec<usize> = all.iter().filter(|c| concerns(asked, &c.0)).map(|c| c.1).collect();
+            let unknown = DesignError::UnknownName { found: asked.clone(), known };
+            if found.is_empty() { Err(unknown) } else { Ok(found) }
+        };
+        let mut required = all.clone();
+        if !options.required.is_empty() {
+            let asked = options.required.iter().map(named).collect::<Result<Vec<_>, _>>()?.concat();
+            required.retain(|c| asked.contains(&c.1));
+        }
+        let mut caps = vec![usize::MAX; required.len()];
+        for (name, cap) in &options.degree_caps {
+            let concerned = name.as_ref().map(named).transpose()?;
+            for (slot, c) in caps.iter_mut().zip(&required) {
+                if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
+                    *slot = *cap;
+                }
+            }
+        }
+        let requirements = resolve("required sigma", &platform, &conditions.requirements, f64::NAN)?;
+        let requirements: Vec<f64> = required.iter().map(|c| requirements[first + c.1]).collect();
+        if options.meet || options.criterion == Kind::Margin {
+            let wrong = |x: &f64| !(x.is_finite() && *x > 0.0);
+            if let Some((c, found)) = required.iter().zip(&requirements).find(|(_, x)| wrong(x)) {
+                return Err(DesignError::Requirement { name: c.0.clone(), found: *found });
+            }
+        }
+        let criterion = match options.criterion {
+            Kind::Worst => Criterion::Worst,
+            Kind::A => Criterion::A,
+            Kind::D => Criterion::D,
+            Kind::E => Criterion::E,
+            Kind::Margin => Criterion::Margin(requirements.clone()),
+        };
+        let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
+        let rows = Rows::new(base, &candidates.attitudes, &indices, options.seed)?;
+        // an attitude counts once
+        let repeated = rows.repeated();
+        let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
+        let place = |c: usize| required.iter().position(|r| r.1 == c);
+        let uses_requirements = options.meet || options.criterion == Kind::Margin;
+        let same = |i: usize, j: usize| match (place(i), place(j)) {
+            (None, None) => true,
+            (Some(i), Some(j)) => {
+                caps[i] == caps[j] && (!uses_requirements || requirements[i] == requirements[j])
+            }
+            _ => false,
+        };
+        let symmetry = rows.select(&kept).symmetry(&same);
+        // orbit by orbit: a set that begins with a representative stands for all its images
+        let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
+        order.sort_unstable();
+        let order: Vec<usize> = order.into_iter().map(|(_, c)| c).collect();
+        let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
+        let symmetry = rows.symmetry(&same);
+        let constraints = Constraints {
+            total_s: options.total_s,
+            slew_s: options.slew_s,
+            sigmas: options.meet.then_some(requirements),
+            degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
+        };
+        Ok(Self { base, options, candidates, required, criterion, constraints, rows, symmetry })
+    }
+
+    /// The fewest candidates that do, with the proof.
+    pub(super) fn minimum(&self, best_degrees: &[Option<usize>]) -> Minimum {
+        let names = |set: &[usize]| set.iter().map(|&c| self.candidates.names[c].clone()).collect();
+        let lost = self.required.iter().zip(best_degrees).filter(|(_, d)| d.is_none());
+        let mut out = Minimum {
+            positions: None,
+            witness: Vec::new(),
+            counting_bound: self.rows.counting_bound(),
+            none_of: Vec::new(),
+            never: lost.map(|(c, _)| c.0.clone()).collect(),
+        };
+        if !out.never.is_empty() {
+            return out;
+        }
+        let most = if self.options.positions.is_none() { EXHAUSTIVE } else { MINIMUM_SETS };
+        let firsts = self.symmetry.representatives();
+        let n = self.rows.candidates() as u64;
+        for size in out.counting_bound..=self.rows.candidates() {
+            let sets = choose(n, size as u64).unwrap_or(u64::MAX);
+            match self.rows.first_observable_set(size, &firsts, most) {
+                (Some(set), _) => {
+                    out.positions = Some(size);
+                    out.witness = names(&set);
+                    return out;
+                }
+                (None, true) => out.none_of.push([size as u64, sets]),
+                (None, false) => return out,
+            }
+        }
+        out
+    }
+
+    /// The number of sets behind an exhaustive search of `k` positions; `None` where the space is too large.
+    pub(super) fn space(&self, k: usize, ordered: bool) -> Option<u64> {
+        let n = self.rows.candidates() as u64;
+        let sets: u64 = (1..=k as u64).try_fold(0u64, |sum, size| sum.checked_add(choose(n, size)?))?;
+        let sequences = if ordered { n.checked_pow(k as u32)? } else { choose(n + k as u64 - 1, k as u64)? };
+        let searched = sequences / self.symmetry.order as u64;
+        (searched <= EXHAUSTIVE && (!ordered || sets <= MOST_SETS)).then_some(sets)
+    }
+
+    /// A sequence with its exact verdict; `None` when rounding called it determined and it is not.
+    pub(super) fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
+        let attitudes: Vec<Euler> =
+            scored.sequence.iter().map(|&c| self.candidates.attitudes[c].clone()).collect();
+        let names = scored.sequence.iter().map(|&c| self.candidates.names[c].clone()).collect();
+        self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)
+    }
+
+    fn judged(
+        &self,
+        evaluator: &Evaluator,
+        sequence: &[usize],
+        attitudes: Vec<Euler>,
+        positions: Vec<String>,
+        value: f64,
+    ) -> Result<Option<Found>, DesignError> {
+        let angles = attitudes.iter().map(|a| a.each_ref().map(ToString::to_string).join(","));
+        let angles = angles.collect();
+        let scheme = Scheme {
+            positions: Scheme::of_angles(attitudes).positions,
+            latitude: latitude_of(self.base),
+            combinations: Vec::new(),
+            ..self.base.clone()
+        };
+        let platform = Platform::new(scheme)?;
+        let verdicts = judge(&platform, self.options.seed)?;
+        let first = platform.names().len() - platform.coefficients();
+        let columns = || self.required.iter().map(|r| first + r.1);
+        let degrees: Option<Vec<usize>> = columns().map(|c| verdicts.degrees.degree[c]).collect();
+        let Some(degrees) = degrees else { return Ok(None) };
+        // beyond the precision of the series the order is not known
+        let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
+        let orders = accuracy.and_then(|a| columns().map(|c| a.order[c]).collect::<Option<Vec<_>>>());
+        let sigmas = evaluator.sigmas(sequence);
+        let worst = sigmas.iter().zip(&self.required).max_by(|a, b| a.0.total_cmp(b.0));
+        let Some((&worst_sigma_dph, (worst, _))) = worst else { return Ok(None) };
+        Ok(Some(Found {
+            positions,
+            angles,
+            refined: false,
+            dwell_s: evaluator.dwell_s(),
+            total_s: evaluator.state_of(sequence).seconds,
+            value,
+            worst_sigma_dph,
+            worst: worst.clone(),
+            worst_degree: degrees.into_iter().max().unwrap_or(0),
+            worst_accuracy_order: orders.and_then(|o| o.into_iter().max()),
+            rank: [verdicts.degrees.rank(), platform.names().len()],
+        }))
+    }
+
+    /// Adds what is found at other dwells and numbers of positions.
+    pub(super) fn front(
+        &self,
+        evaluator: &Evaluator,
+        search: &Search<'_>,
+        (k, dwell_s): (usize, f64),
+        main: &mut Best,
+        out: &mut Design,
+    ) -> Result<(), DesignError> {
+        let mut counts = vec![k];
+        counts.extend(self.options.front.iter().filter(|f| **f != k));
+        for scored in &main.front {
+            out.front.extend(self.found(evaluator, scored)?);
+        }
+        for count in counts {
+            let known = main.found.iter().filter(|s| s.sequence.len() == count);
+            let mut given: Vec<Vec<usize>> = known.map(|s| s.sequence.clone()).collect();
+            for factor in DWELLS {
+                if (count, factor) == (k, 1.0) {
+                    continue;
+                }
+                let other = evaluator.clone().with_dwell(dwell_s * factor)?;
+                // the schemes are compared by their criterion alone
+                let there = Search { evaluator: &other, keep: 1, ..*search };
+                let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };
+                let best = there.exchange(count, &given, restarts, self.options.seed);
+                if !best.complete {
+                    return Ok(());
+                }
+                given.extend(best.found.iter().map(|s| s.sequence.clone()));
+                for scored in &best.front {
+                    out.front.extend(self.found(&other, scored)?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The best sequence with its angles refined, if that makes it better.
+    pub(super) fn refined(
+        &self,
+        evaluator: &Evaluator,
+        sequence: &[usize],
+    ) -> Result<Option<Found>, DesignError> {
+        let start: Vec<Euler> = sequence.iter().map(|&c| self.candidates.attitudes[c].clone()).collect();
+        let places: Vec<usize> = (0..start.len()).collect();
+        let c = &self.constraints;
+        let allowed = |there: &Evaluator| {
+            let slews = places.windows(2).all(|w| c.slew_s.is_none_or(|l| there.slew_s(w[0], w[1]) <= l));
+            let total = c.total_s.is_none_or(|l| there.state_of(&places).seconds <= l);
+            let met = c
+                .sigmas
+                .as_ref()
+                .is_none_or(|limits| there.of_sequence(&places, &Criterion::Margin(limits.clone())) <= 1.0);
+            slews && total && met
+        };
+        let refined = refine::refine(evaluator, &start, &self.criterion, &self.base.gimbals, &allowed)?;
+        let Some((value, attitudes)) = refined else { return Ok(None) };
+        let matrices: Vec<_> = attitudes.iter().map(information::attitude).collect();
+        let there = evaluator.clone().among(&matrices)?;
+        let mut names = Candidates::default();
+        attitudes.iter().for_each(|a| names.add(a.clone()));
+        let found = self.judged(&there, &places, attitudes, names.names, value)?;
+        let caps = |f: &Found| c.degrees.is_none() || f.worst_degree <= self.worst_cap();
+        Ok(found.filter(caps).map(|f| Found { refined: true, ..f }))
+    }
+
+    /// The smallest cap on a degree.
+    fn worst_cap(&self) -> usize {
+        self.constraints.degrees.iter().flatten().copied().min().unwrap_or(usize::MAX)
+    }
+
+    pub(super) fn constraints_in_words(&self) -> Vec<String> {
+        let c = &self.constraints;
+        let mut out = Vec::new();
+        out.extend(c.total_s.map(|s| format!("at most {s} s in all")));
+        out.extend(c.slew_s.map(|s| format!("slews of at most {s} s")));
+        if c.sigmas.is_some() {
+            out.push("every requirement met".into());
+        }
+        for (name, cap) in &self.options.degree_caps {
+            let name = name.as_deref().unwrap_or("every required coefficient");
+            out.push(format!("degree of {name} at most {cap}"));
+        }
+        if !self.base.gimbals.are_free() {
+            out.push(format!("gimbals: {}", self.base.gimbals));
+        }
+        out
+    }
+}
+
+/// The number of sets of `k` of `n`; `None` beyond 2^64.
+fn choose(n: u64, k: u64) -> Option<u64> {
+    if k > n {
+        return Some(0);
+    }
+    let k = k.min(n - k);
+    (0..k)
+        .try_fold(1u128, |product, i| product.checked_mul(u128::from(n - i)).map(|p| p / u128::from(i + 1)))
+        .and_then(|x| u64::try_from(x).ok())
+}
