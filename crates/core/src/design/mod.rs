@@ -253,9 +253,11 @@ pub fn design(
         };
         return Err(DesignError::Impossible { positions: k, why });
     };
-    let mut front = best.clone();
+    for scored in &best.front {
+        out.front.extend(task.found(&evaluator, scored)?);
+    }
     if best.complete {
-        task.front(&evaluator, &search, (k, conditions.dwell_s), &mut front, &mut out)?;
+        task.front(&evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
     }
     if options.refine && best.complete {
         let refined = task.refined(&evaluator, &first.sequence)?;

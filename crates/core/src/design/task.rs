@@ -231,14 +231,11 @@ impl<'a> Task<'a> {
         evaluator: &Evaluator,
         search: &Search<'_>,
         (k, dwell_s): (usize, f64),
-        main: &mut Best,
+        main: &Best,
         out: &mut Design,
     ) -> Result<(), DesignError> {
         let mut counts = vec![k];
         counts.extend(self.options.front.iter().filter(|f| **f != k));
-        for scored in &main.front {
-            out.front.extend(self.found(evaluator, scored)?);
-        }
         for count in counts {
             let known = main.found.iter().filter(|s| s.sequence.len() == count);
             let mut given: Vec<Vec<usize>> = known.map(|s| s.sequence.clone()).collect();
