@@ -46,7 +46,7 @@ fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<
         return Err(ExpressionError::Syntax {
             expected: "a linear combination of unknowns such as D_IX - D_IY",
             found: "something that is not linear in them".into(),
-            span: expression.span.clone(),
+            span: expression.span(),
         });
     }
     Ok(row)
@@ -123,7 +123,7 @@ fn terms_of(
     let unsupported = || ExpressionError::Syntax {
         expected: "rational coefficients times powers of wN and wU",
         found: "another coefficient".into(),
-        span: parsed.span.clone(),
+        span: parsed.span(),
     };
     (0..names.len())
         .filter(|&c| first.0[c] != 0)

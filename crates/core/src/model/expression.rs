@@ -1,51 +1,83 @@
-//! Arithmetic expressions: a Pratt parser with a depth limit, and values in a prime field.
+//! Arithmetic expressions, and their values in a prime field and in floating point.
 //!
-//! `+ - * / ^` with integer exponents, brackets, decimals (exact), names, and `sin cos` of a name.
+//! `+ - * / ^`, brackets, decimals (exact), names, and functions of one argument. Operations are held in a list, operands before what is
+//! made of them, so that nothing walks a tree as deep as a file is long.
 
 use std::ops::Range;
 
 use obsdeg_exact::Field;
+use winnow::Parser;
+use winnow::combinator::{Infix, Prefix, expression};
+use winnow::error::{ErrMode, ParserError};
+use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 
-/// Deepest nesting of brackets and signs.
+/// Deepest nesting of brackets, signs and powers.
 pub const MAX_DEPTH: usize = 200;
 
-/// An expression and where it stands in its text.
-#[derive(Debug, Clone, PartialEq)]
+/// An expression: its operations in order, the last one being the whole.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Expression {
-    /// What it is.
-    pub node: Node,
-    /// Byte range in the text.
-    pub span: Range<usize>,
+    /// Operations; operands are indices of earlier ones.
+    pub nodes: Vec<Node>,
+    /// Byte range of each in the text.
+    pub spans: Vec<Range<usize>>,
 }
 
-/// The kinds of expressions.
+/// The kinds of operations.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "the usual operations")]
 pub enum Node {
     /// `mantissa / 10^decimals`.
     Number {
-        mantissa: i64,
-        decimals: u32,
+        mantissa: i128,
+        decimals: i32,
     },
     Name(String),
     Call {
         function: Function,
-        argument: String,
+        argument: usize,
     },
-    Negate(Box<Expression>),
-    Add(Box<Expression>, Box<Expression>),
-    Subtract(Box<Expression>, Box<Expression>),
-    Multiply(Box<Expression>, Box<Expression>),
-    Divide(Box<Expression>, Box<Expression>),
-    Power(Box<Expression>, i32),
+    Negate(usize),
+    Add(usize, usize),
+    Subtract(usize, usize),
+    Multiply(usize, usize),
+    Divide(usize, usize),
+    Power(usize, usize),
 }
 
-/// Functions of an angle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Functions of one argument.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the usual functions")]
 pub enum Function {
     Sin,
     Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Exp,
+    Log,
+    Sqrt,
+}
+
+impl Function {
+    /// All of them, with their names.
+    pub const ALL: [(&'static str, Self); 9] = [
+        ("sin", Self::Sin),
+        ("cos", Self::Cos),
+        ("tan", Self::Tan),
+        ("asin", Self::Asin),
+        ("acos", Self::Acos),
+        ("atan", Self::Atan),
+        ("exp", Self::Exp),
+        ("log", Self::Log),
+        ("sqrt", Self::Sqrt),
+    ];
+
+    /// The function of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, f)| *f)
+    }
 }
 
 /// Why a text is no expression, or has no value.
@@ -61,7 +93,7 @@ pub enum ExpressionError {
         /// Where.
         span: Range<usize>,
     },
-    /// Brackets nested too deeply.
+    /// Brackets, signs or powers nested too deeply.
     #[error("nested more than {MAX_DEPTH} deep")]
     TooDeep {
         /// Where.
@@ -97,186 +129,235 @@ impl ExpressionError {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
-enum Token {
-    Number { mantissa: i64, decimals: u32 },
-    Name(String),
-    Symbol(char),
-    End,
+/// Which names there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Names {
+    /// Of the platform: `psi_x@1` and `psi_x^n` are names.
+    Platform,
+    /// Letters, digits and `_`.
+    Plain,
 }
 
-struct Parser<'a> {
-    text: &'a str,
+type Input<'a> = Stateful<LocatingSlice<&'a str>, Expression>;
+
+/// Where the grammar is violated, and what could stand there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Wrong {
     at: usize,
-    token: Token,
-    span: Range<usize>,
+    expected: &'static str,
 }
 
-impl<'a> Parser<'a> {
-    fn error(&self, expected: &'static str) -> ExpressionError {
-        let found = match self.token {
-            Token::End => "the end of the expression".into(),
-            _ => format!("`{}`", &self.text[self.span.clone()]),
-        };
-        ExpressionError::Syntax { expected, found, span: self.span.clone() }
+impl ParserError<Input<'_>> for Wrong {
+    type Inner = Self;
+    fn from_input(input: &Input<'_>) -> Self {
+        Self { at: input.current_token_start(), expected: "something else" }
     }
-
-    fn advance(&mut self) -> Result<(), ExpressionError> {
-        let rest = &self.text[self.at..];
-        let start = self.at + (rest.len() - rest.trim_start().len());
-        let rest = &self.text[start..];
-        let run = |accept: &dyn Fn(char) -> bool| rest.find(|c| !accept(c)).unwrap_or(rest.len());
-        let (token, length) = match rest.chars().next() {
-            None => (Token::End, 0),
-            Some(c) if c.is_ascii_digit() || c == '.' => {
-                let length = run(&|c| c.is_ascii_digit() || c == '.');
-                let literal = &rest[..length];
-                let (whole, decimals) = literal.split_once('.').unwrap_or((literal, ""));
-                self.span = start..start + length;
-                match format!("{whole}{decimals}").parse() {
-                    Ok(mantissa) if decimals.len() <= 15 => {
-                        (Token::Number { mantissa, decimals: decimals.len() as u32 }, length)
-                    }
-                    _ => {
-                        return Err(ExpressionError::Syntax {
-                            expected: "a number of at most 18 digits",
-                            found: format!("`{literal}`"),
-                            span: self.span.clone(),
-                        });
-                    }
-                }
-            }
-            Some(c) if c.is_ascii_alphabetic() || c == '_' => {
-                // `@`, `^n` belong to names such as psi_x@1 and psi_x^n
-                let mut length = run(&|c| c.is_ascii_alphanumeric() || c == '_' || c == '@');
-                if rest[length..].starts_with("^n") {
-                    length += 2;
-                }
-                (Token::Name(rest[..length].into()), length)
-            }
-            Some(c) => (Token::Symbol(c), c.len_utf8()),
-        };
-        self.token = token;
-        self.span = start..start + length;
-        self.at = start + length;
-        Ok(())
+    fn into_inner(self) -> Result<Self, Self> {
+        Ok(self)
     }
+}
 
-    fn is(&self, symbol: char) -> bool {
-        self.token == Token::Symbol(symbol)
-    }
+type Parsed<T> = Result<T, ErrMode<Wrong>>;
 
-    fn expect(&mut self, symbol: char, expected: &'static str) -> Result<(), ExpressionError> {
-        if !self.is(symbol) {
-            return Err(self.error(expected));
+fn wrong<T>(input: &Input<'_>, expected: &'static str) -> Parsed<T> {
+    Err(ErrMode::Cut(Wrong { at: input.current_token_start(), expected }))
+}
+
+/// Not this, perhaps something else.
+fn other<T>(input: &Input<'_>) -> Parsed<T> {
+    Err(ErrMode::Backtrack(Wrong::from_input(input)))
+}
+
+fn skip_blanks(input: &mut Input<'_>) {
+    let rest: &str = input.input.as_ref();
+    let blanks = rest.len() - rest.trim_start().len();
+    input.next_slice(blanks);
+}
+
+fn peek(input: &Input<'_>) -> Option<char> {
+    let rest: &str = input.input.as_ref();
+    rest.chars().next()
+}
+
+/// The next character, if it is one of `wanted`.
+fn symbol(input: &mut Input<'_>, wanted: &str) -> Option<char> {
+    skip_blanks(input);
+    let found = peek(input).filter(|c| wanted.contains(*c))?;
+    input.next_slice(found.len_utf8());
+    Some(found)
+}
+
+/// Adds an operation that ends here.
+fn push(input: &mut Input<'_>, node: Node, start: usize) -> usize {
+    let end = input.previous_token_end();
+    input.state.nodes.push(node);
+    input.state.spans.push(start..end);
+    input.state.nodes.len() - 1
+}
+
+fn number(input: &mut Input<'_>) -> Parsed<usize> {
+    let start = input.current_token_start();
+    let rest: &str = input.input.as_ref();
+    let mut length = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+    let literal = &rest[..length];
+    // an exponent, as in 1e-5
+    let tail = &rest[length..];
+    let digits = tail.strip_prefix(['e', 'E']).map(|t| (t, t.strip_prefix(['+', '-']).unwrap_or(t)));
+    let mut exponent = 0i32;
+    if let Some((signed, digits)) = digits.filter(|(_, d)| d.starts_with(|c: char| c.is_ascii_digit())) {
+        let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+        let sign = signed.len() - digits.len();
+        match signed[..sign + end].parse() {
+            Ok(e @ -400..=400) => exponent = e,
+            _ => return wrong(input, "an exponent of at most 400"),
         }
-        self.advance()
+        length += 1 + sign + end;
     }
-
-    fn operand(&mut self, depth: usize) -> Result<Expression, ExpressionError> {
-        let span = self.span.clone();
-        if depth > MAX_DEPTH {
-            return Err(ExpressionError::TooDeep { span });
+    let (whole, decimals) = literal.split_once('.').unwrap_or((literal, ""));
+    let digits = format!("{whole}{decimals}");
+    match digits.parse() {
+        Ok(mantissa) if digits.len() <= 36 => {
+            let decimals = decimals.len() as i32 - exponent;
+            input.next_slice(length);
+            Ok(push(input, Node::Number { mantissa, decimals }, start))
         }
-        let start = span.start;
-        match self.token.clone() {
-            Token::Number { mantissa, decimals } => {
-                self.advance()?;
-                Ok(Expression { node: Node::Number { mantissa, decimals }, span })
-            }
-            Token::Name(name) => {
-                self.advance()?;
-                let function = match name.as_str() {
-                    "sin" => Function::Sin,
-                    "cos" => Function::Cos,
-                    _ => return Ok(Expression { node: Node::Name(name), span }),
-                };
-                self.expect('(', "`(`")?;
-                let Token::Name(argument) = self.token.clone() else {
-                    return Err(self.error("the name of an angle"));
-                };
-                self.advance()?;
-                let end = self.span.end;
-                self.expect(')', "`)`")?;
-                Ok(Expression { node: Node::Call { function, argument }, span: start..end })
-            }
-            Token::Symbol('(') => {
-                self.advance()?;
-                let inner = self.sum(0, depth + 1)?;
-                self.expect(')', "an operator or `)`")?;
-                Ok(inner)
-            }
-            Token::Symbol(sign @ ('-' | '+')) => {
-                self.advance()?;
-                let inner = self.sum(2, depth + 1)?;
-                if sign == '+' {
-                    return Ok(inner);
-                }
-                let span = start..inner.span.end;
-                Ok(Expression { node: Node::Negate(Box::new(inner)), span })
-            }
-            _ => Err(self.error("a number, a name or `(`")),
-        }
+        _ => wrong(input, "a number of at most 36 digits"),
     }
+}
 
-    /// Everything that binds tighter than `binding`: 0 sums, 1 products, 2 powers.
-    fn sum(&mut self, binding: u8, depth: usize) -> Result<Expression, ExpressionError> {
-        let mut left = self.operand(depth)?;
-        loop {
-            let (power, symbol) = match self.token {
-                Token::Symbol(c @ ('+' | '-')) => (1, c),
-                Token::Symbol(c @ ('*' | '/')) => (2, c),
-                Token::Symbol('^') => (3, '^'),
-                _ => return Ok(left),
+fn operand(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
+    skip_blanks(input);
+    let start = input.current_token_start();
+    match peek(input) {
+        Some(c) if c.is_ascii_digit() || c == '.' => number(input),
+        Some(c) if c.is_ascii_alphabetic() || c == '_' => {
+            let rest: &str = input.input.as_ref();
+            let more =
+                |c: char| c.is_ascii_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);
+            let mut length = rest.find(|c| !more(c)).unwrap_or(rest.len());
+            if names == Names::Platform && rest[length..].starts_with("^n") {
+                length += 2;
+            }
+            let name = rest[..length].to_string();
+            input.next_slice(length);
+            let Some(function) = Function::named(&name) else {
+                return Ok(push(input, Node::Name(name), start));
             };
-            if power <= binding {
-                return Ok(left);
+            if symbol(input, "(").is_none() {
+                return wrong(input, "`(`");
             }
-            self.advance()?;
-            let start = left.span.start;
-            if symbol == '^' {
-                let negative = self.is('-');
-                if negative {
-                    self.advance()?;
-                }
-                let Token::Number { mantissa, decimals: 0 } = self.token else {
-                    return Err(self.error("an integer exponent"));
-                };
-                let Ok(exponent) = i32::try_from(mantissa) else {
-                    return Err(self.error("a small integer exponent"));
-                };
-                let span = start..self.span.end;
-                self.advance()?;
-                let exponent = if negative { -exponent } else { exponent };
-                left = Expression { node: Node::Power(Box::new(left), exponent), span };
-                continue;
+            let argument = sum(input, names)?;
+            if symbol(input, ")").is_none() {
+                return wrong(input, "an operator or `)`");
             }
-            let right = self.sum(power, depth + 1)?;
-            let span = start..right.span.end;
-            let (a, b) = (Box::new(left), Box::new(right));
-            let node = match symbol {
-                '+' => Node::Add(a, b),
-                '-' => Node::Subtract(a, b),
-                '*' => Node::Multiply(a, b),
-                _ => Node::Divide(a, b),
-            };
-            left = Expression { node, span };
+            Ok(push(input, Node::Call { function, argument }, start))
         }
+        Some('(') => {
+            symbol(input, "(");
+            let inner = sum(input, names)?;
+            if symbol(input, ")").is_none() {
+                return wrong(input, "an operator or `)`");
+            }
+            Ok(inner)
+        }
+        _ => other(input),
     }
+}
+
+fn sum(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
+    fn of(input: &mut Input<'_>, a: usize, b: usize, node: fn(usize, usize) -> Node) -> Parsed<usize> {
+        let start = input.state.spans[a].start;
+        Ok(push(input, node(a, b), start))
+    }
+    expression(|input: &mut Input<'_>| operand(input, names))
+        .prefix(|input: &mut Input<'_>| match symbol(input, "-+") {
+            Some('-') => Ok(Prefix(5, |input: &mut Input<'_>, a: usize| {
+                let start = input.state.spans[a].start;
+                Ok(push(input, Node::Negate(a), start))
+            })),
+            Some(_) => Ok(Prefix(5, |_: &mut Input<'_>, a: usize| Ok(a))),
+            None => wrong(input, "a number, a name or `(`"),
+        })
+        .infix(|input: &mut Input<'_>| match symbol(input, "+-*/^") {
+            Some('+') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Add))),
+            Some('-') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Subtract))),
+            Some('*') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Multiply))),
+            Some('/') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Divide))),
+            Some(_) => Ok(Infix::Right(8, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Power))),
+            None => other(input),
+        })
+        .parse_next(input)
+}
+
+/// The first place that is nested too deeply.
+fn too_deep(text: &str) -> Option<usize> {
+    let (mut brackets, mut signs, mut powers) = (0usize, 0usize, 0usize);
+    let mut before = ' ';
+    for (at, c) in text.char_indices().filter(|(_, c)| !c.is_whitespace()) {
+        match c {
+            '(' => brackets += 1,
+            ')' => brackets = brackets.saturating_sub(1),
+            _ => {}
+        }
+        signs = if matches!(c, '+' | '-') { signs + 1 } else { 0 };
+        // a sign behind ^ belongs to the exponent
+        if matches!(c, '*' | '/' | '(' | ')')
+            || (matches!(c, '+' | '-') && !matches!(before, '^' | '+' | '-'))
+        {
+            powers = 0;
+        }
+        powers += usize::from(c == '^');
+        if brackets > MAX_DEPTH || signs > MAX_DEPTH || powers > MAX_DEPTH {
+            return Some(at);
+        }
+        before = c;
+    }
+    None
+}
+
+/// Parses a whole text with names of the platform.
+///
+/// # Errors
+/// [`ExpressionError`] with the place in the text.
+pub fn parse(text: &str) -> Result<Expression, ExpressionError> {
+    parse_with(text, Names::Platform)
 }
 
 /// Parses a whole text.
 ///
 /// # Errors
 /// [`ExpressionError`] with the place in the text.
-pub fn parse(text: &str) -> Result<Expression, ExpressionError> {
-    let mut parser = Parser { text, at: 0, token: Token::End, span: 0..0 };
-    parser.advance()?;
-    let expression = parser.sum(0, 0)?;
-    if parser.token != Token::End {
-        return Err(parser.error("an operator or the end of the expression"));
+pub fn parse_with(text: &str, names: Names) -> Result<Expression, ExpressionError> {
+    if let Some(at) = too_deep(text) {
+        return Err(ExpressionError::TooDeep { span: at..at + 1 });
     }
-    Ok(expression)
+    let mut input = Stateful { input: LocatingSlice::new(text), state: Expression::default() };
+    let parsed = sum(&mut input, names).and_then(|root| {
+        skip_blanks(&mut input);
+        match peek(&input) {
+            None => Ok(root),
+            Some(_) => wrong(&input, "an operator or the end of the expression"),
+        }
+    });
+    match parsed {
+        // operands come first: the whole is the last
+        Ok(_) => Ok(input.state),
+        Err(error) => {
+            let wrong = error.into_inner().unwrap_or(Wrong { at: text.len(), expected: "an expression" });
+            let rest = &text[wrong.at..];
+            let token = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_' && c != '.');
+            let length = match token {
+                Some(0) => rest.chars().next().map_or(0, char::len_utf8),
+                other => other.unwrap_or(rest.len()),
+            };
+            let found = match length {
+                0 => "the end of the expression".into(),
+                _ => format!("`{}`", rest[..length].chars().take(40).collect::<String>()),
+            };
+            let span = wrong.at..wrong.at + length;
+            Err(ExpressionError::Syntax { expected: wrong.expected, found, span })
+        }
+    }
 }
 
 /// Where the names of an expression get their values.
@@ -289,61 +370,146 @@ pub trait Environment {
     fn known(&self) -> Vec<String>;
 }
 
-/// The value of `expression` in a field.
-///
-/// # Errors
-/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`].
-pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Result<u64, ExpressionError> {
-    let span = || expression.span.clone();
-    let value = |e: &Expression| evaluate(e, f, env);
-    let unknown = |name: &str| ExpressionError::UnknownName {
-        name: name.into(),
-        hint: nearest(name, &env.known()),
-        span: span(),
-    };
-    let inverse = |a: u64| match a {
-        0 => Err(ExpressionError::DivisionByZero { span: span() }),
-        _ => Ok(f.inv(a)),
-    };
-    Ok(match &expression.node {
-        Node::Number { mantissa, decimals } => {
-            f.mul(f.from_i64(*mantissa), f.inv(f.pow(f.from_u64(10), u64::from(*decimals))))
-        }
-        Node::Name(name) => env.name(name).ok_or_else(|| unknown(name))?,
-        Node::Call { function, argument } => {
-            let (c, s) = env.cos_sin(argument).ok_or_else(|| unknown(argument))?;
-            if *function == Function::Cos { c } else { s }
-        }
-        Node::Negate(a) => f.neg(value(a)?),
-        Node::Add(a, b) => f.add(value(a)?, value(b)?),
-        Node::Subtract(a, b) => f.sub(value(a)?, value(b)?),
-        Node::Multiply(a, b) => f.mul(value(a)?, value(b)?),
-        Node::Divide(a, b) => f.mul(value(a)?, inverse(value(b)?)?),
-        Node::Power(a, e) => {
-            let power = f.pow(value(a)?, e.unsigned_abs().into());
-            if *e < 0 { inverse(power)? } else { power }
-        }
-    })
-}
+impl Expression {
+    /// The whole.
+    pub fn root(&self) -> usize {
+        self.nodes.len().saturating_sub(1)
+    }
 
-/// The value of an expression in floating point, with the names' values from `at`; NaN for functions.
-pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
-    let value = |e: &Expression| evaluate_f64(e, at);
-    match &e.node {
-        Node::Number { mantissa, decimals } => *mantissa as f64 / 10f64.powi(*decimals as i32),
-        Node::Name(n) => at(n),
-        Node::Call { .. } => f64::NAN,
-        Node::Negate(a) => -value(a),
-        Node::Add(a, b) => value(a) + value(b),
-        Node::Subtract(a, b) => value(a) - value(b),
-        Node::Multiply(a, b) => value(a) * value(b),
-        Node::Divide(a, b) => value(a) / value(b),
-        Node::Power(a, k) => value(a).powi(*k),
+    /// The byte range of the whole.
+    pub fn span(&self) -> Range<usize> {
+        self.spans.last().cloned().unwrap_or(0..0)
+    }
+
+    /// The name that an operation is.
+    fn name_at(&self, i: usize) -> Option<&str> {
+        match &self.nodes[i] {
+            Node::Name(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// The integer that an operation is, if it is a small one.
+    pub fn integer_at(&self, i: usize) -> Option<i32> {
+        match self.nodes[i] {
+            Node::Number { mantissa, decimals: 0 } => i32::try_from(mantissa).ok(),
+            Node::Negate(a) => self.integer_at(a).map(|x| -x),
+            _ => None,
+        }
     }
 }
 
+/// The value of `expression` in a field; functions are the sine and cosine of named angles, exponents integers.
+///
+/// # Errors
+/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for other functions and
+/// exponents.
+pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Result<u64, ExpressionError> {
+    let syntax = |i: usize, expected| ExpressionError::Syntax {
+        expected,
+        found: "something else".into(),
+        span: expression.spans[i].clone(),
+    };
+    let mut values: Vec<u64> = Vec::with_capacity(expression.nodes.len());
+    // what only names an angle, or is an exponent, needs no value
+    let mut arguments = vec![false; expression.nodes.len()];
+    for node in &expression.nodes {
+        if let Node::Call { argument, .. } = node {
+            arguments[*argument] = true;
+        }
+    }
+    for (i, node) in expression.nodes.iter().enumerate() {
+        let span = || expression.spans[i].clone();
+        let unknown = |name: &str| ExpressionError::UnknownName {
+            name: name.into(),
+            hint: nearest(name, &env.known()),
+            span: span(),
+        };
+        let inverse = |a: u64| match a {
+            0 => Err(ExpressionError::DivisionByZero { span: span() }),
+            _ => Ok(f.inv(a)),
+        };
+        let value = match node {
+            Node::Number { mantissa, decimals } => {
+                let ten = f.pow(f.from_u64(10), decimals.unsigned_abs().into());
+                f.mul(from_i128(f, *mantissa), if *decimals < 0 { ten } else { f.inv(ten) })
+            }
+            Node::Name(_) if arguments[i] => 0,
+            Node::Name(name) => env.name(name).ok_or_else(|| unknown(name))?,
+            Node::Call { function, argument } => {
+                let Some(angle) = expression.name_at(*argument) else {
+                    return Err(syntax(*argument, "the name of an angle"));
+                };
+                let (c, s) = env.cos_sin(angle).ok_or_else(|| unknown(angle))?;
+                match function {
+                    Function::Cos => c,
+                    Function::Sin => s,
+                    _ => return Err(syntax(i, "sin or cos of an angle")),
+                }
+            }
+            Node::Negate(a) => f.neg(values[*a]),
+            Node::Add(a, b) => f.add(values[*a], values[*b]),
+            Node::Subtract(a, b) => f.sub(values[*a], values[*b]),
+            Node::Multiply(a, b) => f.mul(values[*a], values[*b]),
+            Node::Divide(a, b) => f.mul(values[*a], inverse(values[*b])?),
+            Node::Power(a, b) => {
+                let Some(e) = expression.integer_at(*b) else {
+                    return Err(syntax(*b, "an integer exponent"));
+                };
+                let power = f.pow(values[*a], e.unsigned_abs().into());
+                if e < 0 { inverse(power)? } else { power }
+            }
+        };
+        values.push(value);
+    }
+    Ok(values.last().copied().unwrap_or(0))
+}
+
+/// The image of an integer.
+pub fn from_i128(f: &Field, x: i128) -> u64 {
+    let p = u128::from(f.modulus());
+    let image = f.from_u64((x.unsigned_abs() % p) as u64);
+    if x < 0 { f.neg(image) } else { image }
+}
+
+/// The value of an expression in floating point, with the names' values from `at`.
+pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
+    let mut values: Vec<f64> = Vec::with_capacity(e.nodes.len());
+    for node in &e.nodes {
+        let value = match node {
+            Node::Number { mantissa, decimals } => *mantissa as f64 / 10f64.powi(*decimals),
+            Node::Name(n) => at(n),
+            Node::Call { function, argument } => {
+                let x = values[*argument];
+                match function {
+                    Function::Sin => x.sin(),
+                    Function::Cos => x.cos(),
+                    Function::Tan => x.tan(),
+                    Function::Asin => x.asin(),
+                    Function::Acos => x.acos(),
+                    Function::Atan => x.atan(),
+                    Function::Exp => x.exp(),
+                    Function::Log => x.ln(),
+                    Function::Sqrt => x.sqrt(),
+                }
+            }
+            Node::Negate(a) => -values[*a],
+            Node::Add(a, b) => values[*a] + values[*b],
+            Node::Subtract(a, b) => values[*a] - values[*b],
+            Node::Multiply(a, b) => values[*a] * values[*b],
+            Node::Divide(a, b) => values[*a] / values[*b],
+            Node::Power(a, b) => match e.integer_at(*b) {
+                Some(k) => values[*a].powi(k),
+                None => values[*a].powf(values[*b]),
+            },
+        };
+        values.push(value);
+    }
+    values.last().copied().unwrap_or(f64::NAN)
+}
+
 /// The known name with the least edit distance, if it is close.
-fn nearest(name: &str, known: &[String]) -> Option<String> {
+pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
     let distance = |a: &str, b: &str| {
         let b: Vec<char> = b.chars().collect();
         let mut row: Vec<usize> = (0..=b.len()).collect();
@@ -404,6 +570,11 @@ mod tests {
     #[case("x^-1*3", 1)]
     #[case("sin(alpha)-cos(alpha)", 1)]
     #[case("- - +x", 3)]
+    #[case("(2^3)^2 - 64", 0)]
+    #[case("-2^2", -4)]
+    #[case("x^-(1)*9", 3)]
+    #[case("1.5e1 + 50E-1", 20)]
+    #[case("x--x-+x", 3)]
     fn values(#[case] text: &str, #[case] expected: i64) {
         let f = Field::new((1 << 60) + 33);
         let e = parse(text).expect("it parses");
@@ -415,10 +586,11 @@ mod tests {
     #[case("1 +", "expected a number, a name or `(`, found the end of the expression", 3..3)]
     #[case("(x", "expected an operator or `)`, found the end of the expression", 2..2)]
     #[case("x x", "expected an operator or the end of the expression, found `x`", 2..3)]
-    #[case("x^y", "expected an integer exponent, found `y`", 2..3)]
-    #[case("sin(2)", "expected the name of an angle, found `2`", 4..5)]
+    #[case("sin 2", "expected `(`, found `2`", 4..5)]
+    #[case("2^^3", "expected a number, a name or `(`, found `^`", 2..3)]
+    #[case("1e999", "expected an exponent of at most 400, found `1e999`", 0..5)]
     #[case("é", "expected a number, a name or `(`, found `é`", 0..2)]
-    #[case("99999999999999999999", "expected a number of at most 18 digits, found `99999999999999999999`", 0..20)]
+    #[case("1.2.3", "expected a number of at most 36 digits, found `1.2.3`", 0..5)]
     fn syntax_errors(#[case] text: &str, #[case] message: &str, #[case] span: Range<usize>) {
         let e = parse(text).expect_err("wrong");
         assert_eq!((e.to_string().as_str(), e.span()), (message, span));
@@ -432,12 +604,22 @@ mod tests {
         assert_eq!(wrong("D_FZ"), "`D_FZ` is not known here; did you mean `D_FX`?");
         assert_eq!(wrong("1/(x-3)"), "division by zero");
         assert_eq!(wrong("nothing_like_it"), "`nothing_like_it` is not known here");
+        assert_eq!(wrong("sin(2)"), "expected the name of an angle, found something else");
+        assert_eq!(wrong("tan(alpha)"), "expected sin or cos of an angle, found something else");
+        assert_eq!(wrong("x^x"), "expected an integer exponent, found something else");
     }
 
     #[test]
     fn deep_nesting_is_refused() {
-        let deep = "(".repeat(1_000_000);
-        assert!(matches!(parse(&deep), Err(ExpressionError::TooDeep { .. })));
-        assert!(matches!(parse(&"-".repeat(1_000_000)), Err(ExpressionError::TooDeep { .. })));
+        for deep in ["(", "-", "x^", "2^-", "sin(", "x*(", "- "] {
+            let e = parse(&deep.repeat(1_000_000)).expect_err("too deep");
+            assert!(matches!(e, ExpressionError::TooDeep { .. }), "{deep}: {e}");
+        }
+        // what is long is not deep
+        let f = Field::new((1 << 60) + 33);
+        for (long, value) in [("x+", 3 * 300_001), ("x^2-y^2+y^2-x^2+", 3), ("1*", 3)] {
+            let text = format!("{}x", long.repeat(if value > 3 { 300_000 } else { 1000 })).replace('y', "x");
+            assert_eq!(evaluate(&parse(&text).expect("long"), &f, &Env), Ok(f.from_i64(value)));
+        }
     }
 }

@@ -254,15 +254,18 @@ fn place(values: &mut RandomValues, e: &Expression, names: &[String], rng: &mut 
 
 /// An upper bound on the degree of a polynomial in one name.
 fn degree_in(e: &Expression, name: &str) -> usize {
-    match &e.node {
-        Node::Number { .. } | Node::Call { .. } => 0,
-        Node::Name(n) => usize::from(n == name),
-        Node::Negate(a) => degree_in(a, name),
-        Node::Add(a, b) | Node::Subtract(a, b) => degree_in(a, name).max(degree_in(b, name)),
-        Node::Multiply(a, b) => degree_in(a, name) + degree_in(b, name),
-        Node::Divide(a, _) => degree_in(a, name),
-        Node::Power(a, k) => degree_in(a, name) * k.unsigned_abs() as usize,
+    let mut degrees: Vec<usize> = Vec::with_capacity(e.nodes.len());
+    for node in &e.nodes {
+        degrees.push(match node {
+            Node::Number { .. } | Node::Call { .. } => 0,
+            Node::Name(n) => usize::from(n == name),
+            Node::Negate(a) | Node::Divide(a, _) => degrees[*a],
+            Node::Add(a, b) | Node::Subtract(a, b) => degrees[*a].max(degrees[*b]),
+            Node::Multiply(a, b) => degrees[*a] + degrees[*b],
+            Node::Power(a, k) => degrees[*a] * e.integer_at(*k).map_or(1, |k| k.unsigned_abs() as usize),
+        });
     }
+    degrees.last().copied().unwrap_or(0)
 }
 
 /// Whether the polynomial takes both signs, or zero, on a grid of half tangents.
