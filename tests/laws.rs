@@ -140,7 +140,7 @@ impl<R: DerivativeRows> DerivativeRows for Scaled<R> {
     fn columns(&self) -> usize {
         self.inner.columns()
     }
-    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64])) -> bool {
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64]) -> bool) -> bool {
         let (f, scale) = (self.inner.field(), &self.scale);
         self.inner.emit(order, &mut |row| {
             let scaled: Vec<u64> = row.iter().zip(scale).map(|(&x, &s)| f.mul(x, s)).collect();

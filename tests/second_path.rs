@@ -228,7 +228,7 @@ impl DerivativeRows for Matrices {
     fn columns(&self) -> usize {
         self.columns
     }
-    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64])) -> bool {
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64]) -> bool) -> bool {
         let f = self.field;
         let times = |row: &[u64], m: &[Vec<u64>]| -> Vec<u64> {
             (0..m[0].len()).map(|j| f.dot(0, row.iter().zip(m).map(|(&x, r)| (x, r[j])))).collect()

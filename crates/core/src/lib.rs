@@ -16,3 +16,4 @@ pub mod model;
 pub mod prediction;
 pub mod simulation;
 pub mod solution;
+pub mod system;

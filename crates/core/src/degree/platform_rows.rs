@@ -72,7 +72,7 @@ impl DerivativeRows for PlatformRows {
         self.columns
     }
 
-    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64])) -> bool {
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64]) -> bool) -> bool {
         let f = self.field;
         for block in &self.blocks {
             for local in self.chain.iter().filter(|r| r.order == order) {

@@ -33,12 +33,7 @@ pub fn climb(
     let mut degrees = Degrees { degree: vec![None; rows.columns()], ..Degrees::default() };
     for order in 0.. {
         let full = basis.rank() == basis.columns();
-        let more = !full
-            && rows.emit(order, &mut |row| {
-                if basis.rank() < basis.columns() {
-                    basis.insert(row);
-                }
-            });
+        let more = !full && rows.emit(order, &mut |row| basis.rank() < basis.columns() && basis.insert(row));
         if !more {
             break;
         }

@@ -187,6 +187,16 @@ fn symbol(input: &mut Input<'_>, wanted: &str) -> Option<char> {
     Some(found)
 }
 
+/// An operator between two operands; `**` is `^`.
+fn operator(input: &mut Input<'_>) -> Option<char> {
+    let found = symbol(input, "+-*/^")?;
+    if found == '*' && peek(input) == Some('*') {
+        input.next_slice(1);
+        return Some('^');
+    }
+    Some(found)
+}
+
 /// Adds an operation that ends here.
 fn push(input: &mut Input<'_>, node: Node, start: usize) -> usize {
     let end = input.previous_token_end();
@@ -230,10 +240,9 @@ fn operand(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
     let start = input.current_token_start();
     match peek(input) {
         Some(c) if c.is_ascii_digit() || c == '.' => number(input),
-        Some(c) if c.is_ascii_alphabetic() || c == '_' => {
+        Some(c) if c.is_alphabetic() || c == '_' => {
             let rest: &str = input.input.as_ref();
-            let more =
-                |c: char| c.is_ascii_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);
+            let more = |c: char| c.is_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);
             let mut length = rest.find(|c| !more(c)).unwrap_or(rest.len());
             if names == Names::Platform && rest[length..].starts_with("^n") {
                 length += 2;
@@ -278,7 +287,7 @@ fn sum(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
             Some(_) => Ok(Prefix(5, |_: &mut Input<'_>, a: usize| Ok(a))),
             None => wrong(input, "a number, a name or `(`"),
         })
-        .infix(|input: &mut Input<'_>| match symbol(input, "+-*/^") {
+        .infix(|input: &mut Input<'_>| match operator(input) {
             Some('+') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Add))),
             Some('-') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Subtract))),
             Some('*') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Multiply))),
@@ -293,17 +302,20 @@ fn sum(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
 fn too_deep(text: &str) -> Option<usize> {
     let (mut brackets, mut signs, mut powers) = (0usize, 0usize, 0usize);
     let mut before = ' ';
-    for (at, c) in text.char_indices().filter(|(_, c)| !c.is_whitespace()) {
+    let mut characters = text.char_indices().filter(|(_, c)| !c.is_whitespace()).peekable();
+    while let Some((at, c)) = characters.next() {
+        // ** is ^
+        let double = c == '*' && characters.next_if(|next| *next == (at + 1, '*')).is_some();
+        let c = if double { '^' } else { c };
         match c {
             '(' => brackets += 1,
             ')' => brackets = brackets.saturating_sub(1),
             _ => {}
         }
-        signs = if matches!(c, '+' | '-') { signs + 1 } else { 0 };
+        let sign = matches!(c, '+' | '-');
+        signs = if sign { signs + 1 } else { 0 };
         // a sign behind ^ belongs to the exponent
-        if matches!(c, '*' | '/' | '(' | ')')
-            || (matches!(c, '+' | '-') && !matches!(before, '^' | '+' | '-'))
-        {
+        if matches!(c, '*' | '/' | '(' | ')') || (sign && !matches!(before, '^' | '+' | '-')) {
             powers = 0;
         }
         powers += usize::from(c == '^');
@@ -345,7 +357,7 @@ pub fn parse_with(text: &str, names: Names) -> Result<Expression, ExpressionErro
         Err(error) => {
             let wrong = error.into_inner().unwrap_or(Wrong { at: text.len(), expected: "an expression" });
             let rest = &text[wrong.at..];
-            let token = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_' && c != '.');
+            let token = rest.find(|c: char| !c.is_alphanumeric() && c != '_' && c != '.');
             let length = match token {
                 Some(0) => rest.chars().next().map_or(0, char::len_utf8),
                 other => other.unwrap_or(rest.len()),
@@ -570,7 +582,7 @@ mod tests {
     #[case("x^-1*3", 1)]
     #[case("sin(alpha)-cos(alpha)", 1)]
     #[case("- - +x", 3)]
-    #[case("(2^3)^2 - 64", 0)]
+    #[case("(2^3)**2 - 64", 0)]
     #[case("-2^2", -4)]
     #[case("x^-(1)*9", 3)]
     #[case("1.5e1 + 50E-1", 20)]
@@ -589,7 +601,7 @@ mod tests {
     #[case("sin 2", "expected `(`, found `2`", 4..5)]
     #[case("2^^3", "expected a number, a name or `(`, found `^`", 2..3)]
     #[case("1e999", "expected an exponent of at most 400, found `1e999`", 0..5)]
-    #[case("é", "expected a number, a name or `(`, found `é`", 0..2)]
+    #[case("§", "expected a number, a name or `(`, found `§`", 0..2)]
     #[case("1.2.3", "expected a number of at most 36 digits, found `1.2.3`", 0..5)]
     fn syntax_errors(#[case] text: &str, #[case] message: &str, #[case] span: Range<usize>) {
         let e = parse(text).expect_err("wrong");
@@ -611,13 +623,13 @@ mod tests {
 
     #[test]
     fn deep_nesting_is_refused() {
-        for deep in ["(", "-", "x^", "2^-", "sin(", "x*(", "- "] {
+        for deep in ["(", "-", "x^", "2^-", "sin(", "x*(", "- ", "x**", "2**-"] {
             let e = parse(&deep.repeat(1_000_000)).expect_err("too deep");
             assert!(matches!(e, ExpressionError::TooDeep { .. }), "{deep}: {e}");
         }
         // what is long is not deep
         let f = Field::new((1 << 60) + 33);
-        for (long, value) in [("x+", 3 * 300_001), ("x^2-y^2+y^2-x^2+", 3), ("1*", 3)] {
+        for (long, value) in [("x+", 3 * 300_001), ("x^2-y^2+y^2-x^2+", 3), ("1*", 3), ("1^2*", 3)] {
             let text = format!("{}x", long.repeat(if value > 3 { 300_000 } else { 1000 })).replace('y', "x");
             assert_eq!(evaluate(&parse(&text).expect("long"), &f, &Env), Ok(f.from_i64(value)));
         }

@@ -1,0 +1,154 @@
+//! Verdicts on any system: degrees, agreed on by two random fields.
+
+use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::{Echelon, Field, SplitMix64};
+
+use super::dag::{Dag, Op};
+use super::model::{Compiled, MAX_UNKNOWNS, ModelError, SystemModel};
+use super::rows::{Layout, SystemRows, field_for};
+use super::taylor::Singular;
+use crate::degree::staircase::{Degrees, climb};
+
+/// Pairs of fields that are tried.
+const ATTEMPTS: usize = 5;
+
+/// What is known of a system.
+#[derive(Debug, Clone)]
+pub struct Judgement {
+    /// The unknowns and the bound.
+    pub layout: Layout,
+    /// Ranks and degrees.
+    pub degrees: Degrees,
+    /// The degree of every combination that was asked for.
+    pub combinations: Vec<Option<usize>>,
+    /// The bases of `V_0, V_1, ...` in the first field.
+    pub stairs: Vec<Echelon>,
+    /// The two fields.
+    pub fields: [Field; 2],
+    /// Bound on the probability that any of it is wrong.
+    pub error_bound: f64,
+    /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
+    pub rests_on_bound: bool,
+}
+
+/// Degrees at one random point.
+pub(crate) struct At {
+    pub(crate) degrees: Degrees,
+    pub(crate) combinations: Vec<Option<usize>>,
+    pub(crate) stairs: Vec<Echelon>,
+}
+
+/// Climbs the staircase of a system at a random point of a field.
+pub(crate) fn climb_at(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    field: Field,
+    rng: &mut SplitMix64,
+) -> Result<At, ModelError> {
+    let mut rows = SystemRows::new(model, compiled, layout, field, rng).map_err(|s| singular(compiled, s))?;
+    let gradients = rows.combinations().to_vec();
+    let mut combinations = vec![None; gradients.len()];
+    let mut basis = Echelon::new(field, layout.unknowns.len());
+    let mut stairs = Vec::new();
+    let degrees = climb(&mut rows, &mut basis, |order, basis| {
+        for (degree, gradient) in combinations.iter_mut().zip(&gradients) {
+            if degree.is_none() && basis.contains(gradient) {
+                *degree = Some(order);
+            }
+        }
+        stairs.push(basis.clone());
+    });
+    Ok(At { degrees, combinations, stairs })
+}
+
+fn singular(compiled: &Compiled, singular: Singular) -> ModelError {
+    let (node, message) = match singular {
+        Singular::Division(node) => (node, "division by zero at every point that was tried"),
+        Singular::Root(node) => {
+            (node, "the root of zero, or of nothing that is a square, at every point that was tried")
+        }
+    };
+    match compiled.places.get(&node) {
+        Some((place, span)) => place.error(message.into(), span.clone()),
+        None => ModelError { what: "the model".into(), message: message.into(), span: None },
+    }
+}
+
+/// Judges a model in two random fields of the stream of `seed`; `bound` overrides the highest order.
+///
+/// # Errors
+/// [`ModelError`].
+pub fn judge(model: &SystemModel, seed: u64, bound: Option<usize>) -> Result<Judgement, ModelError> {
+    let compiled = model.compile()?;
+    judge_compiled(model, &compiled, seed, bound)
+}
+
+/// Judges a model that was compiled.
+///
+/// # Errors
+/// [`ModelError`].
+pub fn judge_compiled(
+    model: &SystemModel,
+    compiled: &Compiled,
+    seed: u64,
+    bound: Option<usize>,
+) -> Result<Judgement, ModelError> {
+    let layout = Layout::new(model, bound);
+    let found = layout.unknowns.len();
+    let refuse = |message: String| ModelError { what: "the model".into(), message, span: None };
+    if found > MAX_UNKNOWNS {
+        return Err(refuse(format!("{found} unknowns; expected at most {MAX_UNKNOWNS}")));
+    }
+    let mut rng = SplitMix64::new(seed);
+    for _ in 0..ATTEMPTS {
+        let fields = [field_for(compiled, &mut rng), field_for(compiled, &mut rng)];
+        let first = climb_at(model, compiled, &layout, fields[0], &mut rng)?;
+        let second = climb_at(model, compiled, &layout, fields[1], &mut rng)?;
+        if first.degrees == second.degrees && first.combinations == second.combinations {
+            let full = first.degrees.rank() == found;
+            let error_bound = error_bound(&claim(&compiled.dag, &layout, &first.degrees), 2);
+            return Ok(Judgement {
+                rests_on_bound: !layout.closed && !full,
+                layout,
+                degrees: first.degrees,
+                combinations: first.combinations,
+                stairs: first.stairs,
+                fields,
+                error_bound,
+            });
+        }
+    }
+    Err(refuse(format!(
+        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this model"
+    )))
+}
+
+/// What the error bound depends on. A node is a rational function of the random values, its degree and the size of its
+/// coefficients bounded by what it is made of; a derivative of order k multiplies by the right-hand sides k times.
+fn claim(dag: &Dag, layout: &Layout, degrees: &Degrees) -> Claim {
+    let mut size: Vec<(f64, f64)> = Vec::with_capacity(dag.ops.len());
+    for op in &dag.ops {
+        size.push(match *op {
+            Op::Number { mantissa, decimals } => {
+                let bits = (mantissa.unsigned_abs().max(1) as f64).log2() + f64::from(decimals.abs()) * 3.33;
+                (0.0, bits)
+            }
+            Op::Slot(_) | Op::Primitive { .. } => (1.0, 1.0),
+            Op::Add(a, b) | Op::Subtract(a, b) => (size[a].0 + size[b].0, size[a].1 + size[b].1 + 1.0),
+            Op::Multiply(a, b) | Op::Divide(a, b) => (size[a].0 + size[b].0, size[a].1 + size[b].1),
+        });
+    }
+    let largest = |of: fn(&(f64, f64)) -> f64| size.iter().map(of).fold(1.0, f64::max);
+    let orders = degrees.rank_profile.len() as f64;
+    let n = layout.unknowns.len();
+    // every order adds a factor of f, its derivative and its denominator
+    let factor = 3.0 * (orders + 1.0);
+    Claim {
+        unknowns: n,
+        decisions: degrees.rank_profile.len() + 2 * n,
+        order: 1,
+        row_degree: (factor * largest(|s| s.0)).min(1e18) as usize,
+        row_bits: factor * (largest(|s| s.1) + (orders + 2.0).log2() * orders),
+    }
+}

@@ -1,0 +1,392 @@
+//! Any system `x' = f(x, u, p, t)`, `z = h`: what its file says, before any number is drawn.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use super::dag::{Dag, DagError};
+use crate::model::expression::{Expression, Function, nearest};
+
+/// Where something is written.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Place {
+    /// What it is: `the equation of x1`.
+    pub what: String,
+    /// The byte in the file at which its text begins, where that is known.
+    pub offset: Option<usize>,
+}
+
+/// An expression and its place.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Formula {
+    /// As written.
+    pub text: String,
+    /// What was read.
+    pub expression: Expression,
+    /// Where.
+    pub place: Place,
+}
+
+/// A name with what the reader should know of it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Named {
+    /// The name.
+    pub name: String,
+    /// Its unit; empty when none is given.
+    pub unit: String,
+    /// What it is; empty when nothing is said.
+    pub description: String,
+}
+
+/// What is known of the start of a state.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Start {
+    /// Nothing.
+    #[default]
+    Unknown,
+    /// It is known; its value is generic.
+    Known,
+    /// It is known to have this value.
+    Value(Formula),
+}
+
+/// A state.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct State {
+    /// Its name.
+    pub named: Named,
+    /// Its derivative.
+    pub equation: Formula,
+    /// Its start.
+    pub start: Start,
+}
+
+/// A known input.
+#[derive(Debug, Clone, PartialEq)]
+pub enum KnownInput {
+    /// A generic function of time.
+    Generic,
+    /// A polynomial in time of this degree with generic coefficients (0: a constant).
+    Polynomial(usize),
+    /// This function of the time `t`.
+    Function(Formula),
+}
+
+/// A known constant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Constant {
+    /// Of generic value.
+    Generic,
+    /// Of this value.
+    Value(Formula),
+}
+
+/// A part of the timeline with constants of its own and a map of the states at its beginning.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Segment {
+    /// Constants that take another value.
+    pub constants: Vec<(String, Formula)>,
+    /// States that jump: their values behind the jump, in terms of those before.
+    pub carry: Vec<(String, Formula)>,
+}
+
+/// A system.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SystemModel {
+    /// Its name.
+    pub name: String,
+    /// What it is and where it comes from.
+    pub description: String,
+    /// States.
+    pub states: Vec<State>,
+    /// Unknown constants.
+    pub parameters: Vec<Named>,
+    /// Known inputs.
+    pub known_inputs: Vec<(Named, KnownInput)>,
+    /// Unknown inputs: polynomials in time of this degree, or arbitrary.
+    pub unknown_inputs: Vec<(Named, Option<usize>)>,
+    /// Known constants.
+    pub constants: Vec<(Named, Constant)>,
+    /// Names for subexpressions, in order of use.
+    pub definitions: Vec<(String, Formula)>,
+    /// Outputs.
+    pub outputs: Vec<(Named, Formula)>,
+    /// Runs with starts of their own (and unknown inputs of their own); parameters are shared.
+    pub experiments: usize,
+    /// Segments; none: one, as the model says.
+    pub segments: Vec<Segment>,
+    /// Combinations to be judged.
+    pub combinations: Vec<Formula>,
+}
+
+/// Why a model cannot be judged.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: {message}")]
+pub struct ModelError {
+    /// The offender: `the equation of x1`.
+    pub what: String,
+    /// What is wrong, what was expected.
+    pub message: String,
+    /// Byte range in the file, where it is known.
+    pub span: Option<Range<usize>>,
+}
+
+/// Most unknowns of a system.
+pub const MAX_UNKNOWNS: usize = 500;
+/// Most operations of a system.
+pub const MAX_NODES: usize = 200_000;
+
+impl Place {
+    /// An error in the text of this place, at a range of it.
+    pub fn error(&self, message: String, range: Range<usize>) -> ModelError {
+        let span = self.offset.map(|o| o + range.start..o + range.end);
+        ModelError { what: self.what.clone(), message, span }
+    }
+}
+
+/// What a slot of the graph is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// State i.
+    State(usize),
+    /// Parameter i.
+    Parameter(usize),
+    /// Known input i.
+    KnownInput(usize),
+    /// Unknown input i.
+    UnknownInput(usize),
+    /// Known constant i.
+    Constant(usize),
+    /// The time.
+    Time,
+}
+
+/// A system as a graph.
+#[derive(Debug, Clone)]
+pub struct Compiled {
+    /// The graph.
+    pub dag: Dag,
+    /// What every slot is.
+    pub roles: Vec<Role>,
+    /// The node of every state's derivative.
+    pub rates: Vec<usize>,
+    /// The nodes of the outputs.
+    pub outputs: Vec<usize>,
+    /// The nodes of known starts, by state.
+    pub starts: Vec<Option<usize>>,
+    /// The nodes of known constants, by constant.
+    pub constants: Vec<Option<usize>>,
+    /// Per segment: nodes of constants and of carried states.
+    pub segments: Vec<CompiledSegment>,
+    /// The nodes of the combinations.
+    pub combinations: Vec<usize>,
+    /// Where each division and root was written first.
+    pub places: HashMap<usize, (Place, Range<usize>)>,
+}
+
+/// A segment as nodes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CompiledSegment {
+    /// Constant and node.
+    pub constants: Vec<(usize, usize)>,
+    /// State and node.
+    pub carry: Vec<(usize, usize)>,
+}
+
+impl SystemModel {
+    /// All names with their roles, in slot order.
+    fn roles(&self) -> Vec<(String, Role)> {
+        let mut out: Vec<(String, Role)> = Vec::new();
+        out.extend(self.states.iter().enumerate().map(|(i, s)| (s.named.name.clone(), Role::State(i))));
+        out.extend(self.parameters.iter().enumerate().map(|(i, p)| (p.name.clone(), Role::Parameter(i))));
+        out.extend(
+            self.known_inputs.iter().enumerate().map(|(i, u)| (u.0.name.clone(), Role::KnownInput(i))),
+        );
+        out.extend(
+            self.unknown_inputs.iter().enumerate().map(|(i, u)| (u.0.name.clone(), Role::UnknownInput(i))),
+        );
+        out.extend(self.constants.iter().enumerate().map(|(i, c)| (c.0.name.clone(), Role::Constant(i))));
+        if out.iter().all(|(name, _)| name != "t") {
+            out.push(("t".into(), Role::Time));
+        }
+        out
+    }
+
+    /// The graph of the system.
+    ///
+    /// # Errors
+    /// [`ModelError`] for names that are not known, are given twice or are taken, and for what is never defined.
+    pub fn compile(&self) -> Result<Compiled, ModelError> {
+        self.check()?;
+        let mut dag = Dag::default();
+        // fractions of arguments may be met late: then once more with what is known
+        for _ in 0..6 {
+            let compiled = self.compile_into(dag)?;
+            if !compiled.dag.outdated {
+                return Ok(compiled);
+            }
+            dag = compiled.dag.again();
+        }
+        let message = "functions of fractions of functions are nested too deeply".into();
+        Err(ModelError { what: self.name.clone(), message, span: None })
+    }
+
+    fn check(&self) -> Result<(), ModelError> {
+        let refuse = |what: String, message: String| Err(ModelError { what, message, span: None });
+        if self.states.is_empty() {
+            return refuse("the model".into(), "no state; expected at least one".into());
+        }
+        if self.outputs.is_empty() {
+            return refuse("the model".into(), "no output; expected at least one".into());
+        }
+        // an output may be named as the state it is
+        let mut outputs: Vec<&str> = self.outputs.iter().map(|o| o.0.name.as_str()).collect();
+        outputs.sort_unstable();
+        if let Some(pair) = outputs.windows(2).find(|pair| pair[0] == pair[1]) {
+            return refuse(
+                format!("`{}`", pair[0]),
+                "two outputs of this name; expected different names".into(),
+            );
+        }
+        let mut seen: Vec<String> = Vec::new();
+        let names = self.roles().into_iter().filter(|r| r.1 != Role::Time).map(|r| r.0);
+        for name in names.chain(self.definitions.iter().map(|d| d.0.clone())) {
+            if Function::named(&name).is_some() {
+                return refuse(
+                    format!("`{name}`"),
+                    "the name of a function; expected a name of its own".into(),
+                );
+            }
+            let plain = name.starts_with(|c: char| c.is_alphabetic() || c == '_')
+                && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+            if !plain {
+                return refuse(
+                    format!("`{name}`"),
+                    "not a name; expected a letter, then letters, digits and `_`".into(),
+                );
+            }
+            if seen.contains(&name) {
+                return refuse(format!("`{name}`"), "given twice; expected different names".into());
+            }
+            seen.push(name);
+        }
+        Ok(())
+    }
+
+    fn compile_into(&self, mut dag: Dag) -> Result<Compiled, ModelError> {
+        let roles = self.roles();
+        let mut names: HashMap<String, usize> = HashMap::new();
+        for (slot, (name, _)) in roles.iter().enumerate() {
+            names.insert(name.clone(), dag.slot(slot));
+        }
+        let role_of: HashMap<String, Role> = roles.iter().cloned().collect();
+        let mut places: HashMap<usize, (Place, Range<usize>)> = HashMap::new();
+        let mut node = |dag: &mut Dag, formula: &Formula, names: &HashMap<String, usize>| {
+            let before = dag.ops.len();
+            let made = dag.translate(&formula.expression, &|name| names.get(name).copied());
+            let span = |i: usize| formula.expression.spans.get(i).cloned().unwrap_or(0..0);
+            let node = made.map_err(|(error, i)| {
+                let hint = match &error {
+                    DagError::UnknownName(name) => {
+                        let known: Vec<String> = names.keys().cloned().collect();
+                        nearest(name, &known).map(|h| format!("; did you mean `{h}`?"))
+                    }
+                    _ => None,
+                };
+                formula.place.error(format!("{error}{}", hint.unwrap_or_default()), span(i))
+            })?;
+            for made in before..dag.ops.len() {
+                places.insert(made, (formula.place.clone(), formula.expression.span()));
+            }
+            if dag.ops.len() > MAX_NODES {
+                return Err(formula
+                    .place
+                    .error(format!("more than {MAX_NODES} operations in the model"), span(0)));
+            }
+            Ok(node)
+        };
+        // what may stand in the value of a constant: other constants that come before
+        let mut constants = vec![None; self.constants.len()];
+        let mut constant_names: HashMap<String, usize> = HashMap::new();
+        for (i, (named, constant)) in self.constants.iter().enumerate() {
+            if let Constant::Value(formula) = constant {
+                constants[i] = Some(node(&mut dag, formula, &constant_names)?);
+            }
+            constant_names.insert(named.name.clone(), names[&named.name]);
+        }
+        for (named, input) in &self.known_inputs {
+            if let KnownInput::Function(formula) = input {
+                let mut allowed = constant_names.clone();
+                if let Some(&t) = names.get("t").filter(|_| role_of.get("t") == Some(&Role::Time)) {
+                    allowed.insert("t".into(), t);
+                }
+                let value = node(&mut dag, formula, &allowed)?;
+                names.insert(named.name.clone(), value);
+            }
+        }
+        for (name, formula) in &self.definitions {
+            let value = node(&mut dag, formula, &names)?;
+            names.insert(name.clone(), value);
+        }
+        let mut rates = Vec::new();
+        for s in &self.states {
+            rates.push(node(&mut dag, &s.equation, &names)?);
+        }
+        let mut outputs = Vec::new();
+        for (_, formula) in &self.outputs {
+            outputs.push(node(&mut dag, formula, &names)?);
+        }
+        // a known start may depend on what is constant, and on states whose start is not given by a formula
+        let mut start_names = constant_names.clone();
+        for p in &self.parameters {
+            start_names.insert(p.name.clone(), names[&p.name]);
+        }
+        for s in self.states.iter().filter(|s| !matches!(s.start, Start::Value(_))) {
+            start_names.insert(s.named.name.clone(), names[&s.named.name]);
+        }
+        let mut starts = Vec::new();
+        for s in &self.states {
+            starts.push(match &s.start {
+                Start::Value(formula) => Some(node(&mut dag, formula, &start_names)?),
+                _ => None,
+            });
+        }
+        let mut segments = Vec::new();
+        for segment in &self.segments {
+            let mut compiled = CompiledSegment::default();
+            for (name, formula) in &segment.constants {
+                let Some(Role::Constant(c)) = role_of.get(name) else {
+                    let message = format!("`{name}` is no known constant; expected one of the constants");
+                    return Err(formula.place.error(message, 0..0));
+                };
+                compiled.constants.push((*c, node(&mut dag, formula, &constant_names)?));
+            }
+            let mut carried = start_names.clone();
+            for s in &self.states {
+                carried.insert(s.named.name.clone(), names[&s.named.name]);
+            }
+            for (name, formula) in &segment.carry {
+                let Some(Role::State(s)) = role_of.get(name) else {
+                    let message = format!("`{name}` is no state; expected one of the states");
+                    return Err(formula.place.error(message, 0..0));
+                };
+                compiled.carry.push((*s, node(&mut dag, formula, &carried)?));
+            }
+            segments.push(compiled);
+        }
+        let mut combinations = Vec::new();
+        for formula in &self.combinations {
+            combinations.push(node(&mut dag, formula, &names)?);
+        }
+        Ok(Compiled {
+            dag,
+            roles: roles.into_iter().map(|r| r.1).collect(),
+            rates,
+            outputs,
+            starts,
+            constants,
+            segments,
+            combinations,
+            places,
+        })
+    }
+}

@@ -1,0 +1,321 @@
+//! Any system as a source of derivative rows: the duals of the Taylor coefficients of its outputs.
+
+use obsdeg_exact::prime::is_prime;
+use obsdeg_exact::{Echelon, Field, SplitMix64};
+
+use super::dag::{Op, Start as FunctionStart};
+use super::model::{Compiled, KnownInput, Role, Start, SystemModel};
+use super::taylor::{Initial, Signal, Singular, Starts, Taylor};
+use crate::degree::rows::DerivativeRows;
+
+/// Points that are tried before a division by zero or a missing root is taken to be there at every point.
+const ATTEMPTS: usize = 64;
+
+/// An unknown of a system.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unknown {
+    /// Its name; `x@2` in the second experiment.
+    pub name: String,
+    /// What it is.
+    pub role: Role,
+    /// The Taylor coefficient of an unknown input that it is.
+    pub derivative: usize,
+    /// The experiment it belongs to; parameters belong to all.
+    pub experiment: Option<usize>,
+}
+
+/// The unknowns of a system, and how far it has to be differentiated.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Layout {
+    /// Every lane.
+    pub unknowns: Vec<Unknown>,
+    /// The highest order that is looked at.
+    pub bound: usize,
+    /// The point is generic and every input is, so that an order that adds nothing is the end. Otherwise only the bound ends it.
+    pub closed: bool,
+}
+
+impl Layout {
+    /// The unknowns of `model`; `bound` overrides the order at which it is given up.
+    pub fn new(model: &SystemModel, bound: Option<usize>) -> Self {
+        let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
+        let starts = model.states.iter().all(|s| s.start == Start::Unknown);
+        let closed = starts && !arbitrary;
+        let finite: usize = model.unknown_inputs.iter().map(|u| u.1.map_or(1, |d| d + 1)).sum();
+        let n = model.states.len() + finite + model.parameters.len();
+        let bound = bound.unwrap_or(if closed { n * model.experiments.max(1) } else { 2 * n + 4 });
+        let mut unknowns = Vec::new();
+        for experiment in 0..model.experiments.max(1) {
+            let suffix = if model.experiments > 1 { format!("@{}", experiment + 1) } else { String::new() };
+            for (i, s) in model.states.iter().enumerate().filter(|s| s.1.start == Start::Unknown) {
+                unknowns.push(Unknown {
+                    name: format!("{}{suffix}", s.named.name),
+                    role: Role::State(i),
+                    derivative: 0,
+                    experiment: Some(experiment),
+                });
+            }
+        }
+        for (i, p) in model.parameters.iter().enumerate() {
+            unknowns.push(Unknown {
+                name: p.name.clone(),
+                role: Role::Parameter(i),
+                derivative: 0,
+                experiment: None,
+            });
+        }
+        for experiment in 0..model.experiments.max(1) {
+            let suffix = if model.experiments > 1 { format!("@{}", experiment + 1) } else { String::new() };
+            for (i, (named, degree)) in model.unknown_inputs.iter().enumerate() {
+                for derivative in 0..=degree.unwrap_or(bound) {
+                    let primes = "'".repeat(derivative.min(3));
+                    let name = match derivative {
+                        0..=3 => format!("{}{primes}{suffix}", named.name),
+                        k => format!("{}^({k}){suffix}", named.name),
+                    };
+                    unknowns.push(Unknown {
+                        name,
+                        role: Role::UnknownInput(i),
+                        derivative,
+                        experiment: Some(experiment),
+                    });
+                }
+            }
+        }
+        Self { unknowns, bound, closed }
+    }
+
+    fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
+        let own = |u: &Unknown| u.role == role && u.experiment.is_none_or(|e| e == experiment);
+        self.unknowns.iter().position(own)
+    }
+}
+
+/// The rows of a system at one random point of one field.
+#[derive(Debug, Clone)]
+pub struct SystemRows<'a> {
+    field: Field,
+    lanes: usize,
+    outputs: &'a [usize],
+    runs: Vec<Run<'a>>,
+    bound: usize,
+    closed: bool,
+    single: bool,
+    row: Vec<u64>,
+}
+
+#[derive(Debug, Clone)]
+struct Run<'a> {
+    taylor: Taylor<'a>,
+    /// Its own rank, where there are several runs.
+    own: Echelon,
+    stalled: bool,
+    /// Gradients of the combinations at its start.
+    combinations: Vec<Vec<u64>>,
+}
+
+/// A random prime `2^60 < p < 2^61` in whose field the roots of a graph can be had.
+pub fn field_for(compiled: &Compiled, rng: &mut SplitMix64) -> Field {
+    let degrees: Vec<u64> = compiled
+        .dag
+        .ops
+        .iter()
+        .filter_map(|op| match op {
+            Op::Primitive { start: FunctionStart::Root { denominator, .. }, .. } => {
+                let mut odd = denominator.unsigned_abs();
+                while odd > 0 && odd.is_multiple_of(2) {
+                    odd /= 2;
+                }
+                Some(odd)
+            }
+            _ => None,
+        })
+        .collect();
+    let gcd = |mut a: u64, mut b: u64| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    loop {
+        let p = (1 << 60) + rng.below(1 << 60) / 4 * 4 + 3;
+        if p < 1 << 61 && degrees.iter().all(|&q| q <= 1 || gcd(q, p - 1) == 1) && is_prime(p) {
+            return Field::new(p);
+        }
+    }
+}
+
+impl<'a> SystemRows<'a> {
+    /// The rows of a system at a random point.
+    ///
+    /// # Errors
+    /// [`Singular`] when no point could be found.
+    pub fn new(
+        model: &SystemModel,
+        compiled: &'a Compiled,
+        layout: &Layout,
+        field: Field,
+        rng: &mut SplitMix64,
+    ) -> Result<Self, Singular> {
+        let mut last = Singular::Division(0);
+        for _ in 0..ATTEMPTS {
+            match Self::at(model, compiled, layout, field, rng) {
+                Err(singular) => last = singular,
+                found => return found,
+            }
+        }
+        Err(last)
+    }
+
+    fn at(
+        model: &SystemModel,
+        compiled: &'a Compiled,
+        layout: &Layout,
+        field: Field,
+        rng: &mut SplitMix64,
+    ) -> Result<Self, Singular> {
+        let f = field;
+        let lanes = layout.unknowns.len();
+        let starts = Starts::random(&compiled.dag, &f, rng);
+        let p = f.modulus();
+        let mut random = || rng.below(p);
+        let parameters: Vec<u64> = model.parameters.iter().map(|_| random()).collect();
+        let constants: Vec<u64> = model.constants.iter().map(|_| random()).collect();
+        let mut runs: Vec<Run<'a>> = Vec::new();
+        for experiment in 0..model.experiments.max(1) {
+            let mut signals: Vec<Signal> = Vec::new();
+            let mut initial: Vec<Option<Initial>> = vec![None; compiled.roles.len()];
+            for (slot, role) in compiled.roles.iter().enumerate() {
+                signals.push(match *role {
+                    Role::State(i) => {
+                        let lane = layout.lane(*role, experiment);
+                        initial[slot] = Some((random(), lane.map(|l| (l, f.one())).into_iter().collect()));
+                        Signal::State { rate: compiled.rates[i] }
+                    }
+                    Role::Parameter(i) => {
+                        Signal::Constant { value: parameters[i], lane: layout.lane(*role, experiment) }
+                    }
+                    Role::Constant(i) => Signal::Constant { value: constants[i], lane: None },
+                    Role::KnownInput(i) => Signal::Known {
+                        degree: match model.known_inputs[i].1 {
+                            KnownInput::Polynomial(d) => Some(d),
+                            _ => None,
+                        },
+                    },
+                    Role::UnknownInput(i) => Signal::Unknown {
+                        lane: layout.lane(*role, experiment).unwrap_or(0),
+                        count: model.unknown_inputs[i].1.unwrap_or(layout.bound) + 1,
+                    },
+                    Role::Time => Signal::Time,
+                });
+            }
+            let seed = random();
+            let slot_of = |role: Role| compiled.roles.iter().position(|r| *r == role);
+            // constants and starts that are given by formulas are read off a first look at the point
+            let look = |signals: &[Signal], initial: &[Option<Initial>]| {
+                Taylor::new(&compiled.dag, f, lanes, signals, initial, &starts, SplitMix64::new(seed))
+            };
+            if compiled.constants.iter().any(Option::is_some) {
+                // a constant may use those before it
+                for _ in 0..model.constants.len() {
+                    let seen = look(&signals, &initial)?;
+                    for (c, node) in compiled.constants.iter().enumerate() {
+                        if let (Some(node), Some(slot)) = (node, slot_of(Role::Constant(c))) {
+                            signals[slot] = Signal::Constant { value: seen.start(*node), lane: None };
+                        }
+                    }
+                }
+            }
+            let set = |initial: &mut Vec<Option<Initial>>, seen: &Taylor<'_>, state: usize, node: usize| {
+                if let Some(slot) = slot_of(Role::State(state)) {
+                    let duals = seen.dual(node, 0).iter().copied().enumerate().filter(|(_, x)| *x != 0);
+                    initial[slot] = Some((seen.start(node), duals.collect()));
+                }
+            };
+            if compiled.starts.iter().any(Option::is_some) {
+                let seen = look(&signals, &initial)?;
+                for (state, node) in compiled.starts.iter().enumerate() {
+                    if let Some(node) = node {
+                        set(&mut initial, &seen, state, *node);
+                    }
+                }
+            }
+            let whole = vec![super::model::CompiledSegment::default()];
+            let segments = if compiled.segments.is_empty() { &whole } else { &compiled.segments };
+            for segment in segments {
+                if !segment.constants.is_empty() {
+                    let seen = look(&signals, &initial)?;
+                    for (c, node) in &segment.constants {
+                        if let Some(slot) = slot_of(Role::Constant(*c)) {
+                            signals[slot] = Signal::Constant { value: seen.start(*node), lane: None };
+                        }
+                    }
+                }
+                if !segment.carry.is_empty() {
+                    let seen = look(&signals, &initial)?;
+                    for (state, node) in &segment.carry {
+                        set(&mut initial, &seen, *state, *node);
+                    }
+                }
+                let taylor = look(&signals, &initial)?;
+                let gradient = |&node: &usize| {
+                    let dual = taylor.dual(node, 0);
+                    if dual.is_empty() { vec![0; lanes] } else { dual.to_vec() }
+                };
+                let combinations = compiled.combinations.iter().map(gradient).collect();
+                runs.push(Run { taylor, own: Echelon::new(f, lanes), stalled: false, combinations });
+            }
+        }
+        Ok(Self {
+            field,
+            lanes,
+            outputs: &compiled.outputs,
+            single: runs.len() == 1,
+            runs,
+            bound: layout.bound,
+            closed: layout.closed,
+            row: vec![0; lanes],
+        })
+    }
+
+    /// The gradients of the combinations at the start of the first run.
+    pub fn combinations(&self) -> &[Vec<u64>] {
+        self.runs.first().map_or(&[], |r| &r.combinations)
+    }
+
+    /// The value of a node at the start of the first run.
+    pub fn start(&self, node: usize) -> u64 {
+        self.runs.first().map_or(0, |r| r.taylor.start(node))
+    }
+}
+
+impl DerivativeRows for SystemRows<'_> {
+    fn field(&self) -> Field {
+        self.field
+    }
+
+    fn columns(&self) -> usize {
+        self.lanes
+    }
+
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64]) -> bool) -> bool {
+        if order > self.bound || self.runs.iter().all(|r| r.stalled) {
+            return false;
+        }
+        for run in self.runs.iter_mut().filter(|r| !r.stalled) {
+            while run.taylor.length <= order {
+                run.taylor.advance();
+            }
+            let mut grew = false;
+            for &output in self.outputs {
+                let dual = run.taylor.dual(output, order);
+                let row = if dual.is_empty() { &self.row } else { dual };
+                let new = sink(row);
+                // where runs share the rank, each has to be followed until its own stalls
+                grew |= if self.single { new } else { run.own.insert(row) };
+            }
+            run.stalled = self.closed && !grew;
+        }
+        true
+    }
+}
