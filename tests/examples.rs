@@ -6,6 +6,7 @@ use std::process::Command;
 
 use obsdeg_core::analysis::{Options, analyze};
 use obsdeg_core::model::{Carry, Scheme, Unknowns, scheme_file};
+use obsdeg_core::system::{SystemAnalysis, analyze_system, model_file};
 
 fn table(scheme: &Scheme) -> String {
     let options = Options { solutions: false, ..Options::default() };
@@ -62,6 +63,55 @@ fn wrong_examples_are_refused_with_their_place() {
             assert_eq!(run.status.code(), Some(2));
             assert!(run.stdout.is_empty());
             insta::assert_snapshot!(format!("refused_{name}"), String::from_utf8_lossy(&run.stderr));
+        });
+    });
+}
+
+fn model_table(a: &SystemAnalysis) -> String {
+    let profile: Vec<String> = a.rank_profile.iter().map(ToString::to_string).collect();
+    let mut out = format!("rank profile {} of {}\n", profile.join(" "), a.unknowns);
+    let degree = |d: Option<usize>| d.map_or_else(|| "-".to_string(), |k| k.to_string());
+    for q in &a.quantities {
+        let partners =
+            if q.partners.is_empty() { String::new() } else { format!("  with {}", q.partners.join(" ")) };
+        writeln!(out, "  {:<9} {}  {}{partners}", q.name, degree(q.degree), q.status).expect("text");
+    }
+    for c in a.combinations.iter().chain(&a.invariants) {
+        writeln!(out, "  [{}] {}", c.expression, degree(c.degree)).expect("text");
+    }
+    for s in &a.symmetries {
+        writeln!(out, "  {}", s.words).expect("text");
+    }
+    if a.other_directions > 0 {
+        writeln!(out, "  other directions: {}", a.other_directions).expect("text");
+    }
+    out
+}
+
+#[test]
+fn models() {
+    insta::with_settings!({ omit_expression => true, prepend_module_to_snapshot => false }, {
+        insta::glob!("../examples", "*/model.toml", |path| {
+            let text = std::fs::read_to_string(path).expect("readable");
+            let model = model_file::read(&text).expect("a model");
+            let a = analyze_system(&model, 1, None).expect("judged");
+            insta::assert_snapshot!(format!("model_{}", folder(path)), model_table(&a));
+        });
+    });
+}
+
+#[test]
+fn wrong_models_are_refused_with_their_place() {
+    insta::with_settings!({ omit_expression => true, prepend_module_to_snapshot => false }, {
+        insta::glob!("../examples", "wrong-models/*.toml", |path| {
+            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+            let run = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+                .current_dir(env!("CARGO_MANIFEST_DIR"))
+                .args(["analyze", "--model", &format!("examples/wrong-models/{name}.toml")])
+                .output()
+                .expect("it runs");
+            assert!(run.status.code() == Some(2) && run.stdout.is_empty());
+            insta::assert_snapshot!(format!("refused_model_{name}"), String::from_utf8_lossy(&run.stderr));
         });
     });
 }

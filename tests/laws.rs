@@ -144,7 +144,7 @@ impl<R: DerivativeRows> DerivativeRows for Scaled<R> {
         let (f, scale) = (self.inner.field(), &self.scale);
         self.inner.emit(order, &mut |row| {
             let scaled: Vec<u64> = row.iter().zip(scale).map(|(&x, &s)| f.mul(x, s)).collect();
-            sink(&scaled);
+            sink(&scaled)
         })
     }
 }

@@ -1,14 +1,16 @@
 //! `obsdeg analyze`: the degree table of one scheme.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::{AnalysisError, Options, analyze};
 use obsdeg_core::solution::solver::Frame;
+use obsdeg_core::system::{analyze_system, json, model_file};
 use obsdeg_symbolic::{Worker, WorkerConfig};
 
-use crate::arguments::{OutputArguments, SchemeArguments};
+use crate::arguments::{OutputArguments, SchemeArguments, read_text};
 use crate::failure::Failure;
 use crate::progress::Spinner;
 use crate::{lock, output};
@@ -22,6 +24,7 @@ Examples:
   obsdeg analyze --angles 0,0,0 --terms drift           eps^n of a single position
   obsdeg analyze --angles 0,0,0 --combination \"D_FZ - wN*psi_y\"
   obsdeg analyze --scheme scheme.toml --format json -o verdicts.json
+  obsdeg analyze --model model.toml                     any system x' = f(x, u, p, t), z = h
 
 Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in
 rad/s and Z in g. Exit codes: 0 done, 2 bad input, 3 internal error.";
@@ -43,6 +46,14 @@ enum FrameArgument {
 pub(crate) struct Arguments {
     #[command(flatten)]
     scheme: SchemeArguments,
+
+    /// Any other system: a model file (TOML, or JSON)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "frame", "formulas", "solutions", "symbolic_limit"])]
+    model: Option<PathBuf>,
+
+    /// The highest order of derivatives to look at in a model that has no proven end
+    #[arg(long, value_name = "K", requires = "model", value_parser = clap::value_parser!(u16).range(0..=1000))]
+    order: Option<u16>,
 
     /// Solving expressions; off never starts the symbolic engine
     #[arg(long, value_name = "ON|OFF", default_value = "on", hide_possible_values = true)]
@@ -70,6 +81,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     output::check(&a.output)?;
+    if let Some(path) = &a.model {
+        return system(a, path);
+    }
     let scheme = a.scheme.scheme()?;
     let options = Options {
         seed: a.seed,
@@ -93,6 +107,25 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         eprintln!("{line}");
     }
     let text = obsdeg_report::analysis(&analysis, a.output.format, output::layout(&a.output))
+        .map_err(|e| Failure::internal(e.to_string()))?;
+    output::write(&a.output, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A model file.
+fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
+    let name = path.display().to_string();
+    let text = read_text(path, "model")?;
+    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let read = if json { json::read(&text) } else { model_file::read(&text) };
+    let spinner = Spinner::start("judging the model", a.output.quiet);
+    let analysed = read.and_then(|model| analyze_system(&model, a.seed, a.order.map(Into::into)));
+    drop(spinner);
+    let analysis = analysed.map_err(|e| match e.span.clone() {
+        Some(span) if !json => Failure::at(&e.to_string(), &name, &text, span),
+        _ => Failure::input(format!("{name}: {e}")),
+    })?;
+    let text = obsdeg_report::system(&analysis, a.output.format, output::layout(&a.output))
         .map_err(|e| Failure::internal(e.to_string()))?;
     output::write(&a.output, &text)?;
     Ok(ExitCode::SUCCESS)

@@ -21,7 +21,7 @@ pub(crate) struct SchemeArguments {
     angles: Vec<EulerArgument>,
 
     /// Scheme file (TOML)
-    #[arg(long, value_name = "FILE", required_unless_present = "angles")]
+    #[arg(long, value_name = "FILE")]
     scheme: Option<PathBuf>,
 
     /// What is carried between positions: platform (the paper), inertial or reset
@@ -69,6 +69,11 @@ impl SchemeArguments {
     pub(crate) fn scheme(&self) -> Result<Scheme, Failure> {
         let mut scheme = match &self.scheme {
             Some(path) => read_scheme(path)?,
+            None if self.angles.is_empty() => {
+                return Err(Failure::input(
+                    "nothing to judge; expected --angles A,B,G (once per position) or --scheme FILE".into(),
+                ));
+            }
             None => {
                 let mut scheme = Scheme::of_angles(self.angles.iter().map(|a| a.0.clone()));
                 for (position, a) in scheme.positions.iter_mut().zip(&self.angles) {
@@ -92,11 +97,26 @@ impl SchemeArguments {
     }
 }
 
+/// Largest input file, in bytes.
+const MAX_FILE: u64 = 50_000_000;
+
+/// The text of a file; `what` it is stands in the errors.
+pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Failure> {
+    let name = path.display();
+    let wrong = |e: std::io::Error| Failure::input(format!("cannot read the {what} file {name}: {e}"));
+    let size = std::fs::metadata(path).map_err(wrong)?.len();
+    if size > MAX_FILE {
+        return Err(Failure::input(format!(
+            "the {what} file {name} has {size} bytes; expected at most {MAX_FILE}"
+        )));
+    }
+    std::fs::read_to_string(path).map_err(wrong)
+}
+
 /// The scheme of a file.
 pub(crate) fn read_scheme(path: &Path) -> Result<Scheme, Failure> {
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Failure::input(format!("cannot read the scheme file {name}: {e}")))?;
+    let text = read_text(path, "scheme")?;
     scheme_file::read(&text).map_err(|e| match e.span {
         Some(span) => Failure::at(&e.message, &name, &text, span),
         None => Failure::input(format!("{name}: {}", e.message)),

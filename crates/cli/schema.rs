@@ -10,6 +10,8 @@ use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::design::Design;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::simulation::Simulation;
+use obsdeg_core::system::SystemAnalysis;
+use obsdeg_core::system::model_file::ModelFile;
 use schemars::schema_for;
 
 use crate::failure::Failure;
@@ -31,6 +33,10 @@ enum Kind {
     Design,
     /// Scheme files
     Scheme,
+    /// The JSON of `obsdeg analyze --model`
+    System,
+    /// Model files
+    Model,
 }
 
 #[derive(Debug, Args)]
@@ -48,6 +54,8 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Comparison => schema_for!(Comparison),
         Kind::Design => schema_for!(Design),
         Kind::Scheme => schema_for!(SchemeFile),
+        Kind::System => schema_for!(SystemAnalysis),
+        Kind::Model => schema_for!(ModelFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
     output::print(&(text + "\n"))?;

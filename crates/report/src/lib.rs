@@ -12,6 +12,7 @@ mod latex;
 mod markdown;
 mod series;
 mod simulation;
+mod system;
 mod table;
 mod words;
 
@@ -28,6 +29,7 @@ use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::design::Design;
 use obsdeg_core::simulation::Simulation;
+use obsdeg_core::system::SystemAnalysis;
 
 /// A text format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -149,6 +151,14 @@ pub fn comparison(c: &Comparison, format: Format, layout: Layout) -> Result<Stri
 /// [`ReportError`] when it cannot be drawn.
 pub fn design_figures(d: &Design) -> Result<Vec<File>, ReportError> {
     Ok(design::figures(d)?)
+}
+
+/// The answer for any system in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a value cannot be serialised.
+pub fn system(a: &SystemAnalysis, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(a, &system::document(a), format, layout)
 }
 
 /// A design in the given format, ending in a newline.

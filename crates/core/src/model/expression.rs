@@ -540,7 +540,7 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
         .iter()
         .map(|k| (distance(name, k), k))
         .min()
-        .filter(|(d, _)| *d <= 2.max(name.chars().count() / 3))
+        .filter(|(d, _)| *d <= 1.max(name.chars().count() * 2 / 5))
         .map(|(_, k)| k.clone())
 }
 

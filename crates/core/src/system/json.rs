@@ -70,7 +70,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: None };
     let layout: Layout = serde_json::from_str(text).map_err(|e| refuse("the model", e.to_string()))?;
     let known = |name: &String, list: &[String]| list.contains(name);
-    for name in layout.equations.keys().filter(|n| !known(n, &layout.states)) {
+    if let Some(name) = layout.equations.keys().find(|n| !known(n, &layout.states)) {
         return Err(refuse("equations", format!("`{name}` is no state")));
     }
     let mut model = SystemModel {

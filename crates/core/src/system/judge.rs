@@ -36,6 +36,8 @@ pub(crate) struct At {
     pub(crate) degrees: Degrees,
     pub(crate) combinations: Vec<Option<usize>>,
     pub(crate) stairs: Vec<Echelon>,
+    /// The value of every unknown there.
+    pub(crate) values: Vec<u64>,
 }
 
 /// Climbs the staircase of a system at a random point of a field.
@@ -59,7 +61,8 @@ pub(crate) fn climb_at(
         }
         stairs.push(basis.clone());
     });
-    Ok(At { degrees, combinations, stairs })
+    let values = rows.values(compiled, layout);
+    Ok(At { degrees, combinations, stairs, values })
 }
 
 fn singular(compiled: &Compiled, singular: Singular) -> ModelError {

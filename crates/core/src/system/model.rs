@@ -230,7 +230,8 @@ impl SystemModel {
         Err(ModelError { what: self.name.clone(), message, span: None })
     }
 
-    fn check(&self) -> Result<(), ModelError> {
+    /// Checks what needs no graph: at least one state and output, names of their own.
+    pub(super) fn check(&self) -> Result<(), ModelError> {
         let refuse = |what: String, message: String| Err(ModelError { what, message, span: None });
         if self.states.is_empty() {
             return refuse("the model".into(), "no state; expected at least one".into());
@@ -285,7 +286,11 @@ impl SystemModel {
             let made = dag.translate(&formula.expression, &|name| names.get(name).copied());
             let span = |i: usize| formula.expression.spans.get(i).cloned().unwrap_or(0..0);
             let node = made.map_err(|(error, i)| {
+                let is_output = |name: &String| self.outputs.iter().any(|o| o.0.name == *name);
                 let hint = match &error {
+                    DagError::UnknownName(name) if is_output(name) => {
+                        Some(": an output, to which nothing can refer".into())
+                    }
                     DagError::UnknownName(name) => {
                         let known: Vec<String> = names.keys().cloned().collect();
                         nearest(name, &known).map(|h| format!("; did you mean `{h}`?"))

@@ -283,9 +283,18 @@ impl<'a> SystemRows<'a> {
         self.runs.first().map_or(&[], |r| &r.combinations)
     }
 
-    /// The value of a node at the start of the first run.
-    pub fn start(&self, node: usize) -> u64 {
-        self.runs.first().map_or(0, |r| r.taylor.start(node))
+    /// The value of every unknown at this point.
+    pub fn values(&self, compiled: &Compiled, layout: &Layout) -> Vec<u64> {
+        let segments = compiled.segments.len().max(1);
+        let node_of = |role: Role| {
+            let slot = compiled.roles.iter().position(|r| *r == role)?;
+            compiled.dag.ops.iter().position(|op| *op == Op::Slot(slot))
+        };
+        let value = |u: &Unknown| {
+            let run = self.runs.get(u.experiment.unwrap_or(0) * segments)?;
+            Some(run.taylor.value(node_of(u.role)?, u.derivative))
+        };
+        layout.unknowns.iter().map(|u| value(u).unwrap_or(0)).collect()
     }
 }
 

@@ -249,8 +249,8 @@ impl<'a> Taylor<'a> {
         self.inverses[k]
     }
 
-    /// `values[a]` at order k; zero beyond the start of what is constant.
-    fn value(&self, a: usize, k: usize) -> u64 {
+    /// The coefficient of a node at order k; zero beyond the start of what is constant.
+    pub fn value(&self, a: usize, k: usize) -> u64 {
         self.values[a].get(k).copied().unwrap_or(0)
     }
 

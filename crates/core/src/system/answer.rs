@@ -1,0 +1,297 @@
+//! The answer for one system: plain data, serialisable.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::judge::{Judgement, judge_compiled};
+use super::model::{ModelError, Role, Start, SystemModel};
+use super::symmetry::{Invariant, Symmetries, Symmetry, symmetries};
+use crate::analysis::Status;
+use crate::degree::sparse::{extend_by_short_vectors, support};
+use obsdeg_exact::Echelon;
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.system/1";
+
+/// The answer for one system.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemAnalysis {
+    /// `obsdeg.system/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The system.
+    pub name: String,
+    /// What it is, as its file says.
+    pub description: String,
+    /// The equations, `x' = ...` and `y = ...`, as written.
+    pub equations: Vec<String>,
+    /// `dim V_0, dim V_1, ...`.
+    pub rank_profile: Vec<usize>,
+    /// The final rank.
+    pub rank: usize,
+    /// The number of unknowns.
+    pub unknowns: usize,
+    /// The verdicts in model order.
+    pub quantities: Vec<SystemQuantity>,
+    /// States whose start is known.
+    pub known: Vec<String>,
+    /// Combinations that were asked for.
+    pub combinations: Vec<SystemCombination>,
+    /// The number of independent directions that no output sees.
+    pub unobservable_directions: usize,
+    /// Scalings and translations among them.
+    pub symmetries: Vec<SymmetryReport>,
+    /// Directions that are neither.
+    pub other_directions: usize,
+    /// Combinations of unobservable unknowns that are observable.
+    pub invariants: Vec<SystemCombination>,
+    /// The highest order that was looked at.
+    pub last_order: usize,
+    /// Orders end at this bound.
+    pub bound: usize,
+    /// The end is proven: an order that adds nothing is the last. Otherwise what is not observable rests on the bound.
+    pub closed: bool,
+    /// Whether a verdict rests on the bound.
+    pub rests_on_bound: bool,
+    /// The two random primes.
+    pub primes: [u64; 2],
+    /// Bound on the probability that a verdict is wrong.
+    pub error_bound: f64,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// One unknown.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemQuantity {
+    /// Its name.
+    pub name: String,
+    /// state, parameter or input.
+    pub kind: String,
+    /// Its unit, as the file says.
+    pub unit: String,
+    /// What it is, as the file says.
+    pub description: String,
+    /// The verdict: locally observable (finitely many solutions), inseparable from its partners, or not excited.
+    pub status: Status,
+    /// The smallest order of derivatives that solves it.
+    pub degree: Option<usize>,
+    /// Unknowns that move with it while no output changes.
+    pub partners: Vec<String>,
+}
+
+/// A combination.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemCombination {
+    /// As written, or `b*x1`.
+    pub expression: String,
+    /// Its degree; null when it is not observable.
+    pub degree: Option<usize>,
+}
+
+/// A symmetry in words.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SymmetryReport {
+    /// `multiply alpha by c, divide gamma by c`.
+    pub words: String,
+    /// The unknowns that it moves.
+    pub unknowns: Vec<String>,
+}
+
+/// Judges a model; `bound` overrides the highest order.
+///
+/// # Errors
+/// [`ModelError`].
+pub fn analyze_system(
+    model: &SystemModel,
+    seed: u64,
+    bound: Option<usize>,
+) -> Result<SystemAnalysis, ModelError> {
+    let compiled = model.compile()?;
+    let judged = judge_compiled(model, &compiled, seed, bound)?;
+    let symmetries = symmetries(model, &compiled, &judged, seed)?;
+    let partners = partners(&judged);
+    let name = |c: usize| judged.layout.unknowns[c].name.clone();
+    let quantities = judged.layout.unknowns.iter().enumerate().map(|(c, u)| {
+        let (kind, named) = match u.role {
+            Role::State(i) => ("state", &model.states[i].named),
+            Role::Parameter(i) => ("parameter", &model.parameters[i]),
+            Role::UnknownInput(i) => ("input", &model.unknown_inputs[i].0),
+            // no unknowns
+            Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
+        };
+        let degree = judged.degrees.degree[c];
+        let status = match degree {
+            Some(_) => Status::Observable,
+            None if judged.degrees.excited[c] => Status::Inseparable,
+            None => Status::NotExcited,
+        };
+        SystemQuantity {
+            name: u.name.clone(),
+            kind: kind.into(),
+            unit: named.unit.clone(),
+            description: named.description.clone(),
+            status,
+            degree,
+            partners: partners[c].iter().map(|&p| name(p)).collect(),
+        }
+    });
+    // of arbitrary inputs only the signal itself is of interest
+    let shown = |q: &SystemQuantity| {
+        let place = judged.layout.unknowns.iter().position(|u| u.name == q.name);
+        place.is_none_or(|c| {
+            let u = &judged.layout.unknowns[c];
+            match u.role {
+                Role::UnknownInput(i) => u.derivative == 0 || model.unknown_inputs[i].1.is_some(),
+                _ => true,
+            }
+        })
+    };
+    let equation = |name: &str, sign: &str, text: &str| format!("{name}{sign} = {text}");
+    let equations = (model.definitions.iter().map(|(n, e)| equation(n, "", &e.text)))
+        .chain(model.states.iter().map(|s| equation(&s.named.name, "'", &s.equation.text)))
+        .chain(model.outputs.iter().map(|(n, e)| equation(&n.name, "", &e.text)));
+    let asked = model.combinations.iter().zip(&judged.combinations);
+    Ok(SystemAnalysis {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        name: model.name.clone(),
+        description: model.description.clone(),
+        equations: equations.collect(),
+        rank_profile: judged.degrees.rank_profile.clone(),
+        rank: judged.degrees.rank(),
+        unknowns: judged.layout.unknowns.len(),
+        quantities: quantities.filter(shown).collect(),
+        known: (model.states.iter().filter(|s| s.start != Start::Unknown))
+            .map(|s| s.named.name.clone())
+            .collect(),
+        combinations: asked
+            .map(|(c, degree)| SystemCombination { expression: c.text.clone(), degree: *degree })
+            .collect(),
+        unobservable_directions: judged.layout.unknowns.len() - judged.degrees.rank(),
+        other_directions: symmetries.unexplained,
+        invariants: invariant_reports(&symmetries, &name),
+        symmetries: symmetry_reports(&symmetries, &judged, &name),
+        last_order: judged.degrees.rank_profile.len().saturating_sub(1),
+        bound: judged.layout.bound,
+        closed: judged.layout.closed,
+        rests_on_bound: judged.rests_on_bound,
+        primes: judged.fields.map(|f| f.modulus()),
+        error_bound: judged.error_bound,
+        seed,
+    })
+}
+
+/// For every unknown the others that share a short null vector with it.
+fn partners(judged: &Judgement) -> Vec<Vec<usize>> {
+    let n = judged.layout.unknowns.len();
+    let Some(last) = judged.stairs.last() else { return vec![Vec::new(); n] };
+    let mut span = Echelon::new(judged.fields[0], n);
+    let short = extend_by_short_vectors(&last.null_space(), &mut span);
+    let mut out = vec![Vec::new(); n];
+    for v in short {
+        let support = support(&v);
+        for &c in &support {
+            out[c].extend(support.iter().copied().filter(|&d| d != c));
+        }
+    }
+    for list in &mut out {
+        list.sort_unstable();
+        list.dedup();
+    }
+    out
+}
+
+/// `c`, or a name like it that the model does not use.
+fn free_name(judged: &Judgement) -> String {
+    let taken = |name: &str| judged.layout.unknowns.iter().any(|u| u.name == name);
+    ["c", "s", "k", "factor"].into_iter().find(|n| !taken(n)).unwrap_or("factor_").into()
+}
+
+fn symmetry_reports(
+    symmetries: &Symmetries,
+    judged: &Judgement,
+    name: &dyn Fn(usize) -> String,
+) -> Vec<SymmetryReport> {
+    let c = free_name(judged);
+    symmetries
+        .found
+        .iter()
+        .map(|s| SymmetryReport {
+            words: words(s, &c, name),
+            unknowns: s.scaling.iter().chain(&s.translation).map(|t| name(t.0)).collect(),
+        })
+        .collect()
+}
+
+/// `multiply a, b by c, divide d by c^2`, `add c to x, subtract 2 c from y`.
+fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
+    let fraction = |(p, q): (i64, i64)| if q == 1 { p.to_string() } else { format!("{p}/{q}") };
+    let power = |(p, q): (i64, i64)| match (p, q) {
+        (1, 1) => c.to_string(),
+        (p, 1) => format!("{c}^{p}"),
+        k => format!("{c}^({})", fraction(k)),
+    };
+    let amount = |(p, q): (i64, i64)| {
+        if (p, q) == (1, 1) { c.to_string() } else { format!("{} {c}", fraction((p, q))) }
+    };
+    // unknowns that are treated alike stand together
+    let mut groups: Vec<(String, Vec<String>, String)> = Vec::new();
+    let mut put =
+        |verb: &str, name: String, rest: String| match groups.iter_mut().find(|g| g.0 == verb && g.2 == rest)
+        {
+            Some(group) => group.1.push(name),
+            None => groups.push((verb.into(), vec![name], rest)),
+        };
+    for &(i, (p, q)) in &s.scaling {
+        let verb = if p > 0 { "multiply" } else { "divide" };
+        put(verb, name(i), format!("by {}", power((p.abs(), q))));
+    }
+    for &(i, (p, q)) in &s.translation {
+        let (verb, to) = if p > 0 { ("add", "to") } else { ("subtract", "from") };
+        put(&format!("{verb} {} {to}", amount((p.abs(), q))), name(i), String::new());
+    }
+    let join = |(verb, names, rest): &(String, Vec<String>, String)| {
+        format!("{verb} {} {rest}", names.join(", ")).trim_end().to_string()
+    };
+    groups.iter().map(join).collect::<Vec<_>>().join("; ")
+}
+
+fn invariant_reports(symmetries: &Symmetries, name: &dyn Fn(usize) -> String) -> Vec<SystemCombination> {
+    let product = |i: &Invariant| {
+        let power = |&(c, m): &(usize, i64)| match m.abs() {
+            1 => name(c),
+            m => format!("{}^{m}", name(c)),
+        };
+        let part = |positive: bool| -> Vec<String> {
+            i.terms.iter().filter(|t| (t.1 > 0) == positive).map(power).collect()
+        };
+        let (above, below) = (part(true), part(false));
+        let above = if above.is_empty() { "1".into() } else { above.join("*") };
+        match below.len() {
+            0 => above,
+            1 => format!("{above}/{}", below[0]),
+            _ => format!("{above}/({})", below.join("*")),
+        }
+    };
+    let sum = |i: &Invariant| {
+        let mut out = String::new();
+        for &(c, m) in &i.terms {
+            let sign = match (out.is_empty(), m > 0) {
+                (true, true) => "",
+                (true, false) => "-",
+                (false, true) => " + ",
+                (false, false) => " - ",
+            };
+            let factor = if m.abs() == 1 { String::new() } else { format!("{}*", m.abs()) };
+            out.push_str(&format!("{sign}{factor}{}", name(c)));
+        }
+        out
+    };
+    let report = |i: &Invariant| SystemCombination {
+        expression: if i.product { product(i) } else { sum(i) },
+        degree: Some(i.degree),
+    };
+    symmetries.invariants.iter().map(report).collect()
+}

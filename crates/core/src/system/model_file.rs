@@ -1,0 +1,346 @@
+//! Model files: TOML, with errors that know their place.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_spanned::Spanned;
+use toml::Value;
+
+use super::model::{
+    Constant, Formula, KnownInput, ModelError, Named, Place, Segment, Start, State, SystemModel,
+};
+use crate::model::expression::{Names, nearest, parse_with};
+
+/// Most experiments.
+const MAX_EXPERIMENTS: usize = 20;
+
+/// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan exp log sqrt`
+/// and the names of the model; `t` is the time.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFile {
+    /// Name of the system.
+    name: String,
+    /// What it is and where it comes from.
+    #[serde(default)]
+    description: String,
+    /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value), unit, description.
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    states: BTreeMap<String, Spanned<Value>>,
+    /// Unknown constants: a list of names, or tables with unit and description.
+    #[serde(default)]
+    #[schemars(with = "serde_json::Value")]
+    parameters: Option<Spanned<Value>>,
+    /// Known inputs: "generic", "constant", { polynomial = degree }, { function = "sin(2*t)" }.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    known_inputs: BTreeMap<String, Spanned<Value>>,
+    /// Unknown inputs: "arbitrary" or { polynomial = degree }.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    unknown_inputs: BTreeMap<String, Spanned<Value>>,
+    /// Known constants: "generic", or an exact value.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    constants: BTreeMap<String, Spanned<Value>>,
+    /// Names for subexpressions.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    definitions: BTreeMap<String, Spanned<Value>>,
+    /// Outputs: an expression, or a table with expression, unit, description.
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    outputs: BTreeMap<String, Spanned<Value>>,
+    /// Runs with starts of their own; parameters are shared.
+    #[serde(default)]
+    #[schemars(with = "Option<usize>")]
+    experiments: Option<Spanned<usize>>,
+    /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
+    #[serde(default, rename = "segment")]
+    segments: Vec<SegmentEntry>,
+    /// Combinations to be judged.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    combinations: Vec<Spanned<String>>,
+}
+
+/// A segment of the timeline.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentEntry {
+    /// Constants that take another value.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    constants: BTreeMap<String, Spanned<Value>>,
+    /// States behind the jump, in terms of those before.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    carry: BTreeMap<String, Spanned<Value>>,
+}
+
+/// In the order of the file.
+fn in_order(map: &BTreeMap<String, Spanned<Value>>) -> Vec<(&String, &Spanned<Value>)> {
+    let mut out: Vec<_> = map.iter().collect();
+    out.sort_by_key(|(_, v)| v.span().start);
+    out
+}
+
+/// A file under way.
+struct Reader<'a> {
+    text: &'a str,
+}
+
+impl Reader<'_> {
+    fn at(&self, span: Range<usize>, what: String, message: String) -> ModelError {
+        ModelError { what, message, span: Some(span) }
+    }
+
+    /// The text of an expression: as written for a number, its contents for a string.
+    fn formula(&self, what: String, value: &Value, span: Range<usize>) -> Result<Formula, ModelError> {
+        let within = &self.text[span.clone()];
+        let source = match value {
+            Value::String(s) => s.clone(),
+            Value::Integer(i) if within.contains(['{', '[']) => i.to_string(),
+            Value::Float(x) if within.contains(['{', '[']) => x.to_string(),
+            Value::Integer(_) | Value::Float(_) => within.replace('_', ""),
+            other => {
+                let message =
+                    format!("found a {}; expected an expression in quotes, or a number", other.type_str());
+                return Err(self.at(span, what, message));
+            }
+        };
+        // escapes aside, the expression stands in the file as it is
+        let offset = if source.is_empty() { None } else { within.find(&source).map(|o| span.start + o) };
+        let place = Place { what, offset: offset.or((source.is_empty()).then_some(span.start)) };
+        let expression = parse_with(&source, Names::Plain).map_err(|e| {
+            let mut error = place.error(e.to_string(), e.span());
+            error.span.get_or_insert(span.clone());
+            error
+        })?;
+        Ok(Formula { text: source, expression, place })
+    }
+
+    /// A table's entry, and a check that there is nothing else in it.
+    fn known_keys(
+        &self,
+        what: &str,
+        table: &toml::Table,
+        span: &Range<usize>,
+        keys: &[&str],
+    ) -> Result<(), ModelError> {
+        let Some(wrong) = table.keys().find(|k| !keys.contains(&k.as_str())) else { return Ok(()) };
+        let known: Vec<String> = keys.iter().map(ToString::to_string).collect();
+        let hint = nearest(wrong, &known).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default();
+        let message = format!("unknown key `{wrong}`{hint} (expected {})", keys.join(", "));
+        let start = self.text[span.clone()].find(wrong.as_str()).map_or(span.start, |o| span.start + o);
+        Err(self.at(start..start + wrong.len(), what.into(), message))
+    }
+
+    fn named(&self, name: &str, table: Option<&toml::Table>) -> Named {
+        let text = |key: &str| {
+            table.and_then(|t| t.get(key)).and_then(Value::as_str).unwrap_or_default().to_string()
+        };
+        Named { name: name.into(), unit: text("unit"), description: text("description") }
+    }
+
+    fn state(&self, name: &str, value: &Spanned<Value>) -> Result<State, ModelError> {
+        let (what, span) = (format!("the equation of {name}"), value.span());
+        let Some(table) = value.get_ref().as_table() else {
+            let equation = self.formula(what, value.get_ref(), span)?;
+            return Ok(State { named: self.named(name, None), equation, start: Start::Unknown });
+        };
+        self.known_keys(&what, table, &span, &["equation", "initial", "unit", "description"])?;
+        let equation = table
+            .get("equation")
+            .ok_or_else(|| self.at(span.clone(), what.clone(), "no equation; expected one".into()))?;
+        let start = match table.get("initial") {
+            None => Start::Unknown,
+            Some(Value::String(s)) if s == "known" => Start::Known,
+            Some(Value::String(s)) if s == "unknown" => Start::Unknown,
+            Some(value) => {
+                Start::Value(self.formula(format!("the initial value of {name}"), value, span.clone())?)
+            }
+        };
+        let equation = self.formula(what, equation, span)?;
+        Ok(State { named: self.named(name, Some(table)), equation, start })
+    }
+
+    /// `{ polynomial = 2 }`.
+    fn polynomial(&self, what: &str, table: &toml::Table, span: &Range<usize>) -> Result<usize, ModelError> {
+        let degree = table.get("polynomial").and_then(Value::as_integer);
+        degree.and_then(|d| usize::try_from(d).ok()).filter(|d| *d <= 50).ok_or_else(|| {
+            self.at(span.clone(), what.into(), "expected polynomial = a degree of 0 to 50".into())
+        })
+    }
+}
+
+/// Reads a model.
+///
+/// # Errors
+/// [`ModelError`] with the byte range of the offender where it is known.
+pub fn read(text: &str) -> Result<SystemModel, ModelError> {
+    let file: ModelFile = toml::from_str(text).map_err(|e| ModelError {
+        what: "the model file".into(),
+        message: e.message().trim().to_string(),
+        span: e.span(),
+    })?;
+    let r = Reader { text };
+    let mut model = SystemModel {
+        name: file.name,
+        description: file.description,
+        experiments: 1,
+        ..SystemModel::default()
+    };
+    if let Some(experiments) = &file.experiments {
+        model.experiments = *experiments.get_ref();
+        if !(1..=MAX_EXPERIMENTS).contains(&model.experiments) {
+            let message = format!("expected 1 to {MAX_EXPERIMENTS}");
+            return Err(r.at(experiments.span(), "experiments".into(), message));
+        }
+    }
+    for (name, value) in in_order(&file.states) {
+        model.states.push(r.state(name, value)?);
+    }
+    match file.parameters.as_ref().map(|p| (p.get_ref(), p.span())) {
+        None => {}
+        Some((Value::Array(list), span)) => {
+            for value in list {
+                let name = value.as_str().ok_or_else(|| {
+                    r.at(span.clone(), "parameters".into(), "expected names in quotes".into())
+                })?;
+                model.parameters.push(r.named(name, None));
+            }
+        }
+        Some((Value::Table(table), span)) => {
+            // the order of the file: the line that the key begins, or its place in an inline table
+            let begins = |line: &str, name: &str| {
+                let rest = line.trim_start().strip_prefix(name);
+                rest.is_some_and(|r| r.trim_start().starts_with(['=', '.']))
+            };
+            let place = |name: &str| {
+                let lines = text[span.start..].lines().position(|line| begins(line, name));
+                (lines, text[span.clone()].find(name))
+            };
+            let mut names: Vec<&String> = table.keys().collect();
+            names.sort_by_key(|n| place(n));
+            for name in names {
+                let entry = table.get(name).and_then(Value::as_table);
+                let what = format!("the parameter {name}");
+                let Some(entry) = entry else {
+                    return Err(r.at(span, what, "expected a table, as in { unit = \"1/h\" }".into()));
+                };
+                r.known_keys(&what, entry, &span, &["unit", "description"])?;
+                model.parameters.push(r.named(name, Some(entry)));
+            }
+        }
+        Some((_, span)) => {
+            let message = "expected a list of names, or a table".into();
+            return Err(r.at(span, "parameters".into(), message));
+        }
+    }
+    for (name, value) in in_order(&file.known_inputs) {
+        let (what, span) = (format!("the known input {name}"), value.span());
+        let kind = match value.get_ref() {
+            Value::String(s) if s == "generic" => KnownInput::Generic,
+            Value::String(s) if s == "constant" => KnownInput::Polynomial(0),
+            Value::Table(t) if t.contains_key("function") => {
+                r.known_keys(&what, t, &span, &["function", "unit", "description"])?;
+                KnownInput::Function(r.formula(what, &t["function"], span)?)
+            }
+            Value::Table(t) => {
+                r.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
+                KnownInput::Polynomial(r.polynomial(&what, t, &span)?)
+            }
+            _ => {
+                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \"sin(t)\" }";
+                return Err(r.at(span, what, message.into()));
+            }
+        };
+        model.known_inputs.push((r.named(name, value.get_ref().as_table()), kind));
+    }
+    for (name, value) in in_order(&file.unknown_inputs) {
+        let (what, span) = (format!("the unknown input {name}"), value.span());
+        let degree = match value.get_ref() {
+            Value::String(s) if s == "arbitrary" => None,
+            Value::String(s) if s == "constant" => Some(0),
+            Value::Table(t) => {
+                r.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
+                Some(r.polynomial(&what, t, &span)?)
+            }
+            _ => {
+                let message = "expected \"arbitrary\", \"constant\" or { polynomial = degree }";
+                return Err(r.at(span, what, message.into()));
+            }
+        };
+        model.unknown_inputs.push((r.named(name, value.get_ref().as_table()), degree));
+    }
+    for (name, value) in in_order(&file.constants) {
+        let what = format!("the constant {name}");
+        let table = value.get_ref().as_table();
+        let kind = match (value.get_ref(), table) {
+            (Value::String(s), _) if s == "generic" => Constant::Generic,
+            (_, Some(t)) => {
+                r.known_keys(&what, t, &value.span(), &["value", "unit", "description"])?;
+                match t.get("value") {
+                    None => Constant::Generic,
+                    Some(inner) => Constant::Value(r.formula(what, inner, value.span())?),
+                }
+            }
+            (other, None) => Constant::Value(r.formula(what, other, value.span())?),
+        };
+        model.constants.push((r.named(name, table), kind));
+    }
+    for (name, value) in in_order(&file.definitions) {
+        let formula = r.formula(format!("the definition of {name}"), value.get_ref(), value.span())?;
+        model.definitions.push((name.clone(), formula));
+    }
+    for (name, value) in in_order(&file.outputs) {
+        let (what, span) = (format!("the output {name}"), value.span());
+        let table = value.get_ref().as_table();
+        let formula = match table {
+            None => r.formula(what, value.get_ref(), span)?,
+            Some(t) => {
+                r.known_keys(&what, t, &span, &["expression", "unit", "description"])?;
+                let inner = t
+                    .get("expression")
+                    .ok_or_else(|| r.at(span.clone(), what.clone(), "no expression; expected one".into()))?;
+                r.formula(what, inner, span)?
+            }
+        };
+        model.outputs.push((r.named(name, table), formula));
+    }
+    for (i, segment) in file.segments.iter().enumerate() {
+        let mut out = Segment::default();
+        for (list, map, kind) in [
+            (&mut out.constants, &segment.constants, "the constant"),
+            (&mut out.carry, &segment.carry, "the carried state"),
+        ] {
+            for (name, value) in in_order(map) {
+                let what = format!("{kind} {name} of segment {}", i + 1);
+                list.push((name.clone(), r.formula(what, value.get_ref(), value.span())?));
+            }
+        }
+        model.segments.push(out);
+    }
+    for c in &file.combinations {
+        let what = format!("the combination {}", c.get_ref());
+        model.combinations.push(r.formula(what, &Value::String(c.get_ref().clone()), c.span())?);
+    }
+    match model.check() {
+        Err(e) => Err(ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e }),
+        Ok(()) => Ok(model),
+    }
+}
+
+/// Where a name in quotes (`` `x` ``) is last given: as a key, or in a list of names.
+fn last_mention(text: &str, quoted: &str) -> Option<Range<usize>> {
+    let name = quoted.strip_prefix('`')?.strip_suffix('`')?;
+    let given = |at: usize| {
+        let (before, after) = (&text[..at], text[at + name.len()..].trim_start());
+        let key = after.starts_with('=') && before.trim_end_matches([' ', '\t']).ends_with(['\n', '{', ',']);
+        key || (before.ends_with('"') && text[at + name.len()..].starts_with('"'))
+    };
+    let at = text.match_indices(name).map(|(at, _)| at).filter(|&at| given(at)).last()?;
+    Some(at..at + name.len())
+}

@@ -1,0 +1,123 @@
+//! Any system.
+
+use obsdeg_core::analysis::Status;
+use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination};
+
+use crate::document::{Block, Document};
+use crate::words;
+
+fn explanation(status: Status, partners: &[String], degree: Option<usize>) -> String {
+    const SHOWN: usize = 8;
+    match (status, degree) {
+        (Status::Observable, Some(0)) => "read off an output, or a function of outputs".into(),
+        (Status::Observable, _) => "local: finitely many solutions".into(),
+        (Status::Inseparable, _) => {
+            let more = partners.len().saturating_sub(SHOWN);
+            let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
+            format!(
+                "not told from {}{tail}",
+                partners.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ")
+            )
+        }
+        (Status::NotExcited, _) => "moves no output".into(),
+    }
+}
+
+fn combinations(heading: &str, list: &[SystemCombination]) -> Block {
+    let row = |c: &SystemCombination| {
+        let verdict = if c.degree.is_some() { "observable" } else { "not observable" };
+        vec![c.expression.clone(), verdict.into(), words::degree(c.degree)]
+    };
+    Block::Table {
+        heading: heading.into(),
+        header: vec!["combination", "verdict", "degree"],
+        numbers: vec![false, false, true],
+        rows: list.iter().map(row).collect(),
+    }
+}
+
+pub(crate) fn document(a: &SystemAnalysis) -> Document {
+    let list = |heading: &str, lines: Vec<String>| Block::List { heading: heading.into(), lines };
+    let units = a.quantities.iter().any(|q| !q.unit.is_empty());
+    let mut order: Vec<_> = a.quantities.iter().collect();
+    // best first, what has no degree last
+    order.sort_by_key(|q| (q.status, q.degree));
+    let rows = order.iter().map(|q| {
+        let mut row = vec![q.name.clone(), q.kind.clone()];
+        if units {
+            row.push(q.unit.clone());
+        }
+        row.extend([
+            q.status.to_string(),
+            words::degree(q.degree),
+            explanation(q.status, &q.partners, q.degree),
+        ]);
+        if !q.description.is_empty() {
+            let last = row.len() - 1;
+            row[last] = format!("{} ({})", row[last], q.description);
+        }
+        row
+    });
+    let mut header = vec!["unknown", "kind"];
+    let mut numbers = vec![false, false];
+    if units {
+        header.push("unit");
+        numbers.push(false);
+    }
+    header.extend(["verdict", "degree", "explanation"]);
+    numbers.extend([false, true, false]);
+    let mut blocks = vec![Block::Table { heading: "Verdicts".into(), header, numbers, rows: rows.collect() }];
+    if !a.combinations.is_empty() {
+        blocks.push(combinations("Combinations asked for", &a.combinations));
+    }
+    if !a.invariants.is_empty() {
+        blocks.push(combinations("What stays observable of the unobservable", &a.invariants));
+    }
+    if a.unobservable_directions > 0 {
+        let mut lines: Vec<String> = a.symmetries.iter().map(|s| s.words.clone()).collect();
+        let silent = a.quantities.iter().filter(|q| q.status == Status::NotExcited);
+        lines.extend(silent.map(|q| format!("change {} alone", q.name)));
+        if a.other_directions > 0 {
+            let s = if a.other_directions == 1 { "" } else { "s" };
+            lines.push(format!(
+                "{} direction{s} that {} neither a scaling nor a translation",
+                a.other_directions,
+                if a.other_directions == 1 { "is" } else { "are" }
+            ));
+        }
+        blocks.push(list("No output changes when you", lines));
+    }
+    blocks.push(list("The system", a.equations.clone()));
+    let mut assumed = Vec::new();
+    if !a.known.is_empty() {
+        assumed.push(format!("known starts: {}", a.known.join(", ")));
+    }
+    assumed.push(if a.closed {
+        format!(
+            "generic point and inputs: the first order that adds nothing is the last; {} was looked at",
+            a.last_order
+        )
+    } else if a.rests_on_bound {
+        format!(
+            "starts, inputs or segments are not generic: orders up to the bound {} were looked at, and what is not observable rests on it (--order sets another)",
+            a.bound
+        )
+    } else {
+        format!("everything is observable with derivatives up to order {}", a.last_order)
+    });
+    assumed.push(
+        "the verdict is local: an observable unknown has finitely many solutions near any generic point"
+            .into(),
+    );
+    assumed.push(format!(
+        "ranks modulo the random primes {} and {} at random points; wrong with probability below {:.0e}; seed {}",
+        a.primes[0], a.primes[1], a.error_bound, a.seed
+    ));
+    blocks.push(list("Assumed", assumed));
+    let profile = words::list(&a.rank_profile);
+    let mut lead = vec![format!("rank {} of {}; rank profile {profile}", a.rank, a.unknowns)];
+    if !a.description.is_empty() {
+        lead.insert(0, a.description.clone());
+    }
+    Document { title: format!("Observable degrees: {}", a.name), lead, blocks }
+}
