@@ -327,3 +327,28 @@ rotation = { about = "Z_p", angle_deg = -120 }
         assert_eq!(json(&by_file), json(&by_angles), "{command}");
     }
 }
+
+/// Any system: verdicts in every format, a run with its figures, and orders that are asked for.
+#[test]
+fn models_from_files() {
+    let model = "examples/lotka-volterra/model.toml";
+    for format in ["table", "markdown", "latex", "csv", "json"] {
+        let output = run(&["analyze", "--model", model, "--format", format]);
+        assert!(output.status.success() && stdout(&output).contains("x2"), "{format}: {}", stderr(&output));
+    }
+    let a = json(&["analyze", "--model", model, "--format", "json"]);
+    assert_eq!((&a["schema"], &a["rank"], &a["unknowns"]), (&"obsdeg.system/1".into(), &5.into(), &6.into()));
+    assert_eq!(a["symmetries"][0]["words"], "multiply x2 by s; divide b by s");
+    let (folder, _) = scratch();
+    let out = folder.path().join("run").display().to_string();
+    let r = json(&["simulate", "--model", model, "-o", &out, "--format", "json"]);
+    assert_eq!(r["schema"], "obsdeg.system-run/1");
+    for name in ["summary.json", "series.csv", "series.parquet", "all.svg", "x2.png"] {
+        assert!(folder.path().join("run").join(name).is_file(), "{name}");
+    }
+    refused(&["analyze", "--model", model, "--angles", "0,0,0"], &["cannot be used with"]);
+    refused(&["analyze", "--angles", "0,0,0", "--order", "3"], &["--model"]);
+    refused(&["analyze", "--model", "no/such.toml"], &["cannot read the model file"]);
+    refused(&["simulate", "--model", "examples/sir/model.toml"], &["the duration of the simulation"]);
+    refused(&["analyze"], &["--angles", "--scheme"]);
+}

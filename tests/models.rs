@@ -6,8 +6,11 @@ use std::path::PathBuf;
 use obsdeg_core::analysis::{Options, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::attitude::cardinal;
+use obsdeg_core::system::numeric::Numeric;
 use obsdeg_core::system::rows::Unknown;
-use obsdeg_core::system::{Judgement, json, judge, model_file};
+use obsdeg_core::system::{Judgement, json, judge, model_file, simulate_system};
+use obsdeg_ekf::model::central_difference;
+use obsdeg_ekf::{Measurement, Process};
 use serde_json::Value;
 
 /// The reference models, where they are beside the checkout.
@@ -282,4 +285,71 @@ fn monsters_do_no_harm() {
         // judged or refused, but no panic
         let _ = model_file::read(&text).and_then(|m| judge(&m, 1, None));
     }
+}
+
+fn example(name: &str) -> obsdeg_core::system::SystemModel {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples").join(name).join("model.toml");
+    model_file::read(&std::fs::read_to_string(file).expect("readable")).expect("a model")
+}
+
+/// The Jacobians of the filter are those of its functions, for every function there is.
+#[test]
+fn jacobians_against_differences() {
+    let all = model_file::read(
+        "name='all'\nparameters=['a', 'n']\nknown_inputs={u={function='exp(-t)'}, v='generic'}\n\
+         unknown_inputs={w={polynomial=1}}\n[constants]\nk=2.5\n[states]\nx='-a*x^n + sin(2*x)*u + w'\n\
+         y={equation='exp(-x/3) + log(x*y) - sqrt(x + y) + v*k', initial='2*a'}\n\
+         [outputs]\np='atan(x/y) + asin(x/9) - acos(y/9)'\nq='tan(x/4)*cos(y)^3'\n\
+         [simulation.inputs]\nv='cos(2*t)'",
+    );
+    let models = [all.expect("a model"), example("unicycle-range"), example("lotka-volterra")];
+    for model in &models {
+        let compiled = model.compile().expect("compiled");
+        let numeric = Numeric::new(model, &compiled).expect("numbers");
+        let n = numeric.states.len();
+        let x = nalgebra::DVector::from_iterator(n, (0..n).map(|i| 0.8 + 0.23 * i as f64));
+        let step = nalgebra::DVector::from_element(n, 1e-5);
+        let sigmas = vec![1.0; model.outputs.len()];
+        let (process, outputs) = (numeric.process(0), numeric.measurement(0, &sigmas));
+        for (own, differences) in [
+            (process.jacobian(0.7, &x), central_difference(|x| process.f(0.7, x), &x, &step)),
+            (outputs.jacobian(0.7, &x), central_difference(|x| outputs.h(0.7, x), &x, &step)),
+        ] {
+            assert!(own.iter().all(|d| d.is_finite()), "{}", model.name);
+            assert!(
+                (&own - &differences).amax() < 1e-8 * own.amax().max(1.0),
+                "{} {own} {differences}",
+                model.name
+            );
+        }
+    }
+}
+
+/// The filter of a model: consistent where everything is observable; where a direction is not, a filter that is linearised anew takes
+/// up information that is not there, and the run says whose.
+#[test]
+fn filters_of_models() {
+    let (run, traces) = simulate_system(&example("two-position-alignment"), 1).expect("a run");
+    assert!(run.consistent, "{run:?}");
+    for e in &run.estimates {
+        assert!(e.sigma < e.prior_sigma && e.error_over_sigma.abs() < 4.0, "{e:?}");
+    }
+    assert_eq!((traces.time.len(), traces.series.len()), (1201, 10));
+    // half way round nothing tells phE from bN, afterwards both are known
+    let sigma = |name: &str, k: usize| {
+        traces.series[traces.names.iter().position(|n| n == name).expect("a state")].sigma[k]
+    };
+    assert!(sigma("bN", 600) > 100.0 * sigma("bN", 1200));
+    let (prey, _) = simulate_system(&example("lotka-volterra"), 1).expect("a run");
+    let beyond: Vec<&str> =
+        prey.estimates.iter().filter(|e| e.error_over_sigma.abs() > 4.0).map(|e| e.name.as_str()).collect();
+    assert_eq!((beyond, prey.consistent), (vec!["x2", "b"], false));
+    // the product that is observable comes out all the same
+    let of = |name: &str| prey.estimates.iter().find(|e| e.name == name).expect("an unknown");
+    let product = of("b").estimate * of("x2").estimate / (of("b").truth * of("x2").truth);
+    assert!((product - 1.0).abs() < 0.03, "{product}");
+    // the same seed, the same run; what is missing is named
+    assert_eq!(simulate_system(&example("lotka-volterra"), 1).expect("a run").0, prey);
+    let error = simulate_system(&example("sir"), 1).expect_err("no numbers").to_string();
+    assert!(error.contains("the duration of the simulation"), "{error}");
 }

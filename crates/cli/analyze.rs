@@ -52,7 +52,7 @@ pub(crate) struct Arguments {
     model: Option<PathBuf>,
 
     /// The highest order of derivatives to look at in a model that has no proven end
-    #[arg(long, value_name = "K", requires = "model", value_parser = clap::value_parser!(u16).range(0..=1000))]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(0..=1000))]
     order: Option<u16>,
 
     /// Solving expressions; off never starts the symbolic engine
@@ -83,6 +83,9 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     output::check(&a.output)?;
     if let Some(path) = &a.model {
         return system(a, path);
+    }
+    if a.order.is_some() {
+        return Err(Failure::input("--order goes with --model: a scheme has a proven end".into()));
     }
     let scheme = a.scheme.scheme()?;
     let options = Options {

@@ -10,8 +10,8 @@ use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::design::Design;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::simulation::Simulation;
-use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
+use obsdeg_core::system::{SystemAnalysis, SystemRun};
 use schemars::schema_for;
 
 use crate::failure::Failure;
@@ -35,6 +35,8 @@ enum Kind {
     Scheme,
     /// The JSON of `obsdeg analyze --model`
     System,
+    /// The JSON of `obsdeg simulate --model`
+    Run,
     /// Model files
     Model,
 }
@@ -55,6 +57,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Design => schema_for!(Design),
         Kind::Scheme => schema_for!(SchemeFile),
         Kind::System => schema_for!(SystemAnalysis),
+        Kind::Run => schema_for!(SystemRun),
         Kind::Model => schema_for!(ModelFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;

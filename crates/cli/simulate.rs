@@ -1,14 +1,17 @@
 //! `obsdeg simulate`: one run of the filter against a simulated truth.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::prediction::PredictionError;
-use obsdeg_core::simulation::{Record, Simulation, SimulationError, simulate};
+use obsdeg_core::simulation::{SimulationError, Traces, simulate};
+use obsdeg_core::system::run::RunError;
+use obsdeg_core::system::{ModelError, model_file, simulate_system};
 use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
 
-use crate::arguments::{FolderArguments, SchemeArguments};
+use crate::arguments::{FolderArguments, SchemeArguments, read_text};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
 use crate::output;
@@ -19,6 +22,7 @@ Examples:
   obsdeg simulate --angles 0,0,0 --angles 180,0,0
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 --truth exact --carry inertial --drift-scale 0.001
   obsdeg simulate --scheme scheme.toml --slew-rate 1 --carry inertial -o run
+  obsdeg simulate --model examples/lotka-volterra/model.toml -o run
 
 Left to itself it is the paper's run: psi(0) 0.1 deg each, D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g, random
 drift 0.01 deg/h, noise 1e-5 g, steps of 10 s, 1000 s a position. With -o it writes summary.json, series.csv,
@@ -30,6 +34,10 @@ Exit codes: 0 done (whatever the verdict), 2 bad input, 3 internal error.";
 pub(crate) struct Arguments {
     #[command(flatten)]
     scheme: SchemeArguments,
+
+    /// Any other system: a model file with the numbers of [simulation]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "dwell", "step", "noise", "azimuth_noise", "requirement", "truth", "slew_rate", "drift_noise", "propagation", "value", "prior", "estimate", "drift_scale"])]
+    model: Option<PathBuf>,
 
     #[command(flatten)]
     conditions: ConditionArguments,
@@ -44,6 +52,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     output::check_folder(&a.output)?;
+    if let Some(path) = &a.model {
+        return system(a, path);
+    }
     let scheme = a.scheme.scheme()?;
     let conditions = a.conditions.conditions(&scheme);
     let (summary, record) = simulate(&scheme, &conditions, a.seed).map_err(failure)?;
@@ -51,7 +62,32 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         .map_err(|e| Failure::internal(e.to_string()))?;
     if a.output.output.is_some() {
         let _spinner = Spinner::start("drawing figures", a.output.quiet);
-        let files = files(&summary, &record).map_err(|e| Failure::internal(e.to_string()))?;
+        let json = obsdeg_report::simulation(&summary, Format::Json, Layout::default());
+        let files = files(json, &record.traces).map_err(|e| Failure::internal(e.to_string()))?;
+        output::write_folder(&a.output, &files)?;
+    }
+    output::print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A model file.
+fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
+    let (name, text) = (path.display().to_string(), read_text(path, "model")?);
+    let wrong = |e: ModelError| match e.span.clone() {
+        Some(span) => Failure::at(&e.to_string(), &name, &text, span),
+        None => Failure::input(format!("{name}: {e}")),
+    };
+    let model = model_file::read(&text).map_err(wrong)?;
+    let (run, traces) = simulate_system(&model, a.seed).map_err(|e| match e {
+        RunError::Model(e) => wrong(e),
+        RunError::Filter { .. } => Failure::input(format!("{name}: {e}")),
+    })?;
+    let text = obsdeg_report::system_run(&run, a.output.format, output::terminal())
+        .map_err(|e| Failure::internal(e.to_string()))?;
+    if a.output.output.is_some() {
+        let _spinner = Spinner::start("drawing figures", a.output.quiet);
+        let json = obsdeg_report::system_run(&run, Format::Json, Layout::default());
+        let files = files(json, &traces).map_err(|e| Failure::internal(e.to_string()))?;
         output::write_folder(&a.output, &files)?;
     }
     output::print(&text)?;
@@ -59,14 +95,13 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 /// What goes into the folder.
-fn files(summary: &Simulation, record: &Record) -> Result<Vec<File>, ReportError> {
-    let json = obsdeg_report::simulation(summary, Format::Json, Layout::default())?;
+fn files(json: Result<String, ReportError>, traces: &Traces) -> Result<Vec<File>, ReportError> {
     let mut files = vec![
-        File { name: "summary.json".into(), bytes: json.into_bytes() },
-        File { name: "series.csv".into(), bytes: series_csv(record)?.into_bytes() },
-        File { name: "series.parquet".into(), bytes: series_parquet(record)? },
+        File { name: "summary.json".into(), bytes: json?.into_bytes() },
+        File { name: "series.csv".into(), bytes: series_csv(traces)?.into_bytes() },
+        File { name: "series.parquet".into(), bytes: series_parquet(traces)? },
     ];
-    files.extend(simulation_figures(record)?);
+    files.extend(simulation_figures(traces)?);
     Ok(files)
 }
 

@@ -1,7 +1,6 @@
 //! Which figures a result has.
 
-use obsdeg_core::simulation::Record;
-use obsdeg_core::simulation::conditions::{shown_unit, si_per_shown};
+use obsdeg_core::simulation::Traces;
 use obsdeg_core::simulation::record::Series;
 
 use crate::figure::{
@@ -44,35 +43,35 @@ pub(crate) fn file_name(name: &str) -> String {
 }
 
 /// The curve of one series: truth, estimate and the band of three sigma around it (figures 2-10 of the paper).
-fn curve(record: &Record, i: usize) -> Figure {
-    let (series, unit) = (&record.series[i], &record.units[i]);
-    let scale = si_per_shown(unit);
-    let stride = record.time_s.len().div_ceil(POINTS);
-    let samples = || (0..record.time_s.len()).filter(|k| k % stride == 0 || k + 1 == record.time_s.len());
-    let points = |values: &[f64]| samples().map(|k| (record.time_s[k], values[k] / scale)).collect();
+fn curve(record: &Traces, i: usize) -> Figure {
+    let (series, unit, scale) = (&record.series[i], &record.units[i], record.scales[i]);
+    let bracketed = |unit: &str| if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
+    let stride = record.time.len().div_ceil(POINTS);
+    let samples = || (0..record.time.len()).filter(|k| k % stride == 0 || k + 1 == record.time.len());
+    let points = |values: &[f64]| samples().map(|k| (record.time[k], values[k] / scale)).collect();
     let estimate = &series.estimate;
     // the prior would hide what the data say
     let settled: Vec<usize> = samples().filter(|&k| k > 0).collect();
     let span = |k: usize| {
         let width = 3.0 * series.sigma[k] / scale;
-        (record.time_s[k], estimate[k] / scale - width, estimate[k] / scale + width)
+        (record.time[k], estimate[k] / scale - width, estimate[k] / scale + width)
     };
     let marks = (1..record.position.len())
         .filter(|&k| record.position[k] != record.position[k - 1])
-        .map(|k| record.time_s[k - 1])
+        .map(|k| record.time[k - 1])
         .collect();
     let line = |label: &str, color, stroke, points| Line { label: label.into(), color, stroke, points };
     Figure {
         title: record.names[i].clone(),
-        x_label: "t [s]".into(),
-        y_label: format!("{} [{}]", record.names[i], shown_unit(unit)),
+        x_label: format!("t{}", bracketed(&record.time_unit)),
+        y_label: format!("{}{}", record.names[i], bracketed(unit)),
         bands: vec![Band { color: SKY, points: settled.into_iter().map(span).collect() }],
         lines: vec![
             line("truth", BLACK, Stroke::Solid, points(&series.truth)),
             line("estimate, band of 3 sigma", BLUE, Stroke::Dashed, points(estimate)),
         ],
         marks,
-        x_range: record.time_s.last().map(|&end| (0.0, end)),
+        x_range: record.time.last().map(|&end| (0.0, end)),
         y_range: Some(window(series, scale)),
         log: false,
     }
@@ -91,7 +90,7 @@ fn window(series: &Series, scale: f64) -> (f64, f64) {
 ///
 /// # Errors
 /// [`FigureError`].
-pub fn simulation_figures(record: &Record) -> Result<Vec<File>, FigureError> {
+pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
     let figures: Vec<Figure> = (0..record.names.len()).map(|i| curve(record, i)).collect();
     let mut files = Vec::new();
     for (figure, name) in figures.iter().zip(&record.names) {

@@ -29,7 +29,7 @@ use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::design::Design;
 use obsdeg_core::simulation::Simulation;
-use obsdeg_core::system::SystemAnalysis;
+use obsdeg_core::system::{SystemAnalysis, SystemRun};
 
 /// A text format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -159,6 +159,14 @@ pub fn design_figures(d: &Design) -> Result<Vec<File>, ReportError> {
 /// [`ReportError`] when a value cannot be serialised.
 pub fn system(a: &SystemAnalysis, format: Format, layout: Layout) -> Result<String, ReportError> {
     written(a, &system::document(a), format, layout)
+}
+
+/// A run of any system in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a value cannot be serialised.
+pub fn system_run(r: &SystemRun, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(r, &system::run(r), format, layout)
 }
 
 /// A design in the given format, ending in a newline.

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use obsdeg_core::simulation::Record;
-use obsdeg_core::simulation::conditions::{shown_unit, si_per_shown};
+use obsdeg_core::simulation::Traces;
 use parquet::basic::{Compression, Type as Physical};
 use parquet::data_type::{DoubleType, Int32Type};
 use parquet::file::properties::WriterProperties;
@@ -13,25 +12,22 @@ use parquet::schema::types::Type;
 use crate::ReportError;
 use crate::figures::file_name;
 
-/// `deg/h/g` as a part of a column name.
-fn suffix(unit: &str) -> &'static str {
-    match shown_unit(unit) {
-        "deg" => "deg",
-        "deg/h" => "dph",
-        "deg/h/g" => "dph_per_g",
-        _ => "dph_per_g2",
-    }
+/// A unit as a part of a column name: `deg/h/g` is `dph_per_g`, `mg/l` is `mg_per_l`.
+fn suffix(unit: &str) -> String {
+    let short = unit.replace("deg/h", "dph").replace("g^2", "g2").replace('/', "_per_");
+    let plain: String = short.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+    if plain.is_empty() { plain } else { format!("_{plain}") }
 }
 
 /// The columns after the position: name and values.
-fn columns(record: &Record) -> Vec<(String, Vec<f64>)> {
-    let mut out = vec![("t_s".to_string(), record.time_s.clone())];
-    for ((name, unit), series) in record.names.iter().zip(&record.units).zip(&record.series) {
-        let scale = si_per_shown(unit);
+fn columns(record: &Traces) -> Vec<(String, Vec<f64>)> {
+    let mut out = vec![(format!("t{}", suffix(&record.time_unit)), record.time.clone())];
+    for (i, name) in record.names.iter().enumerate() {
+        let (series, scale) = (&record.series[i], record.scales[i]);
         for (what, values) in
             [("true", &series.truth), ("estimate", &series.estimate), ("sigma", &series.sigma)]
         {
-            let column = format!("{}_{what}_{}", file_name(name), suffix(unit));
+            let column = format!("{}_{what}{}", file_name(name), suffix(&record.units[i]));
             out.push((column, values.iter().map(|x| x / scale).collect()));
         }
     }
@@ -42,10 +38,10 @@ fn columns(record: &Record) -> Vec<(String, Vec<f64>)> {
 ///
 /// # Errors
 /// [`ReportError::Csv`].
-pub fn series_csv(record: &Record) -> Result<String, ReportError> {
+pub fn series_csv(record: &Traces) -> Result<String, ReportError> {
     let columns = columns(record);
     let header = std::iter::once("position".to_string()).chain(columns.iter().map(|c| c.0.clone())).collect();
-    let rows = (0..record.time_s.len()).map(|k| {
+    let rows = (0..record.time.len()).map(|k| {
         let position = (record.position[k] + 1).to_string();
         std::iter::once(position).chain(columns.iter().map(|c| c.1[k].to_string())).collect()
     });
@@ -56,7 +52,7 @@ pub fn series_csv(record: &Record) -> Result<String, ReportError> {
 ///
 /// # Errors
 /// [`ReportError::Parquet`].
-pub fn series_parquet(record: &Record) -> Result<Vec<u8>, ReportError> {
+pub fn series_parquet(record: &Traces) -> Result<Vec<u8>, ReportError> {
     let columns = columns(record);
     let field = |name: &str, kind| {
         Type::primitive_type_builder(name, kind)

@@ -2,8 +2,9 @@
 
 use obsdeg_core::analysis::Status;
 use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination};
+use obsdeg_core::system::run::{SystemEstimate, SystemRun};
 
-use crate::document::{Block, Document};
+use crate::document::{Block, Document, number};
 use crate::words;
 
 fn explanation(status: Status, partners: &[String], degree: Option<usize>) -> String {
@@ -120,4 +121,68 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
         lead.insert(0, a.description.clone());
     }
     Document { title: format!("Observable degrees: {}", a.name), lead, blocks }
+}
+
+/// One run of the filter.
+pub(crate) fn run(r: &SystemRun) -> Document {
+    let row = |e: &SystemEstimate| {
+        let verdict = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
+        vec![
+            e.name.clone(),
+            e.unit.clone(),
+            verdict,
+            words::degree(e.degree),
+            number(e.truth),
+            number(e.estimate),
+            number(e.error),
+            number(e.sigma),
+            format!("{:.2}", e.error_over_sigma),
+            number(e.prior_sigma),
+        ]
+    };
+    let table = Block::Table {
+        heading: "Estimates at the end (verdict and degree: exact)".into(),
+        header: vec![
+            "unknown",
+            "unit",
+            "verdict",
+            "degree",
+            "truth",
+            "estimate",
+            "error",
+            "sigma",
+            "error/sigma",
+            "prior sigma",
+        ],
+        numbers: vec![false, false, false, true, true, true, true, true, true, true],
+        rows: r.estimates.iter().map(row).collect(),
+    };
+    let verdict = if r.consistent {
+        "the filter is consistent with this truth"
+    } else {
+        "the filter is NOT consistent with this truth"
+    };
+    let (low, high) = r.nis_band;
+    let consistency =
+        vec![verdict.into(), format!("mean NIS {} (95 %: {}..{})", number(r.nis), number(low), number(high))];
+    let noise: Vec<String> = r.noise.iter().map(|(name, sigma)| format!("{name} {sigma}")).collect();
+    let assumed = vec![
+        format!(
+            "truth by the equations of the model, for {} in steps of {}",
+            number(r.duration),
+            number(r.step)
+        ),
+        format!("noise of a sample: {}", noise.join(", ")),
+        "the initial estimate is the truth plus an error drawn from the prior".into(),
+        format!("a verdict is wrong with probability below {:.0e}; seed {}", r.error_bound, r.seed),
+    ];
+    Document {
+        title: format!("Simulation: {}", r.name),
+        lead: Vec::new(),
+        blocks: vec![
+            table,
+            Block::List { heading: "Consistency".into(), lines: consistency },
+            Block::List { heading: "Assumed".into(), lines: assumed },
+        ],
+    }
 }

@@ -14,7 +14,7 @@ use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band
 pub use answer::{Simulation, Validity};
 pub use conditions::Conditions;
 pub use plan::Plan;
-pub use record::{Record, Start, run};
+pub use record::{Record, Start, Traces, run};
 
 use crate::model::{Carry, Scheme, SchemeError};
 use crate::prediction::{Prediction, PredictionError};
@@ -129,7 +129,7 @@ fn summary(
     let mut quantities = Vec::new();
     for (c, u) in prediction.unknowns.iter().enumerate() {
         let scale = si_per_shown(units[c]);
-        let series = &record.series[c];
+        let series = &record.traces.series[c];
         quantities.push(Estimate {
             status: u.status,
             degree: u.degree,
@@ -140,7 +140,7 @@ fn summary(
     let mut combinations = Vec::new();
     for (i, c) in prediction.combinations.iter().enumerate() {
         let unit = units[c.terms[0].0];
-        let series = &record.series[n + i];
+        let series = &record.traces.series[n + i];
         combinations.push(Estimate {
             status: c.status,
             degree: c.degree,
@@ -239,7 +239,7 @@ fn estimate(
         error_over_sigma,
         prior_sigma,
         required_sigma,
-        time_to_requirement_s: reached.map(|i| record.time_s[i]),
+        time_to_requirement_s: reached.map(|i| record.traces.time[i]),
         verdict,
     }
 }
@@ -253,7 +253,7 @@ fn consistency(
     let outputs = plan.components.len();
     let samples = record.whitened.len() / outputs;
     let nis = record.whitened.iter().map(|v| v * v).sum::<f64>() / samples as f64;
-    let mut error: Vec<f64> = record.series[..n]
+    let mut error: Vec<f64> = record.traces.series[..n]
         .iter()
         .map(|s| s.estimate.last().copied().unwrap_or(0.0) - s.truth.last().copied().unwrap_or(0.0))
         .collect();
@@ -282,7 +282,8 @@ fn consistency(
 pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, requirements: &[f64]) -> Validity {
     let psi = record.largest_psi;
     let dph = si_per_shown("deg/h");
-    let sensitive = plan.platform.units().iter().zip(&record.series).filter(|(unit, _)| unit.contains("/g"));
+    let sensitive =
+        plan.platform.units().iter().zip(&record.traces.series).filter(|(unit, _)| unit.contains("/g"));
     let coefficient = sensitive.map(|(_, s)| s.truth[0].abs()).fold(0.0, f64::max) / dph;
     let smallest =
         plan.platform.units().iter().zip(requirements).filter(|(unit, t)| **unit != "rad" && !t.is_nan());

@@ -5,7 +5,7 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form};
 
 use super::SimulationError;
-use super::conditions::{Conditions, Truth, resolve, si_per_shown};
+use super::conditions::{Conditions, Truth, resolve, shown_unit, si_per_shown};
 use super::plan::Plan;
 use super::truth::{Noise, TruthModel};
 use crate::prediction::Prediction;
@@ -68,19 +68,30 @@ pub struct Series {
     pub sigma: Vec<f64>,
 }
 
-/// A run, sample by sample.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Record {
+/// What is plotted of a run, sample by sample.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Traces {
     /// Names of the series: unknowns, then combinations.
     pub names: Vec<String>,
-    /// Their units (psi in rad): see [`si_per_shown`].
+    /// The units in which they are shown.
     pub units: Vec<String>,
-    /// The times, from 0, in s.
-    pub time_s: Vec<f64>,
-    /// The position of every sample.
+    /// What a series is divided by to be shown.
+    pub scales: Vec<f64>,
+    /// The unit of the time; empty when none is given.
+    pub time_unit: String,
+    /// The times, from 0.
+    pub time: Vec<f64>,
+    /// The position or segment of every sample.
     pub position: Vec<usize>,
     /// One per name.
     pub series: Vec<Series>,
+}
+
+/// A run, sample by sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Truth, estimate and sigma of everything.
+    pub traces: Traces,
     /// Whitened innovations, one per output and sampled step.
     pub whitened: Vec<f64>,
     /// The covariance at the end.
@@ -102,26 +113,33 @@ pub fn run(
 ) -> Result<Record, SimulationError> {
     let n = plan.unknowns();
     let combinations: Vec<&[(usize, f64)]> = prediction.combinations.iter().map(|c| &c.terms[..]).collect();
-    let mut record = Record {
+    let mut traces = Traces {
         names: plan.platform.names().to_vec(),
-        units: plan.platform.units().iter().map(ToString::to_string).collect(),
-        time_s: vec![0.0],
+        time_unit: "s".into(),
+        time: vec![0.0],
         position: vec![0],
         series: vec![Series::default(); n + combinations.len()],
+        ..Traces::default()
+    };
+    traces.names.extend(prediction.combinations.iter().map(|c| c.expression.clone()));
+    let own_units = plan.platform.units();
+    let units = own_units.iter().chain(prediction.combinations.iter().map(|c| &own_units[c.terms[0].0]));
+    for unit in units {
+        traces.units.push(shown_unit(unit).into());
+        traces.scales.push(si_per_shown(unit));
+    }
+    for segment in &plan.segments {
+        for i in 1..=segment.steps {
+            traces.time.push(segment.start_s + segment.dt * i as f64);
+            traces.position.push(segment.position);
+        }
+    }
+    let mut record = Record {
+        traces,
         whitened: Vec::new(),
         last_covariance: start.covariance(Form::Ud)?,
         largest_psi: 0.0,
     };
-    for c in &prediction.combinations {
-        record.names.push(c.expression.clone());
-        record.units.push(plan.platform.units()[c.terms[0].0].into());
-    }
-    for segment in &plan.segments {
-        for i in 1..=segment.steps {
-            record.time_s.push(segment.start_s + segment.dt * i as f64);
-            record.position.push(segment.position);
-        }
-    }
     let value = |x: &[f64], i: usize| match i.checked_sub(n) {
         None => x[i],
         Some(c) => combinations[c].iter().map(|&(j, k)| k * x[j]).sum(),
@@ -136,9 +154,9 @@ pub fn run(
         }
     };
     let prior = record.last_covariance.clone();
-    sigmas(&mut record.series, &prior);
-    let (series, last) = (&mut record.series, &mut record.last_covariance);
-    let total = record.time_s.len() - 1;
+    sigmas(&mut record.traces.series, &prior);
+    let (series, last) = (&mut record.traces.series, &mut record.last_covariance);
+    let total = record.traces.time.len() - 1;
     let gains = covariance_pass(&plan.stages, prior, |step, p| {
         sigmas(series, p);
         if step + 1 == total {
@@ -149,13 +167,13 @@ pub fn run(
     let mut truth = TruthModel::new(plan, conditions, start.truth.clone());
     let mut noise = Noise::new(seed, 0);
     let mut x = start.estimate.clone();
-    for (i, s) in record.series.iter_mut().enumerate() {
+    for (i, s) in record.traces.series.iter_mut().enumerate() {
         s.truth.push(value(truth.x(), i));
         s.estimate.push(value(&x, i));
     }
     let first_step = first_steps(plan);
-    let mut truths: Vec<Vec<f64>> = vec![Vec::with_capacity(total); record.series.len()];
-    let (series, whitened) = (&mut record.series, &mut record.whitened);
+    let mut truths: Vec<Vec<f64>> = vec![Vec::with_capacity(total); record.traces.series.len()];
+    let (series, whitened) = (&mut record.traces.series, &mut record.whitened);
     state_pass(
         &plan.stages,
         &gains,
@@ -173,7 +191,7 @@ pub fn run(
             whitened.extend_from_slice(innovations);
         },
     );
-    for (s, t) in record.series.iter_mut().zip(truths) {
+    for (s, t) in record.traces.series.iter_mut().zip(truths) {
         s.truth.extend(t);
     }
     record.largest_psi = truth.largest_psi;

@@ -114,6 +114,18 @@ impl Dag {
         Self { denominators: self.denominators.clone(), ..Self::default() }
     }
 
+    /// For every node the function that it is, if it is one.
+    pub fn functions_of_nodes(&self) -> Vec<Option<Function>> {
+        let mut out = vec![None; self.ops.len()];
+        for (&(function, _), &(first, second)) in &self.functions {
+            out[first] = Some(function);
+            if function == Function::Sin {
+                out[second] = Some(Function::Cos);
+            }
+        }
+        out
+    }
+
     fn add(&mut self, op: Op) -> usize {
         if let Some(&i) = self.index.get(&op) {
             return i;

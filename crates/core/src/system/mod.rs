@@ -10,10 +10,13 @@ pub mod json;
 pub mod judge;
 pub mod model;
 pub mod model_file;
+pub mod numeric;
 pub mod rows;
+pub mod run;
 pub mod symmetry;
 pub mod taylor;
 
 pub use answer::{SystemAnalysis, analyze_system};
 pub use judge::{Judgement, judge};
 pub use model::{ModelError, SystemModel};
+pub use run::{SystemRun, simulate_system};

@@ -1,6 +1,6 @@
 //! Any system `x' = f(x, u, p, t)`, `z = h`: what its file says, before any number is drawn.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use super::dag::{Dag, DagError};
@@ -89,6 +89,23 @@ pub struct Segment {
     pub carry: Vec<(String, Formula)>,
 }
 
+/// Numbers for a simulation, as far as the file gives them; in the units of the model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nominal {
+    /// How long it runs.
+    pub duration: Option<f64>,
+    /// Between two samples.
+    pub step: Option<f64>,
+    /// True values of states at the start, parameters, unknown inputs and generic constants.
+    pub values: BTreeMap<String, f64>,
+    /// Standard deviations of the initial estimates.
+    pub priors: BTreeMap<String, f64>,
+    /// Standard deviation of the noise of a sample, by output.
+    pub noise: BTreeMap<String, f64>,
+    /// Generic known inputs as functions of the time `t`.
+    pub inputs: BTreeMap<String, Formula>,
+}
+
 /// A system.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SystemModel {
@@ -116,6 +133,8 @@ pub struct SystemModel {
     pub segments: Vec<Segment>,
     /// Combinations to be judged.
     pub combinations: Vec<Formula>,
+    /// Numbers for a simulation.
+    pub simulation: Nominal,
 }
 
 /// Why a model cannot be judged.

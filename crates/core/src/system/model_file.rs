@@ -11,7 +11,7 @@ use toml::Value;
 use super::model::{
     Constant, Formula, KnownInput, ModelError, Named, Place, Segment, Start, State, SystemModel,
 };
-use crate::model::expression::{Names, nearest, parse_with};
+use crate::model::expression::{Names, Node, nearest, parse_with};
 
 /// Most experiments.
 const MAX_EXPERIMENTS: usize = 20;
@@ -63,6 +63,37 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     combinations: Vec<Spanned<String>>,
+    /// Numbers for `obsdeg simulate --model`.
+    #[serde(default)]
+    simulation: SimulationEntry,
+}
+
+/// Numbers for a simulation, in the units of the model.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationEntry {
+    /// How long it runs.
+    #[schemars(with = "Option<f64>")]
+    duration: Option<Spanned<f64>>,
+    /// Between two samples.
+    #[schemars(with = "Option<f64>")]
+    step: Option<Spanned<f64>>,
+    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    values: BTreeMap<String, Spanned<f64>>,
+    /// Standard deviations of the initial estimates; as large as the value when left out (1 for zero).
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    priors: BTreeMap<String, Spanned<f64>>,
+    /// Standard deviation of the noise of a sample, by output.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    noise: BTreeMap<String, Spanned<f64>>,
+    /// Generic known inputs as functions of the time t.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, String>")]
+    inputs: BTreeMap<String, Spanned<Value>>,
 }
 
 /// A segment of the timeline.
@@ -327,10 +358,73 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let what = format!("the combination {}", c.get_ref());
         model.combinations.push(r.formula(what, &Value::String(c.get_ref().clone()), c.span())?);
     }
+    nominal(&r, &file.simulation, &mut model)?;
     match model.check() {
         Err(e) => Err(ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e }),
         Ok(()) => Ok(model),
     }
+}
+
+/// Numbers for a simulation: names that are known, numbers that can be.
+fn nominal(r: &Reader<'_>, entry: &SimulationEntry, model: &mut SystemModel) -> Result<(), ModelError> {
+    let names =
+        |list: &mut dyn Iterator<Item = &Named>| -> Vec<String> { list.map(|n| n.name.clone()).collect() };
+    let inputs = names(&mut model.unknown_inputs.iter().map(|u| &u.0));
+    let primes =
+        |name: &String| -> Vec<String> { (0..4).map(|k| format!("{name}{}", "'".repeat(k))).collect() };
+    let mut unknowns = names(&mut model.states.iter().map(|s| &s.named));
+    unknowns.extend(names(&mut model.parameters.iter()));
+    unknowns.extend(inputs.iter().flat_map(primes));
+    let mut values = unknowns.clone();
+    values.extend(names(&mut model.constants.iter().map(|c| &c.0)));
+    let outputs = names(&mut model.outputs.iter().map(|o| &o.0));
+    let known = |what: &str, name: &str, list: &[String], span: Range<usize>| {
+        if list.iter().any(|n| n == name) {
+            return Ok(());
+        }
+        let hint = nearest(name, list).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default();
+        Err(r.at(span, format!("{what} of the simulation"), format!("`{name}` is not known here{hint}")))
+    };
+    let nominal = &mut model.simulation;
+    for (what, map, list, target, positive) in [
+        ("values", &entry.values, &values, &mut nominal.values, false),
+        ("priors", &entry.priors, &unknowns, &mut nominal.priors, true),
+        ("noise", &entry.noise, &outputs, &mut nominal.noise, true),
+    ] {
+        for (name, value) in map {
+            known(what, name, list, value.span())?;
+            let x = *value.get_ref();
+            if !x.is_finite() || (positive && x <= 0.0) {
+                let message = if positive { "expected a number above 0" } else { "expected a number" };
+                return Err(r.at(value.span(), format!("{what} of {name}"), message.into()));
+            }
+            target.insert(name.clone(), x);
+        }
+    }
+    for (what, value, target) in
+        [("duration", &entry.duration, &mut nominal.duration), ("step", &entry.step, &mut nominal.step)]
+    {
+        if let Some(value) = value {
+            if !(value.get_ref().is_finite() && *value.get_ref() > 0.0) {
+                let message = "expected a number above 0".into();
+                return Err(r.at(value.span(), format!("{what} of the simulation"), message));
+            }
+            *target = Some(*value.get_ref());
+        }
+    }
+    let generic = names(&mut model.known_inputs.iter().map(|u| &u.0));
+    for (name, value) in &entry.inputs {
+        known("inputs", name, &generic, value.span())?;
+        let formula =
+            r.formula(format!("the input {name} of the simulation"), value.get_ref(), value.span())?;
+        let other = formula.expression.nodes.iter().position(|n| matches!(n, Node::Name(n) if n != "t"));
+        if let Some(i) = other {
+            let message = "expected a function of the time t alone".into();
+            return Err(formula.place.error(message, formula.expression.spans[i].clone()));
+        }
+        nominal.inputs.insert(name.clone(), formula);
+    }
+    Ok(())
 }
 
 /// Where a name in quotes (`` `x` ``) is last given: as a key, or in a list of names.
