@@ -346,6 +346,8 @@ fn models_from_files() {
     for name in ["summary.json", "series.csv", "series.parquet", "all.svg", "x2.png"] {
         assert!(folder.path().join("run").join(name).is_file(), "{name}");
     }
+    let text = stdout(&run(&["simulate", "--model", model]));
+    assert!(text.contains("x2, b: not observable, yet the filter trusts"), "{text}");
     refused(&["analyze", "--model", model, "--angles", "0,0,0"], &["cannot be used with"]);
     refused(&["analyze", "--angles", "0,0,0", "--order", "3"], &["--model"]);
     refused(&["analyze", "--model", "no/such.toml"], &["cannot read the model file"]);

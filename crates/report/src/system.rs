@@ -163,8 +163,16 @@ pub(crate) fn run(r: &SystemRun) -> Document {
         "the filter is NOT consistent with this truth"
     };
     let (low, high) = r.nis_band;
-    let consistency =
+    let mut consistency =
         vec![verdict.into(), format!("mean NIS {} (95 %: {}..{})", number(r.nis), number(low), number(high))];
+    let beyond = |e: &&SystemEstimate| e.status != Some(Status::Observable) && e.error_over_sigma.abs() > 4.0;
+    let beyond: Vec<&str> = r.estimates.iter().filter(beyond).map(|e| e.name.as_str()).collect();
+    if !beyond.is_empty() {
+        consistency.push(format!(
+            "{}: not observable, yet the filter trusts its estimate: linearised anew at every step, it takes up information that is not there",
+            beyond.join(", ")
+        ));
+    }
     let noise: Vec<String> = r.noise.iter().map(|(name, sigma)| format!("{name} {sigma}")).collect();
     let assumed = vec![
         format!(
