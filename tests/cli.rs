@@ -351,6 +351,8 @@ fn models_from_files() {
     refused(&["analyze", "--model", model, "--angles", "0,0,0"], &["cannot be used with"]);
     refused(&["analyze", "--angles", "0,0,0", "--order", "3"], &["--model"]);
     refused(&["analyze", "--model", "no/such.toml"], &["cannot read the model file"]);
-    refused(&["simulate", "--model", "examples/sir/model.toml"], &["the duration of the simulation"]);
+    refused(&["simulate", "--model", "examples/platform-as-model/model.toml"], &["[simulation.values]"]);
+    let e = json(&["crosscheck", "--model", model, "--format", "json"]);
+    assert_eq!((&e["schema"], &e["passed"]), (&"obsdeg.system-evidence/1".into(), &true.into()));
     refused(&["analyze"], &["--angles", "--scheme"]);
 }

@@ -1,11 +1,14 @@
 //! `obsdeg crosscheck`: the exact verdicts against a filter.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
 use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_core::model::{Carry, Latitude, Scheme};
+use obsdeg_core::system::crosscheck_system;
+use obsdeg_report::{File, Format, Layout};
 
 use crate::arguments::{FolderArguments, SchemeArguments};
 use crate::conditions::ConditionArguments;
@@ -13,13 +16,14 @@ use crate::failure::{CHECK, Failure};
 use crate::interrupt;
 use crate::output;
 use crate::progress::Bar;
-use crate::simulate::failure;
+use crate::simulate::{failure, with_model};
 
 const AFTER_HELP: &str = "\
 Examples:
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
   obsdeg crosscheck --scheme scheme.toml --runs 1000 -o evidence
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 --filter-carry inertial     (must disagree)
+  obsdeg crosscheck --model examples/lotka-volterra/model.toml
 
 Evidence: a. log-log slope of sigma against the dwell, b. prior inflation and null vectors, c. covariance against
 inverse information, d. Monte Carlo consistency, e. rank correlation of orders, f. filters that are wrong on purpose.
@@ -31,6 +35,10 @@ Exit codes: 0 everything agrees, 1 something disagrees, 2 bad input, 3 internal 
 pub(crate) struct Arguments {
     #[command(flatten)]
     scheme: SchemeArguments,
+
+    /// Any other system: a model file with the numbers of [simulation]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "dwell", "step", "noise", "azimuth_noise", "requirement", "truth", "slew_rate", "drift_noise", "propagation", "value", "prior", "estimate", "drift_scale", "filter_carry", "filter_latitude", "filter_drop", "runs"])]
+    model: Option<PathBuf>,
 
     #[command(flatten)]
     conditions: ConditionArguments,
@@ -61,6 +69,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     output::check_folder(&a.output)?;
+    if let Some(path) = &a.model {
+        return system(a, path);
+    }
     let scheme = a.scheme.scheme()?;
     let conditions = a.conditions.conditions(&scheme);
     let dropped = a.filter_drop.as_ref().map(|name| position(&scheme, name)).transpose()?;
@@ -82,6 +93,21 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let text = obsdeg_report::crosscheck(&evidence, a.output.format, output::terminal()).map_err(internal)?;
     if a.output.output.is_some() {
         output::write_folder(&a.output, &obsdeg_report::crosscheck_files(&evidence).map_err(internal)?)?;
+    }
+    output::print(&text)?;
+    Ok(if evidence.passed { ExitCode::SUCCESS } else { ExitCode::from(CHECK) })
+}
+
+/// A model file.
+fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
+    let evidence = with_model(path, |model| crosscheck_system(model, a.seed))?;
+    let internal = |e: obsdeg_report::ReportError| Failure::internal(e.to_string());
+    let text =
+        obsdeg_report::system_evidence(&evidence, a.output.format, output::terminal()).map_err(internal)?;
+    if a.output.output.is_some() {
+        let json = obsdeg_report::system_evidence(&evidence, Format::Json, Layout::default());
+        let file = File { name: "evidence.json".into(), bytes: json.map_err(internal)?.into_bytes() };
+        output::write_folder(&a.output, &[file])?;
     }
     output::print(&text)?;
     Ok(if evidence.passed { ExitCode::SUCCESS } else { ExitCode::from(CHECK) })

@@ -11,7 +11,7 @@ use obsdeg_core::design::Design;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::simulation::Simulation;
 use obsdeg_core::system::model_file::ModelFile;
-use obsdeg_core::system::{SystemAnalysis, SystemRun};
+use obsdeg_core::system::{SystemAnalysis, SystemEvidence, SystemRun};
 use schemars::schema_for;
 
 use crate::failure::Failure;
@@ -37,6 +37,8 @@ enum Kind {
     System,
     /// The JSON of `obsdeg simulate --model`
     Run,
+    /// The JSON of `obsdeg crosscheck --model`
+    Evidence,
     /// Model files
     Model,
 }
@@ -58,6 +60,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Scheme => schema_for!(SchemeFile),
         Kind::System => schema_for!(SystemAnalysis),
         Kind::Run => schema_for!(SystemRun),
+        Kind::Evidence => schema_for!(SystemEvidence),
         Kind::Model => schema_for!(ModelFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;

@@ -29,7 +29,7 @@ use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::design::Design;
 use obsdeg_core::simulation::Simulation;
-use obsdeg_core::system::{SystemAnalysis, SystemRun};
+use obsdeg_core::system::{SystemAnalysis, SystemEvidence, SystemRun};
 
 /// A text format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -167,6 +167,14 @@ pub fn system(a: &SystemAnalysis, format: Format, layout: Layout) -> Result<Stri
 /// [`ReportError`] when a value cannot be serialised.
 pub fn system_run(r: &SystemRun, format: Format, layout: Layout) -> Result<String, ReportError> {
     written(r, &system::run(r), format, layout)
+}
+
+/// The evidence for any system in the given format, ending in a newline.
+///
+/// # Errors
+/// [`ReportError`] when a value cannot be serialised.
+pub fn system_evidence(e: &SystemEvidence, format: Format, layout: Layout) -> Result<String, ReportError> {
+    written(e, &system::evidence(e), format, layout)
 }
 
 /// A design in the given format, ending in a newline.

@@ -245,13 +245,11 @@ impl Dag {
 
     /// The multiple of `atom / d`, d the common denominator, that `k` atoms are.
     fn multiple(&mut self, family: Family, atom: usize, (p, q): Ratio) -> Result<(i64, i64), DagError> {
-        let known = self.denominators.entry((family, atom)).or_insert(1);
-        if *known % q != 0 {
-            let common = *known / gcd(*known, q) * q;
-            *known = common;
-            self.outdated = true;
-        }
-        let d = *known;
+        let known = self.denominators.get(&(family, atom)).copied().unwrap_or(1);
+        let common = (known / gcd(known, q)).checked_mul(q).filter(|d| *d <= MAX_POWER);
+        let d = common.ok_or(DagError::TooLarge("a denominator above 1000 inside a function"))?;
+        self.outdated |= d != known;
+        self.denominators.insert((family, atom), d);
         let m = p.checked_mul(d / q).filter(|m| m.abs() <= MAX_POWER);
         Ok((m.ok_or(DagError::TooLarge("a multiple above 1000 inside a function"))?, d))
     }

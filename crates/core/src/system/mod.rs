@@ -6,6 +6,7 @@
 
 pub mod answer;
 pub mod dag;
+pub mod evidence;
 pub mod json;
 pub mod judge;
 pub mod model;
@@ -17,6 +18,7 @@ pub mod symmetry;
 pub mod taylor;
 
 pub use answer::{SystemAnalysis, analyze_system};
+pub use evidence::{SystemEvidence, crosscheck_system};
 pub use judge::{Judgement, judge};
 pub use model::{ModelError, SystemModel};
 pub use run::{SystemRun, simulate_system};

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::answer::{SystemAnalysis, analyze_system};
-use super::model::{ModelError, Start, SystemModel};
+use super::model::{Compiled, ModelError, Start, SystemModel};
 use super::numeric::{FilterState, Numeric};
 use crate::analysis::Status;
 use crate::simulation::Traces;
@@ -129,6 +129,36 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
     Ok((truth, sigmas))
 }
 
+/// Everything that a run needs, in numbers.
+#[derive(Debug, Clone)]
+pub(super) struct Setup<'a> {
+    pub(super) numeric: Numeric<'a>,
+    /// The true states of the filter at the start, and the standard deviations of their first estimates.
+    pub(super) truth: DVector<f64>,
+    pub(super) prior: Vec<f64>,
+    /// Of the noise of every output.
+    pub(super) sigmas: Vec<f64>,
+    pub(super) duration: f64,
+    pub(super) step: f64,
+}
+
+impl<'a> Setup<'a> {
+    pub(super) fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
+        let numeric = Numeric::new(model, compiled)?;
+        let nominal = &model.simulation;
+        let no = |what: &str| {
+            missing(&format!("the {what} of the simulation"), "missing; expected one under [simulation]")
+        };
+        let noise =
+            |name: &String| nominal.noise.get(name).copied().ok_or_else(|| no(&format!("noise of {name}")));
+        let sigmas = model.outputs.iter().map(|o| noise(&o.0.name)).collect::<Result<_, _>>()?;
+        let duration = nominal.duration.ok_or_else(|| no("duration"))?;
+        let step = nominal.step.ok_or_else(|| no("step"))?;
+        let (truth, prior) = starts(model, &numeric)?;
+        Ok(Self { numeric, truth, prior, sigmas, duration, step })
+    }
+}
+
 /// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn from the prior, random numbers
 /// come from `seed`.
 ///
@@ -137,18 +167,7 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
 pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
     let analysis = analyze_system(model, seed, None)?;
     let compiled = model.compile()?;
-    let numeric = Numeric::new(model, &compiled)?;
-    let nominal = &model.simulation;
-    let no = |what: &str| {
-        missing(&format!("the {what} of the simulation"), "missing; expected one under [simulation]")
-    };
-    let duration = nominal.duration.ok_or_else(|| no("duration"))?;
-    let step = nominal.step.ok_or_else(|| no("step"))?;
-    let sigmas: Vec<f64> = model
-        .outputs
-        .iter()
-        .map(|o| nominal.noise.get(&o.0.name).copied().ok_or_else(|| no(&format!("noise of {}", o.0.name))))
-        .collect::<Result<_, _>>()?;
+    let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
     let segments = numeric.segments();
     let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
     if samples * segments as f64 > MAX_SAMPLES {
@@ -157,7 +176,6 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         );
     }
     let dt = duration / segments as f64 / samples;
-    let (mut truth, prior) = starts(model, &numeric)?;
     let mut noise = Noise::new(seed, 0);
     let n = truth.len();
     let estimate = DVector::from_iterator(n, (0..n).map(|c| truth[c] + prior[c] * noise.normal()));
