@@ -36,7 +36,7 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     scheme: SchemeArguments,
 
-    /// Any other system: a model file with the numbers of [simulation]
+    /// Any other system: a model file with its table of numbers for a simulation
     #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "dwell", "step", "noise", "azimuth_noise", "requirement", "truth", "slew_rate", "drift_noise", "propagation", "value", "prior", "estimate", "drift_scale", "filter_carry", "filter_latitude", "filter_drop", "runs"])]
     model: Option<PathBuf>,
 
