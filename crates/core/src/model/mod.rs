@@ -6,6 +6,7 @@ pub mod dwell;
 pub mod expression;
 pub mod geometry;
 pub mod gimbals;
+mod parser;
 pub mod platform;
 pub mod ring;
 pub mod rotation;

@@ -7,6 +7,7 @@
 pub mod answer;
 pub mod dag;
 pub mod evidence;
+mod functions;
 pub mod json;
 pub mod judge;
 pub mod model;
