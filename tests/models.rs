@@ -345,6 +345,9 @@ fn the_information_confirms_the_verdicts() {
     ] {
         let e = crosscheck_system(&example(name), 1).expect("evidence");
         assert!(e.passed && e.checks > 3, "{name}: {e:?}");
+        // every direction that no output sees is printed, and the samples do not see it either
+        assert_eq!(e.symmetries.len() + usize::from(name == "sir"), e.defect.predicted, "{name}");
+        assert!(e.symmetries.iter().all(|s| s.seen.measured.is_some_and(|x| x < 1e-9)), "{name}: {e:?}");
         for q in &e.quantities {
             let Some(measured) = q.slope.measured else { continue };
             let degree = q.degree.expect("observable") as f64;

@@ -83,7 +83,7 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
         if a.other_directions > 0 {
             let s = if a.other_directions == 1 { "" } else { "s" };
             lines.push(format!(
-                "{} direction{s} that {} neither a scaling nor a translation",
+                "{} direction{s} that {} neither a scaling, a translation nor linear in the unknowns",
                 a.other_directions,
                 if a.other_directions == 1 { "is" } else { "are" }
             ));

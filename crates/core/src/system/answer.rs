@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, Start, SystemModel};
-use super::symmetry::{Invariant, Symmetries, Symmetry, symmetries};
+use super::symmetry::{Invariant, LinearDirection, LinearTerm, Symmetries, Symmetry, symmetries};
 use crate::analysis::Status;
 use crate::degree::sparse::{extend_by_short_vectors, support};
 use obsdeg_exact::Echelon;
@@ -112,7 +112,11 @@ pub fn analyze_system(
     let judged = judge_compiled(model, &compiled, seed, bound)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let partners = partners(&judged);
-    let name = |c: usize| judged.layout.unknowns[c].name.clone();
+    // known constants are counted on behind the unknowns
+    let name = |c: usize| match judged.layout.unknowns.get(c) {
+        Some(u) => u.name.clone(),
+        None => model.constants[c - judged.layout.unknowns.len()].0.name.clone(),
+    };
     let quantities = judged.layout.unknowns.iter().enumerate().map(|(c, u)| {
         let (kind, named) = match u.role {
             Role::State(i) => ("state", &model.states[i].named),
@@ -215,14 +219,41 @@ fn symmetry_reports(
     name: &dyn Fn(usize) -> String,
 ) -> Vec<SymmetryReport> {
     let c = free_name(judged);
-    symmetries
-        .found
-        .iter()
-        .map(|s| SymmetryReport {
-            words: words(s, &c, name),
-            unknowns: s.scaling.iter().chain(&s.translation).map(|t| name(t.0)).collect(),
-        })
-        .collect()
+    let plain = symmetries.found.iter().map(|s| SymmetryReport {
+        words: words(s, &c, name),
+        unknowns: s.scaling.iter().chain(&s.translation).map(|t| name(t.0)).collect(),
+    });
+    let linear = symmetries.linear.iter().map(|d| SymmetryReport {
+        words: along(d, name),
+        unknowns: d.components.iter().map(|c| name(c.0)).collect(),
+    });
+    plain.chain(linear).collect()
+}
+
+/// `move x, y, theta along -y, x, 1`.
+fn along(d: &LinearDirection, name: &dyn Fn(usize) -> String) -> String {
+    let term = |(factor, (p, q)): &LinearTerm, first: bool| {
+        let sign = match (*p < 0, first) {
+            (true, true) => "-",
+            (true, false) => " - ",
+            (false, true) => "",
+            (false, false) => " + ",
+        };
+        let size = match (p.abs(), *q) {
+            (1, 1) if factor.is_some() => String::new(),
+            (p, 1) => p.to_string(),
+            (p, q) => format!("{p}/{q}"),
+        };
+        let factor = factor.map(name).unwrap_or_default();
+        let times = if size.is_empty() || factor.is_empty() { "" } else { "*" };
+        format!("{sign}{size}{times}{factor}")
+    };
+    let component = |terms: &Vec<LinearTerm>| -> String {
+        terms.iter().enumerate().map(|(i, t)| term(t, i == 0)).collect()
+    };
+    let names: Vec<String> = d.components.iter().map(|c| name(c.0)).collect();
+    let speeds: Vec<String> = d.components.iter().map(|c| component(&c.1)).collect();
+    format!("move {} along {}", names.join(", "), speeds.join(", "))
 }
 
 /// `multiply a, b by c, divide d by c^2`, `add c to x, subtract 2 c from y`.

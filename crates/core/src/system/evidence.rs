@@ -13,7 +13,7 @@ use super::model::{ModelError, Role, Start, SystemModel};
 use super::numeric::{FilterState, Numeric};
 use super::rows::Unknown;
 use super::run::{RunError, Setup};
-use super::symmetry::{Symmetry, symmetries};
+use super::symmetry::{LinearDirection, Symmetry, symmetries};
 use crate::analysis::Status;
 use crate::crosscheck::answer::{Check, Count};
 
@@ -228,12 +228,17 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let measured = values.iter().filter(|s| **s <= SEEN * largest).count();
     let predicted = unknowns.len() - rank;
     let defect = Count { predicted, measured, pass: predicted == measured };
-    let symmetries: Vec<SymmetryEvidence> = found
+    let directions = found
         .found
         .iter()
+        .map(|s| direction(s, &setup.truth, &columns))
+        .chain(found.linear.iter().map(|d| linear_direction(d, &setup, &columns)));
+    let symmetries: Vec<SymmetryEvidence> = directions
         .zip(&analysis.symmetries)
-        .map(|(s, report)| {
-            let v = direction(s, &setup.truth, &columns, &norms);
+        .map(|(mut v, report)| {
+            for (x, norm) in v.iter_mut().zip(&norms) {
+                *x *= norm;
+            }
             let seen = (&m * &v).norm() / (v.norm() * largest);
             // the derivatives are integrated by Runge-Kutta: what a symmetry leaves alone, its error does not
             let pass = seen <= 1e-6;
@@ -266,18 +271,34 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     })
 }
 
-/// A symmetry at the truth, in columns of unit length.
-fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize], norms: &[f64]) -> DVector<f64> {
+fn quotient((p, q): (i64, i64)) -> f64 {
+    p as f64 / q as f64
+}
+
+/// A symmetry at the truth.
+fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
     let mut v = DVector::zeros(columns.len());
-    let ratio = |(p, q): (i64, i64)| p as f64 / q as f64;
     for &(c, k) in &s.scaling {
-        v[c] += ratio(k) * truth[columns[c]];
+        v[c] += quotient(k) * truth[columns[c]];
     }
     for &(c, k) in &s.translation {
-        v[c] += ratio(k);
+        v[c] += quotient(k);
     }
-    for (x, norm) in v.iter_mut().zip(norms) {
-        *x *= norm;
+    v
+}
+
+/// A direction that is linear in unknowns and known constants, at the truth.
+fn linear_direction(d: &LinearDirection, setup: &Setup<'_>, columns: &[usize]) -> DVector<f64> {
+    let mut v = DVector::zeros(columns.len());
+    for (c, terms) in &d.components {
+        let factor = |f: &Option<usize>| match f {
+            None => 1.0,
+            Some(j) => match columns.get(*j) {
+                Some(&state) => setup.truth[state],
+                None => setup.numeric.constant(j - columns.len()),
+            },
+        };
+        v[*c] = terms.iter().map(|(f, k)| quotient(*k) * factor(f)).sum();
     }
     v
 }

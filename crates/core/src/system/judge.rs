@@ -36,7 +36,7 @@ pub(crate) struct At {
     pub(crate) degrees: Degrees,
     pub(crate) combinations: Vec<Option<usize>>,
     pub(crate) stairs: Vec<Echelon>,
-    /// The value of every unknown there.
+    /// The value of every unknown there, then of every known constant.
     pub(crate) values: Vec<u64>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn climb_at(
         }
         stairs.push(basis.clone());
     });
-    let values = rows.values(compiled, layout);
+    let values = rows.values(compiled, layout, model.constants.len());
     Ok(At { degrees, combinations, stairs, values })
 }
 

@@ -109,6 +109,11 @@ impl<'a> Numeric<'a> {
         Ok(Self { compiled, states, names, functions: compiled.dag.functions_of_nodes(), inputs, constants })
     }
 
+    /// A known constant in the first segment.
+    pub fn constant(&self, k: usize) -> f64 {
+        self.constants[0][k]
+    }
+
     /// The number of segments.
     pub fn segments(&self) -> usize {
         self.constants.len()

@@ -283,8 +283,8 @@ impl<'a> SystemRows<'a> {
         self.runs.first().map_or(&[], |r| &r.combinations)
     }
 
-    /// The value of every unknown at this point.
-    pub fn values(&self, compiled: &Compiled, layout: &Layout) -> Vec<u64> {
+    /// The value of every unknown at this point, then of every known constant (in the first segment).
+    pub fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<u64> {
         let segments = compiled.segments.len().max(1);
         let node_of = |role: Role| {
             let slot = compiled.roles.iter().position(|r| *r == role)?;
@@ -294,7 +294,9 @@ impl<'a> SystemRows<'a> {
             let run = self.runs.get(u.experiment.unwrap_or(0) * segments)?;
             Some(run.taylor.value(node_of(u.role)?, u.derivative))
         };
-        layout.unknowns.iter().map(|u| value(u).unwrap_or(0)).collect()
+        let constant = |c: usize| Some(self.runs.first()?.taylor.start(node_of(Role::Constant(c))?));
+        let unknowns = layout.unknowns.iter().map(value);
+        unknowns.chain((0..constants).map(constant)).map(|x| x.unwrap_or(0)).collect()
     }
 }
 

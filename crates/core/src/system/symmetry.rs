@@ -13,6 +13,11 @@ const NUMERATOR: u64 = 1000;
 /// Largest denominator of a coefficient.
 const DENOMINATOR: i64 = 24;
 
+/// Most unknowns among which directions that are linear in them are sought.
+const MOVED: usize = 12;
+/// Points that these take, at most.
+const LINEAR_POINTS: usize = 100;
+
 /// A rational coefficient of an unknown.
 pub type Term = (usize, (i64, i64));
 
@@ -36,11 +41,24 @@ pub struct Invariant {
     pub degree: usize,
 }
 
+/// A factor, if there is one, and its rational coefficient.
+pub type LinearTerm = (Option<usize>, (i64, i64));
+
+/// A direction whose components are linear in the unknowns and the known constants: `(unknown, [(factor, coefficient)])`; a factor is an
+/// unknown, a known constant (counted on behind the unknowns), or none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LinearDirection {
+    /// Of every unknown that it moves.
+    pub components: Vec<(usize, Vec<LinearTerm>)>,
+}
+
 /// The symmetries of a system, and the invariant combinations that they leave observable.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Symmetries {
     /// Independent ones.
     pub found: Vec<Symmetry>,
+    /// Directions beyond these that are linear in the unknowns: turns, for instance.
+    pub linear: Vec<LinearDirection>,
     /// The number of unobservable directions (among unknowns that are excited) that they do not explain.
     pub unexplained: usize,
     /// Observable combinations of unobservable unknowns.
@@ -137,8 +155,77 @@ pub fn symmetries(
         };
         out.found.push(Symmetry { scaling: terms(&k[..n]), translation: terms(&k[n..]) });
     }
-    out.unexplained = defect.saturating_sub(out.found.len());
+    if out.found.len() < defect {
+        let moved: Vec<usize> =
+            (0..n).filter(|&c| excited[c] && judged.degrees.degree[c].is_none()).collect();
+        let mut draw = || climb_at(model, compiled, &judged.layout, f, &mut rng);
+        // constants that every segment shares may be factors too
+        let shared = |name: &String| {
+            model.segments.iter().all(|s| s.constants.iter().all(|(changed, _)| changed != name))
+        };
+        let constants = model.constants.iter().enumerate().filter(|(_, c)| shared(&c.0.name));
+        let unknowns = if n <= MOVED { (0..n).collect() } else { moved.clone() };
+        let factors: Vec<usize> = unknowns.into_iter().chain(constants.map(|(i, _)| n + i)).collect();
+        out.linear = linear_directions(&f, &moved, &factors, &mut tangents, &at, &mut draw)?;
+    }
+    out.unexplained = defect.saturating_sub(out.found.len() + out.linear.len());
     out.invariants = invariants(&f, n, &out.found, &at);
+    Ok(out)
+}
+
+/// Directions `v_i = b_i + sum_j a_ij x_j` over the unknowns that move, x_j unknowns or known constants (`factors`): a linear system for a and b from rows at several points.
+fn linear_directions(
+    f: &Field,
+    moved: &[usize],
+    factors: &[usize],
+    tangents: &mut Echelon,
+    at: &At,
+    draw: &mut dyn FnMut() -> Result<At, ModelError>,
+) -> Result<Vec<LinearDirection>, ModelError> {
+    if moved.len() > MOVED || factors.len() > 2 * MOVED {
+        return Ok(Vec::new());
+    }
+    // columns: for every unknown that moves the constant, then the factors
+    let width = 1 + factors.len();
+    let mut basis = Echelon::new(*f, moved.len() * width);
+    let (mut rank, mut still) = (0, 0);
+    for _ in 0..LINEAR_POINTS {
+        let here = draw()?;
+        let Some(span) = here.stairs.last() else { break };
+        for i in 0..span.rank() {
+            let row = span.row(i);
+            let entries = moved.iter().flat_map(|&m| {
+                let values = std::iter::once(f.one()).chain(factors.iter().map(|&j| here.values[j]));
+                values.map(move |x| f.mul(row[m], x))
+            });
+            basis.insert(&entries.collect::<Vec<_>>());
+        }
+        still = if basis.rank() == rank { still + 1 } else { 0 };
+        if still == 2 {
+            break;
+        }
+        rank = basis.rank();
+    }
+    if still < 2 {
+        return Ok(Vec::new());
+    }
+    let mut span = Echelon::new(*f, moved.len() * width);
+    let mut out = Vec::new();
+    for v in extend_by_short_vectors(&basis.null_space(), &mut span) {
+        let mut tangent = vec![0; tangents.columns()];
+        for (part, &m) in v.chunks_exact(width).zip(moved) {
+            let linear = factors.iter().zip(&part[1..]).map(|(&j, &a)| (a, at.values[j]));
+            tangent[m] = f.dot(part[0], linear);
+        }
+        let Some(k) = rationals(f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
+        let component = |(part, &m): (&[(i64, i64)], &usize)| {
+            let names = std::iter::once(None).chain(factors.iter().map(|&j| Some(j)));
+            let terms: Vec<_> = names.zip(part.iter().copied()).filter(|(_, k)| k.0 != 0).collect();
+            (!terms.is_empty()).then_some((m, terms))
+        };
+        let components = k.chunks_exact(width).zip(moved).filter_map(component).collect();
+        out.push(LinearDirection { components });
+    }
     Ok(out)
 }
 
