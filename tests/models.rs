@@ -284,6 +284,13 @@ fn monsters_do_no_harm() {
         let error = model_file::read(&model(fraction)).and_then(|m| judge(&m, 1, None)).expect_err(fraction);
         assert!(error.to_string().contains("above 1000"), "{fraction}: {error}");
     }
+    let many: String = (0..200_000).map(|i| format!("x{i} = \"-x{i}\"\n")).collect();
+    let error = model_file::read(&format!("name='many'\n[states]\n{many}[outputs]\ny='x0'"))
+        .and_then(|m| judge(&m, 1, None))
+        .expect_err("too many");
+    assert!(error.to_string().contains("200000 states"), "{error}");
+    let experiments = r#"{"name": "e", "experiments": 1000000000, "states": ["x"], "equations": {"x": "x"}, "outputs": {"y": "x"}}"#;
+    assert!(json::read(experiments).expect_err("too many").to_string().contains("1 to 20"));
     for nested in ["sin(x + ", "exp(2*", "log(x + ", "sqrt(1 + "] {
         let text = model(&format!("{}x{}", nested.repeat(150), ")".repeat(150)));
         // judged or refused, but no panic

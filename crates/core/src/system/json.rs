@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::model::{
-    Constant, Formula, KnownInput, ModelError, Named, Place, Segment, Start, State, SystemModel,
+    Constant, Formula, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, Segment, Start,
+    State, SystemModel,
 };
 use crate::model::expression::{Names, parse_with};
 
@@ -69,6 +70,14 @@ fn cut(text: &str) -> String {
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: None };
     let layout: Layout = serde_json::from_str(text).map_err(|e| refuse("the model", e.to_string()))?;
+    let experiments = layout.experiments.unwrap_or(1);
+    if !(1..=MAX_EXPERIMENTS).contains(&experiments) {
+        return Err(refuse("experiments", format!("{experiments}; expected 1 to {MAX_EXPERIMENTS}")));
+    }
+    if let Some(found) = layout.unknown_input_max_derivative.filter(|d| *d > MAX_DEGREE) {
+        let message = format!("{found}; expected at most {MAX_DEGREE}");
+        return Err(refuse("unknown_input_max_derivative", message));
+    }
     let known = |name: &String, list: &[String]| list.contains(name);
     if let Some(name) = layout.equations.keys().find(|n| !known(n, &layout.states)) {
         return Err(refuse("equations", format!("`{name}` is no state")));
@@ -77,7 +86,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         name: layout.name.clone(),
         description: layout.description.clone(),
         parameters: layout.params.iter().map(|p| named(p)).collect(),
-        experiments: layout.experiments.unwrap_or(1),
+        experiments,
         ..SystemModel::default()
     };
     for state in &layout.states {

@@ -1,6 +1,6 @@
 //! Any system `x' = f(x, u, p, t)`, `z = h`: what its file says, before any number is drawn.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
 use super::dag::{Dag, DagError};
@@ -151,6 +151,10 @@ pub struct ModelError {
 
 /// Most unknowns of a system.
 pub const MAX_UNKNOWNS: usize = 500;
+/// Most experiments.
+pub const MAX_EXPERIMENTS: usize = 20;
+/// Highest degree of an input that is a polynomial in time.
+pub const MAX_DEGREE: usize = 50;
 /// Most operations of a system.
 pub const MAX_NODES: usize = 200_000;
 
@@ -236,6 +240,11 @@ impl SystemModel {
     /// [`ModelError`] for names that are not known, are given twice or are taken, and for what is never defined.
     pub fn compile(&self) -> Result<Compiled, ModelError> {
         self.check()?;
+        let found = self.states.len() + self.parameters.len();
+        if found > MAX_UNKNOWNS {
+            let message = format!("{found} states and parameters; expected at most {MAX_UNKNOWNS} unknowns");
+            return Err(ModelError { what: "the model".into(), message, span: None });
+        }
         let mut dag = Dag::default();
         // fractions of arguments may be met late: then once more with what is known
         for _ in 0..6 {
@@ -267,7 +276,7 @@ impl SystemModel {
                 "two outputs of this name; expected different names".into(),
             );
         }
-        let mut seen: Vec<String> = Vec::new();
+        let mut seen: HashSet<String> = HashSet::new();
         let names = self.roles().into_iter().filter(|r| r.1 != Role::Time).map(|r| r.0);
         for name in names.chain(self.definitions.iter().map(|d| d.0.clone())) {
             if Function::named(&name).is_some() {
@@ -287,7 +296,7 @@ impl SystemModel {
             if seen.contains(&name) {
                 return refuse(format!("`{name}`"), "given twice; expected different names".into());
             }
-            seen.push(name);
+            seen.insert(name);
         }
         Ok(())
     }

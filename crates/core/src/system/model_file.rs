@@ -9,12 +9,10 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::model::{
-    Constant, Formula, KnownInput, ModelError, Named, Place, Segment, Start, State, SystemModel,
+    Constant, Formula, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, Segment, Start,
+    State, SystemModel,
 };
 use crate::model::expression::{Names, Node, nearest, parse_with};
-
-/// Most experiments.
-const MAX_EXPERIMENTS: usize = 20;
 
 /// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan exp log sqrt`
 /// and the names of the model; `t` is the time.
@@ -200,8 +198,8 @@ impl Reader<'_> {
     /// `{ polynomial = 2 }`.
     fn polynomial(&self, what: &str, table: &toml::Table, span: &Range<usize>) -> Result<usize, ModelError> {
         let degree = table.get("polynomial").and_then(Value::as_integer);
-        degree.and_then(|d| usize::try_from(d).ok()).filter(|d| *d <= 50).ok_or_else(|| {
-            self.at(span.clone(), what.into(), "expected polynomial = a degree of 0 to 50".into())
+        degree.and_then(|d| usize::try_from(d).ok()).filter(|d| *d <= MAX_DEGREE).ok_or_else(|| {
+            self.at(span.clone(), what.into(), format!("expected polynomial = a degree of 0 to {MAX_DEGREE}"))
         })
     }
 }
