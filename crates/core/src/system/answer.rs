@@ -111,7 +111,17 @@ pub fn analyze_system(
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, bound)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
-    let partners = partners(&judged);
+    Ok(answer(model, &judged, &symmetries, seed))
+}
+
+/// The answer for a model that was judged.
+pub(super) fn answer(
+    model: &SystemModel,
+    judged: &Judgement,
+    symmetries: &Symmetries,
+    seed: u64,
+) -> SystemAnalysis {
+    let partners = partners(judged);
     // known constants are counted on behind the unknowns
     let name = |c: usize| match judged.layout.unknowns.get(c) {
         Some(u) => u.name.clone(),
@@ -157,7 +167,7 @@ pub fn analyze_system(
         .chain(model.states.iter().map(|s| equation(&s.named.name, "'", &s.equation.text)))
         .chain(model.outputs.iter().map(|(n, e)| equation(&n.name, "", &e.text)));
     let asked = model.combinations.iter().zip(&judged.combinations);
-    Ok(SystemAnalysis {
+    SystemAnalysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         name: model.name.clone(),
@@ -175,8 +185,8 @@ pub fn analyze_system(
             .collect(),
         unobservable_directions: judged.layout.unknowns.len() - judged.degrees.rank(),
         other_directions: symmetries.unexplained,
-        invariants: invariant_reports(&symmetries, &name),
-        symmetries: symmetry_reports(&symmetries, &judged, &name),
+        invariants: invariant_reports(symmetries, &name),
+        symmetries: symmetry_reports(symmetries, judged, &name),
         last_order: judged.degrees.rank_profile.len().saturating_sub(1),
         bound: judged.layout.bound,
         closed: judged.layout.closed,
@@ -184,7 +194,7 @@ pub fn analyze_system(
         primes: judged.fields.map(|f| f.modulus()),
         error_bound: judged.error_bound,
         seed,
-    })
+    }
 }
 
 /// For every unknown the others that share a short null vector with it.

@@ -7,7 +7,7 @@ use obsdeg_ekf::{EkfError, Measurement, SquareRootInformation};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::answer::analyze_system;
+use super::answer::answer;
 use super::judge::judge_compiled;
 use super::model::{ModelError, Role, Start, SystemModel};
 use super::numeric::{FilterState, Numeric};
@@ -172,10 +172,10 @@ fn place(numeric: &Numeric<'_>, u: &Unknown) -> Option<usize> {
 /// # Errors
 /// [`RunError`].
 pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidence, RunError> {
-    let analysis = analyze_system(model, seed, None)?;
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
     let found = symmetries(model, &compiled, &judged, seed)?;
+    let analysis = answer(model, &judged, &found, seed);
     let setup = Setup::new(model, &compiled)?;
     let unknowns = &judged.layout.unknowns;
     let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();

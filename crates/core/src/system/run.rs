@@ -7,9 +7,11 @@ use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::answer::{SystemAnalysis, analyze_system};
+use super::answer::{SystemAnalysis, answer};
+use super::judge::judge_compiled;
 use super::model::{Compiled, ModelError, Start, SystemModel};
 use super::numeric::{FilterState, Numeric};
+use super::symmetry::Symmetries;
 use crate::analysis::Status;
 use crate::simulation::Traces;
 use crate::simulation::record::Series;
@@ -165,8 +167,9 @@ impl<'a> Setup<'a> {
 /// # Errors
 /// [`RunError`].
 pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
-    let analysis = analyze_system(model, seed, None)?;
     let compiled = model.compile()?;
+    let judged = judge_compiled(model, &compiled, seed, None)?;
+    let analysis = answer(model, &judged, &Symmetries::default(), seed);
     let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
     let segments = numeric.segments();
     let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
