@@ -406,7 +406,8 @@ fn constraints_are_kept() {
     // times by hand: quarter turns take 90 s, and the front goes down as time goes up
     assert_eq!(kept.found[0].total_s, 5360.0);
     assert!(free.front.is_sorted_by(|a, b| a.total_s < b.total_s && a.value > b.value));
-    assert!(free.front.iter().any(|f| f.total_s < 5450.0) && free.front.iter().any(|f| f.total_s > 20_000.0));
+    // every dwell is there: what slews alone determine does not push out what the exact verdict knows
+    assert!(free.front.iter().any(|f| f.total_s < 1400.0) && free.front.iter().any(|f| f.total_s > 20_000.0));
     // without the D_I everything may have degree 1 (six positions), and is found before what has a smaller sigma
     let some = ["D_F", "D_O", "D_S"].map(String::from).to_vec();
     let six = Options { required: some.clone(), ..options(Some(6)) };

@@ -382,6 +382,13 @@ impl Search<'_> {
         Scored { worth, seconds: state.seconds, sequence: sequence.to_vec() }
     }
 
+    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at once, does not.
+    fn judged(&self, mut scored: Scored) -> Scored {
+        let missing = self.rows.degrees(&scored.sequence).iter().filter(|d| d.is_none()).count();
+        scored.worth.violation += missing as f64;
+        scored
+    }
+
     /// Coordinate exchange: each place of the sequence takes the candidate that is best there, until none helps. From the
     /// sequences given, then from random ones.
     pub fn exchange(&self, k: usize, given: &[Vec<usize>], restarts: u64, seed: u64) -> Best {
@@ -399,7 +406,10 @@ impl Search<'_> {
                         now[place] = c;
                         let other = self.worth(&now);
                         if other.worth.better_than(&held.worth) {
-                            held = other;
+                            let other = self.judged(other);
+                            if other.worth.better_than(&held.worth) {
+                                held = other;
+                            }
                         }
                     }
                     now.copy_from_slice(&held.sequence);
