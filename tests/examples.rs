@@ -94,7 +94,7 @@ fn models() {
         insta::glob!("../examples", "*/model.toml", |path| {
             let text = std::fs::read_to_string(path).expect("readable");
             let model = model_file::read(&text).expect("a model");
-            let a = analyze_system(&model, 1, None).expect("judged");
+            let a = analyze_system(&model, 1, None, None).expect("judged");
             insta::assert_snapshot!(format!("model_{}", folder(path)), model_table(&a));
         });
     });

@@ -401,3 +401,60 @@ fn filters_of_models() {
     let error = simulate_system(&example("platform-as-model"), 1).map(|r| r.0).expect_err("no numbers");
     assert!(error.to_string().contains("no value; expected one under [simulation.values]"), "{error}");
 }
+
+/// Solving expressions against derivatives taken by hand (chain rule, in floating point), and by the whole program.
+#[cfg(feature = "symbolica")]
+#[test]
+fn solving_expressions() {
+    use obsdeg_core::model::expression::{Names, evaluate_f64, parse_with};
+    let solved = |file: &str| -> (BTreeMap<String, String>, Value) {
+        let out = std::process::Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+            .args(["analyze", "--format", "json", "--model", file])
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .expect("it runs");
+        let answer: Value = serde_json::from_slice(&out.stdout).expect("JSON");
+        let of = |q: &Value| Some((q["name"].as_str()?.to_string(), q["solution"].as_str()?.to_string()));
+        (
+            answer["quantities"].as_array().into_iter().flatten().filter_map(of).collect(),
+            answer["note"].clone(),
+        )
+    };
+    let at = |text: &str, values: &[(&str, f64)]| {
+        // `y''` is no name to the parser
+        let text = text.replace("'''", "_3").replace("''", "_2").replace('\'', "_1");
+        let parsed = parse_with(&text, Names::Plain).expect("an expression");
+        evaluate_f64(&parsed, &|name| {
+            values.iter().find(|v| v.0 == name).unwrap_or_else(|| panic!("{name}")).1
+        })
+    };
+
+    // y = k I; I'/I = a, a' = beta S', S' = -beta S I
+    let (s, i, beta, gamma, k) = (0.9f64, 0.1, 0.5, 0.2, 0.3);
+    let a = beta * s - gamma;
+    let s1 = -beta * s * i;
+    let (a1, a2) = (beta * s1, -beta * beta * (s1 * i + s * a * i));
+    let y: Vec<f64> = [1.0, a, a * a + a1, a.powi(3) + 3.0 * a * a1 + a2].iter().map(|x| k * i * x).collect();
+    let (sir, note) = solved("examples/sir/model.toml");
+    assert_eq!((sir.keys().map(String::as_str).collect::<Vec<_>>(), note), (vec!["gamma"], Value::Null));
+    let found = at(&sir["gamma"], &[("y", y[0]), ("y_1", y[1]), ("y_2", y[2]), ("y_3", y[3])]);
+    assert!((found - gamma).abs() < 1e-9, "{found}");
+
+    // an input: y' = -(p/V) y + u/V, so that y'' and u' solve for both
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("m.toml");
+    let text = "name = \"m\"\n[states]\nx = \"-p*x/V + u/V\"\n[parameters]\np = {}\nV = {}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"x\"\n";
+    std::fs::write(&file, text).expect("written");
+    let (clearance, _) = solved(&file.display().to_string());
+    let (x, p, v, u, u1) = (0.7, 0.4, 2.5, 1.3, -0.6);
+    let y1 = (u - p * x) / v;
+    let y2 = (u1 - p * y1) / v;
+    let values = [("y", x), ("y_1", y1), ("y_2", y2), ("u", u), ("u_1", u1), ("p", p), ("V", v), ("x", x)];
+    for (name, truth) in [("p", p), ("V", v), ("x", x)] {
+        let found = at(&clearance[name], &values);
+        assert!((found - truth).abs() < 1e-9, "{name} = {}: {found}", clearance[name]);
+    }
+    // what has no expression says why
+    let (none, note) = solved("examples/bearing-only/model.toml");
+    assert!(none.is_empty() && note.as_str().is_some_and(|n| n.contains("not rational")), "{note}");
+}

@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     scheme: SchemeArguments,
 
     /// Any other system: a model file (TOML, or JSON)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "frame", "formulas", "solutions", "symbolic_limit"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "frame", "formulas"])]
     model: Option<PathBuf>,
 
     /// The highest order of derivatives to look at in a model that has no proven end
@@ -105,14 +105,18 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         AnalysisError::Scheme(e) => Failure::input(e.to_string()),
         AnalysisError::Verdict(e) => Failure::internal(e.to_string()),
     })?;
-    // the banner of the engine is its licence notice
-    for line in worker.iter().flat_map(Worker::banner).filter(|_| !a.output.quiet) {
-        eprintln!("{line}");
-    }
+    notice(worker.as_ref(), a.output.quiet);
     let text = obsdeg_report::analysis(&analysis, a.output.format, output::layout(&a.output))
         .map_err(|e| Failure::internal(e.to_string()))?;
     output::write(&a.output, &text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The banner of the engine is its licence notice.
+fn notice(worker: Option<&Worker>, quiet: bool) {
+    for line in worker.into_iter().flat_map(Worker::banner).filter(|_| !quiet) {
+        eprintln!("{line}");
+    }
 }
 
 /// A model file.
@@ -122,12 +126,17 @@ fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
     let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let read = if json { json::read(&text) } else { model_file::read(&text) };
     let spinner = Spinner::start("judging the model", a.output.quiet);
-    let analysed = read.and_then(|model| analyze_system(&model, a.seed, a.order.map(Into::into)));
+    let mut worker = worker(a.symbolic_limit)?;
+    let analysed = read.and_then(|model| {
+        let engine = (a.solutions == Switch::On).then_some(worker.as_mut());
+        analyze_system(&model, a.seed, a.order.map(Into::into), engine)
+    });
     drop(spinner);
     let analysis = analysed.map_err(|e| match e.span.clone() {
         Some(span) if !json => Failure::at(&e.to_string(), &name, &text, span),
         _ => Failure::input(format!("{name}: {e}")),
     })?;
+    notice(worker.as_ref(), a.output.quiet);
     let text = obsdeg_report::system(&analysis, a.output.format, output::layout(&a.output))
         .map_err(|e| Failure::internal(e.to_string()))?;
     output::write(&a.output, &text)?;

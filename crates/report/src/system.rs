@@ -2,17 +2,22 @@
 
 use obsdeg_core::analysis::Status;
 use obsdeg_core::crosscheck::answer::Check;
-use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination};
+use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination, SystemQuantity};
 use obsdeg_core::system::evidence::{SystemEvidence, SystemQuantityEvidence};
 use obsdeg_core::system::run::{SystemEstimate, SystemRun};
 
 use crate::document::{Block, Document, number};
 use crate::words;
 
-fn explanation(status: Status, partners: &[String], degree: Option<usize>) -> String {
+/// Longest solving expression that a reader is shown.
+const READABLE: usize = 240;
+
+fn explanation(q: &SystemQuantity) -> String {
     const SHOWN: usize = 8;
-    match (status, degree) {
+    let partners = &q.partners;
+    match (q.status, q.degree) {
         (Status::Observable, Some(0)) => "read off an output, or a function of outputs".into(),
+        (Status::Observable, _) if q.solution.is_some() => "one solution: see below".into(),
         (Status::Observable, _) => "local: finitely many solutions".into(),
         (Status::Inseparable, _) => {
             let more = partners.len().saturating_sub(SHOWN);
@@ -50,11 +55,7 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
         if units {
             row.push(q.unit.clone());
         }
-        row.extend([
-            q.status.to_string(),
-            words::degree(q.degree),
-            explanation(q.status, &q.partners, q.degree),
-        ]);
+        row.extend([q.status.to_string(), words::degree(q.degree), explanation(q)]);
         if !q.description.is_empty() {
             let last = row.len() - 1;
             row[last] = format!("{} ({})", row[last], q.description);
@@ -70,6 +71,17 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
     header.extend(["verdict", "degree", "explanation"]);
     numbers.extend([false, true, false]);
     let mut blocks = vec![Block::Table { heading: "Verdicts".into(), header, numbers, rows: rows.collect() }];
+    let solved = order.iter().filter_map(|q| {
+        let solution = q.solution.as_ref()?;
+        Some(match solution.len() {
+            0..=READABLE => format!("{} = {solution}", q.name),
+            long => format!("{} = a fraction of {long} characters (--format json holds it)", q.name),
+        })
+    });
+    let solved: Vec<String> = solved.collect();
+    if !solved.is_empty() {
+        blocks.push(list("Solved by", solved));
+    }
     if !a.combinations.is_empty() {
         blocks.push(combinations("Combinations asked for", &a.combinations));
     }
@@ -112,6 +124,7 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
         "the verdict is local: an observable unknown has finitely many solutions near any generic point"
             .into(),
     );
+    assumed.extend(a.note.clone());
     assumed.push(format!(
         "ranks modulo the random primes {} and {} at random points; wrong with probability below {:.0e}; seed {}",
         a.primes[0], a.primes[1], a.error_bound, a.seed

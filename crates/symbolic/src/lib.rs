@@ -12,4 +12,4 @@ pub mod protocol;
 pub mod worker;
 
 pub use client::{Worker, WorkerConfig, WorkerError};
-pub use protocol::{Check, Dynamics, Job, Request, Response, System};
+pub use protocol::{Check, Dynamics, Job, RationalSystem, Request, Response, System};

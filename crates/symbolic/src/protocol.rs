@@ -38,6 +38,12 @@ pub enum Job {
         /// Highest order.
         order: usize,
     },
+    /// Solve a rational system for its unknowns, one after the other; answer with one expression per state, then one per
+    /// parameter, empty where there is none.
+    Unknowns {
+        /// The system.
+        system: RationalSystem,
+    },
     /// The irreducible factors of one maximal minor of a matrix of rational functions of the symbols.
     MinorFactors {
         /// The matrix.
@@ -65,6 +71,29 @@ pub struct Dynamics {
     pub equations: Vec<String>,
     /// `h`.
     pub outputs: Vec<String>,
+}
+
+/// `x' = f`, `y = h`, rational in states, parameters, signals and whatever else is announced as a symbol.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RationalSystem {
+    /// The states.
+    pub states: Vec<String>,
+    /// `f`, one per state.
+    pub equations: Vec<String>,
+    /// The unknown constants.
+    pub parameters: Vec<String>,
+    /// Per output `h` and the names of `y, y', y'', ...`.
+    pub outputs: Vec<(String, Vec<String>)>,
+    /// The names of `u, u', ...` of every known input, and whether derivatives beyond vanish.
+    pub inputs: Vec<(Vec<String>, bool)>,
+    /// The name of the time, if it occurs.
+    pub time: Option<String>,
+    /// Known starts: state and name of its value.
+    pub starts: Vec<(usize, String)>,
+    /// The degree of every state, then of every parameter; what has a lower one may stand in its expression.
+    pub degrees: Vec<Option<usize>>,
+    /// Parameters that may take any value, since a symmetry moves them: no expression of an observable unknown depends on it.
+    pub free: Vec<usize>,
 }
 
 /// A claim `sum_i x_i sum_t factor_t (d/dt)^order_t z_output_t at segment_t = target`, to be verified

@@ -5,10 +5,12 @@ use serde::Serialize;
 
 use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, Start, SystemModel};
+use super::solutions::solutions;
 use super::symmetry::{Invariant, LinearDirection, LinearTerm, Symmetries, Symmetry, symmetries};
 use crate::analysis::Status;
 use crate::degree::sparse::{extend_by_short_vectors, support};
 use obsdeg_exact::Echelon;
+use obsdeg_symbolic::Worker;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
@@ -54,6 +56,8 @@ pub struct SystemAnalysis {
     pub closed: bool,
     /// Whether a verdict rests on the bound.
     pub rests_on_bound: bool,
+    /// Why there are no solving expressions, if there are none.
+    pub note: Option<String>,
     /// The two random primes.
     pub primes: [u64; 2],
     /// Bound on the probability that a verdict is wrong.
@@ -79,6 +83,9 @@ pub struct SystemQuantity {
     pub degree: Option<usize>,
     /// Unknowns that move with it while no output changes.
     pub partners: Vec<String>,
+    /// What it is in outputs, inputs, their derivatives and unknowns of no higher degree, where it enters linearly; verified in both
+    /// fields.
+    pub solution: Option<String>,
 }
 
 /// A combination.
@@ -99,7 +106,7 @@ pub struct SymmetryReport {
     pub unknowns: Vec<String>,
 }
 
-/// Judges a model; `bound` overrides the highest order.
+/// Judges a model; `bound` overrides the highest order. Solving expressions are sought if `engine` says so, with its worker.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -107,11 +114,24 @@ pub fn analyze_system(
     model: &SystemModel,
     seed: u64,
     bound: Option<usize>,
+    engine: Option<Option<&mut Worker>>,
 ) -> Result<SystemAnalysis, ModelError> {
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, bound)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
-    Ok(answer(model, &judged, &symmetries, seed))
+    let mut out = answer(model, &judged, &symmetries, seed);
+    match engine.map(|worker| solutions(model, &compiled, &judged, seed, worker)) {
+        Some(Ok(found)) => {
+            for (u, solution) in judged.layout.unknowns.iter().zip(found) {
+                if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
+                    q.solution = solution;
+                }
+            }
+        }
+        Some(Err(reason)) => out.note = Some(reason),
+        None => {}
+    }
+    Ok(out)
 }
 
 /// The answer for a model that was judged.
@@ -149,6 +169,7 @@ pub(super) fn answer(
             status,
             degree,
             partners: partners[c].iter().map(|&p| name(p)).collect(),
+            solution: None,
         }
     });
     // of arbitrary inputs only the signal itself is of interest
@@ -191,6 +212,7 @@ pub(super) fn answer(
         bound: judged.layout.bound,
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
+        note: None,
         primes: judged.fields.map(|f| f.modulus()),
         error_bound: judged.error_bound,
         seed,

@@ -15,6 +15,7 @@ pub mod model_file;
 pub mod numeric;
 pub mod rows;
 pub mod run;
+mod solutions;
 pub mod symmetry;
 pub mod taylor;
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
-use super::dag::{Dag, DagError};
+use super::dag::{Dag, DagError, Op};
 use crate::model::expression::{Expression, Function, nearest};
 
 /// Where something is written.
@@ -204,6 +204,14 @@ pub struct Compiled {
     pub combinations: Vec<usize>,
     /// Where each division and root was written first.
     pub places: HashMap<usize, (Place, Range<usize>)>,
+}
+
+impl Compiled {
+    /// The node of what has this role; `None` where nothing uses it.
+    pub fn node_of(&self, role: Role) -> Option<usize> {
+        let slot = self.roles.iter().position(|r| *r == role)?;
+        self.dag.ops.iter().position(|op| *op == Op::Slot(slot))
+    }
 }
 
 /// A segment as nodes.

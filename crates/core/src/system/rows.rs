@@ -283,13 +283,20 @@ impl<'a> SystemRows<'a> {
         self.runs.first().map_or(&[], |r| &r.combinations)
     }
 
+    /// The derivative of this order of a node at the start of the first run.
+    pub fn derivative(&mut self, node: usize, order: usize) -> u64 {
+        let f = self.field;
+        let Some(run) = self.runs.first_mut() else { return 0 };
+        while run.taylor.length <= order {
+            run.taylor.advance();
+        }
+        (1..=order).fold(run.taylor.value(node, order), |x, k| f.mul(x, f.from_u64(k as u64)))
+    }
+
     /// The value of every unknown at this point, then of every known constant (in the first segment).
     pub fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<u64> {
         let segments = compiled.segments.len().max(1);
-        let node_of = |role: Role| {
-            let slot = compiled.roles.iter().position(|r| *r == role)?;
-            compiled.dag.ops.iter().position(|op| *op == Op::Slot(slot))
-        };
+        let node_of = |role: Role| compiled.node_of(role);
         let value = |u: &Unknown| {
             let run = self.runs.get(u.experiment.unwrap_or(0) * segments)?;
             Some(run.taylor.value(node_of(u.role)?, u.derivative))

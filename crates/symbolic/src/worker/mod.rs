@@ -4,6 +4,7 @@ mod derive;
 mod factor;
 mod solve;
 mod tower;
+mod unknowns;
 
 use std::io::{BufRead, Write};
 
@@ -50,6 +51,7 @@ fn answer(request: &Request) -> Response {
     let result = tower.and_then(|tower| match &request.job {
         Job::Solve { system, check } => solve::solve(&tower, system, check.as_ref()),
         Job::Derive { dynamics, order } => derive::formulas(dynamics, *order).map(|v| (v, false)),
+        Job::Unknowns { system } => unknowns::unknowns(&tower, system).map(|v| (v, false)),
         Job::MinorFactors { matrix } => factor::minor_factors(&tower, matrix).map(|v| (v, false)),
     });
     match result {

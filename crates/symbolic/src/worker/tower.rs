@@ -73,11 +73,21 @@ impl Tower {
 
     /// A rational function of the symbols and half tangents alone.
     pub(crate) fn scalar(&self, text: &str) -> Result<Scalar, JobError> {
-        let s: Scalar = atom(text)?.to_rational_polynomial(&Q, &Z, self.variables.clone());
+        self.scalar_of(&atom(text)?)
+    }
+
+    pub(crate) fn scalar_of(&self, atom: &Atom) -> Result<Scalar, JobError> {
+        let s: Scalar = atom.to_rational_polynomial(&Q, &Z, self.variables.clone());
         if s.get_variables().len() != self.variables.len() {
-            return Err(JobError::NotAnElement { text: text.into() });
+            return Err(JobError::NotAnElement { text: atom.to_string() });
         }
         Ok(s)
+    }
+
+    /// The place of a symbol among the variables.
+    pub(crate) fn place(&self, name: &str) -> usize {
+        let wanted = variable(name);
+        self.variables.iter().position(|v| *v == wanted).unwrap_or(usize::MAX)
     }
 
     fn size(&self) -> usize {
@@ -258,7 +268,8 @@ impl Tower {
     }
 }
 
-type Polynomial = MultivariatePolynomial<IntegerRing, u16>;
+/// A polynomial in the symbols.
+pub(crate) type Polynomial = MultivariatePolynomial<IntegerRing, u16>;
 
 /// Whose powers above one are kept; the other's square is replaced.
 #[derive(Clone, Copy)]
@@ -267,8 +278,9 @@ enum Powers {
     OfCosine,
 }
 
-fn degree(p: &Polynomial, variable: usize) -> u32 {
-    p.into_iter().map(|term| u32::from(term.exponents[variable])).max().unwrap_or(0)
+/// Its highest power of a variable.
+pub(crate) fn degree(p: &Polynomial, variable: usize) -> u32 {
+    p.into_iter().filter_map(|term| term.exponents.get(variable)).copied().max().map_or(0, u32::from)
 }
 
 /// `t^j / (1+t^2)^m = cos^(2m-j)(a/2) sin^j(a/2)` in the cosine and sine of `a`, for `j <= 2m`.
