@@ -82,8 +82,8 @@ fn model_table(a: &SystemAnalysis) -> String {
     for s in &a.symmetries {
         writeln!(out, "  {}", s.words).expect("text");
     }
-    if a.other_directions > 0 {
-        writeln!(out, "  other directions: {}", a.other_directions).expect("text");
+    for moved in &a.other_directions {
+        writeln!(out, "  another direction moves {}", moved.join(", ")).expect("text");
     }
     out
 }

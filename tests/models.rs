@@ -458,3 +458,21 @@ fn solving_expressions() {
     let (none, note) = solved("examples/bearing-only/model.toml");
     assert!(none.is_empty() && note.as_str().is_some_and(|n| n.contains("not rational")), "{note}");
 }
+
+/// 1/x grows by 2k in time and y = s1/(1/x + s2), so that 1/x and s2 can be shifted against each other; a number of three digits in a
+/// direction comes out as itself.
+#[test]
+fn directions_that_are_polynomials() {
+    let read = |states: &str, parameters: &str, y: &str| {
+        let text =
+            format!("name = \"m\"\n[states]\n{states}\n[parameters]\n{parameters}\n[outputs]\ny = \"{y}\"\n");
+        let model = model_file::read(&text).expect("a model");
+        let a = obsdeg_core::system::analyze_system(&model, 1, None, None).expect("judged");
+        assert!(a.other_directions.is_empty(), "{:?}", a.other_directions);
+        a.symmetries.into_iter().map(|s| s.words).collect::<Vec<_>>()
+    };
+    let clock = read("x = \"-2*k*x^2\"", "k = {}\ns1 = {}\ns2 = {}", "s1*x/(1 + s2*x)");
+    assert_eq!(clock, ["multiply x by c; divide k, s1, s2 by c", "move x, s2 along x^2, 1"]);
+    let tilt = read("v = \"9.81*phi + b\"\nphi = \"0\"\nb = \"0\"", "", "v");
+    assert_eq!(tilt, ["add c to phi; subtract 981/100 c from b"]);
+}

@@ -28,6 +28,6 @@ pub mod turn;
 pub use echelon::Echelon;
 pub use field::Field;
 pub use prime::{PrimeError, RootField};
-pub use radical::Radical;
+pub use radical::{Radical, Ratio};
 pub use rng::SplitMix64;
 pub use turn::Turn;

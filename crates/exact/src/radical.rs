@@ -27,8 +27,8 @@ impl Ratio {
         Self { num: self.num / g, den: self.den / g }
     }
 
-    /// The rational number below [`BOUND`] whose image is `value`, if there is one.
-    fn recover(field: &Field, value: u64) -> Option<Self> {
+    /// The rational number with numerator and denominator up to 2^20 whose image is `value`, if there is one.
+    pub fn recover(field: &Field, value: u64) -> Option<Self> {
         // half-extended Euclid (Wang 1981, doi:10.1145/800206.806398)
         let (mut r0, mut r1) = (field.modulus(), field.to_u64(value));
         let (mut t0, mut t1) = (0i64, 1i64);

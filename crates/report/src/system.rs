@@ -5,6 +5,7 @@ use obsdeg_core::crosscheck::answer::Check;
 use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination, SystemQuantity};
 use obsdeg_core::system::evidence::{SystemEvidence, SystemQuantityEvidence};
 use obsdeg_core::system::run::{SystemEstimate, SystemRun};
+use obsdeg_core::system::symmetry::POLYNOMIAL_DEGREE;
 
 use crate::document::{Block, Document, number};
 use crate::words;
@@ -92,14 +93,12 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
         let mut lines: Vec<String> = a.symmetries.iter().map(|s| s.words.clone()).collect();
         let silent = a.quantities.iter().filter(|q| q.status == Status::NotExcited);
         lines.extend(silent.map(|q| format!("change {} alone", q.name)));
-        if a.other_directions > 0 {
-            let s = if a.other_directions == 1 { "" } else { "s" };
-            lines.push(format!(
-                "{} direction{s} that {} neither a scaling, a translation nor linear in the unknowns",
-                a.other_directions,
-                if a.other_directions == 1 { "is" } else { "are" }
-            ));
-        }
+        lines.extend(a.other_directions.iter().map(|moved| {
+            format!(
+                "move {} together in a way that is no polynomial of degree up to {POLYNOMIAL_DEGREE}, or a long one",
+                moved.join(", ")
+            )
+        }));
         blocks.push(list("No output changes when you", lines));
     }
     blocks.push(list("The system", a.equations.clone()));

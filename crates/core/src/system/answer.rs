@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, Start, SystemModel};
 use super::solutions::solutions;
-use super::symmetry::{Invariant, LinearDirection, LinearTerm, Symmetries, Symmetry, symmetries};
+use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::analysis::Status;
 use crate::degree::sparse::{extend_by_short_vectors, support};
 use obsdeg_exact::Echelon;
@@ -42,10 +42,10 @@ pub struct SystemAnalysis {
     pub combinations: Vec<SystemCombination>,
     /// The number of independent directions that no output sees.
     pub unobservable_directions: usize,
-    /// Scalings and translations among them.
+    /// Scalings, translations and polynomials among them, exactly.
     pub symmetries: Vec<SymmetryReport>,
-    /// Directions that are neither.
-    pub other_directions: usize,
+    /// What is moved by each direction that is none of these: at a generic point, no polynomial that was found describes it.
+    pub other_directions: Vec<Vec<String>>,
     /// Combinations of unobservable unknowns that are observable.
     pub invariants: Vec<SystemCombination>,
     /// The highest order that was looked at.
@@ -205,7 +205,7 @@ pub(super) fn answer(
             .map(|(c, degree)| SystemCombination { expression: c.text.clone(), degree: *degree })
             .collect(),
         unobservable_directions: judged.layout.unknowns.len() - judged.degrees.rank(),
-        other_directions: symmetries.unexplained,
+        other_directions: named(&symmetries.unexplained, &name),
         invariants: invariant_reports(symmetries, &name),
         symmetries: symmetry_reports(symmetries, judged, &name),
         last_order: judged.degrees.rank_profile.len().saturating_sub(1),
@@ -217,6 +217,10 @@ pub(super) fn answer(
         error_bound: judged.error_bound,
         seed,
     }
+}
+
+fn named(list: &[Vec<usize>], name: &dyn Fn(usize) -> String) -> Vec<Vec<String>> {
+    list.iter().map(|columns| columns.iter().map(|&c| name(c)).collect()).collect()
 }
 
 /// For every unknown the others that share a short null vector with it.
@@ -255,16 +259,16 @@ fn symmetry_reports(
         words: words(s, &c, name),
         unknowns: s.scaling.iter().chain(&s.translation).map(|t| name(t.0)).collect(),
     });
-    let linear = symmetries.linear.iter().map(|d| SymmetryReport {
+    let polynomial = symmetries.polynomial.iter().map(|d| SymmetryReport {
         words: along(d, name),
         unknowns: d.components.iter().map(|c| name(c.0)).collect(),
     });
-    plain.chain(linear).collect()
+    plain.chain(polynomial).collect()
 }
 
 /// `move x, y, theta along -y, x, 1`.
-fn along(d: &LinearDirection, name: &dyn Fn(usize) -> String) -> String {
-    let term = |(factor, (p, q)): &LinearTerm, first: bool| {
+fn along(d: &PolynomialDirection, name: &dyn Fn(usize) -> String) -> String {
+    let term = |(factors, (p, q)): &PolynomialTerm, first: bool| {
         let sign = match (*p < 0, first) {
             (true, true) => "-",
             (true, false) => " - ",
@@ -272,15 +276,26 @@ fn along(d: &LinearDirection, name: &dyn Fn(usize) -> String) -> String {
             (false, false) => " + ",
         };
         let size = match (p.abs(), *q) {
-            (1, 1) if factor.is_some() => String::new(),
+            (1, 1) if !factors.is_empty() => String::new(),
             (p, 1) => p.to_string(),
             (p, q) => format!("{p}/{q}"),
         };
-        let factor = factor.map(name).unwrap_or_default();
+        let mut powers: Vec<(usize, usize)> = Vec::new();
+        for &f in factors {
+            match powers.last_mut() {
+                Some((last, power)) if *last == f => *power += 1,
+                _ => powers.push((f, 1)),
+            }
+        }
+        let power = |&(f, power): &(usize, usize)| match power {
+            1 => name(f),
+            k => format!("{}^{k}", name(f)),
+        };
+        let factor = powers.iter().map(power).collect::<Vec<_>>().join("*");
         let times = if size.is_empty() || factor.is_empty() { "" } else { "*" };
         format!("{sign}{size}{times}{factor}")
     };
-    let component = |terms: &Vec<LinearTerm>| -> String {
+    let component = |terms: &Vec<PolynomialTerm>| -> String {
         terms.iter().enumerate().map(|(i, t)| term(t, i == 0)).collect()
     };
     let names: Vec<String> = d.components.iter().map(|c| name(c.0)).collect();

@@ -13,7 +13,7 @@ use super::model::{ModelError, Role, Start, SystemModel};
 use super::numeric::{FilterState, Numeric};
 use super::rows::Unknown;
 use super::run::{RunError, Setup};
-use super::symmetry::{LinearDirection, Symmetry, symmetries};
+use super::symmetry::{PolynomialDirection, Symmetry, symmetries};
 use crate::analysis::Status;
 use crate::crosscheck::answer::{Check, Count};
 
@@ -232,7 +232,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         .found
         .iter()
         .map(|s| direction(s, &setup.truth, &columns))
-        .chain(found.linear.iter().map(|d| linear_direction(d, &setup, &columns)));
+        .chain(found.polynomial.iter().map(|d| polynomial_direction(d, &setup, &columns)));
     let symmetries: Vec<SymmetryEvidence> = directions
         .zip(&analysis.symmetries)
         .map(|(mut v, report)| {
@@ -287,18 +287,15 @@ fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize]) -> DVector<f
     v
 }
 
-/// A direction that is linear in unknowns and known constants, at the truth.
-fn linear_direction(d: &LinearDirection, setup: &Setup<'_>, columns: &[usize]) -> DVector<f64> {
+/// A direction that is polynomial in unknowns and known constants, at the truth.
+fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[usize]) -> DVector<f64> {
     let mut v = DVector::zeros(columns.len());
+    let factor = |&j: &usize| match columns.get(j) {
+        Some(&state) => setup.truth[state],
+        None => setup.numeric.constant(j - columns.len()),
+    };
     for (c, terms) in &d.components {
-        let factor = |f: &Option<usize>| match f {
-            None => 1.0,
-            Some(j) => match columns.get(*j) {
-                Some(&state) => setup.truth[state],
-                None => setup.numeric.constant(j - columns.len()),
-            },
-        };
-        v[*c] = terms.iter().map(|(f, k)| quotient(*k) * factor(f)).sum();
+        v[*c] = terms.iter().map(|(f, k)| quotient(*k) * f.iter().map(factor).product::<f64>()).sum();
     }
     v
 }

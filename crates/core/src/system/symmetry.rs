@@ -1,6 +1,6 @@
 //! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output sees, at any point.
 
-use obsdeg_exact::{Echelon, Field, SplitMix64};
+use obsdeg_exact::{Echelon, Field, Ratio, SplitMix64};
 
 use super::judge::{At, Judgement, climb_at};
 use super::model::{Compiled, ModelError, SystemModel};
@@ -8,15 +8,14 @@ use crate::degree::sparse::{extend_by_short_vectors, support};
 
 /// Points at which a direction must vanish, at most.
 const POINTS: usize = 8;
-/// Largest numerator of a coefficient.
-const NUMERATOR: u64 = 1000;
-/// Largest denominator of a coefficient.
-const DENOMINATOR: i64 = 24;
-
-/// Most unknowns among which directions that are linear in them are sought.
-const MOVED: usize = 12;
+/// Most unknowns among which directions that are polynomials in them are sought.
+const MOVED: usize = 16;
+/// Most coefficients of such a direction.
+const COEFFICIENTS: usize = 800;
 /// Points that these take, at most.
-const LINEAR_POINTS: usize = 100;
+const POLYNOMIAL_POINTS: usize = 400;
+/// Their highest degree.
+pub const POLYNOMIAL_DEGREE: usize = 4;
 
 /// A rational coefficient of an unknown.
 pub type Term = (usize, (i64, i64));
@@ -41,15 +40,15 @@ pub struct Invariant {
     pub degree: usize,
 }
 
-/// A factor, if there is one, and its rational coefficient.
-pub type LinearTerm = (Option<usize>, (i64, i64));
+/// The factors of a product, and its rational coefficient.
+pub type PolynomialTerm = (Vec<usize>, (i64, i64));
 
-/// A direction whose components are linear in the unknowns and the known constants: `(unknown, [(factor, coefficient)])`; a factor is an
-/// unknown, a known constant (counted on behind the unknowns), or none.
+/// A direction whose components are polynomials in the unknowns and the known constants: `(unknown, [(factors, coefficient)])`; a factor
+/// is an unknown or a known constant (counted on behind the unknowns).
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LinearDirection {
+pub struct PolynomialDirection {
     /// Of every unknown that it moves.
-    pub components: Vec<(usize, Vec<LinearTerm>)>,
+    pub components: Vec<(usize, Vec<PolynomialTerm>)>,
 }
 
 /// The symmetries of a system, and the invariant combinations that they leave observable.
@@ -57,31 +56,19 @@ pub struct LinearDirection {
 pub struct Symmetries {
     /// Independent ones.
     pub found: Vec<Symmetry>,
-    /// Directions beyond these that are linear in the unknowns: turns, for instance.
-    pub linear: Vec<LinearDirection>,
-    /// The number of unobservable directions (among unknowns that are excited) that they do not explain.
-    pub unexplained: usize,
+    /// Directions beyond these that are polynomials in the unknowns: turns, for instance.
+    pub polynomial: Vec<PolynomialDirection>,
+    /// What each direction beyond all of these moves: of unobservable directions among unknowns that are excited.
+    pub unexplained: Vec<Vec<usize>>,
     /// Observable combinations of unobservable unknowns.
     pub invariants: Vec<Invariant>,
-}
-
-/// A small rational number that a field element stands for.
-fn ratio(f: &Field, x: u64) -> Option<(i64, i64)> {
-    (1..=DENOMINATOR).find_map(|d| {
-        let y = f.to_u64(f.mul(x, f.from_i64(d)));
-        if y <= NUMERATOR {
-            Some((y as i64, d))
-        } else {
-            (f.modulus() - y <= NUMERATOR).then(|| (-((f.modulus() - y) as i64), d))
-        }
-    })
 }
 
 /// The vector as small rationals, one at its first entry.
 fn rationals(f: &Field, v: &[u64]) -> Option<Vec<(i64, i64)>> {
     let lead = v.iter().find(|x| **x != 0)?;
     let inverse = f.inv(*lead);
-    v.iter().map(|&x| ratio(f, f.mul(x, inverse))).collect()
+    v.iter().map(|&x| Ratio::recover(f, f.mul(x, inverse)).map(|r| (r.num, r.den))).collect()
 }
 
 /// Rationals times their common denominator.
@@ -166,38 +153,66 @@ pub fn symmetries(
         let constants = model.constants.iter().enumerate().filter(|(_, c)| shared(&c.0.name));
         let unknowns = if n <= MOVED { (0..n).collect() } else { moved.clone() };
         let factors: Vec<usize> = unknowns.into_iter().chain(constants.map(|(i, _)| n + i)).collect();
-        out.linear = linear_directions(&f, &moved, &factors, &mut tangents, &at, &mut draw)?;
+        for degree in 1..=POLYNOMIAL_DEGREE {
+            let products = products(&factors, degree);
+            if out.found.len() + out.polynomial.len() == defect
+                || moved.len() > MOVED
+                || moved.len() * products.len() > COEFFICIENTS
+            {
+                break;
+            }
+            out.polynomial.extend(directions(&f, &moved, &products, &mut tangents, &at, &mut draw)?);
+        }
     }
-    out.unexplained = defect.saturating_sub(out.found.len() + out.linear.len());
+    if out.found.len() + out.polynomial.len() < defect
+        && let Some(rows) = at.stairs.last()
+    {
+        let among_excited = |v: &Vec<u64>| support(v).iter().all(|&c| excited[c]);
+        let rest: Vec<Vec<u64>> = rows.null_space().into_iter().filter(among_excited).collect();
+        out.unexplained = extend_by_short_vectors(&rest, &mut tangents).iter().map(|v| support(v)).collect();
+    }
     out.invariants = invariants(&f, n, &out.found, &at);
     Ok(out)
 }
 
-/// Directions `v_i = b_i + sum_j a_ij x_j` over the unknowns that move, x_j unknowns or known constants (`factors`): a linear system for a and b from rows at several points.
-fn linear_directions(
+/// All products of up to `degree` of the factors.
+fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
+    let mut out: Vec<Vec<usize>> = vec![Vec::new()];
+    let mut last = 0;
+    for _ in 0..degree {
+        let end = out.len();
+        for i in last..end {
+            let from = out[i].last().and_then(|l| factors.iter().position(|f| f == l)).unwrap_or(0);
+            let longer = factors[from..].iter().map(|&f| [&out[i][..], &[f]].concat());
+            let longer: Vec<_> = longer.collect();
+            out.extend(longer);
+        }
+        last = end;
+    }
+    out
+}
+
+/// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a linear system for the
+/// a_ij from rows at several points.
+fn directions(
     f: &Field,
     moved: &[usize],
-    factors: &[usize],
+    products: &[Vec<usize>],
     tangents: &mut Echelon,
     at: &At,
     draw: &mut dyn FnMut() -> Result<At, ModelError>,
-) -> Result<Vec<LinearDirection>, ModelError> {
-    if moved.len() > MOVED || factors.len() > 2 * MOVED {
-        return Ok(Vec::new());
-    }
-    // columns: for every unknown that moves the constant, then the factors
-    let width = 1 + factors.len();
+) -> Result<Vec<PolynomialDirection>, ModelError> {
+    let width = products.len();
+    let value = |at: &At, product: &Vec<usize>| product.iter().fold(f.one(), |x, &j| f.mul(x, at.values[j]));
     let mut basis = Echelon::new(*f, moved.len() * width);
     let (mut rank, mut still) = (0, 0);
-    for _ in 0..LINEAR_POINTS {
+    for _ in 0..POLYNOMIAL_POINTS {
         let here = draw()?;
         let Some(span) = here.stairs.last() else { break };
+        let values: Vec<u64> = products.iter().map(|p| value(&here, p)).collect();
         for i in 0..span.rank() {
             let row = span.row(i);
-            let entries = moved.iter().flat_map(|&m| {
-                let values = std::iter::once(f.one()).chain(factors.iter().map(|&j| here.values[j]));
-                values.map(move |x| f.mul(row[m], x))
-            });
+            let entries = moved.iter().flat_map(|&m| values.iter().map(move |&x| f.mul(row[m], x)));
             basis.insert(&entries.collect::<Vec<_>>());
         }
         still = if basis.rank() == rank { still + 1 } else { 0 };
@@ -209,22 +224,22 @@ fn linear_directions(
     if still < 2 {
         return Ok(Vec::new());
     }
+    let here: Vec<u64> = products.iter().map(|p| value(at, p)).collect();
     let mut span = Echelon::new(*f, moved.len() * width);
     let mut out = Vec::new();
     for v in extend_by_short_vectors(&basis.null_space(), &mut span) {
         let mut tangent = vec![0; tangents.columns()];
         for (part, &m) in v.chunks_exact(width).zip(moved) {
-            let linear = factors.iter().zip(&part[1..]).map(|(&j, &a)| (a, at.values[j]));
-            tangent[m] = f.dot(part[0], linear);
+            tangent[m] = f.dot(0, here.iter().zip(part).map(|(&x, &a)| (a, x)));
         }
         let Some(k) = rationals(f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
         let component = |(part, &m): (&[(i64, i64)], &usize)| {
-            let names = std::iter::once(None).chain(factors.iter().map(|&j| Some(j)));
-            let terms: Vec<_> = names.zip(part.iter().copied()).filter(|(_, k)| k.0 != 0).collect();
+            let terms = products.iter().cloned().zip(part.iter().copied());
+            let terms: Vec<_> = terms.filter(|(_, k)| k.0 != 0).collect();
             (!terms.is_empty()).then_some((m, terms))
         };
         let components = k.chunks_exact(width).zip(moved).filter_map(component).collect();
-        out.push(LinearDirection { components });
+        out.push(PolynomialDirection { components });
     }
     Ok(out)
 }

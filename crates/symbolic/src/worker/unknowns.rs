@@ -27,6 +27,9 @@ struct Equation {
     at_any_time: bool,
 }
 
+/// How little an elimination is liked: divides by a parameter, by a signal, its order, its terms.
+type Cost = (bool, bool, usize, usize);
+
 struct Elimination<'a> {
     tower: &'a Tower,
     system: &'a RationalSystem,
@@ -154,7 +157,7 @@ impl Elimination<'_> {
     /// Eliminates states by equations that are linear in them; what is left of the equations without any.
     fn eliminate_states(&mut self, mut equations: Vec<Equation>) -> Result<Vec<Equation>, JobError> {
         loop {
-            let mut best: Option<((bool, bool, usize, usize), usize, usize, Scalar)> = None;
+            let mut best: Option<(Cost, usize, usize, Scalar)> = None;
             for (e, equation) in equations.iter().enumerate() {
                 for v in 0..self.system.states.len() {
                     let Some((slope, rest)) = linear(&equation.zero.numerator, self.state(v)) else {
