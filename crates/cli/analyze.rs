@@ -113,7 +113,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 /// The banner of the engine is its licence notice.
-fn notice(worker: Option<&Worker>, quiet: bool) {
+pub(crate) fn notice(worker: Option<&Worker>, quiet: bool) {
     for line in worker.into_iter().flat_map(Worker::banner).filter(|_| !quiet) {
         eprintln!("{line}");
     }
@@ -144,7 +144,7 @@ fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
 }
 
 /// The symbolic engine in a process of its own, if this build has one; nothing starts yet.
-fn worker(limit_s: u64) -> Result<Option<Worker>, Failure> {
+pub(crate) fn worker(limit_s: u64) -> Result<Option<Worker>, Failure> {
     if !cfg!(feature = "symbolica") {
         return Ok(None);
     }

@@ -1,6 +1,6 @@
 //! `obsdeg compare`: schemes side by side.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -56,7 +56,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         scheme.carry = a.carry.unwrap_or(scheme.carry);
         scheme.latitude = a.latitude.or(scheme.latitude);
         let conditions = a.measurement.conditions(&scheme);
-        entries.push(Entry { name: name(path), scheme, conditions });
+        entries.push(Entry { name: output::name(path), scheme, conditions });
     }
     let spinner = Spinner::start("judging schemes", a.output.quiet);
     let compared = compare(&entries, a.seed);
@@ -66,11 +66,4 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         .map_err(|e| Failure::internal(e.to_string()))?;
     output::write(&a.output, &text)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The file's name without its ending; the folder's for a `scheme.toml`.
-fn name(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or(path.as_os_str());
-    let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "scheme");
-    folder.unwrap_or(stem).to_string_lossy().into_owned()
 }

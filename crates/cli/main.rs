@@ -14,6 +14,7 @@ mod lock;
 mod output;
 mod paper;
 mod progress;
+mod report;
 mod schema;
 mod simulate;
 
@@ -31,6 +32,7 @@ Examples:
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
   obsdeg compare a.toml b.toml
   obsdeg design --positions 5 --carry inertial
+  obsdeg report scheme.toml -o review.html
   obsdeg paper
 
 Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error.";
@@ -55,6 +57,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Find schemes: the fewest positions, or the best of a number of them
     Design(design::Arguments),
+    /// Write the design review of schemes and models: HTML, PDF, Markdown or LaTeX
+    Report(report::Arguments),
     /// Recompute every equation and claim of the paper and say where it is wrong
     Paper(paper::Arguments),
     /// Print the completion script of a shell
@@ -75,6 +79,7 @@ fn run() -> Result<ExitCode, Failure> {
         Command::Crosscheck(a) => crosscheck::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Design(a) => design::run(&a),
+        Command::Report(a) => report::run(&a),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man => completions::man(),

@@ -71,6 +71,11 @@ impl Bar {
         self.at(now.done);
     }
 
+    /// What is being done.
+    pub(crate) fn says(&self, what: &str) {
+        self.bar.set_message(what.to_string());
+    }
+
     /// So much is done.
     pub(crate) fn at(&self, done: u64) {
         if !self.quiet && self.bar.is_hidden() && self.started.elapsed() > Duration::from_secs(1) {

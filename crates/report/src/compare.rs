@@ -6,7 +6,7 @@ use obsdeg_core::compare::answer::{Quantity, Review, Worst};
 use crate::document::{Block, Document, number, optional};
 use crate::words;
 
-fn worst(w: Option<&Worst>) -> String {
+pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
 }
 

@@ -2,6 +2,7 @@
 
 use comfy_table::{Cell, CellAlignment};
 
+use crate::figure::Figure;
 use crate::table::{heading, paragraph, table as new_table};
 use crate::{Layout, ReportError, csv_text, latex, markdown};
 
@@ -17,7 +18,48 @@ pub(crate) enum Block {
     },
     /// Lines, wrapped.
     List { heading: String, lines: Vec<String> },
+    /// The heading of a part (level 1) or of a section of it (level 2).
+    Section { level: usize, title: String },
+    /// A paragraph.
+    Text(String),
+    /// Formulas, each with its left side.
+    Formulas { heading: String, lines: Vec<Formula> },
+    /// A picture.
+    Picture(Picture),
 }
+
+/// A formula in program notation and as LaTeX.
+pub(crate) struct Formula {
+    pub(crate) text: String,
+    pub(crate) latex: String,
+}
+
+/// A picture with a file name of its own and a caption.
+pub(crate) struct Picture {
+    pub(crate) name: String,
+    pub(crate) caption: String,
+    pub(crate) drawing: Drawing,
+}
+
+/// What is drawn.
+pub(crate) enum Drawing {
+    /// Curves, which a page may make interactive.
+    Curves(Box<Figure>),
+    /// A picture as it is, SVG.
+    Still(String),
+}
+
+impl Picture {
+    pub(crate) fn svg(&self) -> String {
+        match &self.drawing {
+            Drawing::Curves(figure) => figure.svg(),
+            Drawing::Still(svg) => svg.clone(),
+        }
+    }
+}
+
+/// Where the pictures of a Markdown or LaTeX text are: a folder beside it.
+pub const PICTURES: &str = "figures";
 
 /// A title and its parts.
 pub(crate) struct Document {
@@ -44,7 +86,33 @@ pub(crate) fn optional(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), number)
 }
 
+/// A block, or pictures that stand together.
+pub(crate) enum Part<'a> {
+    Block(&'a Block),
+    Pictures(Vec<&'a Picture>),
+}
+
 impl Document {
+    /// The blocks, with pictures that follow each other taken together.
+    pub(crate) fn parts(&self) -> Vec<Part<'_>> {
+        let mut out: Vec<Part<'_>> = Vec::new();
+        for block in &self.blocks {
+            match (block, out.last_mut()) {
+                (Block::Picture(p), Some(Part::Pictures(list))) => list.push(p),
+                (Block::Picture(p), _) => out.push(Part::Pictures(vec![p])),
+                (block, _) => out.push(Part::Block(block)),
+            }
+        }
+        out
+    }
+
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = &Picture> {
+        self.blocks.iter().filter_map(|b| match b {
+            Block::Picture(p) => Some(p),
+            _ => None,
+        })
+    }
+
     pub(crate) fn table(&self, layout: Layout) -> String {
         let mut out = String::new();
         heading(&mut out, &self.title, layout);
@@ -72,6 +140,15 @@ impl Document {
                         paragraph(&mut out, line, layout);
                     }
                 }
+                Block::Section { title, .. } => heading(&mut out, title, layout),
+                Block::Text(text) => paragraph(&mut out, text, layout),
+                Block::Formulas { heading: title, lines } => {
+                    heading(&mut out, title, layout);
+                    for line in lines {
+                        paragraph(&mut out, &line.text, layout);
+                    }
+                }
+                Block::Picture(_) => {}
             }
         }
         out
@@ -82,19 +159,35 @@ impl Document {
         for line in &self.lead {
             out.push_str(&format!("{}\n\n", markdown::escape(line)));
         }
+        let sections = self.blocks.iter().any(|b| matches!(b, Block::Section { .. }));
+        let hashes = if sections { "####" } else { "##" };
         for (i, block) in self.blocks.iter().enumerate() {
             let gap = if i == 0 { "" } else { "\n" };
             match block {
                 Block::Table { heading, header, rows, .. } => {
                     let cells = rows.iter().map(|r| r.iter().map(|c| markdown::escape(c)).collect());
                     let table = markdown::table(header, cells);
-                    out.push_str(&format!("{gap}## {}\n\n{table}", markdown::escape(heading)));
+                    out.push_str(&format!("{gap}{hashes} {}\n\n{table}", markdown::escape(heading)));
                 }
                 Block::List { heading, lines } => {
-                    out.push_str(&format!("{gap}## {}\n\n", markdown::escape(heading)));
+                    out.push_str(&format!("{gap}{hashes} {}\n\n", markdown::escape(heading)));
                     for line in lines {
                         out.push_str(&format!("- {}\n", markdown::escape(line)));
                     }
+                }
+                Block::Section { level, title } => {
+                    out.push_str(&format!("{gap}{} {}\n", "#".repeat(level + 1), markdown::escape(title)));
+                }
+                Block::Text(text) => out.push_str(&format!("{gap}{}\n", markdown::escape(text))),
+                Block::Formulas { heading, lines } => {
+                    out.push_str(&format!("{gap}{hashes} {}\n\n", markdown::escape(heading)));
+                    for line in lines {
+                        out.push_str(&format!("- ${}$\n", line.latex));
+                    }
+                }
+                Block::Picture(p) => {
+                    let caption = markdown::escape(&p.caption);
+                    out.push_str(&format!("{gap}![{caption}]({PICTURES}/{}.svg)\n", p.name));
                 }
             }
         }
@@ -124,6 +217,23 @@ impl Document {
                         out.push_str(&item(lines));
                     }
                 }
+                Block::Section { level, title } => {
+                    let command = if *level == 1 { "section" } else { "subsection" };
+                    out.push_str(&format!("\\{command}*{{{}}}\n", latex::escape(title)));
+                }
+                Block::Text(text) => out.push_str(&format!("{}\n\n", latex::escape(text))),
+                Block::Formulas { heading, lines } => {
+                    let items: String = lines.iter().map(|l| format!("\\item ${}$\n", l.latex)).collect();
+                    out.push_str(&format!(
+                        "\\paragraph{{{}}}\n\\begin{{itemize}}\n{items}\\end{{itemize}}\n",
+                        latex::escape(heading)
+                    ));
+                }
+                Block::Picture(p) => out.push_str(&format!(
+                    "\\begin{{center}}\\includegraphics[width=\\linewidth]{{{PICTURES}/{}.png}}\\\\{}\\end{{center}}\n",
+                    p.name,
+                    latex::escape(&p.caption)
+                )),
             }
         }
         out
@@ -133,7 +243,7 @@ impl Document {
     pub(crate) fn csv(&self) -> Result<String, ReportError> {
         let first = self.blocks.iter().find_map(|b| match b {
             Block::Table { header, rows, .. } => Some((header, rows)),
-            Block::List { .. } => None,
+            _ => None,
         });
         let Some((header, rows)) = first else { return Ok(String::new()) };
         let header = header.iter().map(ToString::to_string).collect();

@@ -57,6 +57,8 @@ pub(crate) struct Figure {
     pub(crate) y_range: Option<(f64, f64)>,
     /// Both axes logarithmic.
     pub(crate) log: bool,
+    /// The vertical axis logarithmic.
+    pub(crate) log_y: bool,
 }
 
 /// Width and height of one figure.
@@ -96,6 +98,9 @@ impl Figure {
             .with_y_label_offset(-7.0, 0.0)
             .with_legend_position(LegendPosition::OutsideBottomCenter)
             .with_legend_box(false);
+        if self.log_y {
+            layout = layout.with_log_y().with_y_tick_format(TickFormat::Sci);
+        }
         if self.log {
             layout = layout.with_log_scale().with_y_tick_format(TickFormat::Sci);
         }
@@ -135,31 +140,40 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
     SvgBackend::new().render_scene(&scene)
 }
 
-/// A matrix with entries between -1 and 1, rows and columns named.
-pub(crate) fn heat(title: &str, names: &[String], values: Vec<Vec<f64>>) -> String {
-    // the library stretches colours over the data; here they mean -1 to 1
+/// A matrix: rows and columns named, entries from `low` to 1; signed ones are blue to orange, others white to blue.
+pub(crate) fn heat(
+    title: &str,
+    rows: &[String],
+    columns: &[String],
+    values: Vec<Vec<f64>>,
+    low: f64,
+) -> String {
+    // the library stretches colours over the data; here they mean low to 1
     let all = || values.iter().flatten().copied();
-    let (low, high) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-    let color = move |t: f64| diverging((low + t * (high - low) + 1.0) / 2.0);
+    let (least, most) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    let color = move |t: f64| {
+        let share = (least + t * (most - least) - low) / (1.0 - low);
+        diverging(if low < 0.0 { share } else { (1.0 - share) / 2.0 })
+    };
     let map = Heatmap::new()
         .with_data(values)
-        .with_labels(names.to_vec(), names.to_vec())
+        .with_labels(rows.to_vec(), columns.to_vec())
         .with_color_map(kuva::prelude::ColorMap::Custom(Arc::new(color)));
     let plots = vec![Plot::from(map)];
-    let side = 180.0 + 30.0 * names.len() as f64;
     let layout = Layout::auto_from_plots(&plots)
         .with_title(title)
-        .with_x_categories(names.to_vec())
-        .with_y_categories(names.to_vec())
+        .with_x_categories(columns.to_vec())
+        .with_y_categories(rows.to_vec())
         .with_x_tick_rotate(-60.0)
-        .with_width(side)
-        .with_height(side)
+        .with_width(180.0 + 30.0 * columns.len().max(5) as f64)
+        .with_height(180.0 + 30.0 * rows.len() as f64)
         .with_font_family(FONT);
     kuva::render_to_svg(plots, layout)
 }
 
 /// Blue over white to orange, for 0 to 1.
 fn diverging(t: f64) -> String {
+    let t = t.clamp(0.0, 1.0);
     let (from, to, s) = if t < 0.5 {
         ([0.0, 114.0, 178.0], [255.0; 3], 2.0 * t)
     } else {

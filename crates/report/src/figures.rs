@@ -73,7 +73,7 @@ fn curve(record: &Traces, i: usize) -> Figure {
         marks,
         x_range: record.time.last().map(|&end| (0.0, end)),
         y_range: Some(window(series, scale)),
-        log: false,
+        ..Figure::default()
     }
 }
 
@@ -115,7 +115,7 @@ fn order_color(order: Option<usize>) -> &'static str {
 }
 
 /// Sigma against the dwell for unknowns of one unit, with a reference slope per order.
-fn slope_figure(curves: &[&SlopeCurve], unit: &str) -> Figure {
+pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str) -> Figure {
     let mut orders: Vec<Option<usize>> = curves.iter().map(|c| c.accuracy_order).collect();
     orders.sort_unstable();
     orders.dedup();
@@ -165,7 +165,7 @@ fn lines_are_all_grey(curves: &[&SlopeCurve]) -> bool {
 }
 
 /// A mean over time with the bands in which a right filter's stays.
-fn history_figure(
+pub(crate) fn history_figure(
     c: &CrossCheck,
     title: &str,
     dof: usize,
@@ -222,6 +222,7 @@ pub fn crosscheck_figures(c: &CrossCheck) -> Result<Vec<File>, FigureError> {
     }
     files.extend(picture("nis", history_figure(c, "NIS", outputs, |p| p.nis, |p| p.samples).svg())?);
     let title = "Correlation under a diffuse prior";
-    files.extend(picture("correlation", heat(title, &c.correlation.names, c.correlation.values.clone()))?);
+    let (names, values) = (&c.correlation.names, c.correlation.values.clone());
+    files.extend(picture("correlation", heat(title, names, names, values, -1.0))?);
     Ok(files)
 }

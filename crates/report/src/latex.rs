@@ -28,7 +28,7 @@ pub(crate) fn escape(text: &str) -> String {
 }
 
 /// The math of one name: `D_FX`, `psi_x@1`, `eps_y^n`, `wN`.
-fn symbol(name: &str) -> String {
+pub(crate) fn symbol(name: &str) -> String {
     let (base, position) = name.split_once('@').map_or((name, None), |(b, p)| (b, Some(p)));
     let (base, frame) = base.strip_suffix("^n").map_or((base, ""), |b| (b, "^{n}"));
     let body = match base.split_once('_') {
@@ -47,7 +47,7 @@ fn symbol(name: &str) -> String {
 
 /// An expression in program notation as math: names are set, `*` dropped, `sqrt(2)` and functions
 /// turned into macros.
-fn expression(text: &str) -> String {
+pub(crate) fn expression(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
@@ -104,7 +104,17 @@ fn z(term: &Term, frame: Frame, positions: &[String]) -> String {
 
 fn coefficient(c: &Coefficient) -> String {
     let (_, factors) = c.sign_and_factors();
-    factors.iter().map(|f| expression(f)).collect::<Vec<_>>().join("\\,")
+    factors.iter().map(|f| quotient(f)).collect::<Vec<_>>().join("\\,")
+}
+
+/// An expression; `a/b` without brackets is set as a fraction.
+fn quotient(text: &str) -> String {
+    match text.split_once('/') {
+        Some((above, below)) if !text.contains(['(', ')', ' ']) && !below.contains(['/', '*']) => {
+            format!("\\frac{{{}}}{{{}}}", expression(above), expression(below))
+        }
+        _ => expression(text),
+    }
 }
 
 fn sum(out: &mut String, negative: bool, text: &str) {
@@ -117,7 +127,7 @@ fn sum(out: &mut String, negative: bool, text: &str) {
     out.push_str(text);
 }
 
-fn solution(s: &Solution, frame: Frame, positions: &[String]) -> String {
+pub(crate) fn solution(s: &Solution, frame: Frame, positions: &[String]) -> String {
     let grouped = group(&s.solved);
     let mut inner = String::new();
     let bracket = |g: &Group| {
@@ -141,6 +151,16 @@ fn solution(s: &Solution, frame: Frame, positions: &[String]) -> String {
         None => inner,
         Some(f) => format!("{}\\,[{inner}]", coefficient(f)),
     }
+}
+
+/// A document to be compiled by itself.
+pub(crate) fn document(d: &crate::document::Document) -> String {
+    format!(
+        "\\documentclass[a4paper]{{article}}\n\\usepackage{{amsmath,booktabs,graphicx,longtable}}\n\\usepackage[margin=15mm]{{geometry}}\n\
+         \\title{{{}}}\n\\date{{}}\n\\begin{{document}}\n\\maketitle\n\\footnotesize\n{}\\end{{document}}\n",
+        escape(&d.title),
+        d.latex()
+    )
 }
 
 /// A longtable.

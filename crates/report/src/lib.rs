@@ -8,14 +8,19 @@ mod design;
 mod document;
 mod figure;
 mod figures;
+mod html;
 mod latex;
 mod markdown;
+#[cfg(feature = "pdf")]
+mod pdf;
+mod review;
 mod series;
 mod simulation;
 mod system;
 mod table;
 mod words;
 
+pub use document::PICTURES;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use series::{series_csv, series_parquet};
@@ -28,6 +33,7 @@ use obsdeg_core::audit::Audit;
 use obsdeg_core::compare::Comparison;
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::design::Design;
+use obsdeg_core::review::DesignReview;
 use obsdeg_core::simulation::Simulation;
 use obsdeg_core::system::{SystemAnalysis, SystemEvidence, SystemRun};
 
@@ -105,6 +111,15 @@ pub enum ReportError {
     /// A picture.
     #[error(transparent)]
     Figure(#[from] FigureError),
+    /// No typesetter in this build.
+    #[error("this program was built without the feature `pdf`; expected html, markdown or latex")]
+    NoPdf,
+    /// The typesetter refused.
+    #[error("cannot typeset: {0}")]
+    Typeset(String),
+    /// A page.
+    #[error("cannot write the page: {0}")]
+    Page(#[from] minijinja::Error),
 }
 
 /// An analysis in the given format, ending in a newline.
@@ -194,6 +209,51 @@ pub fn crosscheck_files(c: &CrossCheck) -> Result<Vec<File>, ReportError> {
     let mut files = vec![File { name: "evidence.json".into(), bytes: json.into_bytes() }];
     files.extend(crosscheck_figures(c)?);
     Ok(files)
+}
+
+/// Whether this build can write a PDF.
+pub const HAS_PDF: bool = cfg!(feature = "pdf");
+
+/// A format of a design review.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReviewFormat {
+    /// One self-contained page.
+    #[default]
+    Html,
+    /// GitHub-flavoured Markdown, with its pictures in a folder.
+    Markdown,
+    /// A LaTeX document, with its pictures in a folder.
+    Latex,
+    /// A PDF (cargo feature `pdf`).
+    Pdf,
+}
+
+/// The files of a design review: the text first, then the pictures that it refers to.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn review(r: &DesignReview, format: ReviewFormat) -> Result<Vec<File>, ReportError> {
+    let document = review::document(r);
+    match format {
+        ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),
+        ReviewFormat::Markdown => {
+            let mut files = vec![File::new("review.md", document.markdown())];
+            let svg = |p: &document::Picture| File::new(format!("{}.svg", p.name), p.svg());
+            files.extend(document.pictures().map(svg));
+            Ok(files)
+        }
+        ReviewFormat::Latex => {
+            let mut files = vec![File::new("review.tex", latex::document(&document))];
+            for p in document.pictures() {
+                files.push(File::new(format!("{}.png", p.name), png(&p.svg())?));
+            }
+            Ok(files)
+        }
+        #[cfg(feature = "pdf")]
+        ReviewFormat::Pdf => Ok(vec![File::new("review.pdf", pdf::pages(&document)?)]),
+        #[cfg(not(feature = "pdf"))]
+        ReviewFormat::Pdf => Err(ReportError::NoPdf),
+    }
 }
 
 fn written(

@@ -9,7 +9,7 @@ pub use answer::Comparison;
 
 use crate::analysis::Status;
 use crate::model::ring::Float;
-use crate::model::{Carry, Dwell, Platform, Scheme, SchemeError};
+use crate::model::{Carry, Platform, Scheme};
 use crate::prediction::Prediction;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
@@ -44,6 +44,20 @@ pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, Simu
         schemes: schemes.collect::<Result<_, _>>()?,
         seed,
     })
+}
+
+/// Every unknown with its standard deviation in deg, deg/h, deg/h/g by the information of all samples, without prior and drift noise;
+/// `None` when it is not observable.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn predicted(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<Vec<(String, Option<f64>)>, SimulationError> {
+    let judged = Judged::new(scheme, conditions, seed)?;
+    Ok(judged.platform().names().iter().cloned().zip(judged.sigmas.iter().copied()).collect())
 }
 
 /// The verdicts and the accuracy of one scheme.
@@ -199,13 +213,7 @@ fn sensitivity(
         add(format!("latitude {latitude} deg"), &other, conditions)?;
     }
     for factor in DWELLS {
-        let mut other = scheme.clone();
-        for p in &mut other.positions {
-            let seconds = p.dwell.map_or(conditions.dwell_s, Dwell::seconds) * factor;
-            let found = seconds.to_string();
-            p.dwell = Some(Dwell::from_seconds(seconds).ok_or(SchemeError::Dwell { found })?);
-        }
-        add(format!("dwell x {factor}"), &other, conditions)?;
+        add(format!("dwell x {factor}"), &scheme.with_dwells(conditions.dwell_s, factor)?, conditions)?;
     }
     for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
         // slews carry psi^n: without them another carry can be asked for

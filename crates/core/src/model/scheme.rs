@@ -240,6 +240,10 @@ impl Position {
 /// A torquing scheme and the assumptions under which it is judged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scheme {
+    /// What it is called; empty where nothing says.
+    pub name: String,
+    /// What it is for.
+    pub description: String,
     /// The positions, in order.
     pub positions: Vec<Position>,
     /// What is carried between positions.
@@ -380,6 +384,20 @@ impl Scheme {
             return Err(SchemeError::DriftPositions { found });
         }
         Ok(self.geometry.validate()?)
+    }
+
+    /// The scheme with every dwell times `factor`; `dwell_s` is that of positions that do not say.
+    ///
+    /// # Errors
+    /// [`SchemeError::Dwell`] when that is no dwell.
+    pub fn with_dwells(&self, dwell_s: f64, factor: f64) -> Result<Self, SchemeError> {
+        let mut other = self.clone();
+        for p in &mut other.positions {
+            let seconds = p.dwell.map_or(dwell_s, Dwell::seconds) * factor;
+            let found = seconds.to_string();
+            p.dwell = Some(Dwell::from_seconds(seconds).ok_or(SchemeError::Dwell { found })?);
+        }
+        Ok(other)
     }
 
     /// The scheme without a position; the one behind it is reached from another attitude then, the shortest way.

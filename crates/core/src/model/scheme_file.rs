@@ -29,6 +29,12 @@ pub struct SchemeFileError {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SchemeFile {
+    /// What the scheme is called in a report; the name of the file when left out.
+    #[serde(default)]
+    name: String,
+    /// What it is for, where it comes from: a report says so.
+    #[serde(default)]
+    description: String,
     /// platform (default), inertial or reset.
     #[schemars(with = "Option<super::scheme::Carry>")]
     carry: Option<Spanned<String>>,
@@ -152,6 +158,8 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         _ => text[value.span()].replace('_', ""),
     };
     let mut scheme = Scheme {
+        name: file.name,
+        description: file.description,
         geometry: file.geometry.as_ref().map(|g| *g.get_ref()).unwrap_or_default(),
         measured_azimuth: file.measured_azimuth,
         combinations: file.combinations,

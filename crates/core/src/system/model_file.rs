@@ -204,6 +204,11 @@ impl Reader<'_> {
     }
 }
 
+/// Whether a text is meant as a model, not a scheme.
+pub fn is_model(text: &str) -> bool {
+    text.lines().any(|l| l.trim_start().starts_with("[states"))
+}
+
 /// Reads a model.
 ///
 /// # Errors

@@ -1,0 +1,151 @@
+//! One self-contained HTML page: tables and formulas that read without scripts, pictures that answer the pointer with them.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use minijinja::value::{Serde, Value};
+use minijinja::{AutoEscape, Environment, context};
+use pulldown_latex::config::{DisplayMode, RenderConfig};
+use pulldown_latex::{Parser, Storage, push_mathml};
+use serde_json::{Value as Json, json};
+
+use crate::ReportError;
+use crate::document::{Block, Document, Drawing, Formula, Part, Picture};
+use crate::figure::{Figure, Line, Stroke};
+
+const TEMPLATE: &str = include_str!("../assets/page.html");
+const STYLE: &str = include_str!("../assets/page.css");
+const SCRIPT: &str = include_str!("../assets/page.js");
+const PLOT_SCRIPT: &str = include_str!("../assets/uPlot.iife.min.js");
+const PLOT_STYLE: &str = include_str!("../assets/uPlot.min.css");
+const FONT: &[u8] = include_bytes!("../assets/math.woff2");
+
+/// The document as a page.
+pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
+    let blocks: Vec<Json> = d.parts().iter().enumerate().map(|(i, part)| block(i, part)).collect();
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.add_template("page", TEMPLATE)?;
+    let interactive =
+        d.blocks.iter().any(|b| matches!(b, Block::Picture(Picture { drawing: Drawing::Curves(_), .. })));
+    let page = environment.get_template("page")?.render(context! {
+        title => d.title.clone(),
+        lead => d.lead.clone(),
+        blocks => Value::from(Serde(&blocks)),
+        version => version,
+        interactive => interactive,
+        style => STYLE,
+        script => SCRIPT,
+        plot_style => PLOT_STYLE,
+        plot_script => PLOT_SCRIPT,
+        font => STANDARD.encode(FONT),
+    })?;
+    Ok(page)
+}
+
+/// What the template needs of a block.
+fn block(i: usize, part: &Part<'_>) -> Json {
+    let b = match part {
+        Part::Pictures(pictures) => {
+            let pictures: Vec<Json> = pictures.iter().map(|p| picture(p)).collect();
+            return json!({ "kind": "pictures", "pictures": pictures });
+        }
+        Part::Block(b) => b,
+    };
+    match b {
+        Block::Section { level, title } => {
+            json!({ "kind": "section", "level": level, "title": title, "id": format!("section-{i}") })
+        }
+        Block::Text(text) => json!({ "kind": "text", "text": text }),
+        Block::List { heading, lines } => json!({ "kind": "list", "heading": heading, "lines": lines }),
+        Block::Table { heading, header, numbers, rows } => {
+            json!({ "kind": "table", "heading": heading, "header": header, "numbers": numbers, "rows": rows })
+        }
+        Block::Formulas { heading, lines } => {
+            let lines: Vec<Json> = lines.iter().map(formula).collect();
+            json!({ "kind": "formulas", "heading": heading, "lines": lines })
+        }
+        Block::Picture(_) => Json::Null, // in groups
+    }
+}
+
+fn picture(p: &Picture) -> Json {
+    let plot = match &p.drawing {
+        // `</script>` must not occur in a script
+        Drawing::Curves(figure) => Json::from(curves(figure).to_string().replace('<', "\\u003c")),
+        Drawing::Still(_) => Json::Null,
+    };
+    json!({ "name": p.name, "caption": p.caption, "svg": inlined(p), "plot": plot })
+}
+
+/// MathML; program notation where the LaTeX is none.
+fn formula(f: &Formula) -> Json {
+    let storage = Storage::new();
+    let parser = Parser::new(&f.latex, &storage);
+    let mut mathml = String::new();
+    let config = RenderConfig { display_mode: DisplayMode::Inline, ..RenderConfig::default() };
+    let failed = push_mathml(&mut mathml, parser, config).is_err() || mathml.contains("merror");
+    json!({ "text": f.text, "mathml": if failed { Json::Null } else { Json::from(mathml) } })
+}
+
+/// The SVG with ids of its own, in the colours of the page.
+fn inlined(p: &Picture) -> String {
+    let svg = p.svg();
+    let attribute = |name: &str| {
+        let rest = svg.split_once(&format!(" {name}=\""))?.1;
+        rest.split_once('"').map(|(value, _)| value.to_string())
+    };
+    let size = attribute("width").zip(attribute("height"));
+    let view = size.map_or_else(String::new, |(w, h)| format!(" viewBox=\"0 0 {w} {h}\""));
+    svg.replacen("<svg ", &format!("<svg class=\"still\" role=\"img\" aria-label=\"{}\"{view} ", p.name), 1)
+        .replace("kuva-clip", &format!("{}-clip", p.name))
+        .replacen("<rect width=\"100%\" height=\"100%\" fill=\"white\" />", "", 1)
+        .replace("\"#000000\"", "\"currentColor\"")
+        .replace("\"black\"", "\"currentColor\"")
+}
+
+/// Six significant digits.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+/// Curves for the plotting library: a table of its own for each, x strictly increasing.
+fn curves(f: &Figure) -> Json {
+    let all = || f.lines.iter().flat_map(|l| l.points.iter().map(|p| p.0));
+    let (low, high) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    let step = (high - low).abs().max(f64::MIN_POSITIVE) * 1e-5;
+    let mut series = Vec::new();
+    let mut tables = Vec::new();
+    let mut bands = Vec::new();
+    let mut add =
+        |label: &str, color: &str, dash: &[u32], width: f64, points: &mut dyn Iterator<Item = (f64, f64)>| {
+            let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+            for (x, y) in points {
+                let x = xs.last().map_or(x, |last| if x <= *last { last + step } else { x });
+                xs.push(x);
+                ys.push(rounded(y));
+            }
+            series.push(json!({ "label": label, "color": color, "dash": dash, "width": width }));
+            tables.push(json!([xs.iter().map(|x| (x * 1e6).round() / 1e6).collect::<Vec<_>>(), ys]));
+            series.len()
+        };
+    for b in &f.bands {
+        let high = add("upper", b.color, &[], 0.5, &mut b.points.iter().map(|p| (p.0, p.2)));
+        let low = add("lower", b.color, &[], 0.5, &mut b.points.iter().map(|p| (p.0, p.1)));
+        bands.push(json!({ "series": [high, low], "color": b.color }));
+    }
+    let dash = |l: &Line| -> &'static [u32] {
+        match l.stroke {
+            Stroke::Solid => &[],
+            Stroke::Dashed => &[8, 4],
+            Stroke::Dotted => &[2, 3],
+        }
+    };
+    for l in &f.lines {
+        add(&l.label, l.color, dash(l), 1.6, &mut l.points.iter().copied());
+    }
+    json!({
+        "title": f.title, "x": f.x_label, "y": f.y_label, "log_x": f.log, "log_y": f.log || f.log_y,
+        "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
+        "series": series, "tables": tables, "bands": bands,
+    })
+}

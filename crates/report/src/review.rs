@@ -1,0 +1,460 @@
+//! The design review: its sections in the order in which a review asks for them.
+
+mod pictures;
+
+use obsdeg_core::analysis::{Analysis, Status};
+use obsdeg_core::compare::answer::{Quantity, Review};
+use obsdeg_core::crosscheck::CrossCheck;
+use obsdeg_core::review::{DesignReview, ModelReview, SchemeReview};
+
+use crate::document::{Block, Document, Formula, number, optional};
+use crate::{compare, crosscheck, latex, simulation, system, words};
+
+/// A review as one document; curves have at most `points` samples.
+pub(crate) fn document(r: &DesignReview) -> Document {
+    let mut blocks = Vec::new();
+    let alone = r.schemes.len() + r.models.len() == 1;
+    let level = if alone { 1 } else { 2 };
+    for (i, (s, review)) in r.schemes.iter().zip(&r.comparison.schemes).enumerate() {
+        if !alone {
+            blocks.push(section(1, format!("Scheme {}", s.name)));
+        }
+        scheme(&mut blocks, s, review, level, &format!("s{}", i + 1));
+    }
+    if r.schemes.len() > 1 {
+        blocks.push(section(1, "Comparison of the schemes"));
+        blocks.extend(compare::document(&r.comparison).blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
+        blocks.push(pictures::time_against_sigma(&r.schemes, "comparison_front"));
+    }
+    for (i, m) in r.models.iter().enumerate() {
+        if !alone {
+            blocks.push(section(1, format!("Model {}", m.analysis.name)));
+        }
+        model(&mut blocks, m, level, &format!("m{}", i + 1));
+    }
+    blocks.push(section(1, "About this report"));
+    blocks.push(list(
+        "",
+        vec![
+            format!("obsdeg {}; seed {}; {} Monte Carlo runs", r.version, r.seed, r.runs),
+            "degree: order of the output's derivatives that solves an unknown (J. NUDT 39(1) 2017); sigma ~ T^-(order + 1/2) with the \
+             accuracy order"
+                .into(),
+            "verdicts are exact ranks in prime fields; sigmas are the information of all samples, without prior and drift noise; \
+             the filter's runs have both"
+                .into(),
+        ],
+    ));
+    let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
+        .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
+        .collect();
+    Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
+}
+
+fn section(level: usize, title: impl Into<String>) -> Block {
+    Block::Section { level, title: title.into() }
+}
+
+fn list(heading: &str, lines: Vec<String>) -> Block {
+    Block::List { heading: heading.into(), lines }
+}
+
+fn is_list(block: &Block, name: &str) -> bool {
+    matches!(block, Block::List { heading, .. } if heading == name)
+}
+
+fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}
+
+fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usize, id: &str) {
+    let a = &s.analysis;
+    let coefficients: Vec<&Quantity> =
+        review.quantities.iter().filter(|q| q.name.starts_with("D_")).collect();
+    blocks.push(section(level, "Verdict"));
+    blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
+    blocks.push(Block::Text(verdict(s, review, &coefficients)));
+    blocks.push(section(level, "Unknowns"));
+    blocks.push(unknowns(a, review));
+    blocks.push(pictures::staircase(a, &format!("{id}_staircase")));
+    blocks.push(section(level, "What cannot be told apart"));
+    null_space(blocks, a);
+    blocks.push(section(level, "Positions"));
+    positions(blocks, s, &coefficients, review, id);
+    blocks.push(section(level, "How each is solved"));
+    solved(blocks, a);
+    blocks.push(section(level, "Sensitivity"));
+    sensitivity(blocks, s, review, id);
+    blocks.push(section(level, "Fewest positions, and what each is for"));
+    fewest(blocks, s, review, id);
+    blocks.push(section(level, "Evidence by a filter"));
+    evidence(blocks, s, id);
+    blocks.push(section(level, "Validity of the small-angle model"));
+    blocks.push(list("", simulation::validity(&s.simulation.validity)));
+    blocks.push(section(level, "Assumptions and certainty"));
+    let mut assumed = words::assumptions(a);
+    assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
+    assumed.push(words::certainty(a));
+    assumed.extend(a.notes.iter().chain(&s.notes).map(|n| format!("note: {n}")));
+    blocks.push(list("", assumed));
+}
+
+/// The verdict in two sentences: what is determined, and how well.
+fn verdict(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> String {
+    let a = &s.analysis;
+    let of = |status: Status| coefficients.iter().filter(move |q| q.status == status);
+    let seen: Vec<&&Quantity> = of(Status::Observable).collect();
+    let all = coefficients.len();
+    let mut first = match (seen.len(), all) {
+        (_, 0) => format!("The scheme determines {} of {} unknowns", a.rank, a.unknowns.len()),
+        (n, all) if n == all => format!("The scheme determines every one of the {all} gyro coefficients"),
+        (n, all) => format!("The scheme determines {n} of the {all} gyro coefficients"),
+    };
+    if let Some(worst) = seen.iter().filter_map(|q| q.degree).max() {
+        let names = joined(seen.iter().filter(|q| q.degree == Some(worst)).map(|q| q.name.as_str()));
+        let derivatives = match worst {
+            0 => "without any derivative".to_string(),
+            k => format!("with derivatives up to order {k} ({names})"),
+        };
+        first.push_str(&format!(", {derivatives}"));
+    }
+    let lost = joined(of(Status::Inseparable).map(|q| q.name.as_str()));
+    let silent = joined(of(Status::NotExcited).map(|q| q.name.as_str()));
+    if !lost.is_empty() {
+        first.push_str(&format!("; it cannot separate {lost}"));
+    }
+    if !silent.is_empty() {
+        first.push_str(&format!("; it does not excite {silent}"));
+    }
+    let worst = seen.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
+    let missed: Vec<&str> = (coefficients.iter())
+        .filter(|q| q.requirement.is_some() && q.margin.is_none_or(|m| m < 1.0))
+        .map(|q| q.name.as_str())
+        .collect();
+    let accuracy = worst.map_or_else(
+        || "No coefficient has a finite predicted sigma".to_string(),
+        |(q, sigma)| {
+            format!(
+                "The largest predicted sigma of those is {} {} ({}) after {} s",
+                number(sigma),
+                q.unit,
+                q.name,
+                number(review.total_s)
+            )
+        },
+    );
+    let required = match (coefficients.iter().any(|q| q.requirement.is_some()), missed.is_empty()) {
+        (false, _) => "no requirement is stated".to_string(),
+        (true, true) => "every requirement is met".to_string(),
+        (true, false) => format!("the requirements on {} are NOT met", missed.join(", ")),
+    };
+    let filter = match &s.evidence {
+        None => String::new(),
+        Some(e) if e.passed => ", and the filter confirms the verdicts".into(),
+        Some(_) => ", and the filter DISAGREES with the verdicts".into(),
+    };
+    format!("{first}. {accuracy}; {required}{filter}.")
+}
+
+fn unknowns(a: &Analysis, review: &Review) -> Block {
+    let row = |q: &obsdeg_core::analysis::Quantity| {
+        let predicted = review.quantities.iter().find(|p| p.name == q.name);
+        let of = |value: fn(&Quantity) -> Option<f64>| optional(predicted.and_then(value));
+        let excited = predicted.map_or_else(Vec::new, |p| {
+            let names = review.positions.iter().zip(&p.excitation).filter(|(_, e)| **e > 1e-9);
+            names.map(|(n, _)| n.as_str()).collect()
+        });
+        vec![
+            q.name.clone(),
+            predicted.map_or_else(|| q.unit.clone(), |p| p.unit.clone()),
+            q.status.to_string(),
+            words::degree(q.degree),
+            words::degree(q.accuracy_order),
+            if q.partners.is_empty() { "-".into() } else { q.partners.join(" ") },
+            of(|p| p.sigma),
+            of(|p| p.requirement),
+            of(|p| p.margin),
+            if excited.is_empty() { "-".into() } else { excited.join(" ") },
+        ]
+    };
+    Block::Table {
+        heading: "Every unknown, best first (- where it is not observable)".into(),
+        header: vec![
+            "unknown",
+            "unit",
+            "verdict",
+            "degree",
+            "accuracy order",
+            "not told from",
+            "predicted sigma",
+            "required",
+            "margin",
+            "excited at",
+        ],
+        numbers: vec![false, false, false, true, true, false, true, true, true, false],
+        rows: a.quantities.iter().map(row).collect(),
+    }
+}
+
+fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
+    let mut lines = Vec::new();
+    let mut formulas = Vec::new();
+    for v in &a.null_space {
+        let names = joined(v.iter().map(|c| c.name.as_str()));
+        let parts: Vec<String> = (v.iter())
+            .map(|c| match &c.coefficient {
+                Some(k) => format!("{} by {k}", c.name),
+                None => c.name.clone(),
+            })
+            .collect();
+        lines.push(match v.len() {
+            1 => format!("{names} can take any value"),
+            _ => format!("no output changes when these change together: {}", parts.join(", ")),
+        });
+        let component = |c: &obsdeg_core::analysis::Component| {
+            let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| latex::expression(k));
+            format!("\\delta {} = {value}", latex::symbol(&c.name))
+        };
+        let latex = v.iter().map(component).collect::<Vec<_>>().join(",\\; ");
+        formulas.push(Formula { text: words::null_vector(v), latex });
+    }
+    let silent = words::not_excited(a);
+    if !silent.is_empty() {
+        lines.push(format!("no position excites {}: each can take any value", silent.join(", ")));
+    }
+    if lines.is_empty() {
+        lines.push("nothing: every unknown is observable".into());
+    }
+    blocks.push(list("", lines));
+    if !formulas.is_empty() {
+        blocks.push(Block::Formulas { heading: "Directions that Z does not see".into(), lines: formulas });
+    }
+    let combination = |c: &obsdeg_core::analysis::CombinationReport| {
+        let verdict = match c.degree {
+            Some(k) => format!("degree {k}"),
+            None => c.status.to_string(),
+        };
+        Formula {
+            text: format!("{}: {verdict}", c.expression),
+            latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
+        }
+    };
+    if !a.combinations.is_empty() {
+        let lines = a.combinations.iter().map(combination).collect();
+        blocks.push(Block::Formulas { heading: "What stays observable of them".into(), lines });
+    }
+}
+
+fn positions(
+    blocks: &mut Vec<Block>,
+    s: &SchemeReview,
+    coefficients: &[&Quantity],
+    review: &Review,
+    id: &str,
+) {
+    let g = |g: [f64; 3]| g.map(number).join("  ");
+    let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
+        let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
+        vec![
+            p.name.clone(),
+            words::turned(&angles.join(", "), p.rotation.as_deref()),
+            p.attitude.clone().unwrap_or_else(|| "-".into()),
+            number(numbers.start_s),
+            number(numbers.dwell_s),
+            optional(numbers.slew_s),
+            g(numbers.g[0]),
+            g(numbers.g[1]),
+            g(numbers.g[2]),
+        ]
+    });
+    blocks.push(Block::Table {
+        heading:
+            "Positions, with the components of g along the axes I, O, S of each gyro (in g, at the start)"
+                .into(),
+        header: vec![
+            "position",
+            "alpha, beta, gamma [deg]",
+            "X_p Y_p Z_p",
+            "start [s]",
+            "dwell [s]",
+            "slew to it [s]",
+            "gyro X: I O S",
+            "gyro Y: I O S",
+            "gyro Z: I O S",
+        ],
+        numbers: vec![false, false, false, true, true, true, true, true, true],
+        rows: rows.collect(),
+    });
+    blocks.push(pictures::attitudes(s, &format!("{id}_attitude")));
+    if !coefficients.is_empty() {
+        blocks.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));
+    }
+}
+
+fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
+    let names: Vec<String> = a.positions.iter().map(|p| p.name.clone()).collect();
+    let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Formula {
+        text: format!("{expression} = {}", solution.text),
+        latex: format!("{left} = {}", latex::solution(solution, a.frame, &names)),
+    };
+    let unknowns = a.quantities.iter().filter_map(|q| {
+        let solution = q.solution.as_ref()?;
+        Some(formula(latex::symbol(&q.name), &q.name, solution))
+    });
+    let lines: Vec<Formula> = unknowns.collect();
+    if lines.is_empty() {
+        blocks.push(Block::Text("No unknown is observable by itself.".into()));
+    } else {
+        blocks.push(Block::Formulas { heading: "Unknowns".into(), lines });
+    }
+    let combinations = a.combinations.iter().filter_map(|c| {
+        let solution = c.solution.as_ref()?;
+        Some(formula(latex::expression(&c.expression), &c.expression, solution))
+    });
+    let lines: Vec<Formula> = combinations.collect();
+    if !lines.is_empty() {
+        blocks.push(Block::Formulas { heading: "Combinations".into(), lines });
+    }
+    let accuracy = words::accuracy(a);
+    if !accuracy.is_empty() {
+        blocks.push(list(words::ACCURACY, accuracy));
+    }
+}
+
+fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) {
+    let row = |c: &obsdeg_core::compare::answer::Sensitivity| {
+        vec![c.condition.clone(), format!("{} of {}", c.rank[0], c.rank[1]), compare::worst(c.worst.as_ref())]
+    };
+    blocks.push(Block::Table {
+        heading: "Rank and largest sigma of all coefficients (- where one is not observable)".into(),
+        header: vec!["condition", "rank", "worst sigma(D) [deg/h, /g]"],
+        numbers: vec![false, true, false],
+        rows: review.sensitivity.iter().map(row).collect(),
+    });
+    let carries = s.analysis.carries.iter();
+    let lines: Vec<String> =
+        carries.map(|c| format!("{}: {}", words::carry(c), words::differences(c))).collect();
+    if !lines.is_empty() {
+        blocks.push(list("Verdicts under the other carries", lines));
+    }
+    blocks.extend(pictures::latitudes(s, &format!("{id}_latitude")));
+    blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
+}
+
+fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) {
+    let mut lines = Vec::new();
+    let alternatives = &s.alternatives;
+    if let Some(kept) = &alternatives.kept {
+        lines.push(match kept.positions {
+            Some(k) if k == s.positions.len() => {
+                format!("all {k} positions are needed for what is determined ({})", alternatives.required.join(", "))
+            }
+            Some(k) => format!(
+                "{k} of the {} positions ({}) suffice for what is determined ({}); the others only add accuracy",
+                s.positions.len(),
+                kept.witness.join(", "),
+                alternatives.required.join(", ")
+            ),
+            None => "too many sets of positions to look for the fewest".into(),
+        });
+    }
+    if let Some(all) = &alternatives.all {
+        lines.push(match (all.positions, all.never.is_empty()) {
+            (Some(k), _) => format!(
+                "every coefficient needs at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
+                review.carry,
+                all.witness.join(", ")
+            ),
+            (None, false) => {
+                format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", "))
+            }
+            (None, true) => format!(
+                "no {} cardinal attitudes determine every coefficient",
+                all.none_of.last().map_or_else(|| "few".into(), |n| n[0].to_string())
+            ),
+        });
+    }
+    blocks.push(list("", lines));
+    let row = |d: &obsdeg_core::compare::answer::DropOne| {
+        let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
+        vec![d.position.clone(), lost, compare::worst(d.worst.as_ref())]
+    };
+    if !review.drop_one.is_empty() {
+        blocks.push(Block::Table {
+            heading: "Without one position".into(),
+            header: vec!["without", "not observable any more", "worst sigma(D) [deg/h, /g]"],
+            numbers: vec![false; 3],
+            rows: review.drop_one.iter().map(row).collect(),
+        });
+    }
+    if !alternatives.front.is_empty() {
+        blocks.push(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
+    }
+}
+
+fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
+    match &s.evidence {
+        Some(c) => {
+            blocks.push(Block::Text(format!(
+                "Exact verdicts and a Kalman filter are two independent paths: they {}.",
+                if c.passed { "agree in every check" } else { "DISAGREE, as listed below" }
+            )));
+            let document = crosscheck::document(c);
+            blocks.extend(document.lead.into_iter().map(Block::Text));
+            let kept = |b: &Block| !is_list(b, "Assumed") && !is_list(b, "Validity of the small-angle model");
+            blocks.extend(document.blocks.into_iter().filter(kept));
+            checks(blocks, c, id);
+        }
+        None => blocks.extend(s.notes.first().map(|n| Block::Text(format!("None: {n}.")))),
+    }
+    let run = simulation::document(&s.simulation);
+    blocks.push(Block::Text("One run against a simulated truth, with its errors and bands:".into()));
+    let kept = |b: &Block| {
+        matches!(b, Block::Table { .. } | Block::List { .. })
+            && !is_list(b, "Assumed")
+            && !is_list(b, "Validity of the small-angle model")
+    };
+    blocks.extend(run.blocks.into_iter().filter(kept));
+    blocks.extend(pictures::errors(&s.traces, id));
+}
+
+fn checks(blocks: &mut Vec<Block>, c: &CrossCheck, id: &str) {
+    blocks.extend(pictures::slopes(c, id));
+    blocks.extend(pictures::consistency(c, id));
+    blocks.push(pictures::correlation(c, &format!("{id}_correlation")));
+}
+
+fn model(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &str) {
+    let a = &m.analysis;
+    let document = system::document(a);
+    blocks.push(section(level, "Verdict"));
+    blocks.extend(document.lead.into_iter().map(Block::Text));
+    blocks.push(section(level, "Unknowns and equations"));
+    for block in document.blocks {
+        match block {
+            Block::List { heading, lines } if heading == "Solved by" => {
+                let formula = |text: String| Formula { latex: latex::expression(&text), text };
+                let (long, short) = lines.into_iter().partition(|l: &String| l.contains("a fraction of"));
+                let short: Vec<String> = short;
+                let lines = short.into_iter().map(formula).collect();
+                blocks.push(Block::Formulas { heading: heading.clone(), lines });
+                let long: Vec<String> = long;
+                blocks.extend((!long.is_empty()).then(|| list("", long)));
+            }
+            other => blocks.push(other),
+        }
+    }
+    blocks.push(pictures::model_staircase(a, &format!("{id}_staircase")));
+    blocks.push(section(level, "Evidence by a filter"));
+    blocks.extend(m.note.iter().map(|n| Block::Text(format!("{n}."))));
+    if let Some(e) = &m.evidence {
+        let document = system::evidence(e);
+        blocks.extend(document.lead.into_iter().map(Block::Text));
+        blocks.extend(document.blocks);
+    }
+    if let Some((run, traces)) = &m.run {
+        let document = system::run(run);
+        blocks.extend(document.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
+        blocks.extend(pictures::errors(traces, id));
+    }
+}

@@ -1,0 +1,308 @@
+//! The pictures of a review.
+
+use obsdeg_core::analysis::Analysis;
+use obsdeg_core::compare::answer::{Quantity, Review};
+use obsdeg_core::crosscheck::CrossCheck;
+use obsdeg_core::crosscheck::answer::SlopeCurve;
+use obsdeg_core::review::SchemeReview;
+use obsdeg_core::review::answer::Sweep;
+use obsdeg_core::simulation::Traces;
+use obsdeg_core::system::SystemAnalysis;
+
+use crate::document::{Block, Drawing, Picture};
+use crate::figure::{BLACK, BLUE, Band, Figure, GREEN, GREY, Line, ORANGE, SKY, Stroke, heat};
+use crate::figures::{file_name, history_figure, slope_figure};
+
+/// At most this many points a curve.
+const POINTS: usize = 240;
+/// At most this many pictures of errors.
+const ERRORS: usize = 40;
+
+fn curves(name: &str, caption: impl Into<String>, figure: Figure) -> Block {
+    let drawing = Drawing::Curves(Box::new(figure));
+    Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing })
+}
+
+fn still(name: &str, caption: impl Into<String>, svg: String) -> Block {
+    Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing: Drawing::Still(svg) })
+}
+
+fn line(label: &str, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)>) -> Line {
+    Line { label: label.into(), color, stroke, points }
+}
+
+/// Colours and strokes for many curves, told apart by both.
+fn style(i: usize) -> (&'static str, Stroke) {
+    const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, SKY, BLACK, GREY];
+    let stroke = [Stroke::Solid, Stroke::Dashed, Stroke::Dotted][i / COLORS.len() % 3];
+    (COLORS[i % COLORS.len()], stroke)
+}
+
+/// The rank over the order of derivatives, as steps.
+fn stairs(profile: &[usize], unknowns: usize) -> Figure {
+    let last = profile.len().max(1) as f64;
+    let mut points = Vec::new();
+    for (k, &rank) in profile.iter().enumerate() {
+        points.push((k as f64, rank as f64));
+        points.push((k as f64 + 1.0, rank as f64));
+    }
+    Figure {
+        title: "Degree staircase".into(),
+        x_label: "order of derivatives (a step begins at its order)".into(),
+        y_label: "rank".into(),
+        lines: vec![
+            line("rank", BLUE, Stroke::Solid, points),
+            line("unknowns", BLACK, Stroke::Dotted, vec![(0.0, unknowns as f64), (last, unknowns as f64)]),
+        ],
+        x_range: Some((0.0, last)),
+        y_range: Some((0.0, unknowns as f64 + 1.0)),
+        ..Figure::default()
+    }
+}
+
+pub(super) fn staircase(a: &Analysis, name: &str) -> Block {
+    let mut names: Vec<Vec<&str>> = vec![Vec::new(); a.rank_profile.len()];
+    for q in &a.quantities {
+        if let Some(slot) = q.degree.and_then(|k| names.get_mut(k)) {
+            slot.push(&q.name);
+        }
+    }
+    let steps = names.iter().enumerate().filter(|(_, n)| !n.is_empty());
+    let text: Vec<String> = steps.map(|(k, n)| format!("order {k} solves {}", n.join(", "))).collect();
+    let caption = format!("Rank over the order of derivatives: {}", text.join("; "));
+    curves(name, caption, stairs(&a.rank_profile, a.unknowns.len()))
+}
+
+pub(super) fn model_staircase(a: &SystemAnalysis, name: &str) -> Block {
+    curves(name, "Rank over the order of derivatives", stairs(&a.rank_profile, a.unknowns))
+}
+
+/// Gravity along the platform axes over time.
+pub(super) fn attitudes(s: &SchemeReview, name: &str) -> Block {
+    let axis = |k: usize| s.attitudes.iter().map(|a| (a.t_s, a.g[k])).collect();
+    let figure = Figure {
+        title: "Attitude: components of g".into(),
+        x_label: "t [s]".into(),
+        y_label: "component of g [g]".into(),
+        lines: vec![
+            line("X_p", BLUE, Stroke::Solid, axis(0)),
+            line("Y_p", ORANGE, Stroke::Dashed, axis(1)),
+            line("Z_p", GREEN, Stroke::Dotted, axis(2)),
+        ],
+        marks: s.positions.iter().skip(1).map(|p| p.start_s).collect(),
+        x_range: s.attitudes.last().map(|a| (0.0, a.t_s)),
+        y_range: Some((-1.15, 1.15)),
+        ..Figure::default()
+    };
+    let starts: Vec<String> =
+        s.positions.iter().map(|p| format!("{} from {} s", p.name, p.start_s)).collect();
+    curves(
+        name,
+        format!("Attitude over time, as gravity along the platform axes: {}", starts.join(", ")),
+        figure,
+    )
+}
+
+/// How each coefficient moves the drift at each position.
+pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name: &str) -> Block {
+    let rows: Vec<String> = coefficients.iter().map(|q| q.name.clone()).collect();
+    let values =
+        coefficients.iter().map(|q| q.excitation.iter().map(|x| x.abs().min(1.0)).collect()).collect();
+    let svg = heat("Excitation: drift per unit of a coefficient", &rows, positions, values, 0.0);
+    still(
+        name,
+        "Excitation map: how each coefficient moves the drift at each position (0 white, 1 blue)",
+        svg,
+    )
+}
+
+/// One curve per unknown of a family, where it is observable.
+fn sweep(s: &Sweep, of: &[String], x: impl Fn(f64) -> f64) -> Vec<Line> {
+    let columns: Vec<usize> = (0..s.names.len()).filter(|&c| of.contains(&s.names[c])).collect();
+    let curve = |(i, &c): (usize, &usize)| {
+        let points = s.x.iter().zip(&s.sigmas).filter_map(|(&t, row)| Some((x(t), row[c]?)));
+        let (color, stroke) = style(i);
+        line(&s.names[c], color, stroke, points.collect())
+    };
+    columns.iter().enumerate().map(curve).filter(|l| l.points.len() > 1).collect()
+}
+
+/// Coefficients that some latitude or dwell makes observable.
+fn drifts(s: &Sweep) -> Vec<String> {
+    s.names.iter().filter(|n| n.starts_with("D_")).cloned().collect()
+}
+
+pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
+    let lines = sweep(&s.latitudes, &drifts(&s.latitudes), |x| x);
+    let figure = Figure {
+        title: "Predicted sigma against latitude".into(),
+        x_label: "latitude [deg]".into(),
+        y_label: "sigma [deg/h, /g]".into(),
+        x_range: Some((0.0, 90.0)),
+        y_range: logarithmic_window(&lines),
+        log_y: true,
+        lines,
+        ..Figure::default()
+    };
+    let caption = "Predicted sigma of the coefficients against the latitude; a curve ends where its coefficient is not observable";
+    (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
+}
+
+pub(super) fn dwells(s: &SchemeReview, review: &Review, name: &str) -> Option<Block> {
+    let total = review.total_s;
+    let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
+    let mut lines = sweep(&s.dwells, &drifts(&s.dwells), |factor| (total - slews) * factor + slews);
+    let (first, last) = (lines.first()?.points.first()?.0, lines.first()?.points.last()?.0);
+    let mut required: Vec<f64> = (review.quantities.iter())
+        .filter(|q| q.name.starts_with("D_"))
+        .filter_map(|q| q.requirement)
+        .collect();
+    required.sort_by(f64::total_cmp);
+    required.dedup();
+    for r in &required {
+        lines.push(line(&format!("required {r}"), BLACK, Stroke::Dotted, vec![(first, *r), (last, *r)]));
+    }
+    let figure = Figure {
+        title: "Predicted sigma against time".into(),
+        x_label: "total time, all dwells scaled alike [s]".into(),
+        y_label: "sigma [deg/h, /g]".into(),
+        lines,
+        log: true,
+        ..Figure::default()
+    };
+    Some(curves(
+        name,
+        "What longer dwells buy: predicted sigma against the total time, with the required sigma",
+        figure,
+    ))
+}
+
+/// The range of positive curves with some air.
+fn logarithmic_window(lines: &[Line]) -> Option<(f64, f64)> {
+    let values = lines.iter().flat_map(|l| l.points.iter().map(|p| p.1)).filter(|y| *y > 0.0);
+    let (low, high) = values.fold((f64::MAX, 0.0f64), |(l, h), y| (l.min(y), h.max(y)));
+    (high > 0.0).then_some((low / 1.5, high * 1.5))
+}
+
+/// Total time against the largest sigma: schemes at other dwells, and the front of what was found.
+pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Block {
+    let mut lines = Vec::new();
+    for (i, s) in schemes.iter().enumerate() {
+        let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
+        let dwell: f64 = s.positions.iter().map(|p| p.dwell_s).sum();
+        let worst = s.dwells.worst(&s.alternatives.required);
+        let points: Vec<(f64, f64)> = worst.into_iter().map(|(f, y)| (dwell * f + slews, y)).collect();
+        let (color, _) = style(i);
+        if points.len() > 1 {
+            lines.push(line(&s.name, color, Stroke::Solid, points));
+        }
+        let front = &s.alternatives.front;
+        let steps = front.windows(2).flat_map(|w| [(w[0].total_s, w[0].value), (w[1].total_s, w[0].value)]);
+        let last = front.last().map(|f| (f.total_s, f.value));
+        let points: Vec<(f64, f64)> = steps.chain(last).collect();
+        if points.len() > 1 {
+            let label = format!("best of 24, {} positions ({})", s.alternatives.front_positions, s.name);
+            lines.push(line(&label, color, Stroke::Dotted, points));
+        }
+    }
+    let figure = Figure {
+        title: "Pareto front".into(),
+        x_label: "total time [s]".into(),
+        y_label: "largest sigma [deg/h, /g]".into(),
+        lines,
+        log: true,
+        ..Figure::default()
+    };
+    let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
+                   dwells, and the Pareto front of cardinal attitudes for the same coefficients";
+    curves(name, caption, figure)
+}
+
+/// Errors of the estimate with the band of three sigma, a picture each.
+pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
+    let stride = traces.time.len().div_ceil(POINTS).max(1);
+    let samples: Vec<usize> =
+        (0..traces.time.len()).filter(|k| k % stride == 0 || k + 1 == traces.time.len()).collect();
+    let marks: Vec<f64> = (1..traces.position.len())
+        .filter(|&k| traces.position[k] != traces.position[k - 1])
+        .map(|k| traces.time[k - 1])
+        .collect();
+    let bracketed = |unit: &str| if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
+    let of = |i: usize| {
+        let (series, scale, unit) = (&traces.series[i], traces.scales[i], &traces.units[i]);
+        let error = |k: usize| (series.estimate[k] - series.truth[k]) / scale;
+        let sigma = |k: usize| 3.0 * series.sigma[k] / scale;
+        let settled = || samples.iter().copied().filter(|&k| k > 0);
+        // the prior would hide what the data say
+        let largest = settled().map(|k| error(k).abs()).fold(0.0, f64::max);
+        let end = samples.last().map_or(0.0, |&k| sigma(k));
+        let half = (1.2 * largest.max(2.0 * end)).max(f64::MIN_POSITIVE);
+        let figure = Figure {
+            title: traces.names[i].clone(),
+            x_label: format!("t{}", bracketed(&traces.time_unit)),
+            y_label: format!("error of {}{}", traces.names[i], bracketed(unit)),
+            bands: vec![Band {
+                color: SKY,
+                points: settled().map(|k| (traces.time[k], -sigma(k), sigma(k))).collect(),
+            }],
+            lines: vec![line(
+                "error, band of 3 sigma",
+                BLUE,
+                Stroke::Solid,
+                settled().map(|k| (traces.time[k], error(k))).collect(),
+            )],
+            marks: marks.clone(),
+            x_range: traces.time.last().map(|&end| (0.0, end)),
+            y_range: Some((-half, half)),
+            ..Figure::default()
+        };
+        let name = format!("{id}_error_{}", file_name(&traces.names[i]));
+        curves(&name, format!("Error of the estimate of {} with +-3 sigma", traces.names[i]), figure)
+    };
+    (0..traces.names.len().min(ERRORS)).map(of).collect()
+}
+
+pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {
+    let mut units: Vec<&str> = c.slopes.iter().map(|s| s.unit.as_str()).collect();
+    units.sort_unstable();
+    units.dedup();
+    let of = |(i, unit): (usize, &&str)| {
+        let curves_: Vec<&SlopeCurve> = c.slopes.iter().filter(|s| s.unit == *unit).collect();
+        let caption = format!(
+            "Sigma against the dwell for unknowns in {unit}, with reference slopes -(accuracy order + 1/2)"
+        );
+        curves(&format!("{id}_slopes_{}", i + 1), caption, slope_figure(&curves_, unit))
+    };
+    units.iter().enumerate().map(of).collect()
+}
+
+pub(super) fn consistency(c: &CrossCheck, id: &str) -> Vec<Block> {
+    let outputs = c.monte_carlo.statistics.last().map_or(2, |s| s.expected as usize);
+    let (n, runs) = (c.correlation.names.len(), c.monte_carlo.runs);
+    let mut out = Vec::new();
+    if c.monte_carlo.statistics.len() > 1 {
+        let figure = history_figure(c, "NEES", n, |p| p.nees, |_| runs);
+        out.push(curves(
+            &format!("{id}_nees"),
+            "Normalised estimation error squared, mean of all runs, with its band",
+            figure,
+        ));
+    }
+    let figure = history_figure(c, "NIS", outputs, |p| p.nis, |p| p.samples);
+    out.push(curves(
+        &format!("{id}_nis"),
+        "Normalised innovation squared, mean of all runs, with its band",
+        figure,
+    ));
+    out
+}
+
+pub(super) fn correlation(c: &CrossCheck, name: &str) -> Block {
+    let names = &c.correlation.names;
+    let svg = heat("Correlation under a diffuse prior", names, names, c.correlation.values.clone(), -1.0);
+    still(
+        name,
+        "Correlation of the estimates under a diffuse prior: +-1 (orange, blue) along directions that Z does not see",
+        svg,
+    )
+}
