@@ -140,7 +140,7 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
     SvgBackend::new().render_scene(&scene)
 }
 
-/// A matrix: rows and columns named, entries from `low` to 1; signed ones are blue to orange, others white to blue.
+/// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange, others white to blue.
 pub(crate) fn heat(
     title: &str,
     rows: &[String],
@@ -149,6 +149,7 @@ pub(crate) fn heat(
     low: f64,
 ) -> String {
     // the library stretches colours over the data; here they mean low to 1
+    let (rows, values): (Vec<String>, Vec<Vec<f64>>) = rows.iter().cloned().zip(values).rev().unzip();
     let all = || values.iter().flatten().copied();
     let (least, most) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
     let color = move |t: f64| {
@@ -157,16 +158,16 @@ pub(crate) fn heat(
     };
     let map = Heatmap::new()
         .with_data(values)
-        .with_labels(rows.to_vec(), columns.to_vec())
+        .with_labels(rows.clone(), columns.to_vec())
         .with_color_map(kuva::prelude::ColorMap::Custom(Arc::new(color)));
     let plots = vec![Plot::from(map)];
     let layout = Layout::auto_from_plots(&plots)
         .with_title(title)
         .with_x_categories(columns.to_vec())
-        .with_y_categories(rows.to_vec())
+        .with_y_categories(rows.clone())
         .with_x_tick_rotate(-60.0)
-        .with_width(180.0 + 30.0 * columns.len().max(5) as f64)
-        .with_height(180.0 + 30.0 * rows.len() as f64)
+        .with_width(180.0 + 30.0 * columns.len().max(8) as f64)
+        .with_height(180.0 + 28.0 * rows.len() as f64)
         .with_font_family(FONT);
     kuva::render_to_svg(plots, layout)
 }

@@ -121,14 +121,10 @@ pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str) -> Figure {
     orders.dedup();
     let mut lines = Vec::new();
     for &order in &orders {
-        let label = match order {
-            Some(d) => format!("accuracy order {d}"),
-            None => "not observable (prior)".into(),
-        };
-        let of_order = curves.iter().filter(|c| c.accuracy_order == order);
-        for (i, c) in of_order.enumerate() {
+        for c in curves.iter().filter(|c| c.accuracy_order == order) {
+            let what = order.map_or_else(|| "not observable (prior)".into(), |d| format!("order {d}"));
             lines.push(Line {
-                label: if i == 0 { label.clone() } else { String::new() },
+                label: format!("{}, {what}", c.name),
                 color: order_color(order),
                 stroke: Stroke::Solid,
                 points: c.points.clone(),

@@ -176,7 +176,7 @@ pub(crate) fn table(columns: &str, header: &[&str], rows: impl IntoIterator<Item
 }
 
 pub(crate) fn analysis(a: &Analysis) -> String {
-    let names: Vec<String> = a.positions.iter().map(|p| p.name.clone()).collect();
+    let names = &a.stations;
     let mut out = String::from("% needs the packages booktabs, longtable and amsmath\n");
     out.push_str(&format!(
         "\\paragraph{{Observable degrees}} {}; {}.\n",
@@ -197,7 +197,7 @@ pub(crate) fn analysis(a: &Analysis) -> String {
         &["unknown", "unit", "verdict", "degree", "solution"],
         a.quantities.iter().map(|q| {
             let how = match &q.solution {
-                Some(s) => format!("${}$", solution(s, a.frame, &names)),
+                Some(s) => format!("${}$", solution(s, a.frame, names)),
                 None => escape(&words::explanation(q)),
             };
             vec![
@@ -217,7 +217,7 @@ pub(crate) fn analysis(a: &Analysis) -> String {
                 let how = c
                     .solution
                     .as_ref()
-                    .map_or_else(String::new, |s| format!("${}$", solution(s, a.frame, &names)));
+                    .map_or_else(String::new, |s| format!("${}$", solution(s, a.frame, names)));
                 vec![
                     format!("${}$", expression(&c.expression)),
                     c.status.to_string(),

@@ -118,10 +118,16 @@ fn verdict(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> Str
         };
         first.push_str(&format!(", {derivatives}"));
     }
-    let lost = joined(of(Status::Inseparable).map(|q| q.name.as_str()));
+    let partners = |q: &&&Quantity| {
+        let verdict = a.quantities.iter().find(|v| v.name == q.name);
+        let partners = verdict.map_or_else(String::new, |v| v.partners.join(", "));
+        format!("{} from {partners}", q.name)
+    };
+    let lost: Vec<String> = of(Status::Inseparable).map(|q| partners(&q)).collect();
+    let lost = lost.join("; ");
     let silent = joined(of(Status::NotExcited).map(|q| q.name.as_str()));
     if !lost.is_empty() {
-        first.push_str(&format!("; it cannot separate {lost}"));
+        first.push_str(&format!("; it cannot tell {lost}"));
     }
     if !silent.is_empty() {
         first.push_str(&format!("; it does not excite {silent}"));
@@ -139,7 +145,7 @@ fn verdict(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> Str
                 number(sigma),
                 q.unit,
                 q.name,
-                number(review.total_s)
+                seconds(review.total_s)
             )
         },
     );
@@ -245,6 +251,12 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
     }
 }
 
+/// A time in s, to a tenth.
+fn seconds(t: f64) -> String {
+    let text = format!("{t:.1}");
+    text.strip_suffix(".0").map_or(text.clone(), String::from)
+}
+
 fn positions(
     blocks: &mut Vec<Block>,
     s: &SchemeReview,
@@ -252,16 +264,17 @@ fn positions(
     review: &Review,
     id: &str,
 ) {
-    let g = |g: [f64; 3]| g.map(number).join("  ");
+    let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") };
+    let g = |g: [f64; 3]| g.map(component).join(", ");
     let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
         let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
         vec![
             p.name.clone(),
             words::turned(&angles.join(", "), p.rotation.as_deref()),
             p.attitude.clone().unwrap_or_else(|| "-".into()),
-            number(numbers.start_s),
-            number(numbers.dwell_s),
-            optional(numbers.slew_s),
+            seconds(numbers.start_s),
+            seconds(numbers.dwell_s),
+            numbers.slew_s.map_or_else(|| "-".into(), seconds),
             g(numbers.g[0]),
             g(numbers.g[1]),
             g(numbers.g[2]),
@@ -292,10 +305,9 @@ fn positions(
 }
 
 fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
-    let names: Vec<String> = a.positions.iter().map(|p| p.name.clone()).collect();
     let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Formula {
         text: format!("{expression} = {}", solution.text),
-        latex: format!("{left} = {}", latex::solution(solution, a.frame, &names)),
+        latex: format!("{left} = {}", latex::solution(solution, a.frame, &a.stations)),
     };
     let unknowns = a.quantities.iter().filter_map(|q| {
         let solution = q.solution.as_ref()?;
@@ -323,12 +335,17 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
 
 fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) {
     let row = |c: &obsdeg_core::compare::answer::Sensitivity| {
-        vec![c.condition.clone(), format!("{} of {}", c.rank[0], c.rank[1]), compare::worst(c.worst.as_ref())]
+        vec![
+            c.condition.clone(),
+            format!("{} of {}", c.rank[0], c.rank[1]),
+            compare::worst(c.worst.as_ref()),
+            compare::worst(c.worst_determined.as_ref()),
+        ]
     };
     blocks.push(Block::Table {
-        heading: "Rank and largest sigma of all coefficients (- where one is not observable)".into(),
-        header: vec!["condition", "rank", "worst sigma(D) [deg/h, /g]"],
-        numbers: vec![false, true, false],
+        heading: "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where one is not observable)".into(),
+        header: vec!["condition", "rank", "of all", "of those determined"],
+        numbers: vec![false, true, false, false],
         rows: review.sensitivity.iter().map(row).collect(),
     });
     let carries = s.analysis.carries.iter();

@@ -51,6 +51,8 @@ pub struct Analysis {
     pub measured_azimuth: bool,
     /// The positions.
     pub positions: Vec<PositionReport>,
+    /// Where the terms of solutions are taken: the positions, and points of rotations.
+    pub stations: Vec<String>,
     /// `dim V_0, dim V_1, ...`.
     pub rank_profile: Vec<usize>,
     /// The final rank.

@@ -86,7 +86,8 @@ pub fn analyze(
     let basis = combinations(&platform, &verdicts, &mut solver);
     let null = null_space(&platform, &verdicts, &mut solver);
 
-    let names = scheme.stations().iter().map(Station::name).collect();
+    let names: Vec<String> = scheme.stations().iter().map(Station::name).collect();
+    let stations = names.clone();
     let mut printer = Printer { solver, options, names, accuracy: None, notes: Vec::new() };
     let accuracy = Accuracy::new(&platform, &verdicts, options.seed);
     printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
@@ -107,6 +108,7 @@ pub fn analyze(
     Ok(Analysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
+        stations,
         carry: scheme.carry,
         latitude_deg: scheme.latitude.map(|l| l.degrees()),
         geometry: scheme.geometry,

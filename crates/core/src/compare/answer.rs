@@ -103,4 +103,6 @@ pub struct Sensitivity {
     pub rank: [usize; 2],
     /// The worst sigma there.
     pub worst: Option<Worst>,
+    /// The worst sigma there of the coefficients that the scheme itself makes observable; null when one is not.
+    pub worst_determined: Option<Worst>,
 }

@@ -4,6 +4,7 @@
 pub mod answer;
 
 use obsdeg_ekf::SquareRootInformation;
+use rayon::prelude::*;
 
 pub use answer::Comparison;
 
@@ -98,8 +99,21 @@ impl Judged {
 
     /// The largest sigma of a coefficient, if all are observable.
     fn worst(&self) -> Option<Worst> {
+        self.worst_of(&|_| true)
+    }
+
+    /// Names of the coefficients that are observable.
+    fn determined(&self) -> Vec<String> {
+        let (names, units) = (self.platform().names(), self.platform().units());
+        let determined = (0..names.len()).filter(|&c| units[c] != "rad" && self.sigmas[c].is_some());
+        determined.map(|c| names[c].clone()).collect()
+    }
+
+    /// The largest sigma of a coefficient that counts, if all of these are observable.
+    fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
         let units = self.platform().units();
-        let drifts = (0..units.len()).filter(|&c| units[c] != "rad");
+        let counts = |c: &usize| units[*c] != "rad" && counts(&self.platform().names()[*c]);
+        let drifts = (0..units.len()).filter(counts);
         let mut worst: Option<Worst> = None;
         for c in drifts {
             let sigma_dph = self.sigmas[c]?;
@@ -128,7 +142,7 @@ fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
         quantities,
         worst: judged.worst(),
         drop_one,
-        sensitivity: sensitivity(scheme, conditions, seed)?,
+        sensitivity: sensitivity(scheme, conditions, &judged.determined(), seed)?,
     })
 }
 
@@ -183,6 +197,7 @@ fn drop_one(
         c.is_some_and(|c| j.prediction.unknowns[c].status == Status::Observable || j.sigmas[c].is_some())
     };
     (0..scheme.positions.len())
+        .into_par_iter()
         .map(|i| {
             let position = scheme.positions[i].name.clone();
             let judged = Judged::new(&scheme.without_position(i), conditions, seed)?;
@@ -199,26 +214,27 @@ fn drop_one(
 fn sensitivity(
     scheme: &Scheme,
     conditions: &Conditions,
+    determined: &[String],
     seed: u64,
 ) -> Result<Vec<Sensitivity>, SimulationError> {
-    let mut out = Vec::new();
-    let mut add =
-        |condition: String, scheme: &Scheme, conditions: &Conditions| -> Result<(), SimulationError> {
-            let judged = Judged::new(scheme, conditions, seed)?;
-            out.push(Sensitivity { condition, rank: judged.rank(), worst: judged.worst() });
-            Ok(())
-        };
+    let mut others: Vec<(String, Scheme, Conditions)> = Vec::new();
     for latitude in LATITUDES {
         let other = Scheme { latitude: latitude.parse().ok(), ..scheme.clone() };
-        add(format!("latitude {latitude} deg"), &other, conditions)?;
+        others.push((format!("latitude {latitude} deg"), other, conditions.clone()));
     }
     for factor in DWELLS {
-        add(format!("dwell x {factor}"), &scheme.with_dwells(conditions.dwell_s, factor)?, conditions)?;
+        let other = scheme.with_dwells(conditions.dwell_s, factor)?;
+        others.push((format!("dwell x {factor}"), other, conditions.clone()));
     }
     for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
         // slews carry psi^n: without them another carry can be asked for
         let still = Conditions { slews: false, ..conditions.clone() };
-        add(format!("{carry} carry"), &Scheme { carry, ..scheme.clone() }, &still)?;
+        others.push((format!("{carry} carry"), Scheme { carry, ..scheme.clone() }, still));
     }
-    Ok(out)
+    let judged = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
+        let judged = Judged::new(&scheme, &conditions, seed)?;
+        let worst_determined = judged.worst_of(&|name| determined.contains(name));
+        Ok(Sensitivity { condition, rank: judged.rank(), worst: judged.worst(), worst_determined })
+    };
+    others.into_par_iter().map(judged).collect()
 }

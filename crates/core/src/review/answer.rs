@@ -91,11 +91,15 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    pub(super) fn add(&mut self, x: f64, of: Vec<(String, Option<f64>)>) {
-        let (names, sigmas) = of.into_iter().unzip();
-        self.names = names;
-        self.x.push(x);
-        self.sigmas.push(sigmas);
+    pub(super) fn of(points: Vec<(f64, Vec<(String, Option<f64>)>)>) -> Self {
+        let mut out = Self::default();
+        for (x, of) in points {
+            let (names, sigmas) = of.into_iter().unzip();
+            out.names = names;
+            out.x.push(x);
+            out.sigmas.push(sigmas);
+        }
+        out
     }
 
     /// The largest sigma of a coefficient among `of` at every condition at which all are observable.

@@ -3,6 +3,7 @@
 pub mod answer;
 
 use obsdeg_symbolic::Worker;
+use rayon::prelude::*;
 
 pub use answer::{DesignReview, ModelReview, SchemeReview};
 
@@ -17,9 +18,9 @@ use crate::system::run::RunError;
 use crate::system::{ModelError, SystemModel, analyze_system, crosscheck_system, simulate_system};
 use answer::{Alternatives, Attitude, PositionReview, Sweep};
 
-/// Latitudes of the sweep, in steps of 5 degrees.
+/// Between two latitudes of the sweep, in degrees.
 const LATITUDE_STEP: i32 = 5;
-/// Factors on the dwells: quarters of an octave below and above 1.
+/// The dwells are scaled by up to so many octaves, in halves.
 const OCTAVES: i32 = 3;
 /// Most positions of the schemes that the front is searched for.
 const FRONT_POSITIONS: usize = 5;
@@ -212,25 +213,25 @@ fn attitudes(plan: &Plan) -> Vec<Attitude> {
 }
 
 fn latitudes(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
-    let mut out = Sweep::default();
-    for degrees in (0..=90).step_by(LATITUDE_STEP as usize) {
+    let at = |k: i32| {
+        let degrees = k * LATITUDE_STEP;
         let other = Scheme { latitude: degrees.to_string().parse().ok(), ..scheme.clone() };
-        out.add(f64::from(degrees), predicted(&other, conditions, seed)?);
-    }
-    Ok(out)
+        Ok((f64::from(degrees), predicted(&other, conditions, seed)?))
+    };
+    Ok(Sweep::of((0..=90 / LATITUDE_STEP).into_par_iter().map(at).collect::<Result<_, SimulationError>>()?))
 }
 
 fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
-    let mut out = Sweep::default();
-    for k in -2 * OCTAVES..=2 * OCTAVES {
+    let at = |k: i32| {
         let factor = 2f64.powf(f64::from(k) / 2.0);
         let other = scheme.with_dwells(conditions.dwell_s, factor)?;
         // a step is at most half a dwell
         let shortest = other.positions.iter().filter_map(|p| p.dwell).map(Dwell::seconds);
         let step_s = shortest.fold(conditions.step_s, |step, dwell| step.min(dwell / 2.0));
-        out.add(factor, predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?);
-    }
-    Ok(out)
+        Ok((factor, predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?))
+    };
+    let factors = (-2 * OCTAVES..=2 * OCTAVES).into_par_iter();
+    Ok(Sweep::of(factors.map(at).collect::<Result<_, SimulationError>>()?))
 }
 
 /// The least that keeps what is seen, the least that sees all, and the front of schemes out of the cardinal attitudes.

@@ -108,7 +108,7 @@ pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name:
     let rows: Vec<String> = coefficients.iter().map(|q| q.name.clone()).collect();
     let values =
         coefficients.iter().map(|q| q.excitation.iter().map(|x| x.abs().min(1.0)).collect()).collect();
-    let svg = heat("Excitation: drift per unit of a coefficient", &rows, positions, values, 0.0);
+    let svg = heat("Excitation", &rows, positions, values, 0.0);
     still(
         name,
         "Excitation map: how each coefficient moves the drift at each position (0 white, 1 blue)",
