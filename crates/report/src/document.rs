@@ -195,7 +195,7 @@ impl Document {
     }
 
     pub(crate) fn latex(&self) -> String {
-        let mut out = format!("% {}\n", self.title.replace('\n', " "));
+        let mut out = format!("% {}\n", latex::escape(&self.title.replace('\n', " ")));
         let item = |lines: &[String]| {
             let items: String = lines.iter().map(|l| format!("\\item {}\n", latex::escape(l))).collect();
             format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
