@@ -209,7 +209,9 @@ impl Document {
                     let columns: String = numbers.iter().map(|&n| if n { 'r' } else { 'l' }).collect();
                     let cells = rows.iter().map(|r| r.iter().map(|c| latex::escape(c)).collect::<Vec<_>>());
                     out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
-                    out.push_str(&latex::table(&columns, header, cells));
+                    let header: Vec<String> = header.iter().map(|h| latex::escape(h)).collect();
+                    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+                    out.push_str(&latex::table(&columns, &header, cells));
                 }
                 Block::List { heading, lines } => {
                     out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
@@ -230,7 +232,7 @@ impl Document {
                     ));
                 }
                 Block::Picture(p) => out.push_str(&format!(
-                    "\\begin{{center}}\\includegraphics[width=\\linewidth]{{{PICTURES}/{}.png}}\\\\{}\\end{{center}}\n",
+                    "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{PICTURES}/{}.png}}\\\\{}\\end{{center}}\n",
                     p.name,
                     latex::escape(&p.caption)
                 )),

@@ -96,7 +96,10 @@ impl Figure {
             .with_height(SIZE.1)
             .with_font_family(FONT)
             .with_y_label_offset(-7.0, 0.0)
-            .with_legend_position(LegendPosition::OutsideBottomCenter)
+            .with_legend_position(match self.lines.iter().filter(|l| !l.label.is_empty()).count() {
+                0..=4 => LegendPosition::OutsideBottomCenter,
+                _ => LegendPosition::OutsideRightTop,
+            })
             .with_legend_box(false);
         if self.log_y {
             layout = layout.with_log_y().with_y_tick_format(TickFormat::Sci);

@@ -103,9 +103,9 @@ fn inlined(p: &Picture) -> String {
         .replace("\"black\"", "\"currentColor\"")
 }
 
-/// Six significant digits.
-fn rounded(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
+/// So many significant digits.
+fn rounded(x: f64, digits: usize) -> f64 {
+    format!("{x:.*e}", digits - 1).parse().unwrap_or(x)
 }
 
 /// Curves for the plotting library: a table of its own for each, x strictly increasing.
@@ -114,18 +114,22 @@ fn curves(f: &Figure) -> Json {
     let (low, high) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
     let step = (high - low).abs().max(f64::MIN_POSITIVE) * 1e-5;
     let mut series = Vec::new();
-    let mut tables = Vec::new();
+    // x, then the values of all series in a row that share it
+    let mut tables: Vec<Vec<Vec<f64>>> = Vec::new();
     let mut bands = Vec::new();
     let mut add =
         |label: &str, color: &str, dash: &[u32], width: f64, points: &mut dyn Iterator<Item = (f64, f64)>| {
             let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
             for (x, y) in points {
                 let x = xs.last().map_or(x, |last| if x <= *last { last + step } else { x });
-                xs.push(x);
-                ys.push(rounded(y));
+                xs.push(rounded(x, 8));
+                ys.push(rounded(y, 4));
             }
             series.push(json!({ "label": label, "color": color, "dash": dash, "width": width }));
-            tables.push(json!([xs.iter().map(|x| (x * 1e6).round() / 1e6).collect::<Vec<_>>(), ys]));
+            match tables.last_mut() {
+                Some(table) if table[0] == xs => table.push(ys),
+                _ => tables.push(vec![xs, ys]),
+            }
             series.len()
         };
     for b in &f.bands {

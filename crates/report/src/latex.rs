@@ -38,11 +38,36 @@ pub(crate) fn symbol(name: &str) -> String {
         _ => match base {
             "wN" => "\\omega_N".into(),
             "wU" => "\\omega_U".into(),
-            other => format!("\\mathit{{{}}}", escape(other)),
+            other => name_of_model(other),
         },
     };
     let position = position.map(|p| format!("^{{({p})}}")).unwrap_or_default();
     format!("{body}{frame}{position}")
+}
+
+/// Greek letters, by the names that they have in both notations.
+pub(crate) const GREEK: [&str; 21] = [
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu",
+    "nu", "xi", "pi", "rho", "sigma", "tau", "phi", "chi", "omega",
+];
+
+/// A name of a model: `gamma` is Greek, `k21` and `k_on` have an index.
+fn name_of_model(name: &str) -> String {
+    let letter = |text: &str| match text {
+        t if GREEK.contains(&t) => Some(format!("\\{t}")),
+        t if t.len() == 1 => Some(t.to_string()),
+        _ => None,
+    };
+    let digits = name.find(|c: char| c.is_ascii_digit() || c == '_').unwrap_or(name.len());
+    let (base, index) = name.split_at(digits);
+    let index = index.strip_prefix('_').unwrap_or(index);
+    match letter(base) {
+        Some(base) if index.is_empty() => base,
+        Some(base) if index.chars().all(|c| c.is_ascii_alphanumeric()) => {
+            format!("{base}_{{\\mathit{{{index}}}}}")
+        }
+        _ => format!("\\mathit{{{}}}", escape(name)),
+    }
 }
 
 /// An expression in program notation as math: names are set, `*` dropped, `sqrt(2)` and functions
@@ -261,7 +286,8 @@ mod tests {
         assert_eq!(symbol("psi_x@12"), "\\psi_{x}^{(12)}");
         assert_eq!(symbol("eps_y^n"), "\\varepsilon_{y}^{n}");
         assert_eq!(expression("D_FZ - wN*psi_y"), "D_{FZ} - \\omega_N\\,\\psi_{y}");
-        assert_eq!(expression("sqrt(2)*cos(alpha)^2/4"), "\\sqrt{2}\\,\\cos(\\mathit{alpha})^{2}/4");
+        assert_eq!(expression("sqrt(2)*cos(alpha)^2/4"), "\\sqrt{2}\\,\\cos(\\alpha)^{2}/4");
+        assert_eq!(expression("k21*gamma - V_max"), "k_{\\mathit{21}}\\,\\gamma - V_{\\mathit{max}}");
         assert_eq!(expression("sin(25 deg)"), "\\sin(25 ^{\\circ})");
         assert_eq!(escape("50% & a_b"), "50\\% \\& a\\_b");
     }

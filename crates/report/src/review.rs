@@ -441,11 +441,42 @@ fn checks(blocks: &mut Vec<Block>, c: &CrossCheck, id: &str) {
     blocks.push(pictures::correlation(c, &format!("{id}_correlation")));
 }
 
+/// The verdict on a model in two sentences.
+fn model_verdict(m: &ModelReview) -> String {
+    let a = &m.analysis;
+    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Status::Observable).collect();
+    let worst = seen.iter().filter_map(|q| q.degree).max();
+    let derivatives = match worst {
+        None => String::new(),
+        Some(0) => ", without any derivative".into(),
+        Some(k) => {
+            let names = joined(seen.iter().filter(|q| q.degree == Some(k)).map(|q| q.name.as_str()));
+            format!(", with derivatives up to order {k} ({names})")
+        }
+    };
+    let lost = match a.unobservable_directions {
+        0 => "nothing is lost".to_string(),
+        1 => "one direction changes no output".into(),
+        n => format!("{n} independent directions change no output"),
+    };
+    let filter = match &m.evidence {
+        None => "No filter was run",
+        Some(e) if e.passed => "The information of a simulated run confirms the verdicts",
+        Some(_) => "The information of a simulated run DISAGREES with the verdicts",
+    };
+    format!(
+        "{} of {} unknowns are locally observable{derivatives}; {lost}. {filter}.",
+        seen.len(),
+        a.quantities.len()
+    )
+}
+
 fn model(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &str) {
     let a = &m.analysis;
     let document = system::document(a);
     blocks.push(section(level, "Verdict"));
-    blocks.extend(document.lead.into_iter().map(Block::Text));
+    blocks.extend((!a.description.is_empty()).then(|| Block::Text(a.description.clone())));
+    blocks.push(Block::Text(model_verdict(m)));
     blocks.push(section(level, "Unknowns and equations"));
     for block in document.blocks {
         match block {

@@ -79,6 +79,9 @@ pub struct Attitude {
     pub g: [f64; 3],
 }
 
+/// A condition, and every unknown's sigma there.
+pub(super) type Point = (f64, Vec<(String, Option<f64>)>);
+
 /// Predicted sigmas over a condition.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Sweep {
@@ -91,7 +94,7 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    pub(super) fn of(points: Vec<(f64, Vec<(String, Option<f64>)>)>) -> Self {
+    pub(super) fn of(points: Vec<Point>) -> Self {
         let mut out = Self::default();
         for (x, of) in points {
             let (names, sigmas) = of.into_iter().unzip();

@@ -1,11 +1,11 @@
 //! The LaTeX of our formulas as the typesetter's math. Only what `latex` writes is known; other commands become text.
 
-/// Greek letters, functions and spaces.
-const WORDS: [(&str, &str); 14] = [
+use crate::latex::GREEK;
+
+/// Other letters, functions and spaces.
+const WORDS: [(&str, &str); 12] = [
     ("psi", "psi"),
     ("varepsilon", "epsilon"),
-    ("omega", "omega"),
-    ("delta", "delta"),
     ("sin", "sin"),
     ("cos", "cos"),
     ("tan", "tan"),
@@ -112,6 +112,7 @@ fn command(rest: &mut &str) -> String {
         }
         "text" => plain(rest),
         "mathit" => format!("italic({})", plain(rest)),
+        other if GREEK.contains(&other) => other.into(),
         other => WORDS.iter().find(|w| w.0 == other).map_or_else(|| super::quoted(other), |w| w.1.into()),
     }
 }

@@ -14,7 +14,7 @@ use crate::figure::{BLACK, BLUE, Band, Figure, GREEN, GREY, Line, ORANGE, SKY, S
 use crate::figures::{file_name, history_figure, slope_figure};
 
 /// At most this many points a curve.
-const POINTS: usize = 240;
+const POINTS: usize = 160;
 /// At most this many pictures of errors.
 const ERRORS: usize = 40;
 
@@ -196,10 +196,7 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Block 
         if points.len() > 1 {
             lines.push(line(&s.name, color, Stroke::Solid, points));
         }
-        let front = &s.alternatives.front;
-        let steps = front.windows(2).flat_map(|w| [(w[0].total_s, w[0].value), (w[1].total_s, w[0].value)]);
-        let last = front.last().map(|f| (f.total_s, f.value));
-        let points: Vec<(f64, f64)> = steps.chain(last).collect();
+        let points: Vec<(f64, f64)> = s.alternatives.front.iter().map(|f| (f.total_s, f.value)).collect();
         if points.len() > 1 {
             let label = format!("best of 24, {} positions ({})", s.alternatives.front_positions, s.name);
             lines.push(line(&label, color, Stroke::Dotted, points));
@@ -214,7 +211,8 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Block 
         ..Figure::default()
     };
     let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
-                   dwells, and the Pareto front of cardinal attitudes for the same coefficients";
+                   dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most, for the same \
+                   coefficients";
     curves(name, caption, figure)
 }
 
