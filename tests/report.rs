@@ -68,6 +68,40 @@ fn table(page: &Html, caption: &str) -> Vec<Vec<String>> {
     table.select(&parse("tbody tr")).map(cells).collect()
 }
 
+fn assert_unique_ids(page: &Html) {
+    let selector = Selector::parse("[id]").expect("a selector");
+    let mut ids: Vec<&str> = page.select(&selector).filter_map(|e| e.attr("id")).collect();
+    ids.sort_unstable();
+    let twice: Vec<&str> = ids.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0]).collect();
+    assert!(twice.is_empty(), "{twice:?}");
+}
+
+#[test]
+fn every_example_has_a_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let mut inputs: Vec<PathBuf> = (std::fs::read_dir(root).expect("a folder"))
+        .map(|e| e.expect("an entry").path())
+        .filter(|p| !p.ends_with("generic-angles") && !p.display().to_string().contains("wrong-"))
+        .flat_map(|p| ["scheme.toml", "model.toml"].map(|name| p.join(name)))
+        .filter(|p| p.is_file())
+        .collect();
+    inputs.sort();
+    assert!(inputs.len() > 15);
+    for (i, input) in inputs.iter().enumerate() {
+        let (_, text) = report(folder.path(), &format!("{i}.html"), &[&input.display().to_string()]);
+        let page = Html::parse_document(&text);
+        assert!(page.errors.is_empty(), "{}: {:?}", input.display(), page.errors);
+        assert_unique_ids(&page);
+        assert!(text.len() < 2_000_000 && !text.contains("NaN"), "{}", input.display());
+        let verdict = texts(&page, "main > p")
+            .into_iter()
+            .find(|p| p.starts_with("The scheme") || p.contains("locally"));
+        assert!(verdict.is_some_and(|v| !v.contains("DISAGREES")), "{}", input.display());
+        assert!(texts(&page, ".formulas code").is_empty(), "{}: a formula without MathML", input.display());
+    }
+}
+
 #[test]
 fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -106,12 +140,7 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
     // formulas are math, pictures are there without scripts, ids are unique, nothing is fetched
     assert!(texts(&page, "li math").len() >= 10);
     assert!(texts(&page, "figure svg").len() > 20);
-    let ids = Selector::parse("[id]").expect("a selector");
-    let mut ids: Vec<&str> = page.select(&ids).filter_map(|e| e.attr("id")).collect();
-    let count = ids.len();
-    ids.sort_unstable();
-    ids.dedup();
-    assert_eq!(ids.len(), count);
+    assert_unique_ids(&page);
     for fetched in ["src=\"http", "href=\"http", "@import", "url(http"] {
         assert!(!text.contains(fetched), "{fetched}");
     }

@@ -25,6 +25,11 @@ impl Failure {
         Self { message: format!("error: {message}"), code: INPUT }
     }
 
+    /// The user did not want to wait: the code that a shell gives a program ended by Ctrl-C.
+    pub(crate) fn interrupted() -> Self {
+        Self { message: "interrupted; nothing was written".into(), code: 130 }
+    }
+
     /// The program is wrong.
     pub(crate) fn internal(message: String) -> Self {
         Self { message: format!("internal error: {message}"), code: INTERNAL }

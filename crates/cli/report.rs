@@ -28,7 +28,7 @@ Examples:
 
 The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their
 pictures in the folder `figures` beside it. The same command writes the same bytes.
-Exit codes: 0 done, 2 bad input, 3 internal error.";
+Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FormatArgument {
@@ -118,7 +118,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     });
     let reviewed = reviewed.map_err(|e| match e {
         ReviewError::Simulation { name, error } => failure(error).in_file(&name),
-        ReviewError::Interrupted => Failure::input("interrupted; nothing was written".into()),
+        ReviewError::Interrupted => Failure::interrupted(),
         e => Failure::input(e.to_string()),
     })?;
     bar.says("writing");

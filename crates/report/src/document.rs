@@ -170,7 +170,11 @@ impl Document {
                     out.push_str(&format!("{gap}{hashes} {}\n\n{table}", markdown::escape(heading)));
                 }
                 Block::List { heading, lines } => {
-                    out.push_str(&format!("{gap}{hashes} {}\n\n", markdown::escape(heading)));
+                    if heading.is_empty() {
+                        out.push_str(gap);
+                    } else {
+                        out.push_str(&format!("{gap}{hashes} {}\n\n", markdown::escape(heading)));
+                    }
                     for line in lines {
                         out.push_str(&format!("- {}\n", markdown::escape(line)));
                     }
@@ -214,7 +218,9 @@ impl Document {
                     out.push_str(&latex::table(&columns, &header, cells));
                 }
                 Block::List { heading, lines } => {
-                    out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
+                    if !heading.is_empty() {
+                        out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
+                    }
                     if !lines.is_empty() {
                         out.push_str(&item(lines));
                     }

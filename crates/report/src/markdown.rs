@@ -18,7 +18,8 @@ pub(crate) fn escape(text: &str) -> String {
 
 /// A table.
 pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut out = format!("| {} |\n|{}\n", header.join(" | "), " --- |".repeat(header.len()));
+    let names: Vec<String> = header.iter().map(|h| escape(h)).collect();
+    let mut out = format!("| {} |\n|{}\n", names.join(" | "), " --- |".repeat(header.len()));
     for row in rows {
         out.push_str(&format!("| {} |\n", row.join(" | ")));
     }

@@ -70,7 +70,7 @@ fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
 fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usize, id: &str) {
     let a = &s.analysis;
     let coefficients: Vec<&Quantity> =
-        review.quantities.iter().filter(|q| q.name.starts_with("D_")).collect();
+        review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
     blocks.push(section(level, "Verdict"));
     blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
     blocks.push(Block::Text(verdict(s, review, &coefficients)));
@@ -99,24 +99,34 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usi
     blocks.push(list("", assumed));
 }
 
+/// `with derivatives up to order 2 (D_FY, D_IY)`: names where only some need as many.
+fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usize>)>) -> String {
+    let all: Vec<_> = all.collect();
+    let names: Vec<&str> = all.iter().filter(|q| q.1 == Some(worst)).map(|q| q.0).collect();
+    match (worst, names.len() == all.len()) {
+        (0, _) => "without any derivative".into(),
+        (k, true) => format!("with derivatives up to order {k}"),
+        (k, false) => format!("with derivatives up to order {k} ({})", names.join(", ")),
+    }
+}
+
 /// The verdict in two sentences: what is determined, and how well.
 fn verdict(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> String {
     let a = &s.analysis;
     let of = |status: Status| coefficients.iter().filter(move |q| q.status == status);
     let seen: Vec<&&Quantity> = of(Status::Observable).collect();
     let all = coefficients.len();
+    let what = match coefficients.first() {
+        Some(q) if q.name.starts_with("eps") => "components of the drift",
+        _ => "gyro coefficients",
+    };
     let mut first = match (seen.len(), all) {
-        (_, 0) => format!("The scheme determines {} of {} unknowns", a.rank, a.unknowns.len()),
-        (n, all) if n == all => format!("The scheme determines every one of the {all} gyro coefficients"),
-        (n, all) => format!("The scheme determines {n} of the {all} gyro coefficients"),
+        (n, all) if n == all => format!("The scheme determines every one of the {all} {what}"),
+        (n, all) => format!("The scheme determines {n} of the {all} {what}"),
     };
     if let Some(worst) = seen.iter().filter_map(|q| q.degree).max() {
-        let names = joined(seen.iter().filter(|q| q.degree == Some(worst)).map(|q| q.name.as_str()));
-        let derivatives = match worst {
-            0 => "without any derivative".to_string(),
-            k => format!("with derivatives up to order {k} ({names})"),
-        };
-        first.push_str(&format!(", {derivatives}"));
+        first
+            .push_str(&format!(", {}", derivatives(worst, seen.iter().map(|q| (q.name.as_str(), q.degree)))));
     }
     let partners = |q: &&&Quantity| {
         let verdict = a.quantities.iter().find(|v| v.name == q.name);
@@ -138,7 +148,7 @@ fn verdict(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> Str
         .map(|q| q.name.as_str())
         .collect();
     let accuracy = worst.map_or_else(
-        || "No coefficient has a finite predicted sigma".to_string(),
+        || "None of them has a finite predicted sigma".to_string(),
         |(q, sigma)| {
             format!(
                 "The largest predicted sigma of those is {} {} ({}) after {} s",
@@ -236,9 +246,10 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
         blocks.push(Block::Formulas { heading: "Directions that Z does not see".into(), lines: formulas });
     }
     let combination = |c: &obsdeg_core::analysis::CombinationReport| {
+        let asked = if c.requested { ", asked for" } else { "" };
         let verdict = match c.degree {
-            Some(k) => format!("degree {k}"),
-            None => c.status.to_string(),
+            Some(k) => format!("degree {k}{asked}"),
+            None => format!("{}{asked}", c.status),
         };
         Formula {
             text: format!("{}: {verdict}", c.expression),
@@ -247,7 +258,7 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
     };
     if !a.combinations.is_empty() {
         let lines = a.combinations.iter().map(combination).collect();
-        blocks.push(Block::Formulas { heading: "What stays observable of them".into(), lines });
+        blocks.push(Block::Formulas { heading: "Observable combinations".into(), lines });
     }
 }
 
@@ -299,7 +310,7 @@ fn positions(
         rows: rows.collect(),
     });
     blocks.push(pictures::attitudes(s, &format!("{id}_attitude")));
-    if !coefficients.is_empty() {
+    if coefficients.iter().any(|q| !q.excitation.is_empty()) {
         blocks.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));
     }
 }
@@ -446,14 +457,9 @@ fn model_verdict(m: &ModelReview) -> String {
     let a = &m.analysis;
     let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Status::Observable).collect();
     let worst = seen.iter().filter_map(|q| q.degree).max();
-    let derivatives = match worst {
-        None => String::new(),
-        Some(0) => ", without any derivative".into(),
-        Some(k) => {
-            let names = joined(seen.iter().filter(|q| q.degree == Some(k)).map(|q| q.name.as_str()));
-            format!(", with derivatives up to order {k} ({names})")
-        }
-    };
+    let derivatives = worst.map_or_else(String::new, |k| {
+        format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
+    });
     let lost = match a.unobservable_directions {
         0 => "nothing is lost".to_string(),
         1 => "one direction changes no output".into(),

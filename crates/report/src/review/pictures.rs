@@ -48,7 +48,7 @@ fn stairs(profile: &[usize], unknowns: usize) -> Figure {
     }
     Figure {
         title: "Degree staircase".into(),
-        x_label: "order of derivatives (a step begins at its order)".into(),
+        x_label: "order of derivatives".into(),
         y_label: "rank".into(),
         lines: vec![
             line("rank", BLUE, Stroke::Solid, points),
@@ -254,7 +254,7 @@ pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
             y_range: Some((-half, half)),
             ..Figure::default()
         };
-        let name = format!("{id}_error_{}", file_name(&traces.names[i]));
+        let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
         curves(&name, format!("Error of the estimate of {} with +-3 sigma", traces.names[i]), figure)
     };
     (0..traces.names.len().min(ERRORS)).map(of).collect()
