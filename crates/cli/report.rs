@@ -41,7 +41,7 @@ enum FormatArgument {
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
-    /// Scheme files and model files (TOML)
+    /// Scheme files (TOML) and model files (TOML, or JSON)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 
@@ -96,7 +96,8 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut models: Vec<SystemModel> = Vec::new();
     for path in &a.files {
-        if model_file::is_model(&read_text(path, "scheme or model")?) {
+        let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        if is_json || model_file::is_model(&read_text(path, "scheme or model")?) {
             models.push(read_model(path)?);
             continue;
         }
