@@ -29,6 +29,9 @@ fn sequence(rest: &mut &str) -> String {
     let mut out = String::new();
     while let Some(c) = rest.chars().next().filter(|c| *c != '}') {
         let atom = atom(rest);
+        if atom.is_empty() {
+            continue;
+        }
         // what touches stays together: a prime, an index, an exponent
         let joins = matches!(c, '_' | '^' | '\'');
         if !out.is_empty() && !joins {
