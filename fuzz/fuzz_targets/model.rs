@@ -11,7 +11,7 @@ fuzz_target!(|data: &[u8]| {
         if let Ok(model) = read {
             // small systems only: time is not what is looked for
             if model.states.len() + model.parameters.len() <= 12 {
-                let _ = analyze_system(&model, 1, Some(6));
+                let _ = analyze_system(&model, 1, Some(6), None);
             }
         }
     }
