@@ -7,11 +7,12 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::{AnalysisError, Options, analyze};
 use obsdeg_core::solution::solver::Frame;
-use obsdeg_core::system::{analyze_system, json, model_file};
+use obsdeg_core::system::analyze_system;
 use obsdeg_symbolic::{Worker, WorkerConfig};
 
-use crate::arguments::{OutputArguments, SchemeArguments, read_text};
+use crate::arguments::{OutputArguments, SchemeArguments};
 use crate::failure::Failure;
+use crate::model::ModelFile;
 use crate::progress::Spinner;
 use crate::{lock, output};
 
@@ -121,21 +122,13 @@ pub(crate) fn notice(worker: Option<&Worker>, quiet: bool) {
 
 /// A model file.
 fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let name = path.display().to_string();
-    let text = read_text(path, "model")?;
-    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let read = if json { json::read(&text) } else { model_file::read(&text) };
-    let spinner = Spinner::start("judging the model", a.output.quiet);
+    let file = ModelFile::read(path)?;
     let mut worker = worker(a.symbolic_limit)?;
-    let analysed = read.and_then(|model| {
-        let engine = (a.solutions == Switch::On).then_some(worker.as_mut());
-        analyze_system(&model, a.seed, a.order.map(Into::into), engine)
-    });
+    let spinner = Spinner::start("judging the model", a.output.quiet);
+    let engine = (a.solutions == Switch::On).then_some(worker.as_mut());
+    let analysed = analyze_system(&file.model, a.seed, a.order.map(Into::into), engine);
     drop(spinner);
-    let analysis = analysed.map_err(|e| match e.span.clone() {
-        Some(span) if !json => Failure::at(&e.to_string(), &name, &text, span),
-        _ => Failure::input(format!("{name}: {e}")),
-    })?;
+    let analysis = analysed.map_err(|e| file.wrong(&e))?;
     notice(worker.as_ref(), a.output.quiet);
     let text = obsdeg_report::system(&analysis, a.output.format, output::layout(&a.output))
         .map_err(|e| Failure::internal(e.to_string()))?;

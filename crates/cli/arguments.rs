@@ -7,7 +7,6 @@ use obsdeg_core::model::attitude::Euler;
 use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns, scheme_file};
-use obsdeg_core::system::{ModelError, SystemModel, json, model_file};
 use obsdeg_report::Format;
 
 use crate::failure::Failure;
@@ -122,19 +121,6 @@ pub(crate) fn read_scheme(path: &Path) -> Result<Scheme, Failure> {
         Some(span) => Failure::at(&e.message, &name, &text, span),
         None => Failure::input(format!("{name}: {}", e.message)),
     })
-}
-
-/// The model of a file, compiled once to see that it is one.
-pub(crate) fn read_model(path: &Path) -> Result<SystemModel, Failure> {
-    let (name, text) = (path.display().to_string(), read_text(path, "model")?);
-    let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let wrong = |e: ModelError| match e.span.clone() {
-        Some(span) if !is_json => Failure::at(&e.to_string(), &name, &text, span),
-        _ => Failure::input(format!("{name}: {e}")),
-    };
-    let model = if is_json { json::read(&text) } else { model_file::read(&text) }.map_err(wrong)?;
-    model.compile().map_err(wrong)?;
-    Ok(model)
 }
 
 /// Where and how results are written.

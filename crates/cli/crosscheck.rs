@@ -14,9 +14,10 @@ use crate::arguments::{FolderArguments, SchemeArguments};
 use crate::conditions::ConditionArguments;
 use crate::failure::{CHECK, Failure};
 use crate::interrupt;
+use crate::model::ModelFile;
 use crate::output;
 use crate::progress::Bar;
-use crate::simulate::{failure, with_model};
+use crate::simulate::failure;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -100,7 +101,8 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
 
 /// A model file.
 fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let evidence = with_model(path, |model| crosscheck_system(model, a.seed))?;
+    let file = ModelFile::read(path)?;
+    let evidence = crosscheck_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
     let internal = |e: obsdeg_report::ReportError| Failure::internal(e.to_string());
     let text =
         obsdeg_report::system_evidence(&evidence, a.output.format, output::terminal()).map_err(internal)?;

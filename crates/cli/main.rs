@@ -11,6 +11,7 @@ mod design;
 mod failure;
 mod interrupt;
 mod lock;
+mod model;
 mod output;
 mod paper;
 mod progress;

@@ -12,9 +12,10 @@ use obsdeg_core::system::{SystemModel, model_file};
 use obsdeg_report::{PICTURES, ReviewFormat};
 
 use crate::analyze::{notice, worker};
-use crate::arguments::{read_model, read_scheme, read_text};
+use crate::arguments::{read_scheme, read_text};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
+use crate::model::{ModelFile, is_json};
 use crate::progress::Bar;
 use crate::simulate::failure;
 use crate::{interrupt, output};
@@ -94,11 +95,10 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         output::check_emptiness(&parent.join(PICTURES), a.force)?;
     }
     let mut entries: Vec<Entry> = Vec::new();
-    let mut models: Vec<SystemModel> = Vec::new();
+    let mut files: Vec<ModelFile> = Vec::new();
     for path in &a.files {
-        let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        if is_json || model_file::is_model(&read_text(path, "scheme or model")?) {
-            models.push(read_model(path)?);
+        if is_json(path) || model_file::is_model(&read_text(path, "scheme or model")?) {
+            files.push(ModelFile::read(path)?);
             continue;
         }
         let mut scheme = read_scheme(path)?;
@@ -108,6 +108,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         let name = if scheme.name.is_empty() { output::name(path) } else { scheme.name.clone() };
         entries.push(Entry { name, scheme, conditions });
     }
+    let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
     let mut worker = worker(a.symbolic_limit)?;
     let interrupted = interrupt::flag()?;
     let bar = Bar::start(1000, "", a.quiet);
@@ -120,15 +121,16 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let reviewed = reviewed.map_err(|e| match e {
         ReviewError::Simulation { name, error } => failure(error).in_file(&name),
         ReviewError::Interrupted => Failure::interrupted(),
-        e => Failure::input(e.to_string()),
+        ReviewError::Model { model, error } => files[model].wrong(&error),
+        e @ ReviewError::Analysis { .. } => Failure::input(e.to_string()),
     })?;
     bar.says("writing");
-    let files = obsdeg_report::review(&reviewed, format).map_err(|e| match e {
+    let written = obsdeg_report::review(&reviewed, format).map_err(|e| match e {
         obsdeg_report::ReportError::NoPdf => Failure::input(e.to_string()),
         e => Failure::internal(e.to_string()),
     })?;
     notice(worker.as_ref(), a.quiet);
-    output::write_review(&a.output, &parent.join(PICTURES), &files)?;
+    output::write_review(&a.output, &parent.join(PICTURES), &written)?;
     Ok(ExitCode::SUCCESS)
 }
 

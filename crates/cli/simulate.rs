@@ -7,13 +7,13 @@ use clap::Args;
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::prediction::PredictionError;
 use obsdeg_core::simulation::{SimulationError, Traces, simulate};
-use obsdeg_core::system::run::RunError;
-use obsdeg_core::system::{ModelError, SystemModel, model_file, simulate_system};
+use obsdeg_core::system::simulate_system;
 use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
 
-use crate::arguments::{FolderArguments, SchemeArguments, read_text};
+use crate::arguments::{FolderArguments, SchemeArguments};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
+use crate::model::ModelFile;
 use crate::output;
 use crate::progress::Spinner;
 
@@ -70,26 +70,10 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What is made of a model file.
-pub(crate) fn with_model<T>(
-    path: &Path,
-    work: impl FnOnce(&SystemModel) -> Result<T, RunError>,
-) -> Result<T, Failure> {
-    let (name, text) = (path.display().to_string(), read_text(path, "model")?);
-    let wrong = |e: ModelError| match e.span.clone() {
-        Some(span) => Failure::at(&e.to_string(), &name, &text, span),
-        None => Failure::input(format!("{name}: {e}")),
-    };
-    let model = model_file::read(&text).map_err(wrong)?;
-    work(&model).map_err(|e| match e {
-        RunError::Model(e) => wrong(e),
-        RunError::Filter { .. } => Failure::input(format!("{name}: {e}")),
-    })
-}
-
 /// A model file.
 fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let (run, traces) = with_model(path, |model| simulate_system(model, a.seed))?;
+    let file = ModelFile::read(path)?;
+    let (run, traces) = simulate_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
     let text = obsdeg_report::system_run(&run, a.output.format, output::terminal())
         .map_err(|e| Failure::internal(e.to_string()))?;
     if a.output.output.is_some() {

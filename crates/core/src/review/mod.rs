@@ -56,10 +56,10 @@ pub enum ReviewError {
         error: SimulationError,
     },
     /// A model.
-    #[error("{name}: {error}")]
+    #[error("model {}: {error}", model + 1)]
     Model {
-        /// The model.
-        name: String,
+        /// Its index.
+        model: usize,
         /// What is wrong.
         error: ModelError,
     },
@@ -92,7 +92,8 @@ pub fn review(
     let mut out = Vec::new();
     for (i, model) in models.iter().enumerate() {
         step(entries.len() + i, 0.0, &model.name)?;
-        out.push(self::model(model, options.seed, worker.as_deref_mut())?);
+        let part = self::model(model, options.seed, worker.as_deref_mut());
+        out.push(part.map_err(|error| ReviewError::Model { model: i, error })?);
     }
     let comparison =
         compare(entries, options.seed).map_err(|(name, error)| ReviewError::Simulation { name, error })?;
@@ -290,14 +291,13 @@ fn alternatives(
 }
 
 /// A model with its run and its evidence, where it has the numbers for them.
-fn model(model: &SystemModel, seed: u64, worker: Option<&mut Worker>) -> Result<ModelReview, ReviewError> {
-    let failed = |error: ModelError| ReviewError::Model { name: model.name.clone(), error };
-    let analysis = analyze_system(model, seed, None, Some(worker)).map_err(failed)?;
+fn model(model: &SystemModel, seed: u64, worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
+    let analysis = analyze_system(model, seed, None, Some(worker))?;
     let mut note = None;
     let run = simulate_system(model, seed);
     let evidence = run.as_ref().ok().map(|_| crosscheck_system(model, seed));
     let mut unless_wrong = |e: RunError| match e {
-        RunError::Model(error) if model.simulation.duration.is_some() => Err(failed(error)),
+        RunError::Model(error) if model.simulation.duration.is_some() => Err(error),
         e => {
             note = Some(format!("no run or no evidence: {e}"));
             Ok(())
