@@ -7,8 +7,8 @@ use obsdeg_core::system::evidence::{SystemEvidence, SystemQuantityEvidence};
 use obsdeg_core::system::run::{SystemEstimate, SystemRun};
 use obsdeg_core::system::symmetry::POLYNOMIAL_DEGREE;
 
-use crate::document::{Block, Document, number};
-use crate::words;
+use crate::document::{Block, Document, Formula, number};
+use crate::{latex, words};
 
 /// Longest solving expression that a reader is shown.
 const READABLE: usize = 240;
@@ -74,14 +74,19 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
     let mut blocks = vec![Block::Table { heading: "Verdicts".into(), header, numbers, rows: rows.collect() }];
     let solved = order.iter().filter_map(|q| {
         let solution = q.solution.as_ref()?;
-        Some(match solution.len() {
-            0..=READABLE => format!("{} = {solution}", q.name),
-            long => format!("{} = a fraction of {long} characters (--format json holds it)", q.name),
-        })
+        let (text, latex) = match solution.len() {
+            0..=READABLE => (solution.clone(), latex::expression(solution)),
+            long => {
+                let text = format!("a fraction of {long} characters (--format json holds it)");
+                (text.clone(), format!("\\text{{{text}}}"))
+            }
+        };
+        let latex = format!("{} = {latex}", latex::expression(&q.name));
+        Some(Formula { text: format!("{} = {text}", q.name), latex })
     });
-    let solved: Vec<String> = solved.collect();
-    if !solved.is_empty() {
-        blocks.push(list("Solved by", solved));
+    let lines: Vec<Formula> = solved.collect();
+    if !lines.is_empty() {
+        blocks.push(Block::Formulas { heading: "Solved by".into(), lines });
     }
     if !a.combinations.is_empty() {
         blocks.push(combinations("Combinations asked for", &a.combinations));

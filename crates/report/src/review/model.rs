@@ -3,9 +3,9 @@
 use obsdeg_core::analysis::Status;
 use obsdeg_core::review::ModelReview;
 
-use super::{derivatives, is_list, list, pictures, section};
-use crate::document::{Block, Formula};
-use crate::{latex, system};
+use super::{derivatives, is_list, pictures, section};
+use crate::document::Block;
+use crate::system;
 
 /// The verdict on a model in two sentences.
 fn verdict(m: &ModelReview) -> String {
@@ -40,20 +40,7 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
     blocks.extend((!a.description.is_empty()).then(|| Block::Text(a.description.clone())));
     blocks.push(Block::Text(verdict(m)));
     blocks.push(section(level, "Unknowns and equations"));
-    for block in document.blocks {
-        match block {
-            Block::List { heading, lines } if heading == "Solved by" => {
-                let formula = |text: String| Formula { latex: latex::expression(&text), text };
-                let (long, short) = lines.into_iter().partition(|l: &String| l.contains("a fraction of"));
-                let short: Vec<String> = short;
-                let lines = short.into_iter().map(formula).collect();
-                blocks.push(Block::Formulas { heading: heading.clone(), lines });
-                let long: Vec<String> = long;
-                blocks.extend((!long.is_empty()).then(|| list("", long)));
-            }
-            other => blocks.push(other),
-        }
-    }
+    blocks.extend(document.blocks);
     blocks.push(pictures::model_staircase(a, &format!("{id}_staircase")));
     blocks.push(section(level, "Evidence by a filter"));
     blocks.extend(m.note.iter().map(|n| Block::Text(format!("{n}."))));
