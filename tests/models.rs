@@ -13,15 +13,11 @@ use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{Measurement, Process};
 use serde_json::Value;
 
-/// The reference models, where they are beside the checkout.
-#[expect(clippy::print_stderr, reason = "a skipped test says so")]
-fn models() -> Option<Vec<(String, Value, String)>> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/models");
-    let Ok(entries) = std::fs::read_dir(&folder) else {
-        eprintln!("skipped: no reference models at ../shared/models");
-        return None;
-    };
-    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+/// The reference models: name, JSON, text.
+fn models() -> Vec<(String, Value, String)> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "json"));
     files.sort();
     let read = |file: PathBuf| {
@@ -29,7 +25,7 @@ fn models() -> Option<Vec<(String, Value, String)>> {
         let name = file.file_stem().expect("a name").to_string_lossy().into_owned();
         (name, serde_json::from_str(&text).expect("JSON"), text)
     };
-    Some(files.into_iter().map(read).collect())
+    files.into_iter().map(read).collect()
 }
 
 fn names(value: &Value) -> Vec<String> {
@@ -97,8 +93,8 @@ fn mismatches(reference: &Value, text: &str) -> Vec<String> {
 
 #[test]
 fn every_reference_verdict_and_order() {
-    let Some(models) = models() else { return };
-    assert!(models.len() >= 141, "{} models", models.len());
+    let models = models();
+    assert_eq!(models.len(), 141);
     let mut table = Vec::new();
     for (name, reference, text) in &models {
         table.extend(mismatches(reference, text).into_iter().map(|m| format!("{name}: {m}")));

@@ -11,16 +11,16 @@ fn main() {
 }
 
 fn folder() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models")
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/models")
 }
 
-/// The reference models; none when they are not beside the checkout.
+/// The reference models.
 fn references() -> Vec<String> {
-    let Ok(entries) = std::fs::read_dir(folder()) else { return Vec::new() };
-    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    let entries = std::fs::read_dir(folder()).expect("the reference models");
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "json"));
     files.sort();
-    files.iter().filter_map(|f| std::fs::read_to_string(f).ok()).collect()
+    files.iter().map(|f| std::fs::read_to_string(f).expect("readable")).collect()
 }
 
 /// All 141, read, compiled and judged in two fields.
@@ -38,7 +38,7 @@ fn all_references(bencher: Bencher<'_, '_>) {
 /// MAPK (34 unknowns), the rail vehicle (89 unknowns), the largest others.
 #[divan::bench(args = ["mapk_5out", "mapk_6out", "rail_vehicle_27dof_jothi2016", "jak_stat_bachmann", "ovarian_follicle", "tumor_hu2019"])]
 fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
-    let Ok(text) = std::fs::read_to_string(folder().join(format!("{name}.json"))) else { return };
+    let text = std::fs::read_to_string(folder().join(format!("{name}.json"))).expect("readable");
     let model = json::read(&text).expect("a model");
     bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").degrees.rank());
 }
