@@ -1,5 +1,6 @@
 //! Laws that hold for every scheme, on random ones.
 
+use obsdeg_core::analysis::{AnalysisError, Options, Status, analyze};
 use obsdeg_core::degree::ensemble::{judge, staircase};
 use obsdeg_core::degree::rows::DerivativeRows;
 use obsdeg_core::degree::staircase::{Degrees, climb};
@@ -154,4 +155,38 @@ fn four_hundred_positions_and_duplicates_are_fine() {
     let list: Vec<Attitude> = (0..400).map(|i| (i * 7 % 360, i * 13 % 360, i / 2 * 31 % 360)).collect();
     let (_, d) = judged(scheme(&list, Carry::Platform));
     assert_eq!(d.rank(), 15);
+}
+
+/// Primes are printed, so anybody can write a combination that they divide: it has other primes, and is not taken for nothing.
+/// D_FZ is not told from psi_y.
+#[test]
+fn nobody_aims_at_the_primes_of_a_scheme() {
+    let with = |combination: &str| {
+        let mut scheme = scheme(&[(0, 0, 0), (180, 0, 0)], Carry::Platform);
+        scheme.combinations.push(combination.into());
+        scheme
+    };
+    let asked = |text: &str| {
+        let answer = analyze(&with(text), Options { solutions: false, ..Options::default() }, None)?;
+        let requested = answer.combinations.into_iter().find(|c| c.requested);
+        Ok::<_, AnalysisError>(requested.map(|c| (c.status, c.degree)))
+    };
+    assert_eq!(asked("D_FZ").expect("analysed"), Some((Status::Inseparable, None)));
+    let (mut factors, mut seen) = (String::new(), Vec::new());
+    for _ in 0..3 {
+        let text = format!("{factors}D_FZ");
+        if let Ok(judged) = asked(&text) {
+            assert_eq!(judged, Some((Status::Inseparable, None)), "{text}");
+        }
+        let judged = judge(&Platform::new(with(&text)).expect("valid"), 1).expect("judged");
+        for p in judged.values.map(|v| v.roots().field.modulus()) {
+            factors = format!("{factors}{p}*");
+            seen.push(p);
+        }
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), 6);
+    // what is linear at a point that was fixed
+    assert!(asked("D_FX + D_FX*(D_FX - 1)*(D_FX - 1071274)").is_err());
 }

@@ -472,3 +472,60 @@ fn directions_that_are_polynomials() {
     let tilt = read("v = \"9.81*phi + b\"\nphi = \"0\"\nb = \"0\"", "", "v");
     assert_eq!(tilt, ["add c to phi; subtract 981/100 c from b"]);
 }
+
+/// Primes are printed, so anybody can write a model in which they divide a factor: that model has other primes.
+#[test]
+fn nobody_aims_at_the_primes() {
+    // those of seed 1, when they did not depend on the input
+    let mut product = "1806122528306898383*1665232801720708243".to_string();
+    let mut seen: Vec<u64> = Vec::new();
+    for _ in 0..4 {
+        let text = format!("name='aimed'\n[states]\nx='-x'\n[outputs]\nz='x*{product}'");
+        let judged = judge(&model_file::read(&text).expect("a model"), 1, None).expect("judged");
+        assert_eq!((judged.degrees.rank(), degree_of(&judged, "x")), (1, Some(0)), "{product}");
+        let [p, q] = judged.fields.map(|f| f.modulus());
+        seen.extend([p, q]);
+        product = format!("{product}*{p}*{q}");
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), 8);
+}
+
+/// Whatever moves a verdict takes part in the choice of primes, nothing else does.
+#[test]
+fn the_input_chooses_the_primes() {
+    let first = |text: &str| {
+        let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+        model.random(1, "verdicts").next_u64()
+    };
+    let plain = "name='m'\nparameters=['a', 'b']\nknown_inputs={u='generic'}\nunknown_inputs={w='arbitrary'}\n[constants]\nc=2\n\
+                 [states]\nx='-a*x + u'\ny={equation='c*x + w', initial=1}\n[outputs]\nz='b*y'\n";
+    let words = plain.replace("name='m'", "name='another'\ndescription='words'");
+    assert_eq!(first(plain), first(&words));
+    let mut seen = vec![first(plain)];
+    for (old, new) in [
+        ("-a*x", "-2*a*x"),
+        ("z='b*y'", "q='b*y'"),
+        ("z='b*y'", "z='b*y'\nq='x'"),
+        ("u='generic'", "u='constant'"),
+        ("u='generic'", "u={function='t'}"),
+        ("w='arbitrary'", "w={polynomial=1}"),
+        ("initial=1", "initial=2"),
+        (", initial=1", ""),
+        ("c=2", "c=3"),
+        ("name='m'", "name='m'\nexperiments=2"),
+        ("name='m'", "name='m'\ncombinations=['a*b']"),
+        ("[states]", "[definitions]\nd='a'\n[states]"),
+        ("z='b*y'\n", "z='b*y'\n[[segment]]\n[[segment]]\n"),
+        ("z='b*y'\n", "z='b*y'\n[[segment]]\n[[segment]]\nconstants={c=5}\n"),
+        ("z='b*y'\n", "z='b*y'\n[[segment]]\n[[segment]]\ncarry={x='x + 1'}\n"),
+    ] {
+        assert!(plain.contains(old));
+        seen.push(first(&plain.replace(old, new)));
+    }
+    let all = seen.len();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), all);
+}

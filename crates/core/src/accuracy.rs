@@ -60,8 +60,8 @@ impl Accuracy {
             return Err(AccuracyError::Rotation);
         }
         let dwells = dwell_ratios(scheme);
-        let mut rng = SplitMix64::new(seed ^ 0x00d0_3e11_00d0_3e11);
         let [first, second] = [0, 1].map(|i| {
+            let mut rng = scheme.random(seed, &format!("accuracy orders, field {i}"));
             let sample = verdicts.values[i].sample(scheme, 1);
             let module = module(platform, &sample, &dwells, &mut rng)?;
             let one = sample.point.ring.one();

@@ -73,7 +73,7 @@ impl Prediction {
     /// [`PredictionError`].
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
         let verdicts = judge(platform, seed).map_err(AnalysisError::from)?;
-        let requested = requested_combinations(platform, &verdicts)?;
+        let requested = requested_combinations(platform, &verdicts, seed)?;
         let accuracy = match Accuracy::new(platform, &verdicts, seed) {
             Err(AccuracyError::Rotation) => None,
             other => Some(other?),

@@ -26,6 +26,9 @@ pub struct Claim {
 ///   `unknowns * row_bits / 60` over the number of primes `p = 1 mod n` of 61 bits, taken by their
 ///   density `2^60 / (phi(n) ln 2^61)`.
 ///
+/// Primes and points are random to whoever wrote the input, since a hash of the input chooses them ([`crate::SplitMix64::of`]); every
+/// field has a stream of its own.
+///
 /// ```
 /// use obsdeg_exact::certainty::{Claim, error_bound};
 /// let claim = Claim { unknowns: 15, decisions: 48, order: 24, row_degree: 4, row_bits: 12.0 };

@@ -79,7 +79,7 @@ pub fn analyze(
 ) -> Result<Analysis, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
     let verdicts = judge(&platform, options.seed)?;
-    let requested = requested_combinations(&platform, &verdicts)?;
+    let requested = requested_combinations(&platform, &verdicts, options.seed)?;
     let built = worker.is_some();
     let worker = worker.filter(|_| options.solutions || options.formulas);
     let mut solver = Solver::new(&platform, &verdicts, options.seed, options.frame, worker);

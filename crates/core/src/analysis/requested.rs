@@ -1,5 +1,7 @@
 //! Combinations that a scheme asks for: read, checked to be linear, judged.
 
+use obsdeg_exact::SplitMix64;
+
 use super::{AnalysisError, Status, Verdict};
 use crate::degree::coefficient::{Coefficient, Image, Number, rates_between, recover_radical};
 use crate::degree::ensemble::Verdicts;
@@ -31,8 +33,13 @@ impl Environment for Unit<'_> {
     }
 }
 
-/// The coefficients of a linear expression at one sample, or why it is not linear.
-fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<Vec<u64>, ExpressionError> {
+/// The coefficients of a linear expression at one sample, or why it is not linear: then it is not the sum of its parts at a random point.
+fn row_of(
+    expression: &Expression,
+    names: &[String],
+    sample: &Sample,
+    rng: &mut SplitMix64,
+) -> Result<Vec<u64>, ExpressionError> {
     let f = sample.roots.field;
     let rates = [sample.point.w_n, sample.point.w_u];
     let at = |values: &[u64]| evaluate(expression, &f, &Unit { names, values, rates });
@@ -40,7 +47,7 @@ fn row_of(expression: &Expression, names: &[String], sample: &Sample) -> Result<
     let unit =
         |c: usize| -> Vec<u64> { (0..names.len()).map(|j| if j == c { f.one() } else { 0 }).collect() };
     let row: Vec<u64> = (0..names.len()).map(|c| at(&unit(c))).collect::<Result<_, _>>()?;
-    let probe: Vec<u64> = (0..names.len() as u64).map(|c| f.from_u64(1_000_003 + 7919 * c * c)).collect();
+    let probe: Vec<u64> = names.iter().map(|_| rng.below(f.modulus())).collect();
     let linear = at(&zero)? == 0 && at(&probe)? == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
     if !linear {
         return Err(ExpressionError::Syntax {
@@ -64,12 +71,14 @@ pub(crate) struct Requested {
     pub(crate) verdict: Verdict,
 }
 
-/// Reads and judges the combinations that a scheme asks for.
+/// Reads and judges the combinations that a scheme asks for; the seed chooses the points at which they are looked at.
 pub(crate) fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
+    seed: u64,
 ) -> Result<Vec<Requested>, AnalysisError> {
     let scheme = platform.scheme();
+    let mut rng = scheme.random(seed, "combinations asked for");
     let names = platform.names();
     scheme
         .combinations
@@ -82,7 +91,7 @@ pub(crate) fn requested_combinations(
             };
             let parsed = parse(text).map_err(wrap)?;
             let sample = verdicts.values[0].sample(scheme, 1);
-            let row = row_of(&parsed, names, &sample).map_err(wrap)?;
+            let row = row_of(&parsed, names, &sample, &mut rng).map_err(wrap)?;
             let degree = verdicts.stairs.iter().position(|v| v.contains(&row));
             let moved = (0..names.len()).any(|c| row[c] != 0 && verdicts.degrees.excited[c]);
             let status = match degree {
@@ -90,7 +99,7 @@ pub(crate) fn requested_combinations(
                 None if moved => Status::Inseparable,
                 None => Status::NotExcited,
             };
-            let terms = terms_of(&parsed, platform, verdicts).map_err(wrap)?;
+            let terms = terms_of(&parsed, platform, verdicts, &mut rng).map_err(wrap)?;
             Ok(Requested { text: text.clone(), row, terms, verdict: Verdict { status, degree } })
         })
         .collect()
@@ -101,23 +110,22 @@ fn terms_of(
     parsed: &Expression,
     platform: &Platform,
     verdicts: &Verdicts,
+    rng: &mut SplitMix64,
 ) -> Result<Sparse, ExpressionError> {
     let scheme = platform.scheme();
     let names = platform.names();
-    let at = |field: usize, a: u64, rates: Option<[u64; 2]>| {
-        let mut sample = verdicts.values[field].sample(scheme, a);
-        if let Some([w_n, w_u]) = rates {
-            (sample.point.w_n, sample.point.w_u) = (w_n, w_u);
-        }
-        let rates = [sample.point.w_n, sample.point.w_u];
-        row_of(parsed, names, &sample).map(|row| (row, rates, sample.roots.field))
-    };
     let fields = [*verdicts.values[0].roots(), *verdicts.values[1].roots()];
     let f = fields[0].field;
-    let pairs = [[f.from_u64(1009), f.from_u64(2003)], [f.from_u64(3001), f.from_u64(4001)]];
-    let first = at(0, 1, Some(pairs[0]))?;
-    let second = at(0, 1, Some(pairs[1]))?;
-    let ones = [0, 1].map(|i| at(i, 1, Some([fields[i].field.one(); 2])));
+    let mut nonzero = || 1 + rng.below(f.modulus() - 1);
+    let [one, other] = [[nonzero(), nonzero()], [nonzero(), nonzero()]];
+    let mut at = |field: usize, rates: [u64; 2]| {
+        let mut sample = verdicts.values[field].sample(scheme, 1);
+        [sample.point.w_n, sample.point.w_u] = rates;
+        row_of(parsed, names, &sample, rng).map(|row| (row, rates))
+    };
+    let first = at(0, one)?;
+    let second = at(0, other)?;
+    let ones = [0, 1].map(|i| at(i, [fields[i].field.one(); 2]));
     let [one_a, one_b] = ones;
     let (one_a, one_b) = (one_a?, one_b?);
     let unsupported = || ExpressionError::Syntax {

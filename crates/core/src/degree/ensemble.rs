@@ -2,7 +2,7 @@
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::radical::embeddings;
-use obsdeg_exact::{Echelon, PrimeError, RootField, SplitMix64};
+use obsdeg_exact::{Echelon, PrimeError, RootField};
 
 use super::platform_rows::PlatformRows;
 use super::staircase::{Degrees, climb};
@@ -39,15 +39,18 @@ pub struct Verdicts {
     pub error_bound: f64,
 }
 
-/// Judges `platform` in two random fields of the stream of `seed`.
+/// Judges `platform` in two random fields, each of a stream of its own of `seed` and the scheme.
 ///
 /// # Errors
 /// [`EnsembleError`].
 pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> {
     let scheme = platform.scheme();
-    let mut rng = SplitMix64::new(seed);
-    for _ in 0..ATTEMPTS {
-        let values = [RandomValues::draw(scheme, &mut rng)?, RandomValues::draw(scheme, &mut rng)?];
+    for attempt in 0..ATTEMPTS {
+        let draw = |field: usize| {
+            let mut rng = scheme.random(seed, &format!("verdicts, attempt {attempt}, field {field}"));
+            RandomValues::draw(scheme, &mut rng)
+        };
+        let values = [draw(0)?, draw(1)?];
         let (degrees, stairs) = staircase(platform, &values[0].sample(scheme, 1));
         let (second, _) = staircase(platform, &values[1].sample(scheme, 1));
         if degrees == second {
@@ -119,7 +122,7 @@ impl Tables {
         let scheme = platform.scheme();
         let zeros = RateZeros::of(platform);
         let observables = local_observables(zeros, scheme.measured_azimuth);
-        let mut rng = SplitMix64::new(seed ^ 0x5a5a_5a5a_5a5a_5a5a);
+        let mut rng = scheme.random(seed, "other rates");
         let mut rates = |roots: &RootField| {
             let p = roots.field.modulus();
             let mut draw = |zero: bool| if zero { 0 } else { 1 + rng.below(p - 1) };

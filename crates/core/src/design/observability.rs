@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use obsdeg_exact::{Echelon, Field, SplitMix64};
+use obsdeg_exact::{Echelon, Field};
 use rayon::prelude::*;
 
 use super::DesignError;
@@ -85,7 +85,7 @@ impl Rows {
         }
         // the bound of two fields is the square of that of one
         let miss = verdicts.error_bound.sqrt();
-        let mut rng = SplitMix64::new(seed ^ 0x5e75_0f5e_75ca_4d1d);
+        let mut rng = platform.scheme().random(seed, "keys of sets");
         Ok(Self {
             field: f,
             columns: n - first,

@@ -2,6 +2,7 @@
 
 pub mod angle;
 pub mod attitude;
+mod canonical;
 pub mod dwell;
 pub mod expression;
 pub mod geometry;

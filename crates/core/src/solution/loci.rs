@@ -91,7 +91,7 @@ pub fn loci(
             seen.push(factor);
         }
     }
-    let mut rng = SplitMix64::new(seed ^ 0x10c1);
+    let mut rng = platform.scheme().random(seed, "degenerate angles");
     let mut out: Vec<Locus> = Vec::new();
     for condition in conditions {
         let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else { continue };

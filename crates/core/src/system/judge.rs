@@ -78,7 +78,7 @@ fn singular(compiled: &Compiled, singular: Singular) -> ModelError {
     }
 }
 
-/// Judges a model in two random fields of the stream of `seed`; `bound` overrides the highest order.
+/// Judges a model in two random fields, each of a stream of its own of `seed` and the model; `bound` overrides the highest order.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -103,11 +103,13 @@ pub fn judge_compiled(
     if found > MAX_UNKNOWNS {
         return Err(refuse(format!("{found} unknowns; expected at most {MAX_UNKNOWNS}")));
     }
-    let mut rng = SplitMix64::new(seed);
-    for _ in 0..ATTEMPTS {
-        let fields = [field_for(compiled, &mut rng), field_for(compiled, &mut rng)];
-        let first = climb_at(model, compiled, &layout, fields[0], &mut rng)?;
-        let second = climb_at(model, compiled, &layout, fields[1], &mut rng)?;
+    for attempt in 0..ATTEMPTS {
+        let judged = |i: usize| {
+            let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
+            let field = field_for(compiled, &mut rng);
+            climb_at(model, compiled, &layout, field, &mut rng).map(|at| (field, at))
+        };
+        let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
         if first.degrees == second.degrees && first.combinations == second.combinations {
             let full = first.degrees.rank() == found;
             let error_bound = error_bound(&claim(&compiled.dag, &layout, &first.degrees), 2);
@@ -117,7 +119,7 @@ pub fn judge_compiled(
                 degrees: first.degrees,
                 combinations: first.combinations,
                 stairs: first.stairs,
-                fields,
+                fields: [p, q],
                 error_bound,
             });
         }

@@ -5,6 +5,7 @@
 //! are the derivative rows ([`rows`]).
 
 pub mod answer;
+mod canonical;
 pub mod dag;
 pub mod evidence;
 mod functions;

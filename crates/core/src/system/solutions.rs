@@ -60,7 +60,7 @@ pub(super) fn solutions(
             out[lane] = Some(text.clone());
         }
     }
-    let mut rng = SplitMix64::new(seed ^ 0x0073_6f6c_7665_6400);
+    let mut rng = model.random(seed, "solving expressions");
     for field in judged.fields {
         let held = check(model, compiled, judged, field, &mut rng, &symbols, &out);
         for (slot, held) in out.iter_mut().zip(held) {

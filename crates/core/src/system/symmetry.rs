@@ -1,6 +1,6 @@
 //! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output sees, at any point.
 
-use obsdeg_exact::{Echelon, Field, Ratio, SplitMix64};
+use obsdeg_exact::{Echelon, Field, Ratio};
 
 use super::judge::{At, Judgement, climb_at};
 use super::model::{Compiled, ModelError, SystemModel};
@@ -103,7 +103,7 @@ pub fn symmetries(
         return Ok(Symmetries::default());
     }
     let f = judged.fields[0];
-    let mut rng = SplitMix64::new(seed ^ 0x0073_796d_6d65_7472);
+    let mut rng = model.random(seed, "symmetries");
     let mut basis = Echelon::new(f, 2 * n);
     // an unknown that no output sees is said so by itself; an observable one never moves
     for c in (0..n).filter(|&c| !excited[c] || judged.degrees.degree[c].is_some()) {

@@ -1,0 +1,73 @@
+//! What a scheme's verdicts depend on, as text: the input that takes part in the choice of primes.
+
+use obsdeg_exact::SplitMix64;
+
+use super::scheme::Scheme;
+
+impl Scheme {
+    /// The stream of `seed` for one purpose and this scheme ([`SplitMix64::of`]). Everything takes part but what moves no verdict: the
+    /// names and descriptions, the numbers of a simulation, requirements and gimbals.
+    pub fn random(&self, seed: u64, purpose: &str) -> SplitMix64 {
+        SplitMix64::of(seed, purpose, &self.canonical())
+    }
+
+    /// The parts of the input, lists with their length: the same for the same scheme however it was written.
+    fn canonical(&self) -> Vec<String> {
+        let mut out = vec![
+            "scheme".into(),
+            self.carry.to_string(),
+            self.latitude.map_or_else(|| "generic".into(), |l| l.to_string()),
+            self.unknowns.to_string(),
+            self.measured_azimuth.to_string(),
+        ];
+        for gyro in self.geometry.gyros() {
+            out.extend([gyro.I, gyro.O, gyro.S].map(|axis| axis.to_string()));
+        }
+        out.push(self.positions.len().to_string());
+        for p in &self.positions {
+            out.push(p.angles_text());
+            out.push(p.rotation.as_ref().map_or_else(String::new, ToString::to_string));
+            out.push(p.dwell.map_or_else(String::new, |d| d.to_string()));
+        }
+        out.extend(self.combinations.iter().cloned());
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::scheme_file;
+
+    /// Writing a scheme otherwise changes no prime, every change of what is judged does.
+    #[test]
+    fn what_is_judged_takes_part() {
+        let first = |text: &str| {
+            let scheme = scheme_file::read(text).unwrap_or_else(|e| panic!("{}: {text}", e.message));
+            scheme.random(1, "verdicts").next_u64()
+        };
+        let plain = "[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
+        let words = "name = 'A'\n[[position]]\nname = 'a'\nangles_deg = [0.0, 0, 0]\n[[position]]\nangles_deg = ['180', 0, 0]\n";
+        assert_eq!(first(plain), first(words));
+        let mut seen = vec![first(plain)];
+        for other in [
+            "carry = 'inertial'",
+            "latitude_deg = 28.2",
+            "terms = ['F', 'I']",
+            "measured_azimuth = true",
+            "combinations = ['D_FX']",
+            "combinations = ['D_FX', 'D_FY']",
+            "combinations = ['2*D_FX']",
+            "geometry = { X = { I = '+x', O = '+z', S = '-y' }, Y = { I = '+y', O = '-z', S = '-x' }, Z = { I = '+z', O = '+x', S = '+y' } }",
+        ] {
+            seen.push(first(&format!("{other}\n{plain}")));
+        }
+        for other in ["dwell_s = 500", "rotation = { about = 'X_p', angle_deg = 360 }"] {
+            seen.push(first(&format!("{plain}{other}\n")));
+        }
+        seen.push(first(&plain.replace("180", "180.000000001")));
+        let all = seen.len();
+        seen.sort_unstable();
+        seen.dedup();
+        assert_eq!(seen.len(), all);
+    }
+}

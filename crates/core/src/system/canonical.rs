@@ -1,0 +1,68 @@
+//! What a model's verdicts depend on, as text: the input that takes part in the choice of primes.
+
+use obsdeg_exact::SplitMix64;
+
+use super::model::{Constant, Formula, KnownInput, Start, SystemModel};
+
+impl SystemModel {
+    /// The stream of `seed` for one purpose and this model ([`SplitMix64::of`]). Everything takes part but what moves no verdict: the
+    /// name of the model, units, descriptions, the numbers of a simulation.
+    pub fn random(&self, seed: u64, purpose: &str) -> SplitMix64 {
+        SplitMix64::of(seed, purpose, &self.canonical())
+    }
+
+    /// The parts of the input, lists with their length: the same for the same model whichever file it came from.
+    fn canonical(&self) -> Vec<String> {
+        let mut out: Vec<String> = vec!["model".into()];
+        let text = |f: &Formula| f.text.trim().to_string();
+        let count = |out: &mut Vec<String>, n: usize| out.push(n.to_string());
+        count(&mut out, self.states.len());
+        for s in &self.states {
+            let start = match &s.start {
+                Start::Unknown => "unknown".into(),
+                Start::Known => "known".into(),
+                Start::Value(f) => format!("={}", text(f)),
+            };
+            out.extend([s.named.name.clone(), text(&s.equation), start]);
+        }
+        count(&mut out, self.parameters.len());
+        out.extend(self.parameters.iter().map(|p| p.name.clone()));
+        count(&mut out, self.known_inputs.len());
+        for (named, input) in &self.known_inputs {
+            let kind = match input {
+                KnownInput::Generic => "generic".into(),
+                KnownInput::Polynomial(degree) => format!("polynomial {degree}"),
+                KnownInput::Function(f) => format!("={}", text(f)),
+            };
+            out.extend([named.name.clone(), kind]);
+        }
+        count(&mut out, self.unknown_inputs.len());
+        for (named, degree) in &self.unknown_inputs {
+            let kind = degree.map_or_else(|| "arbitrary".into(), |d| format!("polynomial {d}"));
+            out.extend([named.name.clone(), kind]);
+        }
+        count(&mut out, self.constants.len());
+        for (named, constant) in &self.constants {
+            let value = match constant {
+                Constant::Generic => "generic".into(),
+                Constant::Value(f) => format!("={}", text(f)),
+            };
+            out.extend([named.name.clone(), value]);
+        }
+        let formulas = |out: &mut Vec<String>, list: &mut dyn Iterator<Item = (&String, &Formula)>| {
+            let pairs: Vec<[String; 2]> = list.map(|(name, f)| [name.clone(), text(f)]).collect();
+            out.push(pairs.len().to_string());
+            out.extend(pairs.into_iter().flatten());
+        };
+        formulas(&mut out, &mut self.definitions.iter().map(|(name, f)| (name, f)));
+        formulas(&mut out, &mut self.outputs.iter().map(|(named, f)| (&named.name, f)));
+        count(&mut out, self.experiments);
+        count(&mut out, self.segments.len());
+        for s in &self.segments {
+            formulas(&mut out, &mut s.constants.iter().map(|(name, f)| (name, f)));
+            formulas(&mut out, &mut s.carry.iter().map(|(name, f)| (name, f)));
+        }
+        out.extend(self.combinations.iter().map(text));
+        out
+    }
+}
