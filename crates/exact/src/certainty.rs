@@ -51,6 +51,29 @@ pub fn error_bound(claim: &Claim, fields: i32) -> f64 {
 mod tests {
     use super::*;
 
+    /// By hand from the two sentences of [`error_bound`], with powers of two as exact decimals.
+    #[test]
+    fn hand_computed_values() {
+        const TWO60: f64 = 1_152_921_504_606_846_976.0;
+        let close = |found: f64, expected: f64| {
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} instead of {expected:e}");
+        };
+        let nothing = Claim { unknowns: 3, decisions: 7, order: 4, row_degree: 0, row_bits: 0.0 };
+        assert_eq!(error_bound(&nothing, 1), 0.0);
+        // 7 decisions, each a minor of degree 3 * 5
+        let point = Claim { row_degree: 5, ..nothing };
+        close(error_bound(&point, 1), 105.0 / TWO60);
+        close(error_bound(&point, 2), (105.0 / TWO60) * (105.0 / TWO60));
+        // minors of 3 * 40 bits have at most two prime factors of 60 bits, out of 2^60 / (phi ln 2^61) primes; ln 2^61 = 42.281978...
+        let ln = 42.281_978_014_156_645;
+        for (order, phi) in [(4, 2.0), (24, 8.0), (360, 96.0), (1000, 400.0), (7_200, 1920.0)] {
+            let prime = Claim { row_bits: 40.0, order, ..nothing };
+            close(error_bound(&prime, 1), 7.0 * 2.0 * phi * ln / TWO60);
+            let both = Claim { row_degree: 5, ..prime };
+            close(error_bound(&both, 1), (105.0 + 14.0 * phi * ln) / TWO60);
+        }
+    }
+
     #[test]
     fn finer_angles_weaken_the_bound_and_fields_multiply() {
         let claim = |order| Claim { unknowns: 15, decisions: 48, order, row_degree: 4, row_bits: 12.0 };

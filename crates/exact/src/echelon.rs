@@ -289,7 +289,85 @@ mod tests {
             .prop_flat_map(|(m, n)| prop::collection::vec(prop::collection::vec(-2i64..3, n), m))
     }
 
+    /// The rank modulo `p` by the schoolbook, one reduction a product.
+    fn rank_modulo(p: u64, mut m: Vec<Vec<u64>>) -> usize {
+        let times = |a: u64, b: u64| (u128::from(a) * u128::from(b) % u128::from(p)) as u64;
+        let power = |a: u64, e: u64| {
+            (0..61).rev().fold(1, |x, bit| {
+                let square = times(x, x);
+                if e >> bit & 1 == 1 { times(square, a) } else { square }
+            })
+        };
+        let mut rank = 0;
+        for c in 0..m[0].len() {
+            let Some(pivot) = (rank..m.len()).find(|&i| m[i][c] != 0) else { continue };
+            m.swap(rank, pivot);
+            let (above, below) = m.split_at_mut(rank + 1);
+            let pivot = &above[rank];
+            let inverse = power(pivot[c], p - 2);
+            for row in below {
+                let q = times(row[c], inverse);
+                for (x, &y) in row[c..].iter_mut().zip(&pivot[c..]) {
+                    *x = (*x + (p - times(q, y))) % p;
+                }
+            }
+            rank += 1;
+        }
+        rank
+    }
+
+    #[test]
+    fn cleared_it_is_the_zero_space() {
+        let f = field();
+        let row = |a: [i64; 2]| a.map(|x| f.from_i64(x));
+        let mut v = Echelon::new(f, 2);
+        assert!(v.insert(&row([1, 2])));
+        v.clear();
+        assert_eq!((v.rank(), v.columns(), v.contains(&row([1, 2]))), (0, 2, false));
+        // the pivot of before is free again
+        assert!(v.insert(&row([0, 3])) && v.insert(&row([1, 0])) && v.has_unit(0));
+    }
+
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        /// Full rows of large entries, with more pivots than products fit into one sum: at the largest prime.
+        #[test]
+        fn wide_rows_of_large_entries(
+            rank in 1usize..95,
+            mixes in prop::collection::vec(prop::collection::vec(0u64..4, 95), 1..4),
+            seed in any::<u64>(),
+        ) {
+            let f = Field::new((1 << 61) - 1);
+            let n = 96;
+            let mut rng = crate::SplitMix64::new(seed);
+            let top = |rng: &mut crate::SplitMix64| f.modulus() - 1 - rng.below(3);
+            let rows: Vec<Vec<u64>> = (0..rank).map(|_| (0..n).map(|_| top(&mut rng)).collect()).collect();
+            let mixed = |weights: &Vec<u64>| -> Vec<u64> {
+                let entry = |c: usize| f.dot(0, rows.iter().zip(weights).map(|(r, &w)| (f.from_u64(w), r[c])));
+                (0..n).map(entry).collect()
+            };
+            let mut v = Echelon::new(f, n);
+            for row in &rows {
+                v.insert(row);
+            }
+            let plain = |rows: &[Vec<u64>]| -> usize {
+                let values: Vec<Vec<u64>> =
+                    rows.iter().map(|r| r.iter().map(|&a| f.to_u64(a)).collect()).collect();
+                rank_modulo(f.modulus(), values)
+            };
+            prop_assert_eq!(v.rank(), plain(&rows));
+            for weights in &mixes {
+                let inside = mixed(weights);
+                prop_assert!(v.contains(&inside) && !v.clone().insert(&inside));
+                let mut beside = inside;
+                beside[rank.min(n - 1)] = f.add(beside[rank.min(n - 1)], f.one());
+                let mut all = rows.clone();
+                all.push(beside.clone());
+                prop_assert_eq!(v.contains(&beside), plain(&all) == v.rank());
+            }
+        }
+
         #[test]
         fn rank_null_space_and_units(rows in matrices()) {
             let f = field();

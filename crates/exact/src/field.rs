@@ -204,10 +204,13 @@ mod tests {
 
     #[test]
     fn extremes_do_not_overflow() {
-        let f = Field::new(P);
-        let m = P - 1;
-        let n = 1000;
-        let slow = (0..n).fold(m, |acc, _| f.add(acc, f.mul(m, m)));
-        assert_eq!(f.dot(m, (0..n).map(|_| (m, m))), slow);
+        // the smallest and the largest prime allowed
+        for p in [P, (1 << 61) - 1] {
+            let f = Field::new(p);
+            let m = p - 1;
+            let n = 1000;
+            let slow = (0..n).fold(m, |acc, _| f.add(acc, f.mul(m, m)));
+            assert_eq!(f.dot(m, (0..n).map(|_| (m, m))), slow);
+        }
     }
 }

@@ -205,6 +205,62 @@ mod tests {
     }
 
     #[test]
+    fn embeddings_are_units_that_move_the_square_roots_in_all_four_ways() {
+        let gcd = |mut a: u64, mut b: u64| {
+            while b != 0 {
+                (a, b) = (b, a % b);
+            }
+            a
+        };
+        for order in [24, 72, 120, 360, 600, 3600, 1_800_000, 360_000_000_000] {
+            let all = embeddings(order);
+            // sqrt 2 = 2 cos 45 and sqrt 3 = 2 cos 30 go by the residue modulo 8 and 12, so modulo 24
+            assert_eq!(all.map(|a| a % 24), [1, 5, 7, 11], "{order}");
+            assert_eq!(all.map(|a| gcd(a, order)), [1; 4], "{order}");
+        }
+        assert_eq!(embeddings(24), [1, 5, 7, 11]);
+        // 5 shares a factor with 120: the next is 29
+        assert_eq!(embeddings(120), [1, 29, 7, 11]);
+    }
+
+    #[test]
+    fn images_under_every_embedding() {
+        let k = RootField::random(120, &mut SplitMix64::new(17)).expect("order");
+        let f = &k.field;
+        let [_, r2, r3, r6] = square_roots(&k);
+        assert_eq!([f.mul(r2, r2), f.mul(r3, r3), f.mul(r6, r6)], [2, 3, 6].map(|x| f.from_i64(x)));
+        // exp(2 pi i 5 / 8) = -exp(2 pi i / 8): 5 and 7 modulo 8 and 12 turn the signs (-, -), (+, -), (-, +)
+        let signs = [(1, 1), (-1, -1), (1, -1), (-1, 1)];
+        for (a, (s2, s3)) in embeddings(120).into_iter().zip(signs) {
+            let [_, c2, c3, _] = square_roots(&k.conjugate(a));
+            assert_eq!((c2, c3), (f.mul(f.from_i64(s2), r2), f.mul(f.from_i64(s3), r3)), "{a}");
+        }
+    }
+
+    #[test]
+    fn ratios_at_the_bound() {
+        let f = Field::new((1 << 60) + 33);
+        for (num, den) in [(1 << 20, 1), (-(1 << 20), (1 << 20) - 1), (1, 1 << 20), (0, 1), (-7, 3)] {
+            assert_eq!(Ratio::recover(&f, f.from_ratio(num, den)), Some(ratio(num, den)), "{num}/{den}");
+        }
+        for (num, den) in [((1 << 20) + 1, 1), (1, (1 << 20) + 1), (-(1 << 20) - 5, 7)] {
+            assert_eq!(Ratio::recover(&f, f.from_ratio(num, den)), None, "{num}/{den}");
+        }
+    }
+
+    #[test]
+    fn printed_with_signs_and_roots() {
+        let of = |c: [(i64, i64); 4]| Radical { coefficients: c.map(|(n, d)| ratio(n, d)) };
+        let zero = (0, 1);
+        assert_eq!(of([zero; 4]).to_string(), "0");
+        assert_eq!(of([(-1, 2), (3, 4), zero, (-1, 1)]).to_string(), "-1/2+3*sqrt(2)/4-sqrt(6)");
+        let mixed = of([(-1, 2), (3, 4), zero, (-1, 1)]);
+        assert_eq!((mixed.terms(), mixed.negated().terms()), (3, 3));
+        assert!((mixed.to_f64() - (-0.5 + 0.75 * 2f64.sqrt() - 6f64.sqrt())).abs() < 1e-15);
+        assert!((mixed.negated().to_f64() + mixed.to_f64()).abs() < 1e-15);
+    }
+
+    #[test]
     fn cosine_of_fifteen_degrees() {
         let k = RootField::random(24, &mut SplitMix64::new(11)).expect("order");
         let images = embeddings(24).map(|a| {

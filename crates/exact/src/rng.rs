@@ -69,4 +69,27 @@ mod tests {
         assert_eq!(SplitMix64::of(1, "verdicts", &["a", "bc"]).0, 0x83cf_5556_0392_a482);
         assert_eq!(SplitMix64::of::<&str>(0, "", &[]).0, 0xd59d_71f7_ff08_4737);
     }
+
+    #[test]
+    fn reference_vector() {
+        // the outputs of the authors' program for the seed 1234567
+        let mut rng = SplitMix64::new(1_234_567);
+        let expected = [
+            6_457_827_717_110_365_317,
+            3_203_168_211_198_807_973,
+            9_817_491_932_198_370_423,
+            4_593_380_528_125_082_431,
+            16_408_922_859_458_223_821,
+        ];
+        assert_eq!(expected.map(|_| rng.next_u64()), expected);
+    }
+
+    #[test]
+    fn integers_below_a_bound() {
+        let first = 6_457_827_717_110_365_317u64;
+        let below = |bound: u64| SplitMix64::new(1_234_567).below(bound);
+        assert_eq!((below(1), below(1 << 63)), (0, first >> 1));
+        // floor(100 * 0.350078...)
+        assert_eq!(below(100), 35);
+    }
 }
