@@ -269,6 +269,7 @@ impl fmt::Display for Coefficient {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use obsdeg_exact::Ratio;
 
     fn coefficient(x: f64, rates: Rates) -> Coefficient {
         Coefficient { number: Number::Decimal(x), rates }
@@ -297,10 +298,134 @@ mod tests {
         assert_eq!(rates_between(&f, sum(5, 7), sum(11, 13)), None);
     }
 
+    fn radical(parts: [(i64, i64); 4], rates: Rates) -> Coefficient {
+        let sum = |c: [(i64, i64); 4]| Radical { coefficients: c.map(|(num, den)| Ratio { num, den }) };
+        Coefficient { number: Number::Radical(sum(parts)), rates }
+    }
+
+    fn symbolic(shown: &str) -> Coefficient {
+        Coefficient { number: Number::Text { raw: shown.into(), shown: shown.into() }, rates: [0, 0] }
+    }
+
+    const ZERO: (i64, i64) = (0, 1);
+
+    #[test]
+    fn what_is_zero_and_how_exact_it_is() {
+        let of = |c: &Coefficient| (c.is_zero(), c.form());
+        assert_eq!(of(&radical([ZERO; 4], [1, 0])), (true, Form::Exact));
+        assert_eq!(of(&radical([ZERO, ZERO, (1, 2), ZERO], [0, 0])), (false, Form::Exact));
+        assert_eq!(of(&coefficient(0.0, [0, 0])), (true, Form::Decimal));
+        assert_eq!(of(&coefficient(-0.1, [0, 0])), (false, Form::Decimal));
+        assert_eq!(of(&symbolic("0")), (true, Form::Symbolic));
+        assert_eq!(of(&symbolic("sin(a)")), (false, Form::Symbolic));
+        assert_eq!(of(&Coefficient::one()), (false, Form::Exact));
+        assert_eq!(symbolic("0").to_string(), "0");
+    }
+
+    #[test]
+    fn factors_of_every_kind_of_number() {
+        let of = |c: &Coefficient| c.sign_and_factors();
+        let list = |negative: bool, factors: &[&str]| {
+            (negative, factors.iter().map(ToString::to_string).collect::<Vec<_>>())
+        };
+        assert_eq!(of(&Coefficient::one()), list(false, &[]));
+        assert_eq!(of(&radical([(-1, 1), ZERO, ZERO, ZERO], [0, 1])), list(true, &["wU"]));
+        assert_eq!(of(&radical([(1, 2), ZERO, ZERO, ZERO], [2, -1])), list(false, &["1/2*wN^2/wU"]));
+        assert_eq!(of(&radical([(1, 1), (-1, 1), ZERO, ZERO], [0, 0])), list(true, &["(-1+sqrt(2))"]));
+        assert_eq!(of(&radical([(1, 1), ZERO, ZERO, ZERO], [-1, -2])), list(false, &["1/wN/wU^2"]));
+        assert_eq!(of(&coefficient(-1.0, [0, 0])), list(true, &[]));
+        assert_eq!(of(&symbolic("-sin(a)")), list(true, &["sin(a)"]));
+        assert_eq!(of(&symbolic("-sin(a)+1")), list(false, &["(-sin(a)+1)"]));
+        assert_eq!(of(&symbolic("sin(a-b)")), list(false, &["sin(a-b)"]));
+        assert_eq!(of(&symbolic("1")), list(false, &[]));
+    }
+
+    #[test]
+    fn sums_outside_of_brackets() {
+        for sum in ["a+b", "a-b", "sin(a)-1", "(a)+(b)", "2*a+b"] {
+            assert!(has_sum(sum), "{sum}");
+        }
+        for product in ["-a", "sin(a+b)", "a*-b", "a^-2", "a/-b", "(a+b)*(c-d)", "+a"] {
+            assert!(!has_sum(product), "{product}");
+        }
+    }
+
+    #[test]
+    fn negated_is_the_opposite() {
+        assert_eq!(coefficient(0.5, [1, 0]).negated(), coefficient(-0.5, [1, 0]));
+        assert_eq!(
+            radical([(1, 2), ZERO, (-3, 1), ZERO], [0, 0]).negated(),
+            radical([(-1, 2), ZERO, (3, 1), ZERO], [0, 0])
+        );
+        assert_eq!(symbolic("-sin(a)").negated(), symbolic("sin(a)"));
+        assert_eq!(symbolic("sin(a)").negated(), symbolic("-(sin(a))"));
+    }
+
+    #[test]
+    fn long_roots_become_decimals_together() {
+        let long = radical([(1234, 987), (-4321, 789), (77777, 1234), (1, 98765)], [1, 0]);
+        assert!(long.without_rates().to_string().len() > READABLE && long.is_unreadable());
+        let half = radical([(1, 2), ZERO, ZERO, ZERO], [0, 0]);
+        assert!(!half.is_unreadable() && !coefficient(1.0, [0, 0]).is_unreadable());
+        assert_eq!(readable(vec![half.clone()]), vec![half.clone()]);
+        let shown = readable(vec![half, long]);
+        assert_eq!(shown[0], coefficient(0.5, [0, 0]));
+        // 1234/987 - 4321/789 sqrt 2 + 77777/1234 sqrt 3 + sqrt 6/98765, by bc
+        let Number::Decimal(x) = shown[1].number else { panic!("{:?}", shown[1]) };
+        assert!((x - 102.673_590_249_84).abs() < 1e-9 && shown[1].rates == [1, 0], "{x}");
+    }
+
+    #[test]
+    fn powers_of_the_rates() {
+        let f = Field::new((1 << 60) + 33);
+        let rates = [f.from_i64(3), f.from_i64(5)];
+        assert_eq!(power(&f, rates, [2, -1]), Some(f.from_ratio(9, 5)));
+        assert_eq!(power(&f, rates, [0, 0]), Some(f.one()));
+        assert_eq!(power(&f, [0, rates[1]], [0, 1]), Some(rates[1]));
+        assert_eq!(power(&f, [0, rates[1]], [1, 1]), None);
+        let zero = Image { value: 0, rates };
+        assert_eq!(rates_between(&f, zero, zero), Some([0, 0]));
+        assert_eq!(rates_between(&f, zero, Image { value: 1, rates }), None);
+        // the simplest comes first, up to the second power of each
+        let all = candidate_rates();
+        assert_eq!((all.len(), &all[..5]), (25, &[[0, 0], [1, 0], [0, 1], [0, -1], [-1, 0]][..]));
+        let square = |n: i64, u: i64| {
+            let rates = [f.from_i64(n), f.from_i64(u)];
+            Image { value: f.mul(f.from_i64(7), f.from_ratio(n * n, u * u)), rates }
+        };
+        assert_eq!(rates_between(&f, square(3, 5), square(11, 13)), Some([2, -2]));
+    }
+
+    #[test]
+    fn a_radical_must_hold_in_both_fields() {
+        use obsdeg_exact::SplitMix64;
+        use obsdeg_exact::radical::embeddings;
+        let mut rng = SplitMix64::new(9);
+        let fields = [0, 1].map(|_| RootField::random(24, &mut rng).expect("order"));
+        let sent =
+            Radical { coefficients: [(1, 2), (-3, 4), ZERO, (5, 1)].map(|(num, den)| Ratio { num, den }) };
+        let images = fields.map(|k| embeddings(24).map(|a| sent.image(&k.conjugate(a))));
+        assert_eq!(recover_radical(&fields, &images), Some(sent));
+        for e in 0..4 {
+            let mut wrong = images;
+            wrong[1][e] = fields[1].field.add(wrong[1][e], fields[1].field.one());
+            assert_eq!(recover_radical(&fields, &wrong), None);
+        }
+    }
+
+    #[test]
+    fn sums_of_named_terms() {
+        let (half, minus) = (coefficient(0.5, [0, 0]), coefficient(-1.0, [0, 1]));
+        assert_eq!(linear_combination([(&minus, "a"), (&half, "b")]), "-wU*a + 0.5*b");
+        assert_eq!(linear_combination([(&coefficient(0.0, [0, 0]), "a"), (&half, "b")]), "0.5*b");
+        assert_eq!(linear_combination([]), "0");
+    }
+
     #[test]
     fn six_digits() {
         assert_eq!(decimal(0.123_456_789), "0.123457");
         assert_eq!(decimal(1234567.0), "1234567");
         assert_eq!(decimal(-1.5), "-1.5");
+        assert_eq!(["0", "0.001", "100000", "99999.9"], [0.0, 0.001, 1e5, 99_999.9].map(decimal)[..]);
     }
 }

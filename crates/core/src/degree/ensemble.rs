@@ -170,3 +170,30 @@ impl Tables {
         &self.tables[0][0]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Scheme;
+
+    fn claimed(angles: &[[&str; 3]], latitude: Option<&str>) -> Claim {
+        let angles = angles.iter().map(|a| a.map(|x| x.parse().expect("an angle")));
+        let latitude = latitude.map(|l| l.parse().expect("a latitude"));
+        let platform = Platform::new(Scheme { latitude, ..Scheme::of_angles(angles) }).expect("a scheme");
+        let verdicts = judge(&platform, 1).expect("verdicts");
+        claim(&platform, &verdicts.degrees, verdicts.values[0].roots().order)
+    }
+
+    /// By hand: p1 p2 has 15 unknowns and the rank profile 2 6 8, so three orders, each with a rank and 15 memberships.
+    #[test]
+    fn what_is_claimed() {
+        let p1_p2 = Claim { unknowns: 15, decisions: 48, order: 24, row_degree: 3, row_bits: 16.0 };
+        assert_eq!(claimed(&[["0", "0", "0"], ["180", "0", "0"]], None), p1_p2);
+        // 10 degrees are a 36th of a turn: with multiples of 15 degrees, 72
+        let finer = Claim { order: 72, ..p1_p2 };
+        assert_eq!(claimed(&[["0", "0", "0"], ["180", "10", "0"]], None).order, finer.order);
+        // one position: 2 3 4 of 15, so three orders; six sines and cosines of generic angles per factor of g
+        let generic = claimed(&[["alpha", "0", "0"]], None);
+        assert_eq!((generic.row_degree, generic.decisions), (3 + 18, 48));
+    }
+}
