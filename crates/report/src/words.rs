@@ -112,7 +112,8 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         format!("latitude {latitude}"),
         format!("gyros {}; drift terms {}", gyros.join(", "), a.terms),
         format!("observation {z}"),
-        "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g".into(),
+        "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g; a blank multiplies"
+            .into(),
     ];
     if a.positions.iter().any(|p| p.rotation.is_some()) {
         out.push(

@@ -1,4 +1,5 @@
-//! Solutions as text: common factors in front, terms of equal coefficient in brackets.
+//! Solutions as text: common factors in front, terms of equal coefficient in brackets. A blank multiplies, and however strongly
+//! a reader thinks it does, the formula means the same: a quotient before one stands in brackets, unless it is a number.
 
 use super::solver::{Frame, Solved, Term};
 use crate::degree::coefficient::Coefficient;
@@ -33,7 +34,9 @@ pub fn group(solved: &Solved) -> Grouped {
     let mut factor: Option<Coefficient> = None;
     let numbers: Vec<Coefficient> =
         solved.terms.iter().map(|t| magnitude(&t.coefficient).1.without_rates()).collect();
+    // a single term keeps its number, so that its sign stands in front of it
     if let Some((first, rest)) = numbers.split_first()
+        && !rest.is_empty()
         && first.to_string() != "1"
         && rest.iter().all(|n| n.to_string() == first.to_string())
     {
@@ -64,6 +67,23 @@ pub fn z_name(term: &Term, frame: Frame, positions: &[String]) -> String {
     format!("{base}{}@{}", "'".repeat(term.order), positions[term.position])
 }
 
+/// Factors as one, to be followed by a blank and what they multiply: `wU`, `1/2*wU`, `(wU/wN)`.
+fn before_a_blank(factors: &[String]) -> String {
+    let text = factors.join("*");
+    // quotients outside of all brackets, but for the number in front
+    let digits = |t: &str| t.find(|c: char| !c.is_ascii_digit()).unwrap_or(t.len());
+    let rest = &text[digits(&text)..];
+    let below = rest.strip_prefix('/').map_or(0, digits);
+    let rest =
+        rest.get(below + 1..).filter(|r| below > 0 && (r.is_empty() || r.starts_with('*'))).unwrap_or(rest);
+    let mut depth = 0;
+    let quotient = rest.chars().any(|c| {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        c == '/' && depth == 0
+    });
+    if quotient { format!("({text})") } else { text }
+}
+
 /// A solution in one line, as in `1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]`.
 pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
     let grouped = group(solved);
@@ -87,7 +107,7 @@ pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
             continue;
         }
         sign(&mut out, g.negative);
-        out.push_str(&factors.join("*"));
+        out.push_str(&before_a_blank(&factors));
         out.push_str(if single { " " } else { " (" });
         let mut inner = String::new();
         for (negative, term) in &g.terms {
@@ -102,10 +122,7 @@ pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
     match grouped.factor {
         None if out.is_empty() => "0".into(),
         None => out,
-        Some(factor) if grouped.groups.len() == 1 && grouped.groups[0].terms.len() == 1 => {
-            format!("{factor} {out}")
-        }
-        Some(factor) => format!("{factor} [ {out} ]"),
+        Some(factor) => format!("{} [ {out} ]", before_a_blank(&factor.sign_and_factors().1)),
     }
 }
 
@@ -136,5 +153,26 @@ mod tests {
         };
         let names = ["p1".to_string(), "p2".to_string()];
         assert_eq!(text(&solved, Frame::N, &names), "1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]");
+        // the sign of a single term stands before its number, not between the two
+        let single = Solved { terms: vec![term(0, 3, 1, -1, [0, 1])], ..solved };
+        assert_eq!(text(&single, Frame::N, &names), "-1/2*wU Z3'@p1");
+    }
+
+    #[test]
+    fn quotients_before_a_blank() {
+        for (plain, printed) in [
+            ("wU", "wU"),
+            ("1/2", "1/2"),
+            ("1/2*wU", "1/2*wU"),
+            ("3*wU", "3*wU"),
+            ("1/wN", "(1/wN)"),
+            ("1/2*wU/wN", "(1/2*wU/wN)"),
+            ("1/2/sin(a)", "(1/2/sin(a))"),
+            ("1/2a", "(1/2a)"),
+            ("sqrt(2)/2", "(sqrt(2)/2)"),
+            ("(1/2+sqrt(2)/2)*wU", "(1/2+sqrt(2)/2)*wU"),
+        ] {
+            assert_eq!(before_a_blank(&[plain.to_string()]), printed);
+        }
     }
 }

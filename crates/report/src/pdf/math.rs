@@ -1,21 +1,18 @@
 //! The LaTeX of our formulas as the typesetter's math. Only what `latex` writes is known; other commands become text.
 
-use crate::latex::GREEK;
+use crate::latex::{FUNCTIONS, GREEK};
 
-/// Other letters, functions and spaces.
-const WORDS: [(&str, &str); 12] = [
+/// Other letters, operators and spaces.
+const WORDS: [(&str, &str); 9] = [
     ("psi", "psi"),
     ("varepsilon", "epsilon"),
-    ("sin", "sin"),
-    ("cos", "cos"),
-    ("tan", "tan"),
+    ("cdot", "dot.op"),
     ("to", "arrow.r"),
     ("circ", "degree"),
     ("quad", "quad"),
     (",", "thin"),
     (";", "med"),
     ("_", "\\_"),
-    ("log", "log"),
 ];
 
 /// The formula in the typesetter's notation.
@@ -115,7 +112,7 @@ fn command(rest: &mut &str) -> String {
         }
         "text" => plain(rest),
         "mathit" => format!("italic({})", plain(rest)),
-        other if GREEK.contains(&other) => other.into(),
+        other if GREEK.contains(&other) || FUNCTIONS.iter().any(|f| f.1 == other) => other.into(),
         other => WORDS.iter().find(|w| w.0 == other).map_or_else(|| super::quoted(other), |w| w.1.into()),
     }
 }
@@ -134,6 +131,7 @@ mod tests {
             ("\\psi_{x}^{(12)}", "psi_(x)^(( 12 ))"),
             ("\\ddot{Z}_{3}'^{2}/4", "dot.double(Z)_(3)'^(2) \\/ 4"),
             ("\\mathit{k\\_1}", "italic(\"k_1\")"),
+            ("\\cos^{2}(\\alpha)\\cdot 2", "cos^(2) ( alpha ) dot.op 2"),
             ("\\text{a \\$ \"b\" \\textbackslash{}}", "\"a $ \\\"b\\\" \\\\\""),
         ];
         for (latex, expected) in cases {

@@ -1,0 +1,372 @@
+//! Formulas as LaTeX: names, expressions in program notation, solutions.
+
+use obsdeg_core::analysis::Solution;
+use obsdeg_core::degree::coefficient::Coefficient;
+use obsdeg_core::solution::print::{Group, group};
+use obsdeg_core::solution::solver::{Frame, Term};
+
+use super::escape;
+
+/// Greek letters, by the names that they have in both notations.
+pub(crate) const GREEK: [&str; 21] = [
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu",
+    "nu", "xi", "pi", "rho", "sigma", "tau", "phi", "chi", "omega",
+];
+
+/// Functions by their names in program notation, and their commands.
+pub(crate) const FUNCTIONS: [(&str, &str); 8] = [
+    ("sin", "sin"),
+    ("cos", "cos"),
+    ("tan", "tan"),
+    ("asin", "arcsin"),
+    ("acos", "arccos"),
+    ("atan", "arctan"),
+    ("exp", "exp"),
+    ("log", "log"),
+];
+
+/// Deepest nesting of brackets that is set as a formula.
+const MAX_DEPTH: usize = 60;
+
+/// The math of one name: `D_FX`, `psi_x@1`, `eps_y^n`, `wN`.
+pub(crate) fn symbol(name: &str) -> String {
+    let (base, position) = name.split_once('@').map_or((name, None), |(b, p)| (b, Some(p)));
+    let (base, frame) = base.strip_suffix("^n").map_or((base, ""), |b| (b, "^{n}"));
+    let body = match base.split_once('_') {
+        Some(("psi", axis)) => format!("\\psi_{{{axis}}}"),
+        Some(("eps", axis)) => format!("\\varepsilon_{{{axis}}}"),
+        Some(("D", rest)) => format!("D_{{{rest}}}"),
+        _ => match base {
+            "wN" => "\\omega_N".into(),
+            "wU" => "\\omega_U".into(),
+            other => name_of_model(other),
+        },
+    };
+    let position = position.map(|p| format!("^{{({p})}}")).unwrap_or_default();
+    format!("{body}{frame}{position}")
+}
+
+/// A name of a model: `gamma` is Greek, `k21` and `k_on` have an index.
+fn name_of_model(name: &str) -> String {
+    let letter = |text: &str| match text {
+        t if GREEK.contains(&t) => Some(format!("\\{t}")),
+        t if t.len() == 1 => Some(t.to_string()),
+        _ => None,
+    };
+    let digits = name.find(|c: char| c.is_ascii_digit() || c == '_').unwrap_or(name.len());
+    let (base, index) = name.split_at(digits);
+    let index = index.strip_prefix('_').unwrap_or(index);
+    match letter(base) {
+        Some(base) if index.is_empty() => base,
+        Some(base) if index.chars().all(|c| c.is_ascii_alphanumeric()) => {
+            format!("{base}_{{\\mathit{{{index}}}}}")
+        }
+        _ => format!("\\mathit{{{}}}", escape(name)),
+    }
+}
+
+/// An expression in program notation as math: `*` becomes a thin space, every quotient a fraction, so that nothing hangs on
+/// which of two operations binds more; text as it is where it is no expression.
+pub(crate) fn expression(text: &str) -> String {
+    let mut reader = Reader { rest: text, depth: 0 };
+    match reader.sum() {
+        Some(math) if reader.rest.trim().is_empty() => math,
+        _ => format!("\\text{{{}}}", escape(text)),
+    }
+}
+
+/// A factor as LaTeX, and whether it is a sum in brackets.
+struct Factor {
+    math: String,
+    /// The sum without its brackets.
+    sum: Option<String>,
+}
+
+impl Factor {
+    fn of(math: String) -> Self {
+        Self { math, sum: None }
+    }
+}
+
+/// Factors side by side; a sum that stands alone needs no brackets when `alone`.
+fn side_by_side(factors: &[Factor], alone: bool) -> String {
+    match factors {
+        [] => "1".into(),
+        [Factor { sum: Some(sum), .. }] if alone => sum.clone(),
+        _ => {
+            let mut out = String::new();
+            for f in factors {
+                let digit = f.math.starts_with(|c: char| c.is_ascii_digit());
+                out.push_str(match (out.is_empty(), digit) {
+                    (true, _) => "",
+                    (false, true) => "\\cdot ",
+                    (false, false) => "\\,",
+                });
+                out.push_str(&f.math);
+            }
+            out
+        }
+    }
+}
+
+/// Recursive descent over an expression; `None` where there is none.
+struct Reader<'a> {
+    rest: &'a str,
+    depth: usize,
+}
+
+impl Reader<'_> {
+    /// The next character that is no blank, without taking it.
+    fn peek(&mut self) -> Option<char> {
+        self.rest = self.rest.trim_start();
+        self.rest.chars().next()
+    }
+
+    fn take(&mut self, c: char) -> bool {
+        let found = self.peek() == Some(c);
+        if found {
+            self.rest = &self.rest[c.len_utf8()..];
+        }
+        found
+    }
+
+    /// The characters that satisfy `which`.
+    fn word(&mut self, which: impl Fn(char) -> bool) -> String {
+        let end = self.rest.find(|c| !which(c)).unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        word.into()
+    }
+
+    fn sum(&mut self) -> Option<String> {
+        let mut out = String::new();
+        let mut negative = self.take('-');
+        loop {
+            let (minus, product) = self.product()?;
+            sum(&mut out, minus != negative, &product);
+            negative = match self.peek() {
+                Some('-') => true,
+                Some('+') => false,
+                _ => return Some(out),
+            };
+            self.rest = &self.rest[1..];
+        }
+    }
+
+    /// A product, and whether it is negative.
+    fn product(&mut self) -> Option<(bool, String)> {
+        let (mut negative, mut above, mut below) = (false, Vec::new(), Vec::new());
+        let mut divides = false;
+        loop {
+            while let Some(sign) = self.peek().filter(|c| matches!(c, '+' | '-')) {
+                negative ^= sign == '-';
+                self.rest = &self.rest[1..];
+            }
+            let factor = self.power()?;
+            if divides {
+                below.push(factor)
+            } else {
+                above.push(factor)
+            }
+            divides = match self.peek() {
+                // ** is ^, and `power` has taken it
+                Some('*') => false,
+                Some('/') => true,
+                _ => break,
+            };
+            self.rest = &self.rest[1..];
+        }
+        // the one of `1/x*y` is none
+        if above.len() > 1 {
+            above.retain(|f| f.math != "1");
+        }
+        let math = match &below[..] {
+            [] => side_by_side(&above, false),
+            _ => format!("\\frac{{{}}}{{{}}}", side_by_side(&above, true), side_by_side(&below, true)),
+        };
+        Some((negative, math))
+    }
+
+    fn power(&mut self) -> Option<Factor> {
+        let (base, function) = self.primary()?;
+        if self.peek() == Some('^') {
+            self.rest = &self.rest[1..];
+        } else if let Some(rest) = self.rest.strip_prefix("**") {
+            self.rest = rest;
+        } else {
+            return Some(base);
+        }
+        let minus = self.take('-');
+        let exponent = self.power()?;
+        let exponent = exponent.sum.unwrap_or(exponent.math);
+        let exponent = if minus { format!("-{exponent}") } else { exponent };
+        let positive = exponent.chars().all(|c| c.is_ascii_digit());
+        Some(Factor::of(match function {
+            // `f^{-1}` would be the inverse
+            Some((name, argument)) if positive => format!("\\{name}^{{{exponent}}}({argument})"),
+            Some(_) => format!("({})^{{{exponent}}}", base.math),
+            None if base.sum.is_none() && base.math.contains(['^', '\\']) && !plain(&base.math) => {
+                format!("({})^{{{exponent}}}", base.math)
+            }
+            None => format!("{}^{{{exponent}}}", base.math),
+        }))
+    }
+
+    /// A number, a name, a function or a bracket; of a function its command and argument too.
+    fn primary(&mut self) -> Option<(Factor, Option<(&'static str, String)>)> {
+        let c = self.peek()?;
+        if c.is_ascii_digit() || c == '.' {
+            let number = self.word(|c| c.is_ascii_digit() || c == '.');
+            let degrees = self.rest.strip_prefix(" deg");
+            let degrees = degrees.filter(|r| !r.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_'));
+            if let Some(rest) = degrees {
+                self.rest = rest;
+                return Some((Factor::of(format!("{number}^{{\\circ}}")), None));
+            }
+            return Some((Factor::of(number), None));
+        }
+        if c == '(' {
+            let inner = self.bracket()?;
+            return Some((Factor { math: format!("({inner})"), sum: Some(inner) }, None));
+        }
+        if !(c.is_alphabetic() || c == '_') {
+            return None;
+        }
+        let mut name = self.word(|c| c.is_alphanumeric() || c == '_' || c == '@');
+        if let Some(rest) = self.rest.strip_prefix("^n")
+            && ["psi_", "eps_"].iter().any(|p| name.starts_with(p))
+            && !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+        {
+            name.push_str("^n");
+            self.rest = rest;
+        }
+        if !self.rest.starts_with('(') {
+            return Some((Factor::of(symbol(&name)), None));
+        }
+        let argument = self.bracket()?;
+        if name == "sqrt" {
+            return Some((Factor::of(format!("\\sqrt{{{argument}}}")), None));
+        }
+        let command = FUNCTIONS.iter().find(|(known, _)| *known == name)?.1;
+        Some((Factor::of(format!("\\{command}({argument})")), Some((command, argument))))
+    }
+
+    /// What stands in brackets.
+    fn bracket(&mut self) -> Option<String> {
+        self.depth += 1;
+        let inside = self.depth <= MAX_DEPTH && self.take('(');
+        let sum = if inside { self.sum() } else { None }?;
+        self.depth -= 1;
+        self.take(')').then_some(sum)
+    }
+}
+
+/// Whether an exponent can be set on it: a letter with an index at most.
+fn plain(math: &str) -> bool {
+    !math.contains('^') && !["\\frac", "\\sqrt", "("].iter().any(|c| math.contains(c))
+}
+
+/// `Z_3''@p1` and the like.
+fn z(term: &Term, frame: Frame, positions: &[String]) -> String {
+    let letter = match term.order {
+        0 => "Z".to_string(),
+        1 => "\\dot{Z}".into(),
+        2 => "\\ddot{Z}".into(),
+        k => format!("Z^{{({k})}}"),
+    };
+    let index = match (frame, term.azimuth) {
+        (_, true) => "a".to_string(),
+        (Frame::N, _) => term.component.to_string(),
+        (Frame::Platform, _) => ["x", "y", "z"][term.component - 1].into(),
+    };
+    format!("{letter}_{{{index}}}(\\text{{{}}})", escape(&positions[term.position]))
+}
+
+/// The left side of a formula: `Z1''`, or `psi_x^n` at a position.
+pub(crate) fn left(name: &str, position: Option<&str>) -> String {
+    let plain = name.trim_end_matches('\'');
+    let letter = match (plain.strip_prefix('Z'), name.len() - plain.len()) {
+        (Some(index), 0) => format!("Z_{{{index}}}"),
+        (Some(index), 1) => format!("\\dot{{Z}}_{{{index}}}"),
+        (Some(index), 2) => format!("\\ddot{{Z}}_{{{index}}}"),
+        _ => symbol(plain),
+    };
+    position.map_or(letter.clone(), |p| format!("{letter}(\\text{{{}}})", escape(p)))
+}
+
+/// The magnitude of a coefficient; empty for one.
+fn coefficient(c: &Coefficient) -> String {
+    let (_, factors) = c.sign_and_factors();
+    if factors.is_empty() { String::new() } else { expression(&factors.join("*")) }
+}
+
+fn sum(out: &mut String, negative: bool, text: &str) {
+    out.push_str(match (out.is_empty(), negative) {
+        (true, true) => "-",
+        (true, false) => "",
+        (false, true) => " - ",
+        (false, false) => " + ",
+    });
+    out.push_str(text);
+}
+
+/// A solution: common factors in front, terms of equal coefficient in brackets.
+pub(crate) fn solution(s: &Solution, frame: Frame, positions: &[String]) -> String {
+    let grouped = group(&s.solved);
+    let mut inner = String::new();
+    let bracket = |g: &Group| {
+        let mut terms = String::new();
+        for (negative, t) in &g.terms {
+            sum(&mut terms, *negative, &z(t, frame, positions));
+        }
+        if g.terms.len() > 1 { format!("({terms})") } else { terms }
+    };
+    for g in &grouped.groups {
+        let c = coefficient(&g.coefficient);
+        if c.is_empty() {
+            for (negative, t) in &g.terms {
+                sum(&mut inner, *negative != g.negative, &z(t, frame, positions));
+            }
+        } else {
+            sum(&mut inner, g.negative, &format!("{c}\\,{}", bracket(g)));
+        }
+    }
+    match &grouped.factor {
+        None if inner.is_empty() => "0".into(),
+        None => inner,
+        Some(f) => format!("{}\\,[{inner}]", coefficient(f)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_expressions() {
+        assert_eq!(symbol("D_FX"), "D_{FX}");
+        assert_eq!(symbol("psi_x@12"), "\\psi_{x}^{(12)}");
+        assert_eq!(symbol("eps_y^n"), "\\varepsilon_{y}^{n}");
+        for (text, math) in [
+            ("D_FZ - wN*psi_y", "D_{FZ} - \\omega_N\\,\\psi_{y}"),
+            ("sqrt(2)*cos(alpha)^2/4", "\\frac{\\sqrt{2}\\,\\cos^{2}(\\alpha)}{4}"),
+            ("k21*gamma - V_max", "k_{\\mathit{21}}\\,\\gamma - V_{\\mathit{max}}"),
+            ("sin(25 deg)", "\\sin(25^{\\circ})"),
+            // every quotient is a fraction, and what stands behind it is not under it
+            ("1/cos(25 deg)*wU/wN^2", "\\frac{\\omega_U}{\\cos(25^{\\circ})\\,\\omega_N^{2}}"),
+            ("1/2/(a+b)*(c-d)", "\\frac{c - d}{2\\,(a + b)}"),
+            ("1/(a+b)", "\\frac{1}{a + b}"),
+            ("(a+b)*c", "(a + b)\\,c"),
+            ("-(1/2+a)*wN", "-(\\frac{1}{2} + a)\\,\\omega_N"),
+            ("a - -b + c*-2", "a + b - c\\cdot 2"),
+            ("psi_x^n^2 + (a/b)^2", "(\\psi_{x}^{n})^{2} + (\\frac{a}{b})^{2}"),
+            ("sqrt(a)^3*sin(a)^-1", "(\\sqrt{a})^{3}\\,(\\sin(a))^{-1}"),
+            ("exp(-k*t)*x^n", "\\exp(-k\\,t)\\,x^{n}"),
+            ("a combination of D_FX, D_FY", "\\text{a combination of D\\_FX, D\\_FY}"),
+            ("?", "\\text{?}"),
+        ] {
+            assert_eq!(expression(text), math, "{text}");
+        }
+        assert!(expression(&"(".repeat(100_000)).starts_with("\\text{"));
+    }
+}

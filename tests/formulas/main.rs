@@ -1,0 +1,407 @@
+//! Every printed formula is read back, from text, JSON and LaTeX, and evaluated on derivatives of Z that are simulated from the
+//! equations alone. Nothing here but the printing under test comes from the engine: readers, motion and values are the test's own.
+
+#[cfg(feature = "symbolica")]
+#[allow(dead_code, reason = "shared with the command line")]
+#[path = "../../crates/cli/lock.rs"]
+mod lock;
+mod platform;
+mod tex;
+mod text;
+mod value;
+
+use std::collections::HashMap;
+
+use obsdeg_core::analysis::{Analysis, Options, analyze};
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::{self, Scheme};
+use obsdeg_core::solution::solver::Frame;
+use obsdeg_report::{Format, Layout};
+use obsdeg_symbolic::Worker;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{Config, RngAlgorithm, RngSeed, TestRunner};
+use serde_json::Value as Json;
+
+use platform::{Carry, Case, Position};
+use text::READINGS;
+use value::Value;
+
+/// Exact coefficients, relative to the sum of the magnitudes that are added up.
+const EXACT: f64 = 1e-9;
+/// Coefficients that are printed with six digits: 5e-6 each, and those of a combination on the left as well.
+const SIX_DIGITS: f64 = 1.1e-5;
+
+/// How the angles of a scheme are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Angles {
+    /// Multiples of 90 degrees.
+    Cardinal,
+    /// Multiples of 15 degrees.
+    Roots,
+    /// Few constant angles besides, whose sines and cosines are symbols.
+    Constants,
+    /// A name, with signs and offsets.
+    Names,
+    /// Two names.
+    TwoNames,
+    /// Decimals, all different.
+    Decimals,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone)]
+struct Draw {
+    angles: Vec<[String; 3]>,
+    carry: Carry,
+    latitude: Option<&'static str>,
+    azimuth: bool,
+    terms: &'static str,
+    values: Vec<f64>,
+}
+
+fn angle(kind: Angles) -> BoxedStrategy<String> {
+    let of = |list: &'static [&'static str]| prop::sample::select(list).prop_map(String::from).boxed();
+    match kind {
+        Angles::Cardinal => of(&["0", "90", "180", "-90"]),
+        Angles::Roots => of(&["0", "90", "-90", "30", "45", "-120", "15", "105"]),
+        Angles::Constants => of(&["0", "90", "180", "20", "-20", "110", "35.5"]),
+        Angles::Names => of(&["0", "90", "180", "alpha", "-alpha", "alpha+90"]),
+        Angles::TwoNames => of(&["0", "90", "alpha", "180-a1"]),
+        Angles::Decimals => (-1800..1800i32).prop_map(|x| format!("{}.{}", x / 10, x.abs() % 10)).boxed(),
+    }
+}
+
+fn draws(kind: Angles, most: usize) -> impl Strategy<Value = Draw> {
+    (
+        prop::collection::vec(prop::array::uniform3(angle(kind)), 1..=most),
+        prop::sample::select(vec![Carry::Platform, Carry::Inertial, Carry::Reset]),
+        prop::sample::select(vec![None, None, Some("28.2"), Some("-60"), Some("0"), Some("90"), Some("-90")]),
+        prop::bool::weighted(0.2),
+        prop::sample::select(vec!["F,I,O,S", "F,I,O,S", "F,I", "F,I,O,S,II,SS,IS"]),
+        prop::collection::vec(0.2f64..1.0, 64),
+    )
+        .prop_map(move |(angles, carry, latitude, azimuth, terms, values)| {
+            // the drift alone is that of one position
+            let terms = if angles.len() == 1 && values[0] < 0.5 { "drift" } else { terms };
+            Draw { angles, carry, latitude, azimuth, terms, values }
+        })
+}
+
+impl Draw {
+    fn scheme(&self) -> Scheme {
+        let angles = self.angles.iter().map(|a| parse_attitude(&a.join(",")).expect("an attitude"));
+        Scheme {
+            carry: match self.carry {
+                Carry::Platform => model::Carry::Platform,
+                Carry::Inertial => model::Carry::Inertial,
+                Carry::Reset => model::Carry::Reset,
+            },
+            latitude: self.latitude.map(|l| l.parse().expect("a latitude")),
+            measured_azimuth: self.azimuth,
+            unknowns: self.terms.parse().expect("terms"),
+            ..Scheme::of_angles(angles)
+        }
+    }
+
+    /// Values for all that is unknown, of both signs, none near zero.
+    fn case(&self) -> Case {
+        let mut values =
+            self.values.iter().enumerate().map(|(i, x)| if i % 3 == 0 { -x } else { *x }).cycle();
+        let mut next = || values.next().expect("endless");
+        let names: HashMap<&str, f64> = [("alpha", next()), ("a1", next())].into();
+        let number = |text: &str| -> f64 {
+            // a name with a sign, and decimal degrees before or behind it
+            let mut total = 0.0;
+            let mut rest = text;
+            while !rest.is_empty() {
+                let end = rest[1..].find(['+', '-']).map_or(rest.len(), |e| e + 1);
+                let (part, after) = rest.split_at(end);
+                rest = after;
+                let (sign, part) = match part.strip_prefix('-') {
+                    Some(part) => (-1.0, part),
+                    None => (1.0, part.strip_prefix('+').unwrap_or(part)),
+                };
+                let value = names.get(part).copied();
+                total += sign * value.unwrap_or_else(|| part.parse::<f64>().expect("degrees").to_radians());
+            }
+            total
+        };
+        let positions = self.angles.iter().enumerate().map(|(i, a)| Position {
+            name: format!("p{}", i + 1),
+            angles: std::array::from_fn(|k| number(&a[k])),
+            turn: None,
+        });
+        let positions: Vec<Position> = positions.collect();
+        let rates = match self.latitude {
+            None => [next().abs(), next()],
+            Some(l) => {
+                let l: f64 = l.parse::<f64>().expect("degrees").to_radians();
+                // a rate that is zero is zero
+                let zero = |x: f64| if x.abs() < 1e-15 { 0.0 } else { x };
+                [zero(l.cos()), zero(l.sin())]
+            }
+        };
+        let psi = positions.iter().map(|_| std::array::from_fn(|_| next())).collect();
+        let mut drift = HashMap::new();
+        let terms = if self.terms == "drift" { "F,I,O,S" } else { self.terms };
+        for term in terms.split(',') {
+            for gyro in ["X", "Y", "Z"] {
+                drift.insert(format!("D_{term}{gyro}"), next());
+            }
+        }
+        Case {
+            positions,
+            carry: self.carry,
+            rates,
+            psi,
+            drift,
+            names: names.iter().map(|(n, x)| ((*n).into(), *x)).collect(),
+        }
+    }
+}
+
+/// How many of each kind were checked.
+#[derive(Debug, Default)]
+struct Seen {
+    exact: usize,
+    symbolic: usize,
+    decimal: usize,
+    combinations: usize,
+    null_vectors: usize,
+    formulas: usize,
+}
+
+/// One check of a scheme, with all that a failure needs.
+struct Check<'a> {
+    case: &'a Case,
+    about: String,
+}
+
+impl Check<'_> {
+    fn text(&self, formula: &str) -> Value {
+        let at = |name: &str| self.case.value(name);
+        let values = READINGS.map(|blank| {
+            text::evaluate(formula, blank, &at).unwrap_or_else(|e| panic!("{e}\n{}", self.about))
+        });
+        for v in &values {
+            assert!(
+                v.is(values[0].value, 1e-13),
+                "`{formula}` reads in two ways: {values:?}\n{}",
+                self.about
+            );
+        }
+        values[0]
+    }
+
+    fn latex(&self, formula: &str) -> Value {
+        tex::evaluate(formula, &|name| self.case.value(name))
+            .unwrap_or_else(|e| panic!("{e}\n{}", self.about))
+    }
+
+    fn equal(&self, what: &str, found: Value, expected: Value, tolerance: f64) {
+        // values are near one: what should vanish does so up to rounding
+        let size = Value { size: found.size.max(expected.size).max(1e-3), ..found };
+        assert!(
+            size.is(expected.value, tolerance),
+            "{what}: {found:?}, expected {expected:?}\n{}",
+            self.about
+        );
+    }
+}
+
+/// The rows of the tables in a LaTeX document whose first cell is a formula, and its lines of null vectors.
+fn latex_rows(document: &str) -> Vec<Vec<String>> {
+    let rows = document.lines().filter(|l| l.starts_with('$') && l.ends_with("\\\\"));
+    rows.map(|l| {
+        let cells = l.trim_end_matches("\\\\").split(" & ");
+        cells.map(|c| c.trim().trim_matches('$').to_string()).collect()
+    })
+    .collect()
+}
+
+/// Everything that is printed about one scheme.
+fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen) {
+    let (scheme, case) = (draw.scheme(), draw.case());
+    let options = Options { seed: 1, solutions: true, formulas: worker.is_some(), frame };
+    let a: Analysis = analyze(&scheme, options, worker).expect("analysed");
+    let written = |format| obsdeg_report::analysis(&a, format, Layout::default()).expect("written");
+    let document = written(Format::Latex);
+    let latex = latex_rows(&document);
+    let json: Json = serde_json::from_str(&written(Format::Json)).expect("JSON");
+    null_vectors(&json, &document, draw, &case, seen);
+    if options.formulas {
+        position_formulas(&json, &document, draw, &case, seen);
+    }
+    let csv = written(Format::Csv);
+    let csv: Vec<csv::StringRecord> =
+        csv::Reader::from_reader(csv.as_bytes()).records().map(|r| r.expect("a record")).collect();
+    let list = |key: &str| json[key].as_array().cloned().unwrap_or_default();
+    let (quantities, combinations) = (list("quantities"), list("combinations"));
+    assert_eq!((latex.len(), csv.len()), (quantities.len() + combinations.len(), latex.len()));
+    let rows = quantities.iter().chain(&combinations).zip(latex).zip(&csv);
+    for (i, ((q, latex), csv)) in rows.enumerate() {
+        let single = i < quantities.len();
+        let left = q[if single { "name" } else { "expression" }].as_str().expect("a text");
+        let c = Check { case: &case, about: format!("{left} of {draw:?} in {frame:?}: {q:#}") };
+        assert_eq!(&csv[1], left);
+        let expected = c.text(left);
+        c.equal("left side in LaTeX", c.latex(&latex[0]), expected, EXACT);
+        if single {
+            assert_eq!(tex::name(&latex[0]).as_deref(), Ok(left));
+        }
+        let Some(solution) = q["solution"].as_object() else { continue };
+        let printed = solution["text"].as_str().expect("a text");
+        assert_eq!(&csv[csv.len() - 1], printed);
+        let tolerance = match solution["form"].as_str() {
+            Some("exact") => {
+                seen.exact += 1;
+                EXACT
+            }
+            Some("symbolic") => {
+                seen.symbolic += 1;
+                EXACT
+            }
+            _ => {
+                seen.decimal += 1;
+                SIX_DIGITS
+            }
+        };
+        // coefficients of a combination may be decimals too
+        let tolerance = if left.contains('.') { SIX_DIGITS.max(tolerance) } else { tolerance };
+        seen.combinations += usize::from(!single);
+        c.equal("text", c.text(printed), expected, tolerance);
+        c.equal("LaTeX", c.latex(&latex[latex.len() - 1]), expected, tolerance);
+    }
+}
+
+/// The directions that Z is said not to see move no derivative of it.
+fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
+    let lines: Vec<&str> = latex.lines().filter_map(|l| l.strip_prefix("\\item not seen by $Z$: ")).collect();
+    let vectors = json["null_space"].as_array().expect("a list");
+    assert_eq!(lines.len(), vectors.len());
+    if draw.terms == "drift" {
+        return;
+    }
+    let c = Check { case, about: format!("{vectors:#?} of {draw:?}") };
+    for (vector, line) in vectors.iter().zip(lines) {
+        let mut moved = case.clone();
+        let mut parts = line.split("$, $").map(|part| part.trim_matches('$'));
+        let mut decimals = false;
+        for component in vector.as_array().expect("a list") {
+            let text = |key: &str| component[key].as_str().expect("a text");
+            let (left, right) = parts.next().and_then(|p| p.split_once(" = ")).expect("a component");
+            assert_eq!(tex::name(left).as_deref(), Ok(text("name")));
+            let amount = c.text(text("coefficient"));
+            decimals |= text("coefficient").contains('.');
+            c.equal("LaTeX", c.latex(right), amount, EXACT);
+            assert!(moved.change(text("name"), amount.value), "{}", text("name"));
+        }
+        seen.null_vectors += 1;
+        for i in 0..case.positions.len() {
+            let (here, there) = (case.station(i, 0.0), moved.station(i, 0.0));
+            for (x, y) in here.z_n.iter().flatten().zip(there.z_n.iter().flatten()) {
+                assert!((x - y).abs() <= if decimals { 1e-4 } else { 1e-9 } * (1.0 + x.abs()), "{}", c.about);
+            }
+        }
+    }
+}
+
+/// The formulas of Z, and of psi and eps at each position.
+fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
+    let formulas = json["formulas"].as_array().expect("formulas");
+    let lines = latex.lines().filter_map(|l| l.strip_prefix("\\item $")).filter_map(|l| l.split_once(" = "));
+    let lines: Vec<(&str, &str)> = lines.collect();
+    for (i, f) in formulas.iter().enumerate() {
+        let text = |key: &str| f[key].as_str().expect("a text");
+        let stations: Vec<String> = match f["position"].as_str() {
+            Some(name) => vec![name.into()],
+            None => case.positions.iter().map(|p| p.name.clone()).collect(),
+        };
+        for station in stations {
+            // at a position, its own psi^n and eps^n
+            let at = |name: &str| {
+                let local = name.ends_with("^n");
+                case.value(&if local { format!("{name}@{station}") } else { name.into() })
+            };
+            let about = format!("{f} of {draw:?}");
+            let expected = at(&if text("left").starts_with('Z') {
+                format!("{}@{station}", text("left"))
+            } else {
+                text("left").into()
+            });
+            let expected = Value::of(expected.unwrap_or_else(|| panic!("{about}")));
+            let c = Check { case, about };
+            for blank in READINGS {
+                let v =
+                    text::evaluate(text("right"), blank, &at).unwrap_or_else(|e| panic!("{e}\n{}", c.about));
+                c.equal("formula", v, expected, EXACT);
+            }
+            let right = lines[i].1.strip_suffix('$').expect("a formula");
+            let v = tex::evaluate(right, &at).unwrap_or_else(|e| panic!("{e}\n{}", c.about));
+            c.equal("LaTeX", v, expected, EXACT);
+            let left =
+                f["position"].as_str().map_or(text("left").into(), |p| format!("{}@{p}", text("left")));
+            assert_eq!(tex::name(lines[i].0), Ok(left));
+        }
+        seen.formulas += 1;
+    }
+}
+
+/// Draws `n` cases, the same ones every time.
+fn cases(kind: Angles, most: usize, n: usize) -> Vec<Draw> {
+    let config =
+        Config { rng_seed: RngSeed::Fixed(12), rng_algorithm: RngAlgorithm::ChaCha, ..Config::default() };
+    let mut runner = TestRunner::new(config);
+    (0..n).map(|_| draws(kind, most).new_tree(&mut runner).expect("drawn").current()).collect()
+}
+
+/// Without the engine: numbers recovered from the fields, and decimals.
+#[test]
+fn formulas_without_the_engine_give_the_truth() {
+    let mut seen = Seen::default();
+    for (kind, most, n) in [
+        (Angles::Cardinal, 5, 30),
+        (Angles::Roots, 4, 30),
+        (Angles::Constants, 3, 10),
+        (Angles::Decimals, 4, 10),
+    ] {
+        for draw in cases(kind, most, n) {
+            for frame in [Frame::N, Frame::Platform] {
+                check(&draw, frame, None, &mut seen);
+            }
+        }
+    }
+    assert!(seen.exact > 500 && seen.decimal > 300 && seen.null_vectors > 100, "{seen:?}");
+}
+
+/// With it: sines and cosines of names and of constant angles, and the formulas of each position.
+#[cfg(feature = "symbolica")]
+#[test]
+fn formulas_of_the_engine_give_the_truth() {
+    use std::time::Duration;
+
+    let mut worker = Worker::new(obsdeg_symbolic::WorkerConfig {
+        program: env!("CARGO_BIN_EXE_obsdeg").into(),
+        arguments: vec!["symbolic-worker".into()],
+        lock_file: lock::symbolic_lock_file(),
+        lock_limit: Duration::from_secs(600),
+        time_limit: Duration::from_secs(60),
+    });
+    let mut seen = Seen::default();
+    for (kind, most, n) in [
+        (Angles::Cardinal, 3, 4),
+        (Angles::Roots, 3, 6),
+        (Angles::Constants, 2, 12),
+        (Angles::Names, 2, 12),
+        (Angles::TwoNames, 1, 4),
+    ] {
+        for (i, draw) in cases(kind, most, n).iter().enumerate() {
+            check(draw, [Frame::N, Frame::Platform][i % 2], Some(&mut worker), &mut seen);
+        }
+    }
+    assert!(
+        seen.exact > 100 && seen.symbolic > 50 && seen.null_vectors > 30 && seen.formulas > 300,
+        "{seen:?}"
+    );
+}
