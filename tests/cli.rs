@@ -139,6 +139,8 @@ fn bad_input_is_refused_by_name() {
     refused(&angles("1e9,0,0"), &["is not a number"]);
     refused(&angles("2000000,0,0"), &["out of range"]);
     refused(&angles("NUW"), &["`NUW` is not an attitude", "right-handed"]);
+    refused(&angles("nue"), &["small letters", "as in NUE"]);
+    refused(&angles("0 0 0"), &["no commas", "as in 0,0,0"]);
     refused(&angles("--carry"), &["expected three angles", "`--carry`"]);
     refused(&[&P1P2[..], &["--carry", "sideways"]].concat(), &["`sideways`", "platform, inertial or reset"]);
     refused(&[&P1P2[..], &["--latitude", "91"]].concat(), &["latitude 91", "-90 to 90"]);
@@ -153,6 +155,85 @@ fn bad_input_is_refused_by_name() {
     refused(&["analyze"], &["--scheme"]);
     refused(&["analyze", "--angles", "0,0,0", "--scheme", "x.toml"], &["cannot be used with"]);
     refused(&["frobnicate"], &["unrecognized subcommand"]);
+}
+
+/// The whole file is checked by every command that reads it.
+#[test]
+fn every_command_checks_the_whole_scheme_file() {
+    let (folder, _) = scratch();
+    let file = folder.path().join("s.toml").display().to_string();
+    let out = folder.path().join("r.html").display().to_string();
+    let commands: [&[&str]; 6] = [
+        &["analyze", "--scheme", &file],
+        &["simulate", "--scheme", &file],
+        &["crosscheck", "--scheme", &file],
+        &["compare", &file],
+        &["design", "--minimum", "--candidates", &file],
+        &["report", &file, "-o", &out],
+    ];
+    for (keys, expected) in [
+        ("[simulation]\ndwell_s = -5", "simulation.dwell_s is -5; expected 0.001 to 1e6 s"),
+        ("[simulation]\nslew_rate_deg_s = 0", "simulation.slew_rate_deg_s is 0; expected"),
+        ("[simulation.priors]\nD_F = nan", "simulation.priors.D_F is NaN; expected"),
+        ("[requirements]\nD = -0.1", "requirements.D is -0.1; expected"),
+        ("[requirements]\nD_QX = 0.1", "`D_QX`: no such unknown"),
+        ("[[position]]\nname = \"p1\"\nattitude = \"NDW\"", "two positions are named `p1`"),
+    ] {
+        std::fs::write(&file, format!("[[position]]\nattitude = \"NUE\"\n{keys}\n")).expect("written");
+        for command in commands {
+            refused(command, &[expected, "s.toml:", "^"]);
+        }
+    }
+    refused(
+        &["crosscheck", "--angles", "0,0,0", "--filter-drop", "p1"],
+        &["only position cannot be dropped"],
+    );
+}
+
+#[test]
+fn a_file_of_the_other_kind_is_named() {
+    let (scheme, model) = ("examples/pole/scheme.toml", "examples/sir/model.toml");
+    refused(&["analyze", "--model", scheme], &["is a scheme file; expected a model file", "--scheme"]);
+    refused(&["analyze", "--scheme", model], &["is a model file; expected a scheme file", "--model"]);
+    refused(&["compare", model], &["is a model file; expected a scheme file"]);
+    let (folder, _) = scratch();
+    let file = folder.path().join("m.json").display().to_string();
+    for (text, expected) in [
+        (r#"{"name": 3}"#, &["found the number 3; expected a text in quotes", "m.json:1:10", "^"][..]),
+        (r#"{"name": "x", "states": ["x"]}"#, &["`equations` is missing", "m.json:1:30"]),
+        (
+            "{\"name\": \"x\",\n \"states\": [\"x\"],\n \"equations\": {\"x\": \"y+\"}, \"outputs\": {\"y\": \"x\"}}",
+            &["end of the expression", "m.json:3:24"],
+        ),
+        (
+            "{\"name\": \"x\",\n \"states\": [\"x\"],\n \"equations\": {\"x\": 5}, \"outputs\": {\"y\": \"x\"}}",
+            &["found a number; expected a text in quotes", "m.json:3:22"],
+        ),
+    ] {
+        std::fs::write(&file, text).expect("written");
+        refused(&["analyze", "--model", &file], expected);
+    }
+}
+
+/// Ranges of numbers are those of the help.
+#[test]
+fn the_help_states_the_ranges() {
+    use obsdeg_core::simulation::ranges;
+    let help = stdout(&run(&["simulate", "--help"])).split_whitespace().collect::<Vec<_>>().join(" ");
+    for range in [
+        ranges::DWELL_S,
+        ranges::STEP_S,
+        ranges::NOISE_G,
+        ranges::AZIMUTH_NOISE_DEG,
+        ranges::SLEW_RATE_DEG_S,
+        ranges::DRIFT_NOISE,
+        ranges::DRIFT_SCALE,
+        ranges::PRIOR,
+        ranges::VALUE,
+        ranges::REQUIREMENT,
+    ] {
+        assert!(help.contains(&format!("{range})")), "{range}: {help}");
+    }
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn exact_truth_is_the_linear_one_for_small_angles() {
             truth,
             slew_rate_deg_s: slew,
             drift_noise: DriftNoise::OneStep(0.0),
-            accelerometer_noise_g: 1e-30,
+            accelerometer_noise_g: 1e-15,
             drift_scale: 1e-4,
             values: [Conditions::default().values, vec![Assignment { name: "psi".into(), value: 1e-5 }]]
                 .concat(),
@@ -275,16 +275,24 @@ fn the_folder_of_a_run() {
 #[test]
 fn wrong_arguments_name_the_place() {
     for (arguments, expected) in [
-        (&["--step", "0"][..], "step_s"),
+        (&["--step", "0"][..], "'--step <S>': expected 1e-6 to 1e6 s"),
+        (&["--dwell", "-5"], "'--dwell <S>': expected"),
+        (&["--drift-noise", "1e200 deg/h"], "0, or 1e-12 to 1e6 deg/h"),
+        (&["--drift-scale", "1e-300"], "expected 1e-6 to 1e6"),
+        (&["--noise", "1e-160"], "expected 1e-15 to 1000 g"),
+        (&["--noise", "1e155"], "expected 1e-15 to 1000 g"),
+        (&["--prior", "D=1e200"], "expected 1e-9 to 1e9"),
+        (&["--slew-rate", "1e-6"], "expected 1e-4 to 10000 deg/s"),
         (&["--value", "D_FX"], "NAME=NUMBER"),
         (&["--value", "D_FW=1"], "`D_FW`"),
-        (&["--prior", "psi=0"], "prior sigma"),
+        (&["--prior", "psi=0"], "'--prior <NAME=X>': expected 1e-9 to 1e9"),
         (&["--drift-noise", "0.01"], "unit"),
         (&["--slew-rate", "1"], "inertial"),
         (&["--truth", "rough"], "linear"),
         (&["--combination", "D_FX +"], "combination"),
         (&["--angles", "alpha,0,0"], "alpha"),
-        (&["--dwell", "1e9"], "steps"),
+        (&["--dwell", "1e9"], "'--dwell <S>': expected 0.001 to 1e6 s"),
+        (&["--step", "1e-6"], "steps"),
     ] {
         let output = obsdeg(&[&P1P2[..], arguments].concat());
         let stderr = String::from_utf8_lossy(&output.stderr);

@@ -7,6 +7,7 @@ use obsdeg_core::model::attitude::Euler;
 use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns, scheme_file};
+use obsdeg_core::system::model_file;
 use obsdeg_report::Format;
 
 use crate::failure::Failure;
@@ -113,11 +114,20 @@ pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(wrong)
 }
 
+/// Whether a file that is no scheme is meant as a model.
+fn is_model(path: &Path, text: &str) -> bool {
+    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    json || text.trim_start().starts_with('{') || model_file::is_model(text)
+}
+
 /// The scheme of a file.
 pub(crate) fn read_scheme(path: &Path) -> Result<Scheme, Failure> {
     let name = path.display().to_string();
     let text = read_text(path, "scheme")?;
     scheme_file::read(&text).map_err(|e| match e.span {
+        _ if is_model(path, &text) => Failure::input(format!(
+            "{name} is a model file; expected a scheme file, with [[position]] tables (models go with --model, or to report)"
+        )),
         Some(span) => Failure::at(&e.message, &name, &text, span),
         None => Failure::input(format!("{name}: {}", e.message)),
     })

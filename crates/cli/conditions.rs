@@ -4,6 +4,7 @@ use clap::{Args, ValueEnum};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::simulation::Conditions;
 use obsdeg_core::simulation::conditions::{Assignment, DriftNoise, Propagation, Settings, Truth};
+use obsdeg_core::simulation::ranges::{self, Range};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TruthArgument {
@@ -17,29 +18,45 @@ enum PropagationArgument {
     Rk4,
 }
 
+/// Reads a number of a range.
+pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = text.trim().parse().ok().filter(|x| range.admits(*x));
+        number.ok_or_else(|| format!("expected {range}"))
+    }
+}
+
+/// Reads `NAME=X` with a number of a range.
+fn assigned(range: Range) -> impl Fn(&str) -> Result<Assignment, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let a: Assignment = text.parse()?;
+        if range.admits(a.value) { Ok(a) } else { Err(format!("expected {range}")) }
+    }
+}
+
 /// What is measured, and how well it is to be known: all that a prediction by information needs.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Measurement")]
 pub(crate) struct MeasurementArguments {
-    /// Dwell of positions that do not say theirs, in s (default: 1000)
-    #[arg(long, value_name = "S")]
+    /// Dwell of positions that do not say theirs, in s (default: 1000; 0.001 to 1e6 s)
+    #[arg(long, value_name = "S", value_parser = within(ranges::DWELL_S))]
     dwell: Option<f64>,
 
-    /// Largest sampling step, in s (default: 10)
-    #[arg(long, value_name = "S")]
+    /// Largest sampling step, in s (default: 10; 1e-6 to 1e6 s)
+    #[arg(long, value_name = "S", value_parser = within(ranges::STEP_S))]
     step: Option<f64>,
 
-    /// White noise of Z per sample and axis, in g (default: 1e-5)
-    #[arg(long, value_name = "G")]
+    /// White noise of Z per sample and axis, in g (default: 1e-5; 1e-15 to 1000 g)
+    #[arg(long, value_name = "G", value_parser = within(ranges::NOISE_G))]
     noise: Option<f64>,
 
-    /// Noise of a measured azimuth per sample, in deg (default: 0.001)
-    #[arg(long, value_name = "DEG")]
+    /// Noise of a measured azimuth per sample, in deg (default: 0.001; 1e-12 to 1000 deg)
+    #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
     azimuth_noise: Option<f64>,
 
     /// Largest standard deviation allowed for an unknown or family in deg, deg/h, deg/h/g: D=0.05, D_FX=0.01
-    /// (default: psi 0.01, D 0.1)
-    #[arg(long, value_name = "NAME=X")]
+    /// (default: psi 0.01, D 0.1; 1e-12 to 1e9)
+    #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
     requirement: Vec<Assignment>,
 }
 
@@ -54,12 +71,13 @@ pub(crate) struct ConditionArguments {
     #[arg(long, value_name = "LEVEL", hide_possible_values = true)]
     truth: Option<TruthArgument>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous)
-    #[arg(long, value_name = "DEG_S")]
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
+    /// 1e-4 to 10000 deg/s)
+    #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
     slew_rate: Option<f64>,
 
     /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
-    /// (default: 0.01 deg/h)
+    /// (default: 0.01 deg/h; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "NOISE")]
     drift_noise: Option<DriftNoise>,
 
@@ -67,20 +85,21 @@ pub(crate) struct ConditionArguments {
     #[arg(long, value_name = "HOW", hide_possible_values = true)]
     propagation: Option<PropagationArgument>,
 
-    /// True value of an unknown or family in deg, deg/h, deg/h/g: D_FX=11, D_I=5, psi=0.1 (the paper's)
-    #[arg(long, value_name = "NAME=X")]
+    /// True value of an unknown or family in deg, deg/h, deg/h/g: D_FX=11, D_I=5, psi=0.1 (the paper's;
+    /// -1e6 to 1e6)
+    #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
     value: Vec<Assignment>,
 
-    /// Initial standard deviation, likewise (default: psi 0.1, D_F 20, D_I D_O D_S 10, others 1)
-    #[arg(long, value_name = "NAME=X")]
+    /// Initial standard deviation, likewise (default: psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
+    #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
     prior: Vec<Assignment>,
 
-    /// Initial estimate, likewise (default: 0)
-    #[arg(long, value_name = "NAME=X")]
+    /// Initial estimate, likewise (default: 0; -1e6 to 1e6)
+    #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
     estimate: Vec<Assignment>,
 
-    /// Factor on the true drifts and their priors (default: 1)
-    #[arg(long, value_name = "X")]
+    /// Factor on the true drifts and their priors (default: 1; 1e-6 to 1e6)
+    #[arg(long, value_name = "X", value_parser = within(ranges::DRIFT_SCALE))]
     drift_scale: Option<f64>,
 }
 

@@ -12,10 +12,11 @@ use obsdeg_core::model::angle::{format_decimal, parse_decimal};
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_core::simulation::Conditions;
 use obsdeg_core::simulation::conditions::latitude_of;
+use obsdeg_core::simulation::ranges::SLEW_RATE_DEG_S;
 use obsdeg_report::{File, Format, Layout, ReportError, design_figures};
 
 use crate::arguments::{FolderArguments, read_scheme};
-use crate::conditions::MeasurementArguments;
+use crate::conditions::{MeasurementArguments, within};
 use crate::failure::Failure;
 use crate::progress::Bar;
 use crate::{interrupt, output};
@@ -131,8 +132,8 @@ struct WantedArguments {
     #[arg(long, value_name = "S", requires = "slew_rate")]
     max_slew: Option<f64>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous)
-    #[arg(long, value_name = "DEG_S")]
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous; 1e-4 to 10000 deg/s)
+    #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
     slew_rate: Option<f64>,
 
     /// How far a gimbal turns in degrees, as alpha=-180:180, beta=-80:80; attitudes beyond are left out
@@ -201,7 +202,8 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
 
 fn failure(e: DesignError) -> Failure {
     match e {
-        DesignError::Verdict(_) | DesignError::Filter(_) => Failure::internal(e.to_string()),
+        DesignError::Verdict(_) => Failure::internal(e.to_string()),
+        DesignError::Filter(e) => crate::simulate::failure(e.into()),
         DesignError::Conditions(e) => crate::simulate::failure(e),
         _ => Failure::input(e.to_string()),
     }

@@ -21,7 +21,7 @@ mod simulate;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use failure::Failure;
 
@@ -73,8 +73,21 @@ enum Command {
     SymbolicWorker,
 }
 
+/// The command line as it is read: a negative number behind an option is its value, so that the option can say what it expects.
+fn command() -> clap::Command {
+    let takes =
+        |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
+    Cli::command().mut_subcommands(move |command| {
+        command.mut_args(|a| {
+            if takes(&a) && !a.is_allow_hyphen_values_set() { a.allow_negative_numbers(true) } else { a }
+        })
+    })
+}
+
 fn run() -> Result<ExitCode, Failure> {
-    match Cli::parse().command {
+    let matches = command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    match cli.command {
         Command::Analyze(a) => analyze::run(&a),
         Command::Simulate(a) => simulate::run(&a),
         Command::Crosscheck(a) => crosscheck::run(&a),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use obsdeg_core::model::scheme_file;
 use obsdeg_core::system::run::RunError;
 use obsdeg_core::system::{ModelError, SystemModel, json, model_file};
 
@@ -18,14 +19,16 @@ pub(crate) struct ModelFile {
 struct Source {
     name: String,
     text: String,
-    is_json: bool,
 }
 
 impl Source {
     fn wrong(&self, e: &ModelError) -> Failure {
         match e.span.clone() {
-            // places in JSON are inside its strings
-            Some(span) if !self.is_json => Failure::at(&e.to_string(), &self.name, &self.text, span),
+            _ if scheme_file::is_scheme(&self.text) => Failure::input(format!(
+                "{} is a scheme file; expected a model file, with [states] and [outputs] (schemes go with --scheme)",
+                self.name
+            )),
+            Some(span) => Failure::at(&e.to_string(), &self.name, &self.text, span),
             _ => Failure::input(format!("{}: {e}", self.name)),
         }
     }
@@ -40,8 +43,8 @@ impl ModelFile {
     /// Reads TOML, or JSON by the ending of the file.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let name = path.display().to_string();
-        let source = Source { name, text: read_text(path, "model")?, is_json: is_json(path) };
-        let read = if source.is_json { json::read(&source.text) } else { model_file::read(&source.text) };
+        let source = Source { name, text: read_text(path, "model")? };
+        let read = if is_json(path) { json::read(&source.text) } else { model_file::read(&source.text) };
         let model = read.map_err(|e| source.wrong(&e))?;
         Ok(Self { model, source })
     }

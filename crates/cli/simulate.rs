@@ -105,6 +105,9 @@ pub(crate) fn failure(e: SimulationError) -> Failure {
             reason,
             span,
         })) => Failure::at(&format!("combination: {reason}"), "--combination", &text, span),
+        SimulationError::Filter(e) if e.is_numeric() => Failure::input(format!(
+            "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
+        )),
         SimulationError::Prediction(_) | SimulationError::Filter(_) => Failure::internal(e.to_string()),
         _ => Failure::input(e.to_string()),
     }

@@ -1,13 +1,12 @@
 //! Combinations that a scheme asks for: read, checked to be linear, judged.
 
-use obsdeg_exact::SplitMix64;
+use obsdeg_exact::{Field, RootField, SplitMix64};
 
 use super::{AnalysisError, Status, Verdict};
 use crate::degree::coefficient::{Coefficient, Image, Number, rates_between, recover_radical};
 use crate::degree::ensemble::Verdicts;
 use crate::model::Platform;
-use crate::model::expression::{Environment, Expression, ExpressionError, evaluate, parse};
-use crate::model::platform::Sample;
+use crate::model::expression::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 use crate::solution::solver::Sparse;
 
 struct Unit<'a> {
@@ -37,16 +36,19 @@ impl Environment for Unit<'_> {
 fn row_of(
     expression: &Expression,
     names: &[String],
-    sample: &Sample,
+    f: &Field,
+    rates: [u64; 2],
     rng: &mut SplitMix64,
 ) -> Result<Vec<u64>, ExpressionError> {
-    let f = sample.roots.field;
-    let rates = [sample.point.w_n, sample.point.w_u];
-    let at = |values: &[u64]| evaluate(expression, &f, &Unit { names, values, rates });
+    let at = |values: &[u64]| evaluate(expression, f, &Unit { names, values, rates });
     let zero = vec![0; names.len()];
     let unit =
         |c: usize| -> Vec<u64> { (0..names.len()).map(|j| if j == c { f.one() } else { 0 }).collect() };
-    let row: Vec<u64> = (0..names.len()).map(|c| at(&unit(c))).collect::<Result<_, _>>()?;
+    // what it does not name has no part in it
+    let named =
+        |c: usize| expression.nodes.iter().any(|n| matches!(n, Node::Name(name) if *name == names[c]));
+    let row: Vec<u64> =
+        (0..names.len()).map(|c| if named(c) { at(&unit(c)) } else { Ok(0) }).collect::<Result<_, _>>()?;
     let probe: Vec<u64> = names.iter().map(|_| rng.below(f.modulus())).collect();
     let linear = at(&zero)? == 0 && at(&probe)? == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
     if !linear {
@@ -57,6 +59,16 @@ fn row_of(
         });
     }
     Ok(row)
+}
+
+/// Checks that a text is a linear combination of unknowns of these names.
+pub(crate) fn check(text: &str, names: &[String]) -> Result<(), ExpressionError> {
+    let parsed = parse(text)?;
+    let mut rng = SplitMix64::of(1, "combination", &[text]);
+    // there are enough primes of order 4
+    let Ok(roots) = RootField::random(4, &mut rng) else { return Ok(()) };
+    let rates = [0; 2].map(|_| 1 + rng.below(roots.field.modulus() - 1));
+    row_of(&parsed, names, &roots.field, rates, &mut rng).map(|_| ())
 }
 
 /// A combination that was asked for.
@@ -91,7 +103,8 @@ pub(crate) fn requested_combinations(
             };
             let parsed = parse(text).map_err(wrap)?;
             let sample = verdicts.values[0].sample(scheme, 1);
-            let row = row_of(&parsed, names, &sample, &mut rng).map_err(wrap)?;
+            let rates = [sample.point.w_n, sample.point.w_u];
+            let row = row_of(&parsed, names, &sample.roots.field, rates, &mut rng).map_err(wrap)?;
             let degree = verdicts.stairs.iter().position(|v| v.contains(&row));
             let moved = (0..names.len()).any(|c| row[c] != 0 && verdicts.degrees.excited[c]);
             let status = match degree {
@@ -112,16 +125,13 @@ fn terms_of(
     verdicts: &Verdicts,
     rng: &mut SplitMix64,
 ) -> Result<Sparse, ExpressionError> {
-    let scheme = platform.scheme();
     let names = platform.names();
     let fields = [*verdicts.values[0].roots(), *verdicts.values[1].roots()];
     let f = fields[0].field;
     let mut nonzero = || 1 + rng.below(f.modulus() - 1);
     let [one, other] = [[nonzero(), nonzero()], [nonzero(), nonzero()]];
     let mut at = |field: usize, rates: [u64; 2]| {
-        let mut sample = verdicts.values[field].sample(scheme, 1);
-        [sample.point.w_n, sample.point.w_u] = rates;
-        row_of(parsed, names, &sample, rng).map(|row| (row, rates))
+        row_of(parsed, names, &fields[field].field, rates, rng).map(|row| (row, rates))
     };
     let first = at(0, one)?;
     let second = at(0, other)?;

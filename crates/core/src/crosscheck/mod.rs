@@ -100,6 +100,9 @@ pub fn crosscheck(
     if scheme.rotates() {
         return Err(SimulationError::CrosscheckRotation);
     }
+    if options.filter.dropped.is_some() && scheme.positions.len() < 2 {
+        return Err(SimulationError::DroppedOnly);
+    }
     let truth = Plan::new(scheme, conditions)?;
     let slews = truth.segments.iter().any(|s| matches!(s.kind, Kind::Slew(_)));
     if slews && options.filter.dropped.is_some() {

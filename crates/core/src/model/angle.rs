@@ -9,6 +9,8 @@ use obsdeg_exact::Turn;
 pub const MAX_DECIMALS: usize = 9;
 /// Largest magnitude of an angle in degrees.
 pub const MAX_DEGREES: i64 = 1_000_000;
+/// Most characters of the name of an angle or a position.
+pub const MAX_NAME: usize = 64;
 
 /// `turn`, or `+-name + turn` for a generic angle.
 ///
@@ -63,6 +65,14 @@ pub enum AngleError {
         /// The text found.
         found: String,
     },
+    /// A name that is too long for formulas and tables.
+    #[error("the name `{beginning}...` of an angle has {found} characters; expected at most {MAX_NAME}")]
+    LongName {
+        /// Its first characters.
+        beginning: String,
+        /// Its length.
+        found: usize,
+    },
     /// A name that means something else.
     #[error("`{found}` cannot name an angle: it already stands for something in the formulas")]
     Reserved {
@@ -71,12 +81,18 @@ pub enum AngleError {
     },
 }
 
+/// What fits into a message.
+pub(crate) fn excerpt(text: &str) -> String {
+    let short: String = text.chars().take(60).collect();
+    if short.len() < text.len() { short + "..." } else { short }
+}
+
 /// Exact decimal degrees in units of 1e-9 degrees.
 ///
 /// # Errors
 /// [`AngleError`] for anything but an optional sign, digits and up to nine decimals.
 pub fn parse_decimal(text: &str) -> Result<i64, AngleError> {
-    let found = || text.to_string();
+    let found = || excerpt(text);
     if text.is_empty() {
         return Err(AngleError::Empty);
     }
@@ -153,10 +169,13 @@ impl Angle {
         let mut bytes = name.bytes();
         let letter_first = bytes.next().is_some_and(|b| b.is_ascii_alphabetic());
         if !letter_first || !bytes.all(|b| b.is_ascii_alphanumeric() || b == b'_') {
-            return Err(AngleError::NotANumber { found: name.into() });
+            return Err(AngleError::NotANumber { found: excerpt(name) });
         }
         if matches!(name.to_ascii_lowercase().as_str(), "nan" | "inf" | "infinity") {
             return Err(AngleError::NotFinite { found: name.into() });
+        }
+        if name.len() > MAX_NAME {
+            return Err(AngleError::LongName { beginning: name[..12].into(), found: name.len() });
         }
         let taken = matches!(name, "wN" | "wU" | "sin" | "cos" | "tan" | "sqrt" | "deg")
             || ["D_", "psi", "eps", "Z", "r_", "s_", "c_", "t_"].iter().any(|p| name.starts_with(p));
@@ -183,7 +202,7 @@ impl FromStr for Angle {
         match split.map(|i| (&text[..i], &text[i..])) {
             Some((a, b)) if is_name(a) && !is_name(b) => signed(a, parse_decimal(b)?),
             Some((a, b)) if !is_name(a) && is_name(b) => signed(b, parse_decimal(a)?),
-            Some(_) => Err(AngleError::NotANumber { found: text.into() }),
+            Some(_) => Err(AngleError::NotANumber { found: excerpt(text) }),
             None if is_name(text) => signed(text, 0),
             None => parse_decimal(text).map(Self::from_nanodeg),
         }

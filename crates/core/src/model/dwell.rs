@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::angle::{format_decimal, parse_decimal};
+use crate::simulation::ranges::DWELL_S;
 
 /// The time spent at a position, an exact decimal of seconds.
 ///
@@ -20,7 +21,7 @@ pub struct Dwell {
 
 /// Why a text is no dwell.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{found}` is not a dwell; expected seconds above 0 and up to 1000000, with at most nine decimals")]
+#[error("`{found}` is not a dwell; expected {}, with at most nine decimals", DWELL_S)]
 pub struct DwellError {
     /// The text found.
     pub found: String,
@@ -30,10 +31,10 @@ impl Dwell {
     /// The dwell of the paper's positions, 1000 s.
     pub const PAPER: Self = Self { nanoseconds: 1_000_000_000_000 };
 
-    /// The dwell of so many seconds, to 1e-9 s; `None` outside the range.
+    /// The dwell of so many seconds, to 1e-9 s. Sweeps go beyond what is admitted for a scheme: `None` outside 1e-9 to 1e9 s.
     pub fn from_seconds(seconds: f64) -> Option<Self> {
         let nanoseconds = (seconds * 1e9).round();
-        (1.0..=1e15).contains(&nanoseconds).then_some(Self { nanoseconds: nanoseconds as u64 })
+        (1.0..=1e18).contains(&nanoseconds).then_some(Self { nanoseconds: nanoseconds as u64 })
     }
 
     /// The dwell in 1e-9 s.
@@ -51,14 +52,15 @@ impl FromStr for Dwell {
     type Err = DwellError;
     fn from_str(text: &str) -> Result<Self, DwellError> {
         let nanoseconds = parse_decimal(text.trim()).ok().and_then(|n| u64::try_from(n).ok());
-        let nanoseconds = nanoseconds.filter(|&n| n > 0);
-        nanoseconds.map(|nanoseconds| Self { nanoseconds }).ok_or_else(|| DwellError { found: text.into() })
+        let dwell =
+            nanoseconds.map(|nanoseconds| Self { nanoseconds }).filter(|d| DWELL_S.admits(d.seconds()));
+        dwell.ok_or_else(|| DwellError { found: text.into() })
     }
 }
 
 impl fmt::Display for Dwell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // at most 1e15 ns
+        // at most 1e18 ns
         f.write_str(&format_decimal(self.nanoseconds as i64))
     }
 }

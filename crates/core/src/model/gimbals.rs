@@ -97,11 +97,12 @@ impl Gimbals {
             return None;
         }
         let start = c_n(&Float, &position.angles, None, |a| a.turn().cos_sin_f64());
-        // a turn of so many degrees in so many seconds
+        // a turn of so many degrees in so many seconds; behind a whole turn nothing is new
         let whole = r.angle.nanodeg() as f64 / 1e9;
         let path = Slew::about(&start, r, whole.abs());
-        let steps = whole.abs().ceil();
-        (1..=steps as usize).map(|k| k as f64 * whole.abs() / steps).find_map(|t| {
+        let arc = whole.abs().min(360.0);
+        let steps = arc.ceil();
+        (1..=steps as usize).map(|k| k as f64 * arc / steps).find_map(|t| {
             let angles = euler_angles(&path.at(t)).map(|x| (x.to_degrees() * 1e9).round() as i64);
             let turned = if whole < 0.0 { -t } else { t };
             (!self.reach_nanodeg(angles, ROUNDING))

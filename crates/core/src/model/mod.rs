@@ -5,6 +5,7 @@ pub mod attitude;
 mod canonical;
 pub mod dwell;
 pub mod expression;
+pub(crate) mod file_error;
 pub mod geometry;
 pub mod gimbals;
 mod parser;

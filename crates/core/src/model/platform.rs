@@ -99,6 +99,11 @@ impl Platform {
         &self.scheme
     }
 
+    /// The scheme, when the rest is no longer needed.
+    pub fn into_scheme(self) -> Scheme {
+        self.scheme
+    }
+
     /// The names of the unknowns: psi first, then the coefficients term by term.
     pub fn names(&self) -> &[String] {
         &self.names

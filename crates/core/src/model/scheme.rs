@@ -1,20 +1,21 @@
 //! A torquing scheme: positions, carry, latitude, geometry and what is unknown.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt;
 use std::str::FromStr;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::angle::{Angle, AngleError, format_decimal, parse_decimal};
+use super::angle::{Angle, AngleError, MAX_NAME, excerpt, format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, Turned, c_n, cardinal, cardinal_name};
 use super::dwell::Dwell;
 use super::geometry::{Geometry, Unknowns};
 use super::gimbals::Gimbals;
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
-use crate::simulation::conditions::Settings;
+use crate::simulation::conditions::{self, Settings};
+use crate::simulation::ranges::{self, RangeError};
 
 /// What is carried from one position to the next (the paper does not say).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -193,6 +194,22 @@ pub enum PositionError {
         /// What is wrong with it.
         error: AngleError,
     },
+    /// Three parts that are not separated by commas.
+    #[error("position `{text}` has no commas; expected them between the angles, as in {hint}")]
+    Commas {
+        /// The text found.
+        text: String,
+        /// The same with commas.
+        hint: String,
+    },
+    /// Direction letters that are small.
+    #[error("position `{text}` has small letters; expected directions out of N S U D E W, as in {hint}")]
+    SmallLetters {
+        /// The text found.
+        text: String,
+        /// The same in capitals.
+        hint: String,
+    },
     /// Letters, but no right-handed attitude.
     #[error(
         "`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, perpendicular and right-handed, as in NUE or NDW"
@@ -213,13 +230,22 @@ pub fn parse_attitude(text: &str) -> Result<Euler, PositionError> {
     if letters && trimmed.len() == 3 {
         return cardinal(trimmed).ok_or_else(|| PositionError::Cardinal { found: trimmed.into() });
     }
+    let capitals = trimmed.to_ascii_uppercase();
+    if trimmed.len() == 3 && capitals != trimmed && capitals.chars().all(|c| "NSUDEW".contains(c)) {
+        return Err(PositionError::SmallLetters { text: trimmed.into(), hint: capitals });
+    }
     let parts: Vec<&str> = trimmed.split(',').collect();
     let [a, b, c] = parts[..] else {
+        let text = excerpt(trimmed);
+        let others: Vec<&str> = trimmed.split([' ', '\t', ';', ':', '/']).filter(|p| !p.is_empty()).collect();
+        if let (1, [a, b, c]) = (parts.len(), &others[..]) {
+            return Err(PositionError::Commas { hint: excerpt(&format!("{a},{b},{c}")), text });
+        }
         let found = if trimmed.is_empty() { 0 } else { parts.len() };
-        return Err(PositionError::Count { text: text.into(), found });
+        return Err(PositionError::Count { text, found });
     };
     let parse = |part: &str, which| {
-        let wrap = |error| PositionError::Angle { text: text.into(), which, error };
+        let wrap = |error| PositionError::Angle { text: excerpt(trimmed), which, error };
         part.parse::<Angle>().map_err(wrap)
     };
     Ok([parse(a, "alpha")?, parse(b, "beta")?, parse(c, "gamma")?])
@@ -283,6 +309,45 @@ pub enum SchemeError {
     DuplicateName {
         /// The name.
         name: String,
+        /// The index of the second.
+        index: usize,
+    },
+    /// A name that tables and formulas cannot hold.
+    #[error("position name `{name}`; expected up to {MAX_NAME} letters, digits, `_`, `-`, `.` and blanks")]
+    PositionName {
+        /// The name, or its first characters.
+        name: String,
+        /// The index of the position.
+        index: usize,
+    },
+    /// A text that is too long for a report.
+    #[error("{key} has {found} characters; expected at most {most}")]
+    LongText {
+        /// The key in a scheme file.
+        key: String,
+        /// Its length.
+        found: usize,
+        /// The most.
+        most: usize,
+    },
+    /// Too many combinations.
+    #[error("{found} combinations; expected at most {MAX_COMBINATIONS}")]
+    Combinations {
+        /// Their number.
+        found: usize,
+    },
+    /// A number beyond its range.
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    /// A number for something that no gyro model has.
+    #[error(
+        "`{name}`: no such unknown; expected an unknown such as D_FX or psi_x, or a family such as D_F, D or psi"
+    )]
+    UnknownName {
+        /// The key in a scheme file.
+        key: String,
+        /// The name, or its first characters.
+        name: String,
     },
     /// The drift alone is constant at one position only.
     #[error(
@@ -293,7 +358,7 @@ pub enum SchemeError {
         found: usize,
     },
     /// A dwell out of range.
-    #[error("a dwell of {found} s; expected above 0 and up to 1000000 s")]
+    #[error("a dwell of {found} s; expected 1e-9 to 1e9 s")]
     Dwell {
         /// The seconds found.
         found: String,
@@ -303,12 +368,16 @@ pub enum SchemeError {
     Rotation {
         /// The segment.
         name: String,
+        /// Its index.
+        index: usize,
     },
     /// A position that the gimbals do not reach.
     #[error("the gimbals do not reach `{name}` ({attitude}); expected {limits}")]
     Gimbals {
         /// The position.
         name: String,
+        /// Its index.
+        index: usize,
         /// Its angles, and how far it has turned.
         attitude: String,
         /// The limits.
@@ -332,6 +401,33 @@ const STATION_STEPS: i64 = 8;
 
 /// Most positions that a scheme may have.
 pub const MAX_POSITIONS: usize = 1000;
+/// Most combinations that a scheme may ask for, and characters of one.
+pub const MAX_COMBINATIONS: usize = 100;
+const MAX_COMBINATION: usize = 1000;
+/// Most characters of the name and of the description of a scheme.
+const MAX_TITLE: usize = 200;
+const MAX_DESCRIPTION: usize = 10_000;
+
+impl SchemeError {
+    /// The key of the offender in a scheme file, as in `position.1.name`; `None` when it is the whole scheme.
+    pub fn key(&self) -> Option<String> {
+        match self {
+            Self::Empty | Self::Dwell { .. } => None,
+            Self::TooMany { .. } => Some(format!("position.{MAX_POSITIONS}")),
+            Self::DuplicateName { index, .. } | Self::PositionName { index, .. } => {
+                Some(format!("position.{index}.name"))
+            }
+            Self::LongText { key, .. } | Self::UnknownName { key, .. } => Some(key.clone()),
+            Self::Combinations { .. } => Some("combinations".into()),
+            Self::Range(e) => Some(e.what.clone()),
+            Self::DriftPositions { .. } => Some("terms".into()),
+            Self::Rotation { index, .. } => Some(format!("position.{index}.rotation")),
+            Self::Gimbals { index, .. } => Some(format!("position.{index}")),
+            Self::FirstSlew { .. } => Some("position.0.slew".into()),
+            Self::Geometry(_) => Some("geometry".into()),
+        }
+    }
+}
 
 impl Scheme {
     /// A scheme of the given attitudes, named p1, p2, ..., with the paper's defaults.
@@ -362,28 +458,76 @@ impl Scheme {
         if found > MAX_POSITIONS {
             return Err(SchemeError::TooMany { found });
         }
-        let mut names: Vec<&str> = self.positions.iter().map(|p| p.name.as_str()).collect();
-        names.sort_unstable();
-        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(SchemeError::DuplicateName { name: pair[0].into() });
-        }
-        if let Some(p) = self.positions.iter().find(|p| {
-            p.rotation
-                .as_ref()
-                .is_some_and(|r| r.angle.generic().is_some() || r.angle.nanodeg().abs() < MIN_ROTATION)
-        }) {
-            return Err(SchemeError::Rotation { name: p.name.clone() });
-        }
-        if let Some(p) = self.positions.first().filter(|p| p.slew.is_some()) {
-            return Err(SchemeError::FirstSlew { name: p.name.clone() });
-        }
-        if let Some((name, attitude)) = self.positions.iter().find_map(|p| self.gimbals.beyond(p)) {
-            return Err(SchemeError::Gimbals { name, attitude, limits: self.gimbals.to_string() });
+        self.geometry.validate()?;
+        self.validate_texts()?;
+        self.validate_numbers()?;
+        for (index, p) in self.positions.iter().enumerate() {
+            let name = p.name.clone();
+            let none = |r: &Rotation| r.angle.generic().is_some() || r.angle.nanodeg().abs() < MIN_ROTATION;
+            if p.rotation.as_ref().is_some_and(none) {
+                return Err(SchemeError::Rotation { name, index });
+            }
+            if index == 0 && p.slew.is_some() {
+                return Err(SchemeError::FirstSlew { name });
+            }
+            if let Some((name, attitude)) = self.gimbals.beyond(p) {
+                return Err(SchemeError::Gimbals { name, index, attitude, limits: self.gimbals.to_string() });
+            }
         }
         if self.unknowns == Unknowns::Drift && (found > 1 || self.rotates()) {
             return Err(SchemeError::DriftPositions { found });
         }
-        Ok(self.geometry.validate()?)
+        Ok(())
+    }
+
+    /// Names and other texts.
+    fn validate_texts(&self) -> Result<(), SchemeError> {
+        let plain = |c: char| c.is_alphanumeric() || "_-. ".contains(c);
+        let mut names = HashSet::new();
+        for (index, p) in self.positions.iter().enumerate() {
+            let length = p.name.chars().count();
+            if !(1..=MAX_NAME).contains(&length) || !p.name.chars().all(plain) {
+                return Err(SchemeError::PositionName { name: excerpt(&p.name), index });
+            }
+            if !names.insert(&p.name) {
+                return Err(SchemeError::DuplicateName { name: p.name.clone(), index });
+            }
+        }
+        let found = self.combinations.len();
+        if found > MAX_COMBINATIONS {
+            return Err(SchemeError::Combinations { found });
+        }
+        let combinations = self.combinations.iter().enumerate();
+        let combinations = combinations.map(|(i, text)| (format!("combinations.{i}"), text, MAX_COMBINATION));
+        let own = [("name", &self.name, MAX_TITLE), ("description", &self.description, MAX_DESCRIPTION)];
+        let own = own.into_iter().map(|(key, text, most)| (key.to_string(), text, most));
+        for (key, text, most) in own.chain(combinations) {
+            let found = text.chars().count();
+            if found > most {
+                return Err(SchemeError::LongText { key, found, most });
+            }
+        }
+        Ok(())
+    }
+
+    /// Numbers and the names that they are for.
+    fn validate_numbers(&self) -> Result<(), SchemeError> {
+        let lists = self.simulation.lists().map(|(key, list, _)| (format!("simulation.{key}"), list));
+        for (key, list) in lists.into_iter().chain([("requirements".into(), &self.requirements)]) {
+            if let Some(name) = list.keys().find(|name| !conditions::may_be_unknown(name)) {
+                return Err(SchemeError::UnknownName { key: format!("{key}.{name}"), name: excerpt(name) });
+            }
+        }
+        let required = self.requirements.iter();
+        let required = required.map(|(name, x)| (format!("requirements.{name}"), *x, ranges::REQUIREMENT));
+        let slews = self.positions.iter().enumerate().filter_map(|(i, p)| {
+            let rate = p.slew.as_ref()?.rate_deg_s?;
+            Some((format!("position.{i}.slew.rate_deg_s"), rate, ranges::SLEW_RATE_DEG_S))
+        });
+        for (key, x, range) in self.simulation.numbers().into_iter().chain(required).chain(slews) {
+            range.check(key, x)?;
+        }
+        Ok(())
     }
 
     /// The scheme with every dwell times `factor`; `dwell_s` is that of positions that do not say.

@@ -8,6 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SimulationError;
+use super::ranges::{self, Range, RangeError};
+use crate::model::expression::nearest;
 use crate::model::{Latitude, Platform, Position, Scheme};
 
 /// How the truth is generated.
@@ -45,6 +47,18 @@ pub enum DriftNoise {
 }
 
 impl DriftNoise {
+    /// The number without its unit.
+    pub fn amount(self) -> f64 {
+        match self {
+            Self::OneStep(x) | Self::RandomWalk(x) => x,
+        }
+    }
+
+    /// Refuses what is neither zero nor in its range.
+    fn check(self, what: &str) -> Result<(), RangeError> {
+        if self.amount() == 0.0 { Ok(()) } else { ranges::DRIFT_NOISE.check(what, self.amount()) }
+    }
+
     /// The standard deviation in rad/s of the bias held over one step of `dt` seconds.
     pub fn held_rad_s(self, dt: f64) -> f64 {
         match self {
@@ -65,14 +79,15 @@ impl FromStr for DriftNoise {
         let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
         let split = compact.find("deg").ok_or_else(wrong)?;
         let value: f64 = compact[..split].parse().map_err(|_| wrong())?;
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(wrong());
-        }
-        match &compact[split..] {
-            "deg/h" => Ok(Self::OneStep(value)),
-            "deg/sqrt(h)" => Ok(Self::RandomWalk(value)),
-            _ => Err(wrong()),
-        }
+        let noise = match &compact[split..] {
+            "deg/h" => Self::OneStep(value),
+            "deg/sqrt(h)" => Self::RandomWalk(value),
+            _ => return Err(wrong()),
+        };
+        noise
+            .check("")
+            .map_err(|e| format!("`{text}`: expected 0, or {} {}", e.expected, &compact[split..]))?;
+        Ok(noise)
     }
 }
 
@@ -186,9 +201,8 @@ impl Default for Conditions {
     }
 }
 
-/// The conditions as a scheme file gives them: `[simulation]`.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// The conditions as a scheme gives them.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
     /// linear (default) or exact.
     pub truth: Option<Truth>,
@@ -209,13 +223,10 @@ pub struct Settings {
     /// Factor on the true drift coefficients and their priors.
     pub drift_scale: Option<f64>,
     /// True values by unknown or family, as in D_F = 11.
-    #[serde(default)]
     pub values: BTreeMap<String, f64>,
     /// Initial estimates.
-    #[serde(default)]
     pub estimates: BTreeMap<String, f64>,
     /// Initial standard deviations.
-    #[serde(default)]
     pub priors: BTreeMap<String, f64>,
 }
 
@@ -266,21 +277,92 @@ impl Conditions {
         own.or(self.slew_rate_deg_s).filter(|_| self.slews)
     }
 
-    /// Checks what the types do not.
+    /// Checks what the types do not: every number is in its range.
     ///
     /// # Errors
-    /// [`SimulationError`] naming the offender.
+    /// [`SimulationError::Range`] naming the offender.
     pub fn validate(&self) -> Result<(), SimulationError> {
-        let positive = [
-            ("step_s", self.step_s),
-            ("dwell_s", self.dwell_s),
-            ("accelerometer_noise_g", self.accelerometer_noise_g),
-            ("azimuth_noise_deg", self.azimuth_noise_deg),
-            ("drift_scale", self.drift_scale),
-            ("slew_rate_deg_s", self.slew_rate_deg_s.unwrap_or(1.0)),
+        let single = [
+            ("step_s", self.step_s, ranges::STEP_S),
+            ("dwell_s", self.dwell_s, ranges::DWELL_S),
+            ("slew_rate_deg_s", self.slew_rate_deg_s.unwrap_or(1.0), ranges::SLEW_RATE_DEG_S),
+            ("accelerometer_noise_g", self.accelerometer_noise_g, ranges::NOISE_G),
+            ("azimuth_noise_deg", self.azimuth_noise_deg, ranges::AZIMUTH_NOISE_DEG),
+            ("drift_scale", self.drift_scale, ranges::DRIFT_SCALE),
         ];
-        let wrong = positive.into_iter().find(|(_, x)| !(x.is_finite() && *x > 0.0));
-        wrong.map_or(Ok(()), |(what, found)| Err(SimulationError::NotPositive { what, found }))
+        for (what, x, range) in single {
+            range.check(what, x)?;
+        }
+        self.drift_noise.check("drift_noise")?;
+        for (what, list, range) in self.lists() {
+            for a in list {
+                range.check(format!("the {what} of {}", a.name), a.value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Every list of assignments, in words, with the range of its numbers.
+    fn lists(&self) -> [(&'static str, &[Assignment], Range); 4] {
+        [
+            (TRUE_VALUE, &self.values, ranges::VALUE),
+            (ESTIMATE, &self.estimates, ranges::VALUE),
+            (PRIOR, &self.priors, ranges::PRIOR),
+            (REQUIRED, &self.requirements, ranges::REQUIREMENT),
+        ]
+    }
+
+    /// Checks that every assignment concerns an unknown of `platform`, or a family that a gyro model may have.
+    ///
+    /// # Errors
+    /// [`SimulationError::UnknownName`].
+    pub fn concern(&self, platform: &Platform) -> Result<(), SimulationError> {
+        self.lists()
+            .into_iter()
+            .try_for_each(|(what, list, _)| resolve(what, platform, list, 0.0).map(|_| ()))
+    }
+}
+
+/// A true value in words.
+pub const TRUE_VALUE: &str = "true value";
+/// An initial estimate in words.
+pub const ESTIMATE: &str = "initial estimate";
+/// A prior standard deviation in words.
+pub const PRIOR: &str = "prior sigma";
+/// A requirement in words.
+pub const REQUIRED: &str = "required sigma";
+
+impl Settings {
+    /// Every number by its key in a scheme file, with its range.
+    pub(crate) fn numbers(&self) -> Vec<(String, f64, Range)> {
+        let single = [
+            ("step_s", self.step_s, ranges::STEP_S),
+            ("dwell_s", self.dwell_s, ranges::DWELL_S),
+            ("slew_rate_deg_s", self.slew_rate_deg_s, ranges::SLEW_RATE_DEG_S),
+            ("accelerometer_noise_g", self.accelerometer_noise_g, ranges::NOISE_G),
+            ("azimuth_noise_deg", self.azimuth_noise_deg, ranges::AZIMUTH_NOISE_DEG),
+            ("drift_scale", self.drift_scale, ranges::DRIFT_SCALE),
+            (
+                "drift_noise",
+                self.drift_noise.map(DriftNoise::amount).filter(|x| *x != 0.0),
+                ranges::DRIFT_NOISE,
+            ),
+        ];
+        let single =
+            single.into_iter().filter_map(|(key, x, range)| Some((format!("simulation.{key}"), x?, range)));
+        let lists = self.lists().into_iter().flat_map(|(key, list, range)| {
+            list.iter().map(move |(name, x)| (format!("simulation.{key}.{name}"), *x, range))
+        });
+        single.chain(lists).collect()
+    }
+
+    /// The lists by their keys, with the range of their numbers.
+    pub(crate) fn lists(&self) -> [(&'static str, &BTreeMap<String, f64>, Range); 3] {
+        [
+            ("values", &self.values, ranges::VALUE),
+            ("estimates", &self.estimates, ranges::VALUE),
+            ("priors", &self.priors, ranges::PRIOR),
+        ]
     }
 }
 
@@ -299,11 +381,39 @@ pub(crate) fn concerns(pattern: &str, name: &str) -> bool {
     pattern == name || pattern == base || family || kind
 }
 
+/// Whether some scheme has an unknown or family of this name.
+pub(crate) fn may_be_unknown(name: &str) -> bool {
+    let axis = |name: &str| matches!(name, "psi_x" | "psi_y" | "psi_z" | "eps_x" | "eps_y" | "eps_z");
+    let number = |i: &str| i.len() <= 4 && !i.starts_with('0') && i.bytes().all(|b| b.is_ascii_digit());
+    let at = |name: &str| {
+        let parts = name.split_once('@');
+        parts.is_some_and(|(own, i)| own.starts_with("psi") && axis(own) && !i.is_empty() && number(i))
+    };
+    is_family(name) || axis(name.strip_suffix("^n").unwrap_or(name)) || at(name)
+}
+
 /// Whether a gyro model may have it, even if the scheme at hand does not.
-fn is_family(name: &str) -> bool {
+pub(crate) fn is_family(name: &str) -> bool {
     let letters = name.strip_prefix("D_").unwrap_or("");
     let letters = letters.strip_suffix(['X', 'Y', 'Z']).unwrap_or(letters);
     ["psi", "eps", "D"].contains(&name) || crate::model::Term::ALL.iter().any(|t| t.letters() == letters)
+}
+
+/// Families that stand for several unknowns.
+const FAMILIES: [&str; 7] = ["psi", "eps", "D", "D_F", "D_I", "D_O", "D_S"];
+
+/// What could have been meant by `name`: the nearest, or all there is (the first of very many).
+pub(crate) fn known(platform: &Platform, name: &str) -> String {
+    let families = FAMILIES.iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
+    let names: Vec<String> =
+        platform.names().iter().cloned().chain(families.map(ToString::to_string)).collect();
+    match nearest(name, &names) {
+        Some(hint) => format!("did you mean `{hint}`?"),
+        None if names.len() > 40 => {
+            format!("expected one of {}, ... or a family such as D_F", names[..20].join(", "))
+        }
+        None => format!("expected one of {}", names.join(", ")),
+    }
 }
 
 /// One number per unknown of `platform`, in the unit of the unknown (psi in deg): `default` where nothing is
@@ -328,8 +438,11 @@ pub fn resolve(
             }
         }
         if !found {
-            let known = platform.names().join(", ");
-            return Err(SimulationError::UnknownName { what, found: a.name.clone(), known });
+            return Err(SimulationError::UnknownName {
+                what,
+                found: a.name.clone(),
+                known: known(platform, &a.name),
+            });
         }
     }
     Ok(out)

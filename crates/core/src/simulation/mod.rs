@@ -5,6 +5,7 @@ pub(crate) mod attitude_path;
 pub mod batch;
 pub mod conditions;
 pub mod plan;
+pub mod ranges;
 pub mod record;
 pub mod truth;
 
@@ -50,6 +51,9 @@ pub enum SimulationError {
     /// A filter that does not know of a position knows of no slew to it.
     #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
     DroppedSlew,
+    /// The only position cannot be dropped.
+    #[error("the only position cannot be dropped; expected a scheme of at least two positions")]
+    DroppedOnly,
     /// The accuracy orders of a rotation are not known.
     #[error("the cross-check takes positions; found a rotating segment")]
     CrosscheckRotation,
@@ -68,22 +72,17 @@ pub enum SimulationError {
         /// Number of steps.
         found: usize,
     },
-    /// A condition that must be above zero.
-    #[error("{what} is {found}; expected a number above 0")]
-    NotPositive {
-        /// The condition.
-        what: &'static str,
-        /// The number found.
-        found: f64,
-    },
+    /// A condition beyond its range.
+    #[error(transparent)]
+    Range(#[from] ranges::RangeError),
     /// A value for something that the scheme does not have.
-    #[error("{what} for `{found}`: no such unknown; expected one of {known}, or psi, D, D_F, D_I, D_O, D_S")]
+    #[error("{what} for `{found}`: no such unknown; {known}")]
     UnknownName {
         /// Which list.
         what: &'static str,
         /// The name found.
         found: String,
-        /// The unknowns.
+        /// What was expected.
         known: String,
     },
     /// The scheme itself.

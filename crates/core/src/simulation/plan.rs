@@ -88,6 +88,7 @@ impl Plan {
             return Err(SimulationError::SlewCarry { carry: scheme.carry });
         }
         let platform = Platform::new(scheme.clone())?;
+        conditions.concern(&platform)?;
         let n = platform.names().len();
         if n > MAX_UNKNOWNS {
             return Err(SimulationError::TooManyUnknowns { found: n });

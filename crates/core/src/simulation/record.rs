@@ -5,7 +5,7 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form};
 
 use super::SimulationError;
-use super::conditions::{Conditions, Truth, resolve, shown_unit, si_per_shown};
+use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, Truth, resolve, shown_unit, si_per_shown};
 use super::plan::Plan;
 use super::truth::{Noise, TruthModel};
 use crate::prediction::Prediction;
@@ -25,7 +25,7 @@ impl Start {
     /// What the conditions say for the unknowns of `plan`.
     ///
     /// # Errors
-    /// [`SimulationError`] for unknown names, priors that are not positive, and exact truth without coefficients.
+    /// [`SimulationError`] for unknown names, and exact truth without coefficients.
     pub fn new(plan: &Plan, conditions: &Conditions) -> Result<Self, SimulationError> {
         if conditions.truth == Truth::Exact && !plan.has_coefficients() {
             return Err(SimulationError::ExactDrift);
@@ -36,13 +36,10 @@ impl Start {
             let scale = |u: &str| if scaled && u != "rad" { conditions.drift_scale } else { 1.0 };
             units.zip(values).map(|(u, v)| v * si_per_shown(u) * scale(u)).collect()
         };
-        let sigma = resolve("prior sigma", p, &conditions.priors, 1.0)?;
-        if let Some(&found) = sigma.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
-            return Err(SimulationError::NotPositive { what: "a prior sigma", found });
-        }
+        let sigma = resolve(PRIOR, p, &conditions.priors, 1.0)?;
         Ok(Self {
-            truth: si(resolve("true value", p, &conditions.values, 0.0)?, true),
-            estimate: si(resolve("initial estimate", p, &conditions.estimates, 0.0)?, false),
+            truth: si(resolve(TRUE_VALUE, p, &conditions.values, 0.0)?, true),
+            estimate: si(resolve(ESTIMATE, p, &conditions.estimates, 0.0)?, false),
             sigma: si(sigma, true),
         })
     }

@@ -1,14 +1,19 @@
 //! Models as JSON objects: `states`, `params`, `equations`, `outputs` and what else there is to say.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use serde_json::value::RawValue;
 
 use super::model::{
     Constant, Formula, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, Segment, Start,
     State, SystemModel,
 };
+use crate::model::angle::excerpt;
 use crate::model::expression::{Names, parse_with};
+use crate::model::file_error::{json_kind, words};
 
 /// The layout; keys that are not listed are left alone.
 #[derive(Debug, Deserialize)]
@@ -19,8 +24,8 @@ struct Layout {
     states: Vec<String>,
     #[serde(default)]
     params: Vec<String>,
-    equations: BTreeMap<String, String>,
-    outputs: serde_json::Map<String, serde_json::Value>,
+    equations: BTreeMap<String, Text>,
+    outputs: Outputs,
     #[serde(default)]
     known_inputs: Vec<String>,
     #[serde(default)]
@@ -31,45 +36,121 @@ struct Layout {
     #[serde(default)]
     known_constants: Vec<String>,
     #[serde(default)]
-    input_assumption: BTreeMap<String, String>,
+    input_assumption: BTreeMap<String, Text>,
     #[serde(default)]
-    known_initial_values: BTreeMap<String, String>,
+    known_initial_values: BTreeMap<String, Text>,
     #[serde(default)]
     known_initial_conditions: Vec<String>,
     #[serde(default)]
     experiments: Option<usize>,
     #[serde(default)]
-    segments: Vec<BTreeMap<String, String>>,
+    segments: Vec<BTreeMap<String, Text>>,
     #[serde(default)]
     segment_constants: Vec<String>,
     #[serde(default)]
-    observable_combinations: Vec<String>,
+    observable_combinations: Vec<Text>,
+}
+
+/// A text, and where in the memory of the file it was found.
+#[derive(Debug)]
+struct Text {
+    text: String,
+    address: usize,
+    length: usize,
+}
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let raw = <&RawValue>::deserialize(deserializer)?.get();
+        let text = serde_json::from_str(raw)
+            .map_err(|_| D::Error::custom(format!("found {}; expected a text in quotes", json_kind(raw))))?;
+        Ok(Self { text, address: raw.as_ptr().addr(), length: raw.len() })
+    }
+}
+
+/// Outputs in the order of the file.
+#[derive(Debug)]
+struct Outputs(Vec<(String, Text)>);
+
+impl<'de> Deserialize<'de> for Outputs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct InOrder;
+        impl<'de> serde::de::Visitor<'de> for InOrder {
+            type Value = Outputs;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("an object")
+            }
+            fn visit_map<A: serde::de::MapAccess<'de>>(self, mut map: A) -> Result<Outputs, A::Error> {
+                let mut out: Vec<(String, Text)> = Vec::new();
+                while let Some((name, text)) = map.next_entry()? {
+                    out.retain(|(n, _)| *n != name);
+                    out.push((name, text));
+                }
+                Ok(Outputs(out))
+            }
+        }
+        deserializer.deserialize_map(InOrder)
+    }
+}
+
+/// The file.
+struct File<'a>(&'a str);
+
+impl File<'_> {
+    /// Where a text stands, with its quotes.
+    fn span(&self, text: &Text) -> Option<Range<usize>> {
+        let start = text.address.checked_sub(self.0.as_ptr().addr())?;
+        (start + text.length <= self.0.len()).then_some(start..start + text.length)
+    }
+
+    fn formula(&self, what: String, text: &Text) -> Result<Formula, ModelError> {
+        let span = self.span(text);
+        // a text without escapes stands in the file as it is
+        let plain = |s: &Range<usize>| self.0.get(s.start + 1..s.end - 1) == Some(text.text.as_str());
+        let place = Place { what, offset: span.clone().filter(plain).map(|s| s.start + 1) };
+        let expression = parse_with(&text.text, Names::Plain).map_err(|e| {
+            let mut error = place.error(e.to_string(), e.span());
+            error.span = error.span.or(span);
+            error
+        })?;
+        Ok(Formula { text: text.text.clone(), expression, place })
+    }
+
+    /// What the reader of JSON complains of: it says where it stands, behind what is wrong.
+    fn refused(&self, e: &serde_json::Error) -> ModelError {
+        let message = e.to_string();
+        let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(m, _)| m);
+        let line = self.0.split_inclusive('\n').take(e.line().saturating_sub(1)).map(str::len).sum::<usize>();
+        let end = (line + e.column()).min(self.0.len());
+        let before = self.0.get(..end).unwrap_or("");
+        // back over the token that ends here
+        let start = match before.strip_suffix('"') {
+            Some(inner) => inner.rfind('"').unwrap_or(0),
+            None => before.trim_end_matches(|c: char| c.is_alphanumeric() || "-+.".contains(c)).len(),
+        };
+        let start = if start == before.len() {
+            before.char_indices().next_back().map_or(0, |(i, _)| i)
+        } else {
+            start
+        };
+        ModelError { what: "the model file".into(), message: words(message), span: Some(start..before.len()) }
+    }
 }
 
 fn named(name: &str) -> Named {
     Named { name: name.into(), ..Named::default() }
 }
 
-fn formula(what: String, text: &str) -> Result<Formula, ModelError> {
-    let place = Place { what, offset: None };
-    let expression = parse_with(text, Names::Plain)
-        .map_err(|e| place.error(format!("{e}, in `{}`", cut(text)), e.span()))?;
-    Ok(Formula { text: text.into(), expression, place })
-}
-
-/// What fits into a message.
-fn cut(text: &str) -> String {
-    let short: String = text.chars().take(60).collect();
-    if short.len() < text.len() { format!("{short}...") } else { short }
-}
-
 /// Reads a model.
 ///
 /// # Errors
-/// [`ModelError`] naming the key.
+/// [`ModelError`] with the byte range of the offender where it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
-    let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: None };
-    let layout: Layout = serde_json::from_str(text).map_err(|e| refuse("the model", e.to_string()))?;
+    let file = File(text);
+    // a key, at its first mention in quotes
+    let key = |name: &str| text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
+    let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: key(what) };
+    let layout: Layout = serde_json::from_str(text).map_err(|e| file.refused(&e))?;
     let experiments = layout.experiments.unwrap_or(1);
     if !(1..=MAX_EXPERIMENTS).contains(&experiments) {
         return Err(refuse("experiments", format!("{experiments}; expected 1 to {MAX_EXPERIMENTS}")));
@@ -93,19 +174,18 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let text = layout.equations.get(state);
         let text = text.ok_or_else(|| refuse("equations", format!("`{state}` has none; expected one")))?;
         let start = match layout.known_initial_values.get(state) {
-            Some(value) => Start::Value(formula(format!("the initial value of {state}"), value)?),
+            Some(value) => Start::Value(file.formula(format!("the initial value of {state}"), value)?),
             None if known(state, &layout.known_initial_conditions) => Start::Known,
             None => Start::Unknown,
         };
-        let equation = formula(format!("the equation of {state}"), text)?;
+        let equation = file.formula(format!("the equation of {state}"), text)?;
         model.states.push(State { named: named(state), equation, start });
     }
-    for (name, text) in &layout.outputs {
-        let text = text.as_str().ok_or_else(|| refuse("outputs", format!("`{name}` is no text")))?;
-        model.outputs.push((named(name), formula(format!("the output {name}"), text)?));
+    for (name, text) in &layout.outputs.0 {
+        model.outputs.push((named(name), file.formula(format!("the output {name}"), text)?));
     }
     for input in &layout.known_inputs {
-        let kind = match layout.input_assumption.get(input).map(String::as_str) {
+        let kind = match layout.input_assumption.get(input).map(|t| t.text.as_str()) {
             None => KnownInput::Generic,
             Some("constant") => KnownInput::Polynomial(0),
             Some(other) => {
@@ -121,14 +201,14 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     model.constants = constants.map(|c| (named(c), Constant::Generic)).collect();
     for segment in &layout.segments {
         let constants = segment.iter().map(|(name, value)| {
-            Ok((name.clone(), formula(format!("the value of {name} in a segment"), value)?))
+            Ok((name.clone(), file.formula(format!("the value of {name} in a segment"), value)?))
         });
         model
             .segments
             .push(Segment { constants: constants.collect::<Result<_, ModelError>>()?, carry: Vec::new() });
     }
     for text in &layout.observable_combinations {
-        model.combinations.push(formula(format!("the combination {text}"), text)?);
+        model.combinations.push(file.formula(format!("the combination {}", excerpt(&text.text)), text)?);
     }
     Ok(model)
 }

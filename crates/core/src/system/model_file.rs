@@ -13,6 +13,7 @@ use super::model::{
     State, SystemModel,
 };
 use crate::model::expression::{Names, Node, nearest, parse_with};
+use crate::model::file_error::explain;
 
 /// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan exp log sqrt`
 /// and the names of the model; `t` is the time.
@@ -214,10 +215,9 @@ pub fn is_model(text: &str) -> bool {
 /// # Errors
 /// [`ModelError`] with the byte range of the offender where it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
-    let file: ModelFile = toml::from_str(text).map_err(|e| ModelError {
-        what: "the model file".into(),
-        message: e.message().trim().to_string(),
-        span: e.span(),
+    let file: ModelFile = toml::from_str(text).map_err(|e| {
+        let (message, span) = explain(text, &e);
+        ModelError { what: "the model file".into(), message, span }
     })?;
     let r = Reader { text };
     let mut model = SystemModel {

@@ -1,0 +1,221 @@
+//! What a reader of TOML or JSON complains of, in the words of the file's author.
+
+use std::ops::Range;
+
+use super::expression::nearest;
+
+/// Longest part of a file that is repeated in a message.
+const SHOWN: usize = 40;
+
+/// What is wrong with a TOML file, and where.
+pub(crate) fn explain(text: &str, e: &toml::de::Error) -> (String, Option<Range<usize>>) {
+    let span = e.span().filter(|s| text.get(s.clone()).is_some());
+    let message = e.message().trim();
+    if let Some((word, place)) = span.clone().and_then(|s| unquoted(text, s)) {
+        return (
+            format!("`{word}` has no quotes; expected a text such as \"{word}\", or a number"),
+            Some(place),
+        );
+    }
+    let header = |s: &Range<usize>| text[s.clone()].trim_matches(['[', ']']).trim().to_string();
+    match &span {
+        // `[position]`
+        Some(s)
+            if message.starts_with("invalid type: map, expected a sequence")
+                && text[s.clone()].starts_with('[') =>
+        {
+            let name = header(s);
+            (
+                format!("`[{name}]` is one table; expected a list of tables, each beginning with [[{name}]]"),
+                span,
+            )
+        }
+        _ => (words(message), span),
+    }
+}
+
+/// A complaint of a reader about keys and kinds.
+pub(crate) fn words(message: &str) -> String {
+    unknown_key(message)
+        .or_else(|| unknown_value(message))
+        .or_else(|| missing(message))
+        .or_else(|| wrong_kind(message))
+        .unwrap_or_else(|| syntax(message))
+}
+
+/// The kind of a JSON value in words, by how its text begins.
+pub(crate) fn json_kind(text: &str) -> &'static str {
+    match text.as_bytes().first() {
+        Some(b'"') => "a text",
+        Some(b'{') => "an object",
+        Some(b'[') => "a list",
+        Some(b't' | b'f') => "true or false",
+        Some(b'n') => "null",
+        _ => "a number",
+    }
+}
+
+/// The name in backquotes with which a text goes on, and what follows.
+fn quoted(text: &str) -> Option<(&str, &str)> {
+    text.strip_prefix('`')?.split_once('`')
+}
+
+/// The names in backquotes of a list.
+fn names(list: &str) -> Vec<String> {
+    list.split('`').skip(1).step_by(2).map(String::from).collect()
+}
+
+fn hint(found: &str, known: &[String]) -> String {
+    nearest(found, known).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default()
+}
+
+fn unknown_key(message: &str) -> Option<String> {
+    let (found, rest) = quoted(message.strip_prefix("unknown field ")?)?;
+    let known = names(rest);
+    let hint = hint(found, &known);
+    Some(format!("unknown key `{}`{hint} (expected {})", shortened(found), known.join(", ")))
+}
+
+fn unknown_value(message: &str) -> Option<String> {
+    let (found, rest) = quoted(message.strip_prefix("unknown variant ")?)?;
+    let known = names(rest);
+    let hint = hint(found, &known);
+    Some(format!("`{}` is no choice here{hint} (expected {})", shortened(found), known.join(", ")))
+}
+
+fn missing(message: &str) -> Option<String> {
+    let (name, _) = quoted(message.strip_prefix("missing field ")?)?;
+    Some(format!("the key `{name}` is missing; expected it in this table"))
+}
+
+/// `invalid type: string "5", expected f64`.
+fn wrong_kind(message: &str) -> Option<String> {
+    let rest = ["invalid type: ", "invalid value: ", "invalid length "]
+        .iter()
+        .find_map(|p| message.strip_prefix(p))?;
+    let (found, expected) = rest.rsplit_once(", expected ")?;
+    let found = match found.split_once(' ') {
+        Some(("string", text)) => format!("the text {}", shortened(text)),
+        Some(("integer", x)) => format!("the number {}", x.trim_matches('`')),
+        Some(("floating", x)) => format!("the number {}", x.trim_start_matches("point ").trim_matches('`')),
+        Some(("boolean", x)) => x.trim_matches('`').to_string(),
+        _ if found == "map" => "a table".into(),
+        _ if found == "sequence" => "a list".into(),
+        _ => shortened(found),
+    };
+    let expected = match expected {
+        "f64" | "f32" => "a number".into(),
+        "usize" | "u64" | "u32" => "a whole number, not negative".into(),
+        "i64" => "a whole number".into(),
+        "a string" => "a text in quotes".into(),
+        "a boolean" => "true or false".into(),
+        "a sequence" => "a list in [ ]".into(),
+        "a map" => "a table".into(),
+        other if other.starts_with("struct ") => "a table".into(),
+        other => other.to_string(),
+    };
+    Some(format!("found {found}; expected {expected}"))
+}
+
+fn shortened(text: &str) -> String {
+    if text.chars().count() <= SHOWN {
+        return text.into();
+    }
+    text.chars().take(SHOWN).collect::<String>() + "..."
+}
+
+/// What the grammar of TOML does not have.
+fn syntax(message: &str) -> String {
+    if message.starts_with("string values must be quoted") {
+        return "found neither a number nor a text in quotes; expected one of them".into();
+    }
+    let lines: Vec<&str> = message.lines().map(str::trim).collect();
+    lines.join("; ")
+}
+
+/// A bare word where a value is expected.
+fn unquoted(text: &str, span: Range<usize>) -> Option<(String, Range<usize>)> {
+    let line = text[..span.start].rfind('\n').map_or(0, |i| i + 1);
+    let before = text[line..span.start].trim_end();
+    if !before.ends_with(['=', '[', ',']) || before.starts_with('[') {
+        return None;
+    }
+    let rest = text[span.start..].split(['\n', ',', ']', '}', '#']).next()?.trim_end();
+    let known = ["true", "false", "inf", "nan"].contains(&rest.trim_start_matches(['+', '-']));
+    let bare = rest.starts_with(char::is_alphabetic) && !known && !rest.contains(['"', '\'', '=']);
+    bare.then(|| (shortened(rest), span.start..span.start + rest.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "what is read does not matter here")]
+    struct File {
+        carry: String,
+        #[serde(default)]
+        step: f64,
+        #[serde(default)]
+        list: Vec<String>,
+        #[serde(default)]
+        table: BTreeMap<String, usize>,
+        #[serde(default)]
+        choice: Option<crate::model::Carry>,
+    }
+
+    #[test]
+    fn complaints_are_in_words_and_know_their_place() {
+        let said = |text: &str| {
+            let e = toml::from_str::<File>(text).expect_err("wrong");
+            let (message, span) = explain(text, &e);
+            (message, span.map(|s| text[s].to_string()))
+        };
+        let at = |text: &str, message: &str, place: &str| {
+            assert_eq!(said(text), (message.into(), Some(place.into())))
+        };
+        let quotes = |w: &str| format!("`{w}` has no quotes; expected a text such as \"{w}\", or a number");
+        at("carry = inertial", &quotes("inertial"), "inertial");
+        at("carry = 'a'\nlist = [NUE]", &quotes("NUE"), "NUE");
+        at("carry = sideways # so\n", &quotes("sideways"), "sideways");
+        at("carry = 'a'\nstep = '5'", "found the text \"5\"; expected a number", "'5'");
+        at("carry = 5", "found the number 5; expected a text in quotes", "5");
+        at("carry = true", "found true; expected a text in quotes", "true");
+        at("carry = 'a'\nlist = 2", "found the number 2; expected a list in [ ]", "2");
+        at(
+            "carry = 'a'\ntable = {a = -1}",
+            "found the number -1; expected a whole number, not negative",
+            "-1",
+        );
+        at(
+            "carry = 'a'\n[list]\na = 1",
+            "`[list]` is one table; expected a list of tables, each beginning with [[list]]",
+            "[list]",
+        );
+        at("carry = 'a'\ntable = []", "found a list; expected a table", "[]");
+        at(
+            "carry = 'a'\nchoice = 'inertal'",
+            "`inertal` is no choice here; did you mean `inertial`? (expected platform, inertial, reset)",
+            "'inertal'",
+        );
+        let keys = "carry, step, list, table, choice";
+        at(
+            "carry = 'a'\nstp = 1",
+            &format!("unknown key `stp`; did you mean `step`? (expected {keys})"),
+            "stp",
+        );
+        at("carry = 'a'\nfoo = 1", &format!("unknown key `foo` (expected {keys})"), "foo");
+        assert_eq!(said("step = 1").0, "the key `carry` is missing; expected it in this table");
+        at("carry = 'a'\ncarry = 'b'", "duplicate key", "carry");
+        at("carry = 'a'\nstep = nan x", &quotes("nan x"), "nan x");
+        at(
+            "carry = 'a'\nstep = 1 2",
+            "found neither a number nor a text in quotes; expected one of them",
+            "1 2",
+        );
+    }
+}

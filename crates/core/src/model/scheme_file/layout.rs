@@ -1,0 +1,188 @@
+//! What a scheme file holds, as TOML reads it: every value with its place. The JSON Schema comes from here.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_spanned::Spanned;
+
+use crate::model::geometry::{Geometry, Term};
+use crate::model::scheme::Carry;
+use crate::simulation::conditions::{DriftNoise, Propagation, Truth};
+use crate::simulation::ranges;
+
+/// A number as it is written.
+pub(super) type Literal = Option<Spanned<toml::Value>>;
+/// Numbers by unknown or family.
+pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
+
+/// The layout of a scheme file. Angles and the latitude are read as exact decimals.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SchemeFile {
+    /// What the scheme is called in a report; the name of the file when left out.
+    #[schemars(with = "Option<String>")]
+    pub(super) name: Option<Spanned<String>>,
+    /// What it is for, where it comes from: a report says so.
+    #[schemars(with = "Option<String>")]
+    pub(super) description: Option<Spanned<String>>,
+    /// platform (default), inertial or reset.
+    #[schemars(with = "Option<Carry>")]
+    pub(super) carry: Option<Spanned<String>>,
+    /// Latitude in degrees; generic when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = -90, "maximum" = 90))]
+    pub(super) latitude_deg: Literal,
+    /// Unknown terms of the gyro model, for instance `["F", "I", "O", "S"]`, or `"drift"`.
+    #[schemars(with = "Option<Vec<Term>>", extend("type" = ["array", "string", "null"]))]
+    pub(super) terms: Literal,
+    /// Whether psi_y^n is measured too.
+    #[serde(default)]
+    pub(super) measured_azimuth: bool,
+    /// Axes of the gyros; the paper's when left out.
+    #[schemars(with = "Option<Geometry>")]
+    pub(super) geometry: Option<Spanned<Geometry>>,
+    /// Linear combinations of unknowns to be judged, for instance `"D_IX - D_IY"`.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub(super) combinations: Vec<Spanned<String>>,
+    /// Conditions of `obsdeg simulate` and `obsdeg crosscheck`.
+    #[serde(default)]
+    pub(super) simulation: SimulationEntry,
+    /// The largest sigma allowed by unknown or family, as in D_F = 0.02: deg for psi, deg/h for D_F, deg/h/g for the rest.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::REQUIREMENT)))]
+    pub(super) requirements: Numbers,
+    /// How far the gimbals turn; freely when left out.
+    #[serde(default)]
+    pub(super) gimbals: GimbalEntry,
+    /// The positions in order.
+    #[serde(default, rename = "position")]
+    #[schemars(with = "Vec<PositionEntry>")]
+    pub(super) positions: Vec<Spanned<PositionEntry>>,
+}
+
+/// The conditions of a run.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SimulationEntry {
+    /// linear (default) or exact.
+    pub(super) truth: Option<Truth>,
+    /// Largest step in s; 10 when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::STEP_S.low, "maximum" = ranges::STEP_S.high))]
+    pub(super) step_s: Option<Spanned<f64>>,
+    /// Dwell of positions without dwell_s; 1000 when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high))]
+    pub(super) dwell_s: Option<Spanned<f64>>,
+    /// Rate of the rotations between positions in deg/s; instantaneous when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
+    pub(super) slew_rate_deg_s: Option<Spanned<f64>>,
+    /// Noise of the observation per sample in g; 1e-5 when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::NOISE_G.low, "maximum" = ranges::NOISE_G.high))]
+    pub(super) accelerometer_noise_g: Option<Spanned<f64>>,
+    /// Noise of a measured azimuth per sample in deg; 0.001 when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::AZIMUTH_NOISE_DEG.low, "maximum" = ranges::AZIMUTH_NOISE_DEG.high))]
+    pub(super) azimuth_noise_deg: Option<Spanned<f64>>,
+    /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
+    #[schemars(with = "Option<String>", extend("pattern" = "deg */ *(h|sqrt\\(h\\))"))]
+    pub(super) drift_noise: Option<Spanned<DriftNoise>>,
+    /// exponential (default) or rk4.
+    pub(super) propagation: Option<Propagation>,
+    /// Factor on the true drift coefficients and their priors.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::DRIFT_SCALE.low, "maximum" = ranges::DRIFT_SCALE.high))]
+    pub(super) drift_scale: Option<Spanned<f64>>,
+    /// True values by unknown or family, as in D_F = 11.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::VALUE)))]
+    pub(super) values: Numbers,
+    /// Initial estimates.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::VALUE)))]
+    pub(super) estimates: Numbers,
+    /// Initial standard deviations.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::PRIOR)))]
+    pub(super) priors: Numbers,
+}
+
+/// One position: `angles_deg` or `attitude`.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PositionEntry {
+    /// Name in solutions; p1, p2, ... when left out.
+    #[schemars(with = "Option<String>")]
+    pub(super) name: Option<Spanned<String>>,
+    /// Euler angles alpha, beta, gamma in degrees; a string names a generic angle.
+    #[schemars(with = "Option<Vec<f64>>", extend("items" = angle(), "minItems" = 3, "maxItems" = 3))]
+    pub(super) angles_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+    /// How long the position lasts, in seconds.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high))]
+    pub(super) dwell_s: Literal,
+    /// Makes the position a rotating segment that starts there; dwell_s is how long it turns.
+    #[schemars(with = "Option<RotationEntry>")]
+    pub(super) rotation: Option<Spanned<RotationEntry>>,
+    /// The way from the position before, with psi^n carried; Z is not used meanwhile.
+    #[schemars(with = "Option<SlewEntry>")]
+    pub(super) slew: Option<Spanned<SlewEntry>>,
+    /// Directions of X_p, Y_p, Z_p out of N S U D E W, as in "NUE".
+    #[schemars(with = "Option<String>", extend("pattern" = "^[NSUDEW]{3}$"))]
+    pub(super) attitude: Option<Spanned<String>>,
+}
+
+/// A rotation at a constant rate.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RotationEntry {
+    /// X_p, Y_p, Z_p (platform) or N, U, E (geographic).
+    #[schemars(with = "String", extend("enum" = AXES))]
+    pub(super) about: Spanned<String>,
+    /// The whole angle in degrees, right-handed. Two of angle_deg, rate_deg_s and the position's dwell_s say all; angle_deg alone
+    /// goes with the dwell of the conditions.
+    #[schemars(with = "Option<f64>")]
+    pub(super) angle_deg: Literal,
+    /// The rate in deg/s, right-handed.
+    #[schemars(with = "Option<f64>")]
+    pub(super) rate_deg_s: Literal,
+}
+
+/// A turn to a position at a constant rate.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SlewEntry {
+    /// The rate in deg/s; slew_rate_deg_s of the simulation when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
+    pub(super) rate_deg_s: Option<Spanned<f64>>,
+    /// X_p, Y_p, Z_p (platform) or N, U, E (geographic); the shortest way about any axis when left out.
+    #[schemars(with = "Option<String>", extend("enum" = AXES))]
+    pub(super) about: Option<Spanned<String>>,
+    /// The whole angle about that axis in degrees, right-handed; the shorter way when left out.
+    #[schemars(with = "Option<f64>")]
+    pub(super) angle_deg: Literal,
+}
+
+/// Limits of the Euler angles as [low, high] in degrees.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GimbalEntry {
+    /// Of alpha.
+    #[schemars(with = "Option<Vec<f64>>", extend("minItems" = 2, "maxItems" = 2))]
+    pub(super) alpha_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+    /// Of beta.
+    #[schemars(with = "Option<Vec<f64>>", extend("minItems" = 2, "maxItems" = 2))]
+    pub(super) beta_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+    /// Of gamma.
+    #[schemars(with = "Option<Vec<f64>>", extend("minItems" = 2, "maxItems" = 2))]
+    pub(super) gamma_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
+}
+
+/// The directions of an axis to turn about.
+const AXES: [&str; 6] = ["X_p", "Y_p", "Z_p", "N", "U", "E"];
+
+/// Degrees, or the name of a generic angle with an offset.
+fn angle() -> serde_json::Value {
+    serde_json::json!({ "anyOf": [{ "type": "number" }, { "type": "string" }] })
+}
+
+/// Numbers of a range.
+fn within(range: ranges::Range) -> serde_json::Value {
+    serde_json::json!({ "type": "number", "minimum": range.low, "maximum": range.high })
+}

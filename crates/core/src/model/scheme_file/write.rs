@@ -1,0 +1,291 @@
+//! A scheme as a file that reads as the same scheme.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use crate::model::angle::{Angle, format_decimal};
+use crate::model::scheme::{Position, Scheme};
+use crate::model::{Geometry, Unknowns};
+use crate::simulation::conditions::{Propagation, Settings, Truth};
+
+/// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
+pub fn write(scheme: &Scheme) -> String {
+    let mut out = String::new();
+    for (key, text) in [("name", &scheme.name), ("description", &scheme.description)] {
+        if !text.is_empty() {
+            line(&mut out, key, &quoted(text));
+        }
+    }
+    line(&mut out, "carry", &quoted(&scheme.carry.to_string()));
+    if let Some(latitude) = scheme.latitude {
+        line(&mut out, "latitude_deg", &latitude.to_string());
+    }
+    match &scheme.unknowns {
+        Unknowns::Drift => line(&mut out, "terms", "\"drift\""),
+        Unknowns::Coefficients(terms) => {
+            line(&mut out, "terms", &list(terms.iter().map(|t| quoted(t.letters()))))
+        }
+    }
+    if scheme.geometry != Geometry::default() {
+        for (letter, g) in ["X", "Y", "Z"].iter().zip(scheme.geometry.gyros()) {
+            let axes = format!("{{ I = \"{}\", O = \"{}\", S = \"{}\" }}", g.I, g.O, g.S);
+            line(&mut out, &format!("geometry.{letter}"), &axes);
+        }
+    }
+    if scheme.measured_azimuth {
+        line(&mut out, "measured_azimuth", "true");
+    }
+    if !scheme.combinations.is_empty() {
+        line(&mut out, "combinations", &list(scheme.combinations.iter().map(|c| quoted(c))));
+    }
+    settings(&mut out, &scheme.simulation);
+    numbers(&mut out, "requirements", &scheme.requirements);
+    let mut gimbals = String::new();
+    for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(scheme.gimbals.limits) {
+        if let Some(ends) = limit {
+            line(&mut gimbals, &format!("{name}_deg"), &list(ends.map(format_decimal)));
+        }
+    }
+    table(&mut out, "gimbals", &gimbals);
+    for p in &scheme.positions {
+        position(&mut out, p);
+    }
+    out
+}
+
+fn line(out: &mut String, key: &str, value: &str) {
+    // writing to a String does not fail
+    let _ = writeln!(out, "{key} = {value}");
+}
+
+fn list(items: impl IntoIterator<Item = String>) -> String {
+    format!("[{}]", items.into_iter().collect::<Vec<_>>().join(", "))
+}
+
+/// A table, unless it is empty.
+fn table(out: &mut String, name: &str, lines: &str) {
+    if !lines.is_empty() {
+        let _ = write!(out, "\n[{name}]\n{lines}");
+    }
+}
+
+/// A number as TOML has it: the shortest that reads as the same double.
+fn number(x: f64) -> String {
+    match x {
+        x if x == 0.0 || (1e-3..1e15).contains(&x.abs()) => format!("{x}"),
+        x => format!("{x:e}"),
+    }
+}
+
+/// A text in quotes, with what would end it or is no character of a line escaped.
+fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\t' => out.push_str("\\t"),
+            c if c.is_control() => {
+                let _ = write!(out, "\\u{:04X}", u32::from(c));
+            }
+            c => out.push(c),
+        }
+    }
+    out + "\""
+}
+
+fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
+    let mut lines = String::new();
+    for (key, x) in given {
+        // names hold `@` and `^` too
+        line(&mut lines, &quoted(key), &number(*x));
+    }
+    table(out, name, &lines);
+}
+
+fn settings(out: &mut String, s: &Settings) {
+    let mut lines = String::new();
+    let truth = s.truth.map(|t| match t {
+        Truth::Linear => "linear",
+        Truth::Exact => "exact",
+    });
+    let propagation = s.propagation.map(|p| match p {
+        Propagation::Exponential => "exponential",
+        Propagation::Rk4 => "rk4",
+    });
+    let texts = [
+        ("truth", truth.map(quoted)),
+        ("step_s", s.step_s.map(number)),
+        ("dwell_s", s.dwell_s.map(number)),
+        ("slew_rate_deg_s", s.slew_rate_deg_s.map(number)),
+        ("accelerometer_noise_g", s.accelerometer_noise_g.map(number)),
+        ("azimuth_noise_deg", s.azimuth_noise_deg.map(number)),
+        ("drift_noise", s.drift_noise.map(|n| quoted(&n.to_string()))),
+        ("propagation", propagation.map(quoted)),
+        ("drift_scale", s.drift_scale.map(number)),
+    ];
+    for (key, value) in texts {
+        if let Some(value) = value {
+            line(&mut lines, key, &value);
+        }
+    }
+    table(out, "simulation", &lines);
+    numbers(out, "simulation.values", &s.values);
+    numbers(out, "simulation.estimates", &s.estimates);
+    numbers(out, "simulation.priors", &s.priors);
+}
+
+fn position(out: &mut String, p: &Position) {
+    let angle = |a: &Angle| if a.generic().is_some() { quoted(&a.to_string()) } else { a.to_string() };
+    let _ = writeln!(out, "\n[[position]]\nname = {}", quoted(&p.name));
+    line(out, "angles_deg", &list(p.angles.iter().map(angle)));
+    if let Some(dwell) = p.dwell {
+        line(out, "dwell_s", &dwell.to_string());
+    }
+    if let Some(r) = &p.rotation {
+        line(out, "rotation", &format!("{{ about = \"{}\", angle_deg = {} }}", r.axis, r.angle));
+    }
+    if let Some(s) = &p.slew {
+        let keys = [
+            s.rate_deg_s.map(|rate| format!("rate_deg_s = {}", number(rate))),
+            s.axis.map(|axis| format!("about = \"{axis}\"")),
+            s.angle.as_ref().map(|angle| format!("angle_deg = {angle}")),
+        ];
+        let keys: Vec<String> = keys.into_iter().flatten().collect();
+        line(out, "slew", &format!("{{ {} }}", keys.join(", ")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::scheme_file::read;
+    use crate::model::{Carry, Dwell, Gimbals, Rotation, SlewTo, Term};
+    use crate::simulation::conditions::DriftNoise;
+    use proptest::prelude::*;
+
+    fn numbers(range: std::ops::Range<i32>) -> impl Strategy<Value = BTreeMap<String, f64>> {
+        let name = prop::sample::select(vec!["psi", "D", "D_F", "D_FX", "D_OS", "psi_y"]);
+        let number = (range, 1.0f64..10.0).prop_map(|(e, m)| m * 10f64.powi(e));
+        prop::collection::btree_map(name.prop_map(String::from), number, 0..3)
+    }
+
+    fn angle() -> impl Strategy<Value = Angle> {
+        let exact = (-400_000_000_000i64..400_000_000_000).prop_map(Angle::from_nanodeg);
+        let round = (-8i32..8).prop_map(|k| Angle::from_degrees(k * 45));
+        let named = prop::sample::select(vec!["alpha", "-beta", "g2+90.5", "-x_1-0.25"]);
+        prop_oneof![exact, round, named.prop_map(|t| t.parse().expect("an angle"))]
+    }
+
+    prop_compose! {
+        fn place(first: bool)(
+            name in "[a-zäé0-9_.][a-z0-9 ._-]{0,6}",
+            angles in prop::array::uniform3(angle()),
+            dwell in prop::option::of(1_000_000u64..1_000_000_000_000_000),
+            turn in prop::option::of((0usize..6, 1_000_000i64..700_000_000_000)),
+            slew in prop::option::of((prop::option::of(0.001f64..5000.0), prop::option::of(0usize..6), 1_000_000i64..700_000_000_000, any::<bool>())),
+        ) -> Position {
+            let axis = |i: usize| crate::model::rotation::Axis { index: i % 3, geographic: i >= 3 };
+            let dwell = dwell.and_then(|ns| format_decimal(ns as i64).parse::<Dwell>().ok());
+            let rotation = turn.map(|(i, n)| Rotation { axis: axis(i), angle: Angle::from_nanodeg(n) });
+            let slew = slew.filter(|_| !first).map(|(rate_deg_s, about, n, whole)| SlewTo {
+                rate_deg_s,
+                axis: about.map(axis),
+                angle: (whole && about.is_some()).then(|| Angle::from_nanodeg(-n)),
+            });
+            Position { name, angles, dwell, rotation, slew }
+        }
+    }
+
+    prop_compose! {
+        fn settings()(
+            truth in prop::option::of(prop::sample::select(vec![Truth::Linear, Truth::Exact])),
+            propagation in prop::option::of(prop::sample::select(vec![Propagation::Exponential, Propagation::Rk4])),
+            step_s in prop::option::of(1e-6f64..1e6),
+            dwell_s in prop::option::of(1e-3f64..1e6),
+            slew_rate_deg_s in prop::option::of(1e-4f64..1e4),
+            accelerometer_noise_g in prop::option::of(1e-15f64..1e-3),
+            azimuth_noise_deg in prop::option::of(1e-12f64..1e3),
+            noise in prop::option::of((1e-12f64..1e6, any::<bool>())),
+            drift_scale in prop::option::of(1e-6f64..1e6),
+            values in numbers(-20..5),
+            estimates in numbers(-20..5),
+            priors in numbers(-9..8),
+        ) -> Settings {
+            let drift_noise = noise.map(|(x, walk)| if walk { DriftNoise::RandomWalk(x) } else { DriftNoise::OneStep(x) });
+            Settings {
+                truth, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
+                drift_noise, drift_scale, values, estimates, priors,
+            }
+        }
+    }
+
+    prop_compose! {
+        fn scheme()(
+            name in "[ -~äλ\\n\\t\\u{1b}\\u{7f}]{0,12}",
+            description in any::<String>(),
+            carry in prop::sample::select(Carry::ALL.to_vec()),
+            latitude in prop::option::of(-90_000_000_000i64..=90_000_000_000),
+            terms in prop::sample::subsequence(Term::ALL.to_vec(), 1..=10),
+            drift in any::<bool>(),
+            measured_azimuth in any::<bool>(),
+            combination in any::<bool>(),
+            simulation in settings(),
+            requirements in numbers(-12..8),
+            limit in prop::option::of((-400i64..0, 400i64..900)),
+            first in place(true),
+            rest in prop::collection::vec(place(false), 0..4),
+            mirrored in any::<bool>(),
+        ) -> Scheme {
+            let alone = drift && rest.is_empty() && first.rotation.is_none();
+            let mut positions: Vec<Position> = std::iter::once(first).chain(rest).collect();
+            for (i, p) in positions.iter_mut().enumerate() {
+                p.name.push_str(&i.to_string());
+            }
+            let mut geometry = Geometry::default();
+            if mirrored {
+                (geometry.X.O, geometry.X.S) = (geometry.X.S, "+z".parse().expect("an axis"));
+            }
+            let limits = limit.map(|(low, high)| [low * 1_234_567_891, high * 1_000_000_000]);
+            Scheme {
+                name, description, positions, carry,
+                latitude: latitude.and_then(|n| format_decimal(n).parse().ok()),
+                geometry,
+                unknowns: if alone { Unknowns::Drift } else { Unknowns::Coefficients(terms) },
+                measured_azimuth,
+                combinations: if combination && !alone { vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()] } else { Vec::new() },
+                simulation,
+                requirements,
+                gimbals: Gimbals { limits: [None, limits, None] },
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+        #[test]
+        fn what_is_written_reads_as_the_same_scheme(scheme in scheme()) {
+            prop_assume!(scheme.carry != Carry::Reset || scheme.combinations.is_empty());
+            let text = write(&scheme);
+            if scheme.validate().is_ok() {
+                match read(&text) {
+                    Ok(back) => prop_assert_eq!(back, scheme, "{}", text),
+                    // under reset carry psi has a position
+                    Err(e) => prop_assert!(e.message.contains("no such unknown"), "{}\n{}", e.message, text),
+                }
+            } else {
+                prop_assert!(read(&text).is_err(), "{}", text);
+            }
+        }
+    }
+
+    #[test]
+    fn texts_and_numbers() {
+        assert_eq!(quoted("a \"b\" \\ \n\u{1b}"), "\"a \\\"b\\\" \\\\ \\n\\u001B\"");
+        assert_eq!(
+            (number(1e-5), number(1000.0), number(0.25), number(-2e20)),
+            ("1e-5".into(), "1000".into(), "0.25".into(), "-2e20".into())
+        );
+    }
+}
