@@ -308,13 +308,13 @@ fn the_winner_is_a_scheme_file() {
         (&["design", "--positions", "5", "--max-time", "0"], "more than 0"),
         (&["design", "--positions", "5", "--slew-rate", "1"], "inertial"),
         (&["design", "--positions", "4", "--meet", "--requirement", "D=1e-9"], "every sequence was examined"),
-        (&["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"], "sigma above 0"),
+        (&["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"], "expected 1e-12 to 1e9"),
         (&["design"], "--positions"),
         (&["design", "--positions", "0"], "1 to 100"),
         (&["design", "--positions", "3", "--carry", "inertial"], "no scheme of 3"),
         (&["design", "--minimum", "--terms", "drift"], "coefficients"),
         (&["design", "--minimum", "--candidates", "examples/generic-angles/scheme.toml"], "generic"),
-        (&["design", "--positions", "5", "--dwell", "0"], "dwell_s"),
+        (&["design", "--positions", "5", "--dwell", "0"], "'--dwell <S>': expected"),
     ] {
         let output = run(arguments);
         let stderr = String::from_utf8_lossy(&output.stderr);
