@@ -97,9 +97,10 @@ type Series<T> = [T; ORDERS];
 /// What an observer at a station sees and what is there.
 #[derive(Debug, Clone)]
 pub(crate) struct Station {
-    /// `psi^n`, `eps^n`.
+    /// `psi^n`, `eps^n`, and the derivative of `eps^n` by time.
     pub(crate) psi_n: Vector,
     pub(crate) eps_n: Vector,
+    pub(crate) eps_rate_n: Vector,
     /// Derivatives of Z in platform axes and in n, and of `psi_y^n`.
     pub(crate) z_c: [Vector; ORDERS],
     pub(crate) z_n: [Vector; ORDERS],
@@ -231,6 +232,7 @@ impl Case {
         Station {
             psi_n: psi_n[0],
             eps_n: eps_n[0],
+            eps_rate_n: eps_n[1],
             z_c: derivatives(z_c),
             z_n: derivatives(z_n),
             azimuth: psi_n_derivatives.map(|v| v[1]),
@@ -286,7 +288,11 @@ impl Case {
                 ['Z', 'a'] => Some(s.azimuth[order]),
                 ['Z', digit @ '1'..='3'] => Some(s.z_n[order][digit as usize - '1' as usize]),
                 ['Z', letter] => Some(s.z_c[order][axis(letter)?]),
-                _ if order > 0 => None,
+                _ if order > 0 => {
+                    let axis =
+                        plain.strip_prefix("eps_")?.strip_suffix("^n")?.chars().next().and_then(axis)?;
+                    (order == 1).then(|| s.eps_rate_n[axis])
+                }
                 _ => {
                     let component = axis(plain.chars().nth(4)?)?;
                     match (&plain[..4], plain.get(5..)?) {

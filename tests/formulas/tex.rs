@@ -161,11 +161,16 @@ impl Reader<'_> {
         if self.rest.starts_with("\\omega(\\text") && self.take("\\omega") {
             return Ok(format!("w@{}", self.station()?));
         }
-        for (letter, name) in [("\\psi_", "psi_"), ("\\varepsilon_", "eps_"), ("D_", "D_")] {
+        for (letter, name, primes) in [
+            ("\\psi_", "psi_", ""),
+            ("\\varepsilon_", "eps_", ""),
+            ("\\dot{\\varepsilon}_", "eps_", "'"),
+            ("D_", "D_", ""),
+        ] {
             if self.take(letter) {
                 let mut out = format!("{name}{}", self.braces()?);
                 if self.take("^{n}") {
-                    out.push_str("^n");
+                    out.push_str(&format!("^n{primes}"));
                     if self.rest.starts_with("(\\text") {
                         out.push_str(&format!("@{}", self.station()?));
                     }

@@ -118,8 +118,22 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     if a.positions.iter().any(|p| p.rotation.is_some()) {
         out.push(
             "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \
-             goes on through it; p1+45 is p1 after 45 deg"
+             goes on through it"
                 .into(),
+        );
+    }
+    if let Some(s) = a.stations.iter().find(|s| s.turned_deg.is_some_and(|t| t != 0.0)) {
+        let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());
+        let rate = s.rate.as_deref().unwrap_or_default();
+        out.push(format!(
+            "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: derivatives of Z there are those of the \
+             turning platform, and {rate} is the rate of that angle in rad/s",
+            s.label, s.position
+        ));
+    }
+    if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {
+        out.push(
+            "solutions take psi as it is carried from station to station: what the dwells change in it is not in them".into(),
         );
     }
     if a.measured_azimuth {

@@ -8,6 +8,7 @@ use crate::model::Carry;
 use crate::model::geometry::Geometry;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
+use crate::solution::print::{SolutionTerm, StationLabel};
 use crate::solution::solver::{Frame, Solved, Verification};
 
 /// Whether an unknown can be solved.
@@ -51,8 +52,8 @@ pub struct Analysis {
     pub measured_azimuth: bool,
     /// The positions.
     pub positions: Vec<PositionReport>,
-    /// Where the terms of solutions are taken: the positions, and points of rotations.
-    pub stations: Vec<String>,
+    /// Where the terms of solutions are taken: the positions, and attitudes of rotations.
+    pub stations: Vec<StationLabel>,
     /// `dim V_0, dim V_1, ...`.
     pub rank_profile: Vec<usize>,
     /// The final rank.
@@ -150,11 +151,15 @@ pub struct Elsewhere {
 pub struct Solution {
     /// The expression in one line.
     pub text: String,
+    /// Its terms one by one.
+    pub terms: Vec<SolutionTerm>,
+    /// Whether derivatives in it are taken while the platform turns: at stations with a rate.
+    pub turning: bool,
     /// How exact its coefficients are.
     pub form: Form,
     /// How it was checked.
     pub verification: Verification,
-    /// Its terms, for formatting.
+    /// The same as computed, for formatting.
     #[serde(skip)]
     #[schemars(skip)]
     pub solved: Solved,

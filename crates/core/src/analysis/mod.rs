@@ -17,11 +17,10 @@ use crate::degree::verdict::{Combination, NullVector, combinations, expression, 
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::Platform;
 use crate::model::ring::Float;
-use crate::model::scheme::Station;
 use crate::model::{Angle, Carry, Scheme, SchemeError, Unknowns};
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
-use crate::solution::print::text;
+use crate::solution::print::{StationLabel, stations, terms, text};
 use crate::solution::solver::{Frame, Functional, Solver};
 use requested::{Requested, requested_combinations};
 
@@ -86,9 +85,8 @@ pub fn analyze(
     let basis = combinations(&platform, &verdicts, &mut solver);
     let null = null_space(&platform, &verdicts, &mut solver);
 
-    let names: Vec<String> = scheme.stations().iter().map(Station::name).collect();
-    let stations = names.clone();
-    let mut printer = Printer { solver, options, names, accuracy: None, notes: Vec::new() };
+    let mut printer =
+        Printer { solver, options, stations: stations(scheme), accuracy: None, notes: Vec::new() };
     let accuracy = Accuracy::new(&platform, &verdicts, options.seed);
     printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
     let quantities = quantities(&platform, &verdicts, &null, &mut printer)?;
@@ -108,7 +106,7 @@ pub fn analyze(
     Ok(Analysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
-        stations,
+        stations: printer.stations,
         carry: scheme.carry,
         latitude_deg: scheme.latitude.map(|l| l.degrees()),
         geometry: scheme.geometry,
@@ -139,8 +137,7 @@ pub fn analyze(
 struct Printer<'a> {
     solver: Solver<'a>,
     options: Options,
-    /// Names of the positions.
-    names: Vec<String>,
+    stations: Vec<StationLabel>,
     /// The accuracy orders, if they could be computed.
     accuracy: Option<Accuracy>,
     notes: Vec<String>,
@@ -154,7 +151,9 @@ impl Printer<'_> {
         }
         match self.solver.solve(functional, degree) {
             Ok(solved) => Some(Solution {
-                text: text(&solved, self.options.frame, &self.names),
+                text: text(&solved, self.options.frame, &self.stations),
+                terms: terms(&solved, self.options.frame, &self.stations),
+                turning: solved.terms.iter().any(|t| t.order > 0 && self.stations[t.station].rate.is_some()),
                 form: solved.form(),
                 verification: solved.verification,
                 solved,

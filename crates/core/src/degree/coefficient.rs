@@ -167,7 +167,15 @@ impl Coefficient {
 
     /// The sign and the magnitude as factors, without a leading `1`.
     pub fn sign_and_factors(&self) -> (bool, Vec<String>) {
-        let (negative, mut factors) = self.number.sign_and_factor();
+        self.factors(self.number.sign_and_factor(decimal))
+    }
+
+    /// The same with all digits of decimals.
+    pub fn precise_sign_and_factors(&self) -> (bool, Vec<String>) {
+        self.factors(self.number.sign_and_factor(|x| x.to_string()))
+    }
+
+    fn factors(&self, (negative, mut factors): (bool, Vec<String>)) -> (bool, Vec<String>) {
         let rate = |name: &str, e: i32| match e {
             1 => name.to_string(),
             _ => format!("{name}^{e}"),
@@ -186,7 +194,7 @@ impl Coefficient {
 
 impl Number {
     /// The sign and the magnitude (nothing for one).
-    fn sign_and_factor(&self) -> (bool, Vec<String>) {
+    fn sign_and_factor(&self, decimal: impl Fn(f64) -> String) -> (bool, Vec<String>) {
         match self {
             Self::Radical(r) => {
                 let negative = r.to_f64() < 0.0;

@@ -9,6 +9,7 @@ use super::staircase::{Degrees, climb};
 use crate::model::Platform;
 use crate::model::platform::{RandomValues, Sample};
 use crate::solution::local::{LocalObservable, RateZeros, local_observables, rows_at};
+use crate::solution::turning::motion_rows;
 
 /// How many pairs of fields are drawn before a disagreement is an error.
 const ATTEMPTS: usize = 4;
@@ -91,7 +92,8 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
 pub struct Table {
     /// Field and embedding.
     pub sample: Sample,
-    /// One row per position and local observable, position by position.
+    /// One row per station and local observable, station by station; then, if the scheme rotates, one per station of
+    /// [`motion_rows`](crate::solution::turning::motion_rows).
     pub rows: Vec<Vec<u64>>,
 }
 
@@ -108,6 +110,8 @@ impl Table {
 pub struct Tables {
     /// The observables of one position.
     pub observables: Vec<LocalObservable>,
+    /// How many rows are those of local observables.
+    pub observable_rows: usize,
     /// Zeros of the rates.
     pub zeros: RateZeros,
     /// `tables[field][embedding]`.
@@ -131,7 +135,8 @@ impl Tables {
         let table = |values: &RandomValues, a: u64, [w_n, w_u]: [u64; 2]| {
             let mut sample = values.sample(scheme, a);
             (sample.point.w_n, sample.point.w_u) = (w_n, w_u);
-            let rows = rows_at(platform, &sample.point, &observables);
+            let mut rows = rows_at(platform, &sample.point, &observables);
+            rows.extend(motion_rows(platform, &sample.point));
             Table { sample, rows }
         };
         // the rates of the verdicts, so that vectors of the stairs are vectors of the first table
@@ -142,7 +147,8 @@ impl Tables {
         });
         let first = &verdicts.values[0];
         let other_rates = table(first, 1, rates(first.roots()));
-        Self { observables, zeros, tables, other_rates }
+        let observable_rows = scheme.stations().len() * observables.len();
+        Self { observables, observable_rows, zeros, tables, other_rates }
     }
 
     /// The two fields.
@@ -155,14 +161,19 @@ impl Tables {
         self.observables[row % self.observables.len()].order
     }
 
-    /// The position of a row.
-    pub fn position(&self, row: usize) -> usize {
+    /// The station of a row.
+    pub fn station(&self, row: usize) -> usize {
         row / self.observables.len()
     }
 
-    /// The rows of order up to `degree`.
+    /// The row of [`motion_rows`](crate::solution::turning::motion_rows) of a station.
+    pub fn motion_row(&self, station: usize) -> usize {
+        self.observable_rows + station
+    }
+
+    /// The rows of local observables of order up to `degree`.
     pub fn rows_up_to(&self, degree: usize) -> Vec<usize> {
-        (0..self.tables[0][0].rows.len()).filter(|&j| self.order(j) <= degree).collect()
+        (0..self.observable_rows).filter(|&j| self.order(j) <= degree).collect()
     }
 
     /// The first field and embedding.

@@ -133,7 +133,8 @@ fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Sparse>
     let mut basis = Echelon::new(first.sample.roots.field, support.len() - 1);
     // independent rows on the support without its lead determine the vector
     let restricted = |j: usize| -> Vec<u64> { support[1..].iter().map(|&c| first.rows[j][c]).collect() };
-    let used: Vec<usize> = (0..first.rows.len()).filter(|&j| basis.insert(&restricted(j))).collect();
+    let used: Vec<usize> =
+        (0..solver.tables.observable_rows).filter(|&j| basis.insert(&restricted(j))).collect();
     let (values, _) = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
     let rest = support[1..].iter().copied().zip(values);
     Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())

@@ -148,14 +148,6 @@ pub struct Station<'a> {
 }
 
 impl Station<'_> {
-    /// `p1`, or `p1+45` after a turn of 45 degrees.
-    pub fn name(&self) -> String {
-        match &self.turned {
-            Some(t) if self.continues => format!("{}+{}", self.position.name, t.angle),
-            _ => self.position.name.clone(),
-        }
-    }
-
     /// All its angles.
     pub fn angles(&self) -> impl Iterator<Item = &Angle> {
         self.position.angles.iter().chain(self.turned.iter().map(|t| &t.angle))

@@ -5,7 +5,9 @@ use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protoc
 
 use super::local::ZTerm;
 use super::problem::{Outputs, Problem};
-use super::solver::{Contribution, Functional, Key, Solver};
+use super::solver::{Contribution, Functional, Key, Solver, Used};
+use super::symbols::Symbols;
+use super::turning::drift_derivative;
 use crate::degree::coefficient::{Number, Rates};
 use crate::model::platform::{LOCAL, local_dynamics, local_output};
 use crate::model::ring::{Ring, Text};
@@ -44,8 +46,7 @@ impl Solver<'_> {
         &mut self,
         functional: &Functional,
         problem: &Problem,
-        support: &[usize],
-        rates: &[Rates],
+        used: &[Used],
         plan: &[(Key, Vec<Contribution>)],
     ) -> Option<Vec<String>> {
         let text = self.text_or_none()?;
@@ -61,45 +62,61 @@ impl Solver<'_> {
         let numbers: Vec<String> = target.iter().map(|(n, _)| n.clone()).collect();
         let mut system = problem.to_text(&text, &numbers);
         // outputs: the printed terms
-        let n = support.len();
         system.outputs = plan
             .iter()
-            .map(|((_, component, azimuth, _, position), contributions)| {
-                let mut row = vec![Text.zero(); n];
-                for &(j, sign, in_n) in contributions {
-                    let axis = self.axis_factor(&self.text_point, *position, *component, *azimuth, in_n);
-                    row[j] = Text.add(&row[j], &if sign < 0 { Text.neg(&axis) } else { axis });
+            .map(|(key, contributions)| {
+                let mut row = vec![Text.zero(); used.len()];
+                for c in contributions {
+                    row[c.unknown] = Text.add(&row[c.unknown], &self.weight(&self.text_point, key, c));
                 }
                 row
             })
             .collect();
         debug_assert!(problem.outputs == Outputs::Unknowns);
-        let check = self.check(support, rates, target);
+        let check = self.check(used, target);
         let request = self.request(system, Some(check));
         self.ask(&request).filter(|(_, verified)| *verified).map(|(texts, _)| texts)
     }
 
-    fn check(&self, support: &[usize], rates: &[Rates], target: Vec<(String, String)>) -> Check {
+    fn check(&self, used: &[Used], target: Vec<(String, String)>) -> Check {
         let zeros = self.tables.zeros;
         let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
         let azimuth = self.platform.scheme().measured_azimuth;
         let components: Vec<usize> = local_output(&Text, azimuth).iter().map(|(c, _)| *c).collect();
         let state = |i: usize| format!("x_{i}");
         let unknown = |c: usize| format!("u_{c}");
-        let segments = self.platform.blocks(&self.text_point).into_iter().map(|block| {
-            let entry = |row: &Vec<String>| -> String {
-                let names: Vec<String> = block.columns.iter().map(|&c| unknown(c)).collect();
-                Text.dot(row.iter().zip(&names))
-            };
-            block.rows.iter().map(entry).collect()
-        });
-        let terms = support.iter().zip(rates).map(|(&row, r)| {
-            let observable = &self.tables.observables[row % self.tables.observables.len()];
+        let first_d = self.platform.names().len() - self.platform.coefficients();
+        let blocks = self.platform.blocks(&self.text_point).into_iter();
+        let segments =
+            blocks.zip(&self.stations).zip(&self.text_point.attitudes).map(|((block, station), c)| {
+                let entry = |row: &Vec<String>| -> String {
+                    let names: Vec<String> = block.columns.iter().map(|&c| unknown(c)).collect();
+                    Text.dot(row.iter().zip(&names))
+                };
+                let local = block.rows.iter().map(entry);
+                let moving: Vec<String> = match *station {
+                    (position, Some(axis)) => drift_derivative(self.platform, &Text, c, axis)
+                        .iter()
+                        .map(|row| {
+                            let names: Vec<String> = (0..row.len()).map(|k| unknown(first_d + k)).collect();
+                            Text.mul(&Symbols::rate_of_turning(position), &Text.dot(row.iter().zip(&names)))
+                        })
+                        .collect(),
+                    _ => vec![Text.zero(); 3],
+                };
+                local.chain(moving).collect()
+            });
+        let terms = used.iter().map(|u| {
+            let observable = &self.tables.observables[u.row % self.tables.observables.len()];
+            let station = self.tables.station(u.row);
             let term = |z: &ZTerm| {
-                let factor = rates_text([r[0] + z.rates[0], r[1] + z.rates[1]]);
+                let mut factor = rates_text([u.rates[0] + z.rates[0], u.rates[1] + z.rates[1]]);
+                if u.turns > 0 {
+                    factor = format!("{factor}*{}", Symbols::rate_of_turning(self.stations[station].0));
+                }
                 CheckTerm {
                     factor: if z.sign < 0 { format!("-{factor}") } else { factor },
-                    segment: self.tables.position(row),
+                    segment: station,
                     output: components.iter().position(|&c| c == z.component).unwrap_or(0),
                     order: z.order,
                 }
@@ -116,12 +133,17 @@ impl Solver<'_> {
     }
 }
 
-/// (8) and (9) as text, with names for the six local unknowns.
+/// (8) and (9) as text, with names for the six local unknowns and for the derivatives of the last three: `eps^n` changes while the
+/// platform turns.
 pub fn dynamics_text(w_n: &str, w_u: &str, azimuth: bool, state: impl Fn(usize) -> String) -> Dynamics {
-    let states: Vec<String> = (0..LOCAL).map(state).collect();
+    let states: Vec<String> = (0..LOCAL + 3).map(state).collect();
     let row = |row: &[String; LOCAL]| Text.dot(row.iter().zip(&states));
+    let mut equations: Vec<String> =
+        local_dynamics(&Text, &w_n.to_string(), &w_u.to_string()).iter().map(row).collect();
+    equations[3..].clone_from_slice(&states[LOCAL..]);
+    equations.extend(vec![Text.zero(); 3]);
     Dynamics {
-        equations: local_dynamics(&Text, &w_n.to_string(), &w_u.to_string()).iter().map(row).collect(),
+        equations,
         outputs: local_output(&Text, azimuth).iter().map(|(_, r)| row(r)).collect(),
         states,
     }

@@ -5,8 +5,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::ask::dynamics_text;
+use super::print::stations;
 use super::solver::Solver;
-use crate::degree::coefficient::linear_combination;
+use super::turning::drift_derivative;
 use crate::model::Platform;
 use crate::model::platform::{LOCAL_NAMES, local_output};
 use crate::model::ring::{Ring, Text};
@@ -14,7 +15,7 @@ use crate::model::ring::{Ring, Text};
 /// One formula.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Formula {
-    /// The position; null for formulas that hold at every position.
+    /// The label of the station; null for formulas that hold at every one.
     pub position: Option<String>,
     /// Left side, such as `Z1'`.
     pub left: String,
@@ -22,8 +23,8 @@ pub struct Formula {
     pub right: String,
 }
 
-/// The formulas of Z, Z', Z'' in n, which every position shares, then `psi^n` and `eps^n` of every
-/// position in the unknowns.
+/// The formulas of Z, Z', Z'' in n, which every position shares, then `psi^n` and `eps^n` of every position in the unknowns; where
+/// the platform turns `eps^n'` too.
 ///
 /// # Errors
 /// A sentence that says why there are none.
@@ -31,16 +32,28 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
     let azimuth = platform.scheme().measured_azimuth;
     let zeros = solver.tables.zeros;
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
-    let dynamics = dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), azimuth, |i| {
+    let rotates = platform.scheme().rotates();
+    let mut dynamics = dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), azimuth, |i| {
         // `psi_x^n` is a power to the engine
-        LOCAL_NAMES[i].replace("^n", "_n")
+        LOCAL_NAMES.get(i).map_or_else(|| LOCAL_NAMES[i - 3].replace("^n", "_d"), |n| n.replace("^n", "_n"))
     });
+    if !rotates {
+        // eps^n is constant
+        dynamics.equations[3..6].fill(Text.zero());
+    }
     const ORDER: usize = 2;
     let text_point = solver.symbols().point(platform, "wN", "wU");
     let display: Vec<Vec<Vec<String>>> = platform
         .blocks(&text_point)
         .iter()
         .map(|b| b.rows.iter().map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()).collect())
+        .collect();
+    let attitudes = text_point.attitudes.iter().zip(platform.scheme().stations());
+    let slopes: Vec<Option<[Vec<String>; 3]>> = attitudes
+        .map(|(c, station)| {
+            let rows = drift_derivative(platform, &Text, c, station.turned?.axis);
+            Some(rows.map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()))
+        })
         .collect();
     let columns: Vec<Vec<usize>> = platform.blocks(&text_point).into_iter().map(|b| b.columns).collect();
     let worker = solver.worker().ok_or("formulas of Z need the symbolic engine")?;
@@ -55,33 +68,44 @@ pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Form
     for (i, (component, _)) in local_output(&Text, azimuth).iter().enumerate() {
         let name = if *component == 2 { "Za".to_string() } else { format!("Z{component}") };
         for k in 0..=ORDER {
-            let right = texts[i * (ORDER + 1) + k].replace("_n", "^n");
+            let right = texts[i * (ORDER + 1) + k].replace("_n", "^n").replace("_d", "^n'");
             out.push(Formula { position: None, left: format!("{name}{}", "'".repeat(k)), right });
         }
     }
-    for ((station, rows), columns) in platform.scheme().stations().iter().zip(display).zip(columns) {
+    let first_d = platform.names().len() - platform.coefficients();
+    let stations = stations(platform.scheme()).into_iter();
+    for (((station, rows), columns), slopes) in stations.zip(display).zip(columns).zip(slopes) {
+        let mut push = |left: String, right| {
+            out.push(Formula { position: Some(station.label.clone()), left, right });
+        };
         for (name, row) in LOCAL_NAMES.iter().zip(rows) {
-            let terms: Vec<String> = row
-                .iter()
-                .zip(&columns)
-                .filter(|(t, _)| !Text.is_zero(t))
-                .map(|(t, &c)| Text.mul(t, &platform.names()[c]))
-                .collect();
-            let mut right = String::new();
-            for term in terms {
-                let (negative, magnitude) =
-                    term.strip_prefix('-').map_or((false, term.as_str()), |m| (true, m));
-                right.push_str(match (right.is_empty(), negative) {
-                    (true, true) => "-",
-                    (true, false) => "",
-                    (false, true) => " - ",
-                    (false, false) => " + ",
-                });
-                right.push_str(magnitude);
-            }
-            let right = if right.is_empty() { linear_combination([]) } else { right };
-            out.push(Formula { position: Some(station.name()), left: (*name).into(), right });
+            push(
+                (*name).into(),
+                sum(row.iter().zip(&columns).map(|(t, &c)| Text.mul(t, &platform.names()[c]))),
+            );
+        }
+        for (name, row) in LOCAL_NAMES[3..].iter().zip(slopes.iter().flatten()) {
+            let rate = station.rate.as_deref().unwrap_or_default();
+            let names = &platform.names()[first_d..];
+            let right = sum(row.iter().zip(names).map(|(t, d)| Text.mul(&Text.mul(t, &rate.to_string()), d)));
+            push(format!("{name}'"), right);
         }
     }
     Ok(out)
+}
+
+/// Terms with their signs, as a sum.
+fn sum(terms: impl Iterator<Item = String>) -> String {
+    let mut out = String::new();
+    for term in terms.filter(|t| !Text.is_zero(t)) {
+        let (negative, magnitude) = term.strip_prefix('-').map_or((false, term.as_str()), |m| (true, m));
+        out.push_str(match (out.is_empty(), negative) {
+            (true, true) => "-",
+            (true, false) => "",
+            (false, true) => " - ",
+            (false, false) => " + ",
+        });
+        out.push_str(magnitude);
+    }
+    if out.is_empty() { Text.zero() } else { out }
 }

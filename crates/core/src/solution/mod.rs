@@ -7,5 +7,7 @@ pub mod loci;
 pub mod print;
 pub mod problem;
 pub mod solver;
+pub mod substitution;
 pub mod support;
 pub mod symbols;
+pub mod turning;

@@ -1,8 +1,52 @@
 //! Solutions as text: common factors in front, terms of equal coefficient in brackets. A blank multiplies, and however strongly
 //! a reader thinks it does, the formula means the same: a quotient before one stands in brackets, unless it is a number.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::solver::{Frame, Solved, Term};
 use crate::degree::coefficient::Coefficient;
+use crate::model::Scheme;
+
+/// Where derivatives of Z are taken, as formulas name it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct StationLabel {
+    /// As in formulas: `p1`, `"about X"`, `p1[45 deg]`.
+    pub label: String,
+    /// The name of the position or rotation.
+    pub position: String,
+    /// How far the rotation has come, in degrees, right-handed; null for a position that stands. Derivatives of Z at such a
+    /// station are those of a platform that is turning, not of one that stopped there.
+    pub turned_deg: Option<f64>,
+    /// What it turns about: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`.
+    pub about: Option<String>,
+    /// The rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s.
+    pub rate: Option<String>,
+}
+
+/// A name as a formula writes it: in quotation marks unless it is letters, digits and `_` behind a letter.
+pub fn quoted(name: &str) -> String {
+    let plain =
+        name.starts_with(char::is_alphabetic) && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    if plain { name.into() } else { format!("{name:?}") }
+}
+
+/// The stations of a scheme: its positions, and the attitudes of its rotations.
+pub fn stations(scheme: &Scheme) -> Vec<StationLabel> {
+    let stations = scheme.stations();
+    let label = |s: &crate::model::scheme::Station<'_>| {
+        let name = quoted(&s.position.name);
+        let angle = s.turned.as_ref().map(|t| &t.angle);
+        StationLabel {
+            label: angle.map_or(name.clone(), |a| format!("{name}[{a} deg]")),
+            position: s.position.name.clone(),
+            turned_deg: angle.and_then(crate::model::Angle::degrees),
+            about: s.turned.as_ref().map(|t| t.axis.to_string()),
+            rate: angle.map(|_| format!("w@{name}")),
+        }
+    };
+    stations.iter().map(label).collect()
+}
 
 /// A sum with its common factor taken out:
 /// `factor [ sign coefficient (sign Z ...) ... ]`.
@@ -14,19 +58,21 @@ pub struct Grouped {
     pub groups: Vec<Group>,
 }
 
-/// `sign coefficient * (sum of signed Z)`.
+/// `sign coefficient * w^turns * (sum of signed Z)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
     /// True for minus.
     pub negative: bool,
     /// The magnitude.
     pub coefficient: Coefficient,
+    /// The power of the rate of turning; that of all terms is the same.
+    pub turns: usize,
     /// Terms, each with true for minus inside the group.
     pub terms: Vec<(bool, Term)>,
 }
 
 /// Collects the terms of a solution.
-pub fn group(solved: &Solved) -> Grouped {
+pub fn group(solved: &Solved, stations: &[StationLabel]) -> Grouped {
     let magnitude = |c: &Coefficient| -> (bool, Coefficient) {
         let negative = c.sign_and_factors().0;
         (negative, if negative { c.negated() } else { c.clone() })
@@ -49,22 +95,79 @@ pub fn group(solved: &Solved) -> Grouped {
             coefficient = Coefficient { rates: coefficient.rates, ..Coefficient::one() };
         }
         let text = coefficient.to_string();
-        match groups.iter_mut().find(|g| g.coefficient.to_string() == text) {
+        let same = |g: &&mut Group| {
+            let other = &g.terms[0].1;
+            let rates = [other.station, term.station].map(|s| &stations[s].rate);
+            g.turns == term.turns
+                && (g.turns == 0 || rates[0] == rates[1])
+                && g.coefficient.to_string() == text
+        };
+        match groups.iter_mut().find(same) {
             Some(g) => g.terms.push((negative != g.negative, term.clone())),
-            None => groups.push(Group { negative, coefficient, terms: vec![(false, term.clone())] }),
+            None => {
+                let terms = vec![(false, term.clone())];
+                groups.push(Group { negative, coefficient, turns: term.turns, terms });
+            }
         }
     }
     Grouped { factor, groups }
 }
 
-/// The name of a derivative of Z, as in `Z1''@p2`.
-pub fn z_name(term: &Term, frame: Frame, positions: &[String]) -> String {
+impl Group {
+    /// Its factors, without a leading one: `1/2`, `wU/wN`, `w@p1^2`.
+    pub fn factors(&self, stations: &[StationLabel]) -> Vec<String> {
+        let (_, mut factors) = self.coefficient.sign_and_factors();
+        let rate = stations[self.terms[0].1.station].rate.as_deref();
+        factors.extend(rate.filter(|_| self.turns > 0).map(|rate| rate_power(rate, self.turns)));
+        factors
+    }
+}
+
+/// `w@p1`, `w@p1^2`.
+fn rate_power(rate: &str, turns: usize) -> String {
+    if turns == 1 { rate.into() } else { format!("{rate}^{turns}") }
+}
+
+/// The observation of a term, as in `Z1''`.
+fn observed(term: &Term, frame: Frame) -> String {
     let base = match (frame, term.azimuth) {
         (_, true) => "Za".to_string(),
         (Frame::N, _) => format!("Z{}", term.component),
         (Frame::Platform, _) => format!("Z{}", ["x", "y", "z"][term.component - 1]),
     };
-    format!("{base}{}@{}", "'".repeat(term.order), positions[term.position])
+    format!("{base}{}", "'".repeat(term.order))
+}
+
+/// The name of a derivative of Z, as in `Z1''@p2`.
+pub fn z_name(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
+    format!("{}@{}", observed(term, frame), stations[term.station].label)
+}
+
+/// One term of a solution, for programs.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SolutionTerm {
+    /// The coefficient with its sign, such as `-1/2*wU/wN*w@p1`; decimals with all their digits.
+    pub coefficient: String,
+    /// The derivative of the observation, such as `Z1'`.
+    pub observation: String,
+    /// Where it is taken: a label of the stations.
+    pub station: String,
+}
+
+/// The terms of a solution one by one.
+pub fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<SolutionTerm> {
+    let term = |t: &Term| {
+        let (negative, mut factors) = t.coefficient.precise_sign_and_factors();
+        let station = &stations[t.station];
+        factors.extend(station.rate.as_deref().filter(|_| t.turns > 0).map(|rate| rate_power(rate, t.turns)));
+        let magnitude = if factors.is_empty() { "1".into() } else { factors.join("*") };
+        SolutionTerm {
+            coefficient: format!("{}{magnitude}", if negative { "-" } else { "" }),
+            observation: observed(t, frame),
+            station: station.label.clone(),
+        }
+    };
+    solved.terms.iter().map(term).collect()
 }
 
 /// Factors as one, to be followed by a blank and what they multiply: `wU`, `1/2*wU`, `(wU/wN)`.
@@ -85,8 +188,8 @@ fn before_a_blank(factors: &[String]) -> String {
 }
 
 /// A solution in one line, as in `1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]`.
-pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
-    let grouped = group(solved);
+pub fn text(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> String {
+    let grouped = group(solved, stations);
     let mut out = String::new();
     let sign = |out: &mut String, negative: bool| {
         out.push_str(match (out.is_empty(), negative) {
@@ -97,12 +200,12 @@ pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
         });
     };
     for g in &grouped.groups {
-        let (_, factors) = g.coefficient.sign_and_factors();
+        let factors = g.factors(stations);
         let single = g.terms.len() == 1;
         if factors.is_empty() {
             for (negative, term) in &g.terms {
                 sign(&mut out, *negative != g.negative);
-                out.push_str(&z_name(term, frame, positions));
+                out.push_str(&z_name(term, frame, stations));
             }
             continue;
         }
@@ -112,7 +215,7 @@ pub fn text(solved: &Solved, frame: Frame, positions: &[String]) -> String {
         let mut inner = String::new();
         for (negative, term) in &g.terms {
             sign(&mut inner, *negative);
-            inner.push_str(&z_name(term, frame, positions));
+            inner.push_str(&z_name(term, frame, stations));
         }
         out.push_str(&inner);
         if !single {
@@ -135,11 +238,12 @@ mod tests {
 
     #[test]
     fn the_form_of_the_method() {
-        let term = |position, component, order, num, rates| Term {
-            position,
+        let term = |station, component, order, num, rates| Term {
+            station,
             component,
             azimuth: false,
             order,
+            turns: 0,
             coefficient: Coefficient { number: Number::Radical(Radical::rational(num, 2)), rates },
         };
         let solved = Solved {
@@ -151,11 +255,30 @@ mod tests {
             ],
             verification: Verification::Modular,
         };
-        let names = ["p1".to_string(), "p2".to_string()];
+        let attitude = crate::model::scheme::parse_attitude("0,0,0").expect("an attitude");
+        let names = stations(&Scheme::of_angles([attitude.clone(), attitude]));
         assert_eq!(text(&solved, Frame::N, &names), "1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]");
         // the sign of a single term stands before its number, not between the two
         let single = Solved { terms: vec![term(0, 3, 1, -1, [0, 1])], ..solved };
         assert_eq!(text(&single, Frame::N, &names), "-1/2*wU Z3'@p1");
+    }
+
+    /// No name of a station reads as a sum, a product or another name.
+    #[test]
+    fn labels() {
+        let attitude = crate::model::scheme::parse_attitude("0,0,0").expect("an attitude");
+        let mut scheme = Scheme::of_angles([attitude.clone(), attitude]);
+        scheme.positions[0].rotation = crate::model::rotation::Rotation::new("X_p", "-90").ok();
+        scheme.positions[1].name = "about X-1".into();
+        let labels = stations(&scheme);
+        let texts: Vec<&str> = labels.iter().map(|l| l.label.as_str()).collect();
+        assert_eq!(texts[..3], ["p1[0 deg]", "p1[-11.25 deg]", "p1[-22.5 deg]"]);
+        assert_eq!(texts.last(), Some(&"\"about X-1\""));
+        assert_eq!((labels[1].turned_deg, labels[1].rate.as_deref()), (Some(-11.25), Some("w@p1")));
+        assert_eq!(
+            (quoted("p+1").as_str(), quoted("1").as_str(), quoted("\u{b5}1").as_str()),
+            ("\"p+1\"", "\"1\"", "\u{b5}1")
+        );
     }
 
     #[test]

@@ -14,8 +14,8 @@ use crate::model::ring::{Float, Ring, Text};
 pub struct Problem {
     /// Number of unknowns.
     pub unknowns: usize,
-    /// One equation per row: places of its coefficients, and its right side.
-    pub equations: Vec<(Vec<Place>, Right)>,
+    /// One equation per row: the unknowns that occur with the places of their coefficients, and its right side.
+    pub equations: Vec<(Vec<(usize, Place)>, Right)>,
     /// The outputs: the unknowns themselves, or sums of places times unknowns.
     pub outputs: Outputs,
 }
@@ -56,16 +56,37 @@ pub enum Outputs {
     Sums(Vec<Vec<Place>>),
 }
 
+/// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with `sum_i z_i rows[i] = sum_j y_j motion_j`
+/// over some unknowns `y_j` of the solution, given with their rows of minus the motion.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Motion {
+    /// Independent rows that span it.
+    pub rows: Vec<usize>,
+    /// `(j, row of minus motion_j)`.
+    pub of: Vec<(usize, usize)>,
+}
+
+/// Unknowns in order, each with its place.
+fn numbered(places: impl Iterator<Item = Place>) -> Vec<(usize, Place)> {
+    places.enumerate().collect()
+}
+
 impl Problem {
     /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique).
-    /// The right sides are the target's entries, column by column.
-    pub fn solution(rows: &[usize], columns: usize) -> Self {
-        let equation = |c: usize| (rows.iter().map(|&j| (j, c)).collect(), Right::Target(c));
-        Self {
-            unknowns: rows.len(),
-            equations: (0..columns).map(equation).collect(),
-            outputs: Outputs::Unknowns,
+    /// The right sides are the target's entries, column by column. Behind `y` stand the unknowns of every motion.
+    pub fn solution(rows: &[usize], columns: usize, motions: &[Motion]) -> Self {
+        let equation = |c: usize| (numbered(rows.iter().map(|&j| (j, c))), Right::Target(c));
+        let mut equations: Vec<_> = (0..columns).map(equation).collect();
+        let mut unknowns = rows.len();
+        for motion in motions {
+            for c in 0..columns {
+                let own = motion.rows.iter().enumerate().map(|(i, &row)| (unknowns + i, (row, c)));
+                let others = motion.of.iter().map(|&(j, row)| (j, (row, c)));
+                equations.push((own.chain(others).collect(), Right::Zero));
+            }
+            unknowns += motion.rows.len();
         }
+        Self { unknowns, equations, outputs: Outputs::Unknowns }
     }
 
     /// The combination of the given rows that vanishes outside `support` and is one at `lead`.
@@ -74,7 +95,7 @@ impl Problem {
         let places = |c: usize| -> Vec<Place> { rows.iter().map(|&j| (j, c)).collect() };
         let equations = (0..columns)
             .filter(|c| *c == lead || !support.contains(c))
-            .map(|c| (places(c), if c == lead { Right::One } else { Right::Zero }))
+            .map(|c| (numbered(places(c).into_iter()), if c == lead { Right::One } else { Right::Zero }))
             .collect();
         let sums = support.iter().map(|&c| places(c)).collect();
         Self { unknowns: rows.len(), equations, outputs: Outputs::Sums(sums) }
@@ -84,7 +105,7 @@ impl Problem {
     /// one: `sum_c row[c] v_c = -row[lead]`.
     pub fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
         let others: Vec<usize> = support.iter().copied().filter(|&c| c != lead).collect();
-        let equation = |&j: &usize| (others.iter().map(|&c| (j, c)).collect(), Right::Minus((j, lead)));
+        let equation = |&j: &usize| (numbered(others.iter().map(|&c| (j, c))), Right::Minus((j, lead)));
         Self {
             unknowns: others.len(),
             equations: rows.iter().map(equation).collect(),
@@ -109,9 +130,12 @@ impl Problem {
 
     /// The outputs in a prime field; `None` when there is no solution.
     pub fn solve_in_field(&self, f: &Field, table: &[Vec<u64>], targets: &[u64]) -> Option<Vec<u64>> {
-        let columns: Vec<Vec<u64>> = (0..self.unknowns)
-            .map(|i| self.equations.iter().map(|(places, _)| table[places[i].0][places[i].1]).collect())
-            .collect();
+        let mut columns = vec![vec![0; self.equations.len()]; self.unknowns];
+        for (e, (places, _)) in self.equations.iter().enumerate() {
+            for &(i, (r, c)) in places {
+                columns[i][e] = table[r][c];
+            }
+        }
         let refs: Vec<&[u64]> = columns.iter().map(Vec::as_slice).collect();
         let right: Vec<u64> = self.equations.iter().map(|(_, t)| t.value(f, table, targets)).collect();
         let x = express(*f, &refs, &right)?;
@@ -122,10 +146,12 @@ impl Problem {
     /// right side or anything is not finite.
     pub fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
         let m = self.equations.len();
-        let a = DMatrix::from_fn(m, self.unknowns, |e, i| {
-            let (r, c) = self.equations[e].0[i];
-            table[r][c]
-        });
+        let mut a = DMatrix::zeros(m, self.unknowns);
+        for (e, (places, _)) in self.equations.iter().enumerate() {
+            for &(i, (r, c)) in places {
+                a[(e, i)] = table[r][c];
+            }
+        }
         let b =
             DVector::from_iterator(m, self.equations.iter().map(|(_, t)| t.value(&Float, table, targets)));
         let qr = a.clone().qr();
@@ -139,7 +165,14 @@ impl Problem {
     /// The system as text for the symbolic worker: matrix, right side, output matrix.
     pub fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> System {
         let cell = |&(r, c): &Place| table[r][c].clone();
-        let matrix = self.equations.iter().map(|(places, _)| places.iter().map(cell).collect()).collect();
+        let row = |places: &[(usize, Place)]| {
+            let mut row = vec![Text.zero(); self.unknowns];
+            for (i, place) in places {
+                row[*i] = cell(place);
+            }
+            row
+        };
+        let matrix = self.equations.iter().map(|(places, _)| row(places)).collect();
         let right = self.equations.iter().map(|(_, t)| t.value(&Text, table, targets)).collect();
         let outputs = match &self.outputs {
             Outputs::Unknowns => Vec::new(),
@@ -161,7 +194,7 @@ mod tests {
         let images: Vec<Vec<u64>> =
             table.iter().map(|r| r.iter().map(|&a| f.from_i64(a)).collect()).collect();
         // e_0 = (row0 - 2 row1 + 2 row2) / 3
-        let p = Problem::solution(&[0, 1, 2], 3);
+        let p = Problem::solution(&[0, 1, 2], 3, &[]);
         let x = p.solve_in_floats(&floats, &[1.0, 0.0, 0.0]).expect("solvable");
         for (a, b) in x.iter().zip([1.0 / 3.0, -2.0 / 3.0, 2.0 / 3.0]) {
             assert!((a - b).abs() < 1e-12);
@@ -175,7 +208,7 @@ mod tests {
         let p = Problem::null_vector(&[0, 1], &[0, 1, 2], 0);
         assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.from_ratio(-1, 2), f.from_ratio(1, 2)]));
         // no solution
-        let p = Problem::solution(&[0], 3);
+        let p = Problem::solution(&[0], 3, &[]);
         assert_eq!(p.solve_in_field(&f, &images, &[f.one(), 0, 0]), None);
         assert_eq!(p.solve_in_floats(&floats, &[1.0, 0.0, 0.0]), None);
     }

@@ -3,20 +3,23 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_exact::Radical;
+use obsdeg_exact::{Radical, SplitMix64};
 use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::problem::Problem;
+use super::problem::{Motion, Problem};
+use super::substitution::{Substitution, binomial};
 use super::support::short_support;
 use super::symbols::Symbols;
+use super::turning::{attitude_derivative, motion_rows};
 use crate::degree::coefficient::{
     Coefficient, Form, Image, Number, READABLE, Rates, power, rates_between, readable, recover_radical,
 };
 use crate::degree::ensemble::{Table, Tables, Verdicts};
-use crate::model::platform::{LOCAL, Platform, Point, local_dynamics, local_output};
+use crate::model::platform::{Platform, Point};
 use crate::model::ring::{Float, Ring, Text};
+use crate::model::rotation::Axis;
 use crate::solution::local::rows_at;
 
 /// Most angles with symbols of their own for which formulas are attempted.
@@ -25,6 +28,10 @@ const MAX_SYMBOLIC_ANGLES: usize = 4;
 const PRINTABLE: usize = 1000;
 /// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
 const FLOAT_RATES: (f64, f64) = (1.0, 1.0);
+/// Values of `(wN, wU)` and of every rate of turning at which decimals are checked.
+const OTHER_RATES: (f64, f64, f64) = (0.8, 0.5, 1.3);
+/// How far the sum of terms with decimals may be from its target, relative to the sum of their magnitudes.
+const RESIDUAL: f64 = 1e-9;
 
 /// The axes in which Z is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
@@ -45,29 +52,31 @@ pub enum Verification {
     Symbolic,
     /// By substitution in two prime fields.
     Modular,
-    /// By substitution in floating point: residual below 1e-9.
+    /// By substitution in floating point: residual below 1e-9 of the sum of magnitudes.
     Numeric,
 }
 
-/// `coefficient * Z_component^(order) @ position`.
+/// `coefficient * w^turns * Z_component^(order) @ station`, w being the rate at which the platform turns there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Index of the position.
-    pub position: usize,
+    /// Index of the station.
+    pub station: usize,
     /// 1, 2, 3: component in n (2 is a measured azimuth) or platform axis.
     pub component: usize,
     /// Whether this is the measured azimuth.
     pub azimuth: bool,
-    /// Derivative order.
+    /// Derivative order; at a rotation, of the platform that turns.
     pub order: usize,
-    /// The coefficient.
+    /// The power of the rate of turning.
+    pub turns: usize,
+    /// The coefficient, without it.
     pub coefficient: Coefficient,
 }
 
 /// An observable quantity as a sum of derivatives of Z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
-    /// The terms, by order, component and position.
+    /// The terms, by power of the rate of turning, order, component and station.
     pub terms: Vec<Term>,
     /// How it was checked.
     pub verification: Verification,
@@ -92,11 +101,35 @@ pub struct Functional {
     images: Vec<Vec<u64>>,
 }
 
-/// Place of a term in a solution: (order, component, azimuth, rates, position).
-pub(super) type Key = (usize, usize, bool, Rates, usize);
+/// Place of a term in a solution, in the order of printing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    pub(super) turns: usize,
+    pub(super) order: usize,
+    pub(super) component: usize,
+    pub(super) azimuth: bool,
+    pub(super) rates: Rates,
+    pub(super) station: usize,
+}
 
-/// Which row enters a term: (index in the support, sign, component in n).
-pub(super) type Contribution = (usize, i64, usize);
+/// What enters a term: an unknown of the problem, times a factor, times an entry of a derivative of `C_c^n` by the angle of the turn.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contribution {
+    pub(super) unknown: usize,
+    pub(super) factor: i64,
+    /// The component of Z in n.
+    in_n: usize,
+    /// The order of the derivative of `C_c^n`.
+    derivative: usize,
+}
+
+/// An unknown of the problem: a row of the tables, with the rates that its amount is multiplied with.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Used {
+    pub(super) row: usize,
+    pub(super) rates: Rates,
+    pub(super) turns: usize,
+}
 
 /// Everything that coefficients are computed from.
 pub struct Solver<'a> {
@@ -110,6 +143,8 @@ pub struct Solver<'a> {
     pub(super) floats: Option<(Point<Float>, Vec<Vec<f64>>)>,
     pub(super) worker: Option<&'a mut Worker>,
     pub(super) frame: Frame,
+    /// Per station: its position, and the axis if it turns there.
+    pub(super) stations: Vec<(usize, Option<Axis>)>,
 }
 
 impl<'a> Solver<'a> {
@@ -126,13 +161,20 @@ impl<'a> Solver<'a> {
         let rate = |zero: bool| if zero { "0" } else { "1" };
         let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
         let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES;
-        let text = if usable { rows_at(platform, &text_point, &tables.observables) } else { Vec::new() };
+        let mut text = Vec::new();
+        if usable {
+            text = rows_at(platform, &text_point, &tables.observables);
+            text.extend(motion_rows(platform, &text_point));
+        }
         let floats = platform.scheme().generic_names().is_empty().then(|| {
-            let point = float_point(platform, &tables);
-            let rows = rows_at(platform, &point, &tables.observables);
+            let point = float_point(platform, &tables, FLOAT_RATES);
+            let mut rows = rows_at(platform, &point, &tables.observables);
+            rows.extend(motion_rows(platform, &point));
             (point, rows)
         });
-        Self { platform, verdicts, tables, symbols, text, text_point, floats, worker, frame }
+        let stations = platform.scheme().stations();
+        let stations = stations.iter().map(|s| (s.index, s.turned.as_ref().map(|t| t.axis))).collect();
+        Self { platform, verdicts, tables, symbols, text, text_point, floats, worker, frame, stations }
     }
 
     /// Whether formulas in sines and cosines are out of question: too many different angles.
@@ -177,43 +219,49 @@ impl<'a> Solver<'a> {
         Some(Functional { terms, images })
     }
 
-    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z
-    /// is replaced by its row `H F^k S_i`, in all tables. True for decimals, which have their own check.
-    fn holds(&self, terms: &[Term], targets: &[Vec<u64>]) -> bool {
+    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is replaced by its row, at
+    /// rest or turning, in all tables; terms with decimals in floating point.
+    fn holds(&self, terms: &[Term], functional: &Functional, targets: &[Vec<u64>]) -> bool {
         if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
-            return true;
+            return self.holds_in_floats(terms, functional).unwrap_or(false);
         }
-        let azimuth = self.platform.scheme().measured_azimuth;
         self.all_tables().zip(targets).all(|((field, table), target)| {
-            let (f, point) = (table.sample.roots.field, &table.sample.point);
-            let (dynamics, output) = (local_dynamics(&f, &point.w_n, &point.w_u), local_output(&f, azimuth));
-            let blocks = self.platform.blocks(point);
-            let mut sum = vec![0; target.len()];
-            for t in terms {
-                let Some(coefficient) = self.image(&t.coefficient, field, table) else { return false };
-                // Z^n as measured, or Z^c = C_n^c Z^n
-                let c = &point.attitudes[t.position];
-                let mut row = [0; LOCAL];
-                for (component, h) in &output {
-                    let weight = match self.frame {
-                        Frame::Platform if !t.azimuth && *component != 2 => c[component - 1][t.component - 1],
-                        Frame::Platform if !t.azimuth => 0,
-                        _ if *component == t.component => f.one(),
-                        _ => 0,
-                    };
-                    row = std::array::from_fn(|j| f.add(row[j], f.mul(weight, h[j])));
-                }
-                for _ in 0..t.order {
-                    row = std::array::from_fn(|j| f.dot(0, (0..LOCAL).map(|i| (row[i], dynamics[i][j]))));
-                }
-                let block = &blocks[t.position];
-                for (k, &column) in block.columns.iter().enumerate() {
-                    let entry = f.dot(0, (0..LOCAL).map(|i| (row[i], block.rows[i][k])));
-                    sum[column] = f.add(sum[column], f.mul(coefficient, entry));
-                }
-            }
-            sum == *target
+            let f = table.sample.roots.field;
+            // a rate of turning of its own for every position
+            let turning = |i: usize| f.from_u64(SplitMix64::new(f.modulus() ^ i as u64).next_u64());
+            let coefficient = |t: &Term| {
+                let image = self.image(&t.coefficient, field, table)?;
+                Some(f.mul(image, f.pow(turning(self.stations[t.station].0), t.turns as u64)))
+            };
+            let coefficients: Option<Vec<u64>> = terms.iter().map(coefficient).collect();
+            let substitution = Substitution::new(self.platform, &table.sample.point, self.frame);
+            coefficients.is_some_and(|c| substitution.sum(terms, &c, turning) == *target)
         })
+    }
+
+    /// The same at rates of its own in floating point; `None` without numbers.
+    fn holds_in_floats(&self, terms: &[Term], functional: &Functional) -> Option<bool> {
+        let (w_n, w_u, turning) = OTHER_RATES;
+        let point = float_point(self.platform, &self.tables, (w_n, w_u));
+        let number = |c: &Coefficient| -> Option<f64> {
+            let number = match &c.number {
+                Number::Radical(r) => r.to_f64(),
+                Number::Decimal(x) => *x,
+                Number::Text { raw, .. } => self.symbols.float(raw)?,
+            };
+            Some(number * w_n.powi(c.rates[0]) * w_u.powi(c.rates[1]))
+        };
+        let coefficient = |t: &Term| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
+        let coefficients: Vec<f64> = terms.iter().map(coefficient).collect::<Option<_>>()?;
+        let mut rest =
+            Substitution::new(self.platform, &point, self.frame).sum(terms, &coefficients, |_| turning);
+        let mut size: f64 = coefficients.iter().map(|c| c.abs()).sum();
+        for (column, c) in &functional.terms {
+            let target = number(c)?;
+            rest[*column] -= target;
+            size += target.abs();
+        }
+        Some(rest.iter().all(|x| x.abs() <= RESIDUAL * size))
     }
 
     /// The functional on `support` whose coefficients are the outputs of `problem`.
@@ -325,16 +373,29 @@ impl<'a> Solver<'a> {
             cost,
         )
         .ok_or("the rows of its order do not span it")?;
-        let problem = Problem::solution(&support, self.platform.names().len());
-        let y: Vec<Vec<u64>> = self
-            .all_tables()
-            .zip(&targets)
-            .map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target))
-            .collect::<Option<_>>()
-            .ok_or(LOST)?;
-        let split = self.split_rates(&y).ok_or(LOST)?;
-        let rates: Vec<Rates> = split.iter().map(|(r, _)| *r).collect();
-        let plan = self.plan(&support, &rates);
+        let columns = self.platform.names().len();
+        let solve = |problem: &Problem| -> Option<Vec<(Rates, Vec<u64>)>> {
+            let tables = self.all_tables().zip(&targets);
+            let y =
+                tables.map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target));
+            self.split_rates(&y.collect::<Option<Vec<_>>>()?)
+        };
+        let mut problem = Problem::solution(&support, columns, &[]);
+        let mut split = solve(&problem).ok_or(LOST)?;
+        let motions = self
+            .motions(&support, &split)
+            .ok_or("the motion of the platform is not in the span of its stations")?;
+        if !motions.is_empty() {
+            problem = Problem::solution(&support, columns, &motions);
+            split = solve(&problem).ok_or(LOST)?;
+        }
+        let rows = support.iter().map(|&row| (row, [0, 0], 0));
+        // the motion enters (16) with w/wN
+        let moved = motions.iter().flat_map(|m| m.rows.iter().map(|&row| (row, [-1, 0], 1)));
+        let used: Vec<Used> = (rows.chain(moved).zip(&split))
+            .map(|((row, by, turns), (r, _))| Used { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
+            .collect();
+        let plan = self.plan(&used);
         // numbers of the printed terms in every field
         let numbers: Vec<Vec<u64>> = self
             .all_tables()
@@ -347,7 +408,7 @@ impl<'a> Solver<'a> {
         let of_term = |i: usize| -> Vec<u64> { numbers.iter().map(|v| v[i]).collect() };
         let exact: Option<Vec<Number>> =
             (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
-        let symbolic = self.ask_for_solution(functional, &problem, &support, &rates, &plan);
+        let symbolic = self.ask_for_solution(functional, &problem, &used, &plan);
         let (numbers, verification) = match (symbolic, exact) {
             (Some(texts), exact) => {
                 if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
@@ -386,19 +447,18 @@ impl<'a> Solver<'a> {
         let mut terms: Vec<Term> = plan
             .iter()
             .zip(numbers)
-            .map(|(((order, component, azimuth, rates, position), _), number)| Term {
-                position: *position,
-                component: *component,
-                azimuth: *azimuth,
-                order: *order,
-                coefficient: Coefficient { number, rates: *rates },
+            .map(|((key, _), number)| Term {
+                station: key.station,
+                component: key.component,
+                azimuth: key.azimuth,
+                order: key.order,
+                turns: key.turns,
+                coefficient: Coefficient { number, rates: key.rates },
             })
             .collect();
         terms.retain(|t| !t.coefficient.is_zero());
-        if !self.holds(&terms, &targets) {
-            return Err(
-                "it did not survive its substitution in the prime fields: please report this scheme".into()
-            );
+        if !self.holds(&terms, functional, &targets) {
+            return Err("it did not survive its substitution: please report this scheme".into());
         }
         let printed = readable(terms.iter().map(|t| t.coefficient.clone()).collect());
         for (term, coefficient) in terms.iter_mut().zip(printed) {
@@ -407,31 +467,77 @@ impl<'a> Solver<'a> {
         Ok(Solved { terms, verification })
     }
 
-    /// The printed terms of a solution that uses the rows `support` with rates `rates`.
-    fn plan(&self, support: &[usize], rates: &[Rates]) -> Vec<(Key, Vec<Contribution>)> {
+    /// What the turning of the platform adds to a solution by the rows `support`: one motion per rotation and rates of the amounts, in
+    /// rows of the rotation itself up to order one. `None` when these do not span it, which they always do.
+    fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<Motion>> {
+        let first = self.tables.first();
+        let f = first.sample.roots.field;
+        let mut groups: BTreeMap<(usize, Rates), Vec<usize>> = BTreeMap::new();
+        for (j, (&row, (rates, _))) in support.iter().zip(split).enumerate() {
+            let (position, axis) = self.stations[self.tables.station(row)];
+            if axis.is_some() && self.tables.order(row) == 2 {
+                groups.entry((position, *rates)).or_default().push(j);
+            }
+        }
+        let mut out = Vec::new();
+        for ((position, rates), members) in groups {
+            let of: Vec<(usize, usize)> = members
+                .iter()
+                .map(|&j| (j, self.tables.motion_row(self.tables.station(support[j]))))
+                .collect();
+            let factor = power(&f, first.rates(), rates)?;
+            let mut target = vec![0; self.platform.names().len()];
+            for &(j, row) in &of {
+                let amount = f.neg(f.mul(split[j].1[0], factor));
+                for (slot, &x) in target.iter_mut().zip(&first.rows[row]) {
+                    *slot = f.add(*slot, f.mul(amount, x));
+                }
+            }
+            if target.iter().all(|&x| x == 0) {
+                continue;
+            }
+            let mut own = self.tables.rows_up_to(1);
+            own.retain(|&row| self.stations[self.tables.station(row)].0 == position);
+            let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
+            out.push(Motion { rows: short_support(f, &first.rows, &own, &target, cost)?, of });
+        }
+        Some(out)
+    }
+
+    /// The printed terms of a solution that uses the rows `used`.
+    fn plan(&self, used: &[Used]) -> Vec<(Key, Vec<Contribution>)> {
         let mut plan: BTreeMap<Key, Vec<Contribution>> = BTreeMap::new();
-        for (j, (&row, r)) in support.iter().zip(rates).enumerate() {
-            let position = self.tables.position(row);
-            for z in &self.tables.observables[row % self.tables.observables.len()].solution {
-                let rates = [r[0] + z.rates[0], r[1] + z.rates[1]];
+        for (j, u) in used.iter().enumerate() {
+            let station = self.tables.station(u.row);
+            let turns = self.stations[station].1.is_some();
+            for z in &self.tables.observables[u.row % self.tables.observables.len()].solution {
                 let azimuth = z.component == 2;
-                let printed = match self.frame {
-                    Frame::Platform if !azimuth => vec![1, 2, 3],
-                    _ => vec![z.component],
-                };
-                for component in printed {
-                    plan.entry((z.order, component, azimuth, rates, position)).or_default().push((
-                        j,
-                        z.sign,
-                        z.component,
-                    ));
+                let in_platform = self.frame == Frame::Platform && !azimuth;
+                // Z^n = C_c^n Z^c, and C_c^n changes where the platform turns
+                for derivative in 0..=if in_platform && turns { z.order } else { 0 } {
+                    for component in if in_platform { 1..=3 } else { z.component..=z.component } {
+                        let key = Key {
+                            turns: u.turns + derivative,
+                            order: z.order - derivative,
+                            component,
+                            azimuth,
+                            rates: [u.rates[0] + z.rates[0], u.rates[1] + z.rates[1]],
+                            station,
+                        };
+                        plan.entry(key).or_default().push(Contribution {
+                            unknown: j,
+                            factor: z.sign * binomial(z.order, derivative) as i64,
+                            in_n: z.component,
+                            derivative,
+                        });
+                    }
                 }
             }
         }
         plan.into_iter().collect()
     }
 
-    /// `sum sign * x_j * (axis factor)` for every printed term: `Z^n = C_c^n Z^c`.
+    /// `sum factor * x_j * (axis factor)` for every printed term.
     fn term_numbers<R: Ring>(
         &self,
         point: &Point<R>,
@@ -440,28 +546,29 @@ impl<'a> Solver<'a> {
     ) -> Vec<R::Element> {
         let ring = &point.ring;
         plan.iter()
-            .map(|((_, component, azimuth, _, position), contributions)| {
-                contributions.iter().fold(ring.zero(), |sum, &(j, sign, in_n)| {
-                    let axis = self.axis_factor(point, *position, *component, *azimuth, in_n);
-                    let value = ring.mul(&axis, &x[j]);
-                    ring.add(&sum, &if sign < 0 { ring.neg(&value) } else { value })
+            .map(|(key, contributions)| {
+                contributions.iter().fold(ring.zero(), |sum, c| {
+                    ring.add(&sum, &ring.mul(&self.weight(point, key, c), &x[c.unknown]))
                 })
             })
             .collect()
     }
 
-    pub(super) fn axis_factor<R: Ring>(
-        &self,
-        point: &Point<R>,
-        position: usize,
-        component: usize,
-        azimuth: bool,
-        in_n: usize,
-    ) -> R::Element {
-        match self.frame {
-            Frame::Platform if !azimuth => point.attitudes[position][in_n - 1][component - 1].clone(),
-            _ => point.ring.one(),
-        }
+    /// What the amount of a row is multiplied with in a printed term.
+    pub(super) fn weight<R: Ring>(&self, point: &Point<R>, key: &Key, c: &Contribution) -> R::Element {
+        let ring = &point.ring;
+        let axis = match (self.frame, self.stations[key.station].1) {
+            (Frame::Platform, Some(axis)) if !key.azimuth => {
+                let slope = attitude_derivative(ring, &point.attitudes[key.station], axis, c.derivative);
+                slope[c.in_n - 1][key.component - 1].clone()
+            }
+            (Frame::Platform, None) if !key.azimuth => {
+                point.attitudes[key.station][c.in_n - 1][key.component - 1].clone()
+            }
+            _ => ring.one(),
+        };
+        let times = (1..c.factor.unsigned_abs()).fold(axis.clone(), |sum, _| ring.add(&sum, &axis));
+        if c.factor < 0 { ring.neg(&times) } else { times }
     }
 
     fn decimals(
@@ -484,11 +591,11 @@ impl<'a> Solver<'a> {
     }
 }
 
-fn float_point(platform: &Platform, tables: &Tables) -> Point<Float> {
+fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point<Float> {
     let attitudes =
         platform.scheme().stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
     let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
-    let (w_n, w_u) = (rate(tables.zeros.w_n, FLOAT_RATES.0), rate(tables.zeros.w_u, FLOAT_RATES.1));
+    let (w_n, w_u) = (rate(tables.zeros.w_n, rates.0), rate(tables.zeros.w_u, rates.1));
     Point { ring: Float, w_n, w_u, attitudes }
 }
 
@@ -531,13 +638,13 @@ mod tests {
                     row.clone()
                 })
                 .collect();
-            assert!(solver.holds(&solved.terms, &targets));
+            assert!(solver.holds(&solved.terms, &functional, &targets));
             let mut wrong = solved.terms.clone();
             wrong[0].coefficient = wrong[0].coefficient.negated();
-            assert!(!solver.holds(&wrong, &targets));
+            assert!(!solver.holds(&wrong, &functional, &targets));
             let mut wrong = solved.terms.clone();
             wrong[0].order += 1;
-            assert!(!solver.holds(&wrong, &targets));
+            assert!(!solver.holds(&wrong, &functional, &targets));
         }
     }
 }

@@ -20,13 +20,17 @@ enum Base {
 pub struct Symbols {
     bases: Vec<Base>,
     radicals: bool,
+    /// Indices of the positions that rotate.
+    turning: Vec<usize>,
 }
 
 impl Symbols {
     /// The symbols of `platform`: one base per generic name, and one per constant angle that is no
     /// multiple of 15 degrees, up to sign, complement and supplement.
     pub fn of(platform: &Platform) -> Self {
-        let mut out = Self::default();
+        let positions = platform.scheme().positions.iter().enumerate();
+        let turning = positions.filter(|(_, p)| p.rotation.is_some()).map(|(i, _)| i).collect();
+        let mut out = Self { turning, ..Self::default() };
         for angle in platform.scheme().stations().iter().flat_map(Station::angles) {
             if let Some((name, _)) = angle.generic() {
                 out.add(Base::Name(name.into()));
@@ -51,9 +55,15 @@ impl Symbols {
         self.bases.len()
     }
 
-    /// Independent symbols, for the worker: the rates.
+    /// Independent symbols, for the worker: the rates of the earth and of the platform.
     pub fn independent(&self) -> Vec<String> {
-        ["wN", "wU"].map(String::from).to_vec()
+        let turning = self.turning.iter().map(|&i| Self::rate_of_turning(i));
+        ["wN", "wU"].map(String::from).into_iter().chain(turning).collect()
+    }
+
+    /// The rate at which the position of this index turns, for the worker.
+    pub fn rate_of_turning(position: usize) -> String {
+        format!("w_{position}")
     }
 
     /// Square roots with their squares, for the worker.

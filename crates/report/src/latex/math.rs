@@ -1,8 +1,7 @@
 //! Formulas as LaTeX: names, expressions in program notation, solutions.
 
 use obsdeg_core::analysis::Solution;
-use obsdeg_core::degree::coefficient::Coefficient;
-use obsdeg_core::solution::print::{Group, group};
+use obsdeg_core::solution::print::{Group, StationLabel, group};
 use obsdeg_core::solution::solver::{Frame, Term};
 
 use super::escape;
@@ -28,12 +27,17 @@ pub(crate) const FUNCTIONS: [(&str, &str); 8] = [
 /// Deepest nesting of brackets that is set as a formula.
 const MAX_DEPTH: usize = 60;
 
-/// The math of one name: `D_FX`, `psi_x@1`, `eps_y^n`, `wN`.
+/// The math of one name: `D_FX`, `psi_x@1`, `eps_y^n`, `eps_z^n'@p2`, `wN`, `w@p1`.
 pub(crate) fn symbol(name: &str) -> String {
     let (base, position) = name.split_once('@').map_or((name, None), |(b, p)| (b, Some(p)));
+    if let ("w", Some(position)) = (base, position) {
+        return format!("\\omega{}", place(position));
+    }
+    let (base, dotted) = base.strip_suffix('\'').map_or((base, false), |b| (b, true));
     let (base, frame) = base.strip_suffix("^n").map_or((base, ""), |b| (b, "^{n}"));
     let body = match base.split_once('_') {
         Some(("psi", axis)) => format!("\\psi_{{{axis}}}"),
+        Some(("eps", axis)) if dotted => format!("\\dot{{\\varepsilon}}_{{{axis}}}"),
         Some(("eps", axis)) => format!("\\varepsilon_{{{axis}}}"),
         Some(("D", rest)) => format!("D_{{{rest}}}"),
         _ => match base {
@@ -42,7 +46,12 @@ pub(crate) fn symbol(name: &str) -> String {
             other => name_of_model(other),
         },
     };
-    let position = position.map(|p| format!("^{{({p})}}")).unwrap_or_default();
+    // psi_x@1 is an unknown, eps_x^n@p1 a value at a station
+    let position = match position {
+        Some(p) if frame.is_empty() => format!("^{{({p})}}"),
+        Some(p) => place(p),
+        None => String::new(),
+    };
     format!("{body}{frame}{position}")
 }
 
@@ -232,13 +241,18 @@ impl Reader<'_> {
         if !(c.is_alphabetic() || c == '_') {
             return None;
         }
-        let mut name = self.word(|c| c.is_alphanumeric() || c == '_' || c == '@');
+        let mut name = self.word(|c| c.is_alphanumeric() || c == '_');
         if let Some(rest) = self.rest.strip_prefix("^n")
             && ["psi_", "eps_"].iter().any(|p| name.starts_with(p))
             && !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_')
         {
             name.push_str("^n");
             self.rest = rest;
+            name.push_str(&self.word(|c| c == '\''));
+        }
+        if let Some(rest) = self.rest.strip_prefix('@') {
+            self.rest = rest;
+            name.push_str(&self.station()?);
         }
         if !self.rest.starts_with('(') {
             return Some((Factor::of(symbol(&name)), None));
@@ -249,6 +263,21 @@ impl Reader<'_> {
         }
         let command = FUNCTIONS.iter().find(|(known, _)| *known == name)?.1;
         Some((Factor::of(format!("\\{command}({argument})")), Some((command, argument))))
+    }
+
+    /// `@p1`, `@"about X"[45 deg]`.
+    fn station(&mut self) -> Option<String> {
+        let quoted = self.rest.starts_with('"');
+        let end = if quoted {
+            1 + self.rest[1..].find('"')? + 1
+        } else {
+            self.rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(self.rest.len())
+        };
+        let angle = self.rest[end..].strip_prefix('[').and_then(|r| r.find(']'));
+        let end = angle.map_or(end, |a| end + a + 2);
+        let (station, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        Some(format!("@{station}"))
     }
 
     /// What stands in brackets.
@@ -267,7 +296,7 @@ fn plain(math: &str) -> bool {
 }
 
 /// `Z_3''@p1` and the like.
-fn z(term: &Term, frame: Frame, positions: &[String]) -> String {
+fn z(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
     let letter = match term.order {
         0 => "Z".to_string(),
         1 => "\\dot{Z}".into(),
@@ -279,7 +308,17 @@ fn z(term: &Term, frame: Frame, positions: &[String]) -> String {
         (Frame::N, _) => term.component.to_string(),
         (Frame::Platform, _) => ["x", "y", "z"][term.component - 1].into(),
     };
-    format!("{letter}_{{{index}}}(\\text{{{}}})", escape(&positions[term.position]))
+    format!("{letter}_{{{index}}}{}", place(&stations[term.station].label))
+}
+
+/// A station in brackets: `(\text{p1})`, `(\text{about X},\,45^{\circ})`.
+fn place(label: &str) -> String {
+    let (name, angle) = match label.strip_suffix(" deg]").and_then(|l| l.rsplit_once('[')) {
+        Some((name, angle)) => (name, format!(",\\,{angle}^{{\\circ}}")),
+        None => (label, String::new()),
+    };
+    let quoted = name.strip_prefix('"').and_then(|n| n.strip_suffix('"'));
+    format!("(\\text{{{}}}{angle})", escape(quoted.unwrap_or(name)))
 }
 
 /// The left side of a formula: `Z1''`, or `psi_x^n` at a position.
@@ -289,14 +328,14 @@ pub(crate) fn left(name: &str, position: Option<&str>) -> String {
         (Some(index), 0) => format!("Z_{{{index}}}"),
         (Some(index), 1) => format!("\\dot{{Z}}_{{{index}}}"),
         (Some(index), 2) => format!("\\ddot{{Z}}_{{{index}}}"),
-        _ => symbol(plain),
+        (None, 0) => symbol(plain),
+        _ => symbol(name),
     };
-    position.map_or(letter.clone(), |p| format!("{letter}(\\text{{{}}})", escape(p)))
+    format!("{letter}{}", position.map(place).unwrap_or_default())
 }
 
-/// The magnitude of a coefficient; empty for one.
-fn coefficient(c: &Coefficient) -> String {
-    let (_, factors) = c.sign_and_factors();
+/// Factors; empty for none.
+fn product(factors: &[String]) -> String {
     if factors.is_empty() { String::new() } else { expression(&factors.join("*")) }
 }
 
@@ -311,21 +350,21 @@ fn sum(out: &mut String, negative: bool, text: &str) {
 }
 
 /// A solution: common factors in front, terms of equal coefficient in brackets.
-pub(crate) fn solution(s: &Solution, frame: Frame, positions: &[String]) -> String {
-    let grouped = group(&s.solved);
+pub(crate) fn solution(s: &Solution, frame: Frame, stations: &[StationLabel]) -> String {
+    let grouped = group(&s.solved, stations);
     let mut inner = String::new();
     let bracket = |g: &Group| {
         let mut terms = String::new();
         for (negative, t) in &g.terms {
-            sum(&mut terms, *negative, &z(t, frame, positions));
+            sum(&mut terms, *negative, &z(t, frame, stations));
         }
         if g.terms.len() > 1 { format!("({terms})") } else { terms }
     };
     for g in &grouped.groups {
-        let c = coefficient(&g.coefficient);
+        let c = product(&g.factors(stations));
         if c.is_empty() {
             for (negative, t) in &g.terms {
-                sum(&mut inner, *negative != g.negative, &z(t, frame, positions));
+                sum(&mut inner, *negative != g.negative, &z(t, frame, stations));
             }
         } else {
             sum(&mut inner, g.negative, &format!("{c}\\,{}", bracket(g)));
@@ -334,7 +373,7 @@ pub(crate) fn solution(s: &Solution, frame: Frame, positions: &[String]) -> Stri
     match &grouped.factor {
         None if inner.is_empty() => "0".into(),
         None => inner,
-        Some(f) => format!("{}\\,[{inner}]", coefficient(f)),
+        Some(f) => format!("{}\\,[{inner}]", product(&f.sign_and_factors().1)),
     }
 }
 
@@ -364,6 +403,11 @@ mod tests {
             ("exp(-k*t)*x^n", "\\exp(-k\\,t)\\,x^{n}"),
             ("a combination of D_FX, D_FY", "\\text{a combination of D\\_FX, D\\_FY}"),
             ("?", "\\text{?}"),
+            ("1/2*w@p1^2", "\\frac{\\omega(\\text{p1})^{2}}{2}"),
+            (
+                "eps_x^n@\"a-b\"[-4.5 deg] + eps_z^n'",
+                "\\varepsilon_{x}^{n}(\\text{a-b},\\,-4.5^{\\circ}) + \\dot{\\varepsilon}_{z}^{n}",
+            ),
         ] {
             assert_eq!(expression(text), math, "{text}");
         }
