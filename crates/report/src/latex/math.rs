@@ -403,7 +403,7 @@ mod tests {
             ("exp(-k*t)*x^n", "\\exp(-k\\,t)\\,x^{n}"),
             ("a combination of D_FX, D_FY", "\\text{a combination of D\\_FX, D\\_FY}"),
             ("?", "\\text{?}"),
-            ("1/2*w@p1^2", "\\frac{\\omega(\\text{p1})^{2}}{2}"),
+            ("1/2*w@p1^2", "\\frac{(\\omega(\\text{p1}))^{2}}{2}"),
             (
                 "eps_x^n@\"a-b\"[-4.5 deg] + eps_z^n'",
                 "\\varepsilon_{x}^{n}(\\text{a-b},\\,-4.5^{\\circ}) + \\dot{\\varepsilon}_{z}^{n}",
