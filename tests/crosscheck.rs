@@ -8,7 +8,7 @@ use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme, Unknowns};
 use obsdeg_core::simulation::batch::batch;
-use obsdeg_core::simulation::conditions::{Conditions, Truth};
+use obsdeg_core::simulation::conditions::{Assignment, Conditions, Truth};
 use obsdeg_core::simulation::plan::Plan;
 use obsdeg_ekf::SquareRootInformation;
 use proptest::prelude::*;
@@ -146,13 +146,44 @@ fn exact_truth_fails_at_the_papers_drifts_and_passes_at_a_thousandth() {
     assert!(c.passed && c.validity.holds, "{:?}", c.disagreements);
 }
 
+/// A prior of one position holds for the truth and for filters that have no such unknown.
+#[test]
+fn psi_of_one_position() {
+    let prior = |name: &str| Assignment { name: name.into(), value: 0.2 };
+    let priors = [Conditions::default().priors, vec![prior("psi_x@2")]].concat();
+    let conditions = Conditions { priors, ..Conditions::default() };
+    let c = check(&paper(Carry::Reset), &conditions, FilterChange::default());
+    assert!(c.passed && c.controls.len() == 3, "{:?}", c.disagreements);
+    let other = FilterChange { carry: Some(Carry::Platform), ..FilterChange::default() };
+    assert!(!check(&paper(Carry::Reset), &conditions, other).passed);
+}
+
+/// At the pole, drift that nobody sees turns psi during the dwell: what derivatives see is lost at the start (slope) or at the end
+/// (inflation), and directions move psi as well. The filter agrees with all of it.
+#[test]
+fn at_the_pole_the_dwell_takes_away() {
+    let at_the_pole =
+        |attitudes: &[&str], carry| Scheme { latitude: "90".parse().ok(), ..scheme(attitudes, carry) };
+    for carry in Carry::ALL {
+        for attitudes in [&["0,0,0", "0,90,0", "45,0,0"][..], &S6[..3], &S6[..5]] {
+            let c = right(&at_the_pole(attitudes, carry));
+            assert!(c.passed, "{attitudes:?} {carry}: {:?}", c.disagreements);
+        }
+    }
+    let c = right(&at_the_pole(&["0,0,0", "0,90,0", "45,0,0"], Carry::Platform));
+    let of = |name: &str| c.quantities.iter().find(|q| q.name == name).expect("an unknown");
+    let seen = |name: &str| (of(name).accuracy_order, of(name).inflation.predicted);
+    assert_eq!(["psi_x", "psi_y", "psi_z"].map(seen), [(Some(0), 1.0), (None, 10.0), (Some(0), 10.0)]);
+    assert!(of("psi_y").slope.measured.is_some_and(|s| s > 0.9));
+}
+
 /// Same seed, same bytes, whatever the number of threads; and the bar hears of every run.
 #[test]
 fn threads_do_not_change_the_sums() {
     let conditions = Conditions::default();
     let plan = Plan::new(&paper(Carry::Platform), &conditions).expect("a plan");
     let experiment =
-        || Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: &[], seed: 7 };
+        || Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: None, seed: 7 };
     let prepared = Prepared::new(experiment()).expect("prepared");
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");

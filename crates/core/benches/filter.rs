@@ -22,7 +22,7 @@ fn paper(truth: Truth) -> (Plan, Conditions) {
 }
 
 fn experiment<'a>(plan: &'a Plan, conditions: &'a Conditions) -> Experiment<'a> {
-    Experiment { filter: plan, truth: plan, conditions, null_space: &[], seed: 1 }
+    Experiment { filter: plan, truth: plan, conditions, null_space: None, seed: 1 }
 }
 
 /// Covariance pass, truth, state pass, NEES, NIS and autocorrelations of one run.

@@ -25,10 +25,37 @@ const PRECISIONS: [usize; 3] = [8, 16, 32];
 pub struct Accuracy {
     /// Per unknown; `None` when no dwell makes it observable.
     pub order: Vec<Option<usize>>,
+    /// The same for the value at the end: psi moves, and at a pole drift that nobody sees moves it.
+    pub order_at_end: Vec<Option<usize>>,
     /// Bound on the probability that any of the orders is wrong.
     pub error_bound: f64,
     /// The module in the first field; `None` where the orders are the degrees.
-    module: Option<SeriesEchelon>,
+    module: Option<Module>,
+}
+
+/// The module L at one sample.
+#[derive(Debug, Clone)]
+struct Module {
+    ring: SeriesRing,
+    series: SeriesEchelon,
+    /// The span of its rows at a random dwell.
+    at_a_dwell: Echelon,
+    /// psi at the end of the scheme, in the carried axes, as functionals of the unknowns (3 x n).
+    psi_at_end: [Vec<Vec<u64>>; 3],
+}
+
+impl Module {
+    /// The order of a functional (shape n) of psi at the end and the coefficients.
+    fn order_at_end(&self, row: &[u64]) -> Option<usize> {
+        let lifted: Vec<Vec<u64>> = row.iter().map(|x| self.ring.lift(*x)).collect();
+        let moved: Vec<Vec<u64>> = (0..row.len())
+            .map(|c| {
+                let psi = self.ring.dot((0..3).map(|k| (&lifted[k], &self.psi_at_end[k][c])));
+                if c < 3 { psi } else { self.ring.add(&psi, &lifted[c]) }
+            })
+            .collect();
+        self.series.order_of_series(&moved.concat())
+    }
 }
 
 /// Why there are no accuracy orders.
@@ -54,7 +81,8 @@ impl Accuracy {
         let scheme = platform.scheme();
         if scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift {
             let order = verdicts.degrees.degree.clone();
-            return Ok(Self { order, error_bound: verdicts.error_bound, module: None });
+            let order_at_end = order.clone();
+            return Ok(Self { order, order_at_end, error_bound: verdicts.error_bound, module: None });
         }
         if scheme.rotates() {
             return Err(AccuracyError::Rotation);
@@ -66,10 +94,10 @@ impl Accuracy {
             let module = module(platform, &sample, &dwells, &mut rng)?;
             let one = sample.point.ring.one();
             let mut unit = vec![0; platform.names().len()];
-            let order: Vec<Option<usize>> = (0..unit.len())
+            let order: Vec<(Option<usize>, Option<usize>)> = (0..unit.len())
                 .map(|c| {
                     unit[c] = one;
-                    let order = module.order(&unit);
+                    let order = (module.series.order(&unit), module.order_at_end(&unit));
                     unit[c] = 0;
                     order
                 })
@@ -80,18 +108,33 @@ impl Accuracy {
         if order != confirmed {
             return Err(AccuracyError::Disagreement);
         }
+        let (order, order_at_end) = order.into_iter().unzip();
         let error_bound = error_bound(&claim(platform, verdicts, &dwells), 2);
-        Ok(Self { order, error_bound, module: Some(module) })
+        Ok(Self { order, order_at_end, error_bound, module: Some(module) })
     }
 
     /// The rank with dwells; `None` where it is that of the degrees.
     pub fn rank(&self) -> Option<usize> {
-        self.module.as_ref().map(SeriesEchelon::rank)
+        self.module.as_ref().map(|m| m.series.rank())
     }
 
     /// The accuracy order of a functional (shape n, in the first field of the verdicts) of a known degree.
     pub fn of_functional(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
-        self.module.as_ref().map_or(degree, |m| m.order(row))
+        self.module.as_ref().map_or(degree, |m| m.series.order(row))
+    }
+
+    /// Whether samples over the dwells see a direction (shape n, in the first field of the verdicts) that derivatives do not see.
+    pub fn sees(&self, direction: &[u64]) -> bool {
+        self.module.as_ref().is_some_and(|m| {
+            let (span, field) = (&m.at_a_dwell, m.ring.field);
+            let moves = |row: &[u64]| field.dot(0, row.iter().copied().zip(direction.iter().copied())) != 0;
+            (0..span.rank()).any(|i| moves(span.row(i)))
+        })
+    }
+
+    /// The accuracy order of a functional (shape n, in the first field of the verdicts) of a known degree whose psi is that of the end.
+    pub fn of_functional_at_end(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
+        self.module.as_ref().map_or(degree, |m| m.order_at_end(row))
     }
 }
 
@@ -115,7 +158,7 @@ fn module(
     sample: &Sample,
     dwells: &[u64],
     rng: &mut SplitMix64,
-) -> Result<SeriesEchelon, AccuracyError> {
+) -> Result<Module, AccuracyError> {
     let point = &sample.point;
     let field = point.ring;
     let n = platform.names().len();
@@ -124,13 +167,8 @@ fn module(
 
     let mut full = Echelon::new(field, n);
     let at_a_time = AtATime::random(field, point.w_n, point.w_u, rng);
-    for row in dwell_rows(
-        &field,
-        &blocks,
-        &chain,
-        |j| field.pow(at_a_time.t, j as u64),
-        |i| at_a_time.phi(dwells[i]),
-    ) {
+    let power = |j: usize| field.pow(at_a_time.t, j as u64);
+    for row in dwell_rows(&field, &blocks, &chain, power, |i| at_a_time.phi(dwells[i])).0 {
         full.insert(&row);
     }
     for precision in PRECISIONS {
@@ -145,24 +183,24 @@ fn module(
             .collect();
         let power = |j: usize| ring.monomial(field.one(), j);
         let phi = |i: usize| transition(&ring, point.w_n, point.w_u, dwells[i]);
-        let rows = dwell_rows(&ring, &blocks, &chain, power, phi);
-        let module = SeriesEchelon::new(ring, n, rows.into_iter().map(|r| r.concat()).collect());
-        if module.rank() == full.rank() && precision > 2 * module.largest_valuation() {
-            return Ok(module);
+        let (rows, psi_at_end) = dwell_rows(&ring, &blocks, &chain, power, phi);
+        let series = SeriesEchelon::new(ring, n, rows.into_iter().map(|r| r.concat()).collect());
+        if series.rank() == full.rank() && precision > 2 * series.largest_valuation() {
+            return Ok(Module { ring, series, at_a_dwell: full, psi_at_end });
         }
     }
     Err(AccuracyError::Precision)
 }
 
 /// The rows `T^j H F^j S_i Phi_{i-1} ... Phi_1` in a ring: `power` gives `T^j`, `phi` the three rows of
-/// `Phi_i` for `psi^n` as functionals of `(psi^n, eps^n)` (the drift is constant).
+/// `Phi_i` for `psi^n` as functionals of `(psi^n, eps^n)` (the drift is constant). With them psi in the carried axes at the end.
 fn dwell_rows<R: LiftField>(
     ring: &R,
     blocks: &[Block<R::Element>],
     chain: &[LocalRow],
     power: impl Fn(usize) -> R::Element,
     phi: impl Fn(usize) -> [[R::Element; LOCAL]; 3],
-) -> Vec<Vec<R::Element>> {
+) -> (Vec<Vec<R::Element>>, [Vec<R::Element>; 3]) {
     let n = blocks[0].columns.len();
     // psi in the carried axes, as a functional of the unknowns
     let unit = |r: usize| (0..n).map(|c| if c == r { ring.one() } else { ring.zero() }).collect();
@@ -181,18 +219,16 @@ fn dwell_rows<R: LiftField>(
                 (0..n).map(|c| ring.dot(coefficients.iter().zip(&local).map(|(x, l)| (x, &l[c])))).collect(),
             );
         }
-        if i + 1 < blocks.len() {
-            let phi = phi(i);
-            let after: [Vec<R::Element>; 3] = std::array::from_fn(|r| {
-                (0..n).map(|c| ring.dot(phi[r].iter().zip(&local).map(|(x, l)| (x, &l[c])))).collect()
-            });
-            // back to the carried axes: the psi block is a rotation
-            psi = std::array::from_fn(|k| {
-                (0..n).map(|c| ring.dot((0..3).map(|r| (&block.rows[r][k], &after[r][c])))).collect()
-            });
-        }
+        let phi = phi(i);
+        let after: [Vec<R::Element>; 3] = std::array::from_fn(|r| {
+            (0..n).map(|c| ring.dot(phi[r].iter().zip(&local).map(|(x, l)| (x, &l[c])))).collect()
+        });
+        // back to the carried axes: the psi block is a rotation
+        psi = std::array::from_fn(|k| {
+            (0..n).map(|c| ring.dot((0..3).map(|r| (&block.rows[r][k], &after[r][c])))).collect()
+        });
     }
-    rows
+    (rows, psi)
 }
 
 /// Rings that hold the prime field.
@@ -309,7 +345,7 @@ fn claim(platform: &Platform, verdicts: &Verdicts, dwells: &[u64]) -> Claim {
     let unknowns = platform.names().len();
     Claim {
         unknowns,
-        decisions: 2 * (1 + unknowns),
+        decisions: 2 * (1 + 2 * unknowns),
         order: verdicts.values[0].roots().order,
         row_degree: PRECISIONS[2] + 18 + 2 * turns,
         row_bits: 16.0 * dwells.len() as f64,

@@ -21,6 +21,12 @@ pub struct PredictedUnknown {
     pub degree: Option<usize>,
     /// The accuracy order: `None` when no dwell makes it observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
+    /// Whether samples over the dwells determine it (psi: of the start): by the accuracy order, or by the degree where the orders are not computed.
+    pub determined: bool,
+    /// The accuracy order of its value at the end, which is what a filter shows.
+    pub order_at_end: Option<usize>,
+    /// Whether samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves it.
+    pub determined_at_end: bool,
     /// Unknowns that it cannot be told from.
     pub partners: Vec<usize>,
 }
@@ -38,6 +44,10 @@ pub struct PredictedCombination {
     pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
+    /// The accuracy order of its value at the end.
+    pub order_at_end: Option<usize>,
+    /// Whether samples over the dwells determine its value at the end.
+    pub determined_at_end: bool,
 }
 
 /// All of it.
@@ -47,10 +57,13 @@ pub struct Prediction {
     pub unknowns: Vec<PredictedUnknown>,
     /// Observable combinations beyond single unknowns, and those that the scheme asks for.
     pub combinations: Vec<PredictedCombination>,
-    /// A basis of the directions that Z does not see, unknowns that are not excited included.
+    /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis, except at a pole, where others
+    /// move psi as well.
     pub null_space: Vec<Combination>,
     /// The rank with dwells: unknowns minus this is the defect of a filter.
     pub rank: usize,
+    /// Whether there are accuracy orders: none are computed for schemes that rotate.
+    pub has_accuracy_orders: bool,
     /// Bound on the probability that any of it is wrong.
     pub error_bound: f64,
 }
@@ -82,13 +95,25 @@ impl Prediction {
         let null = null_space(platform, &verdicts, &mut solver);
         let n = platform.names().len();
         let partners = partners(n, &null);
+        let determined = |order: Option<usize>, degree: Option<usize>| {
+            if accuracy.is_some() { order.is_some() } else { degree.is_some() }
+        };
         let unknowns: Vec<PredictedUnknown> = partners
             .into_iter()
             .enumerate()
             .map(|(c, partners)| {
                 let v = verdict(&verdicts.degrees, c);
                 let accuracy_order = accuracy.as_ref().and_then(|a| a.order[c]);
-                PredictedUnknown { status: v.status, degree: v.degree, accuracy_order, partners }
+                let order_at_end = accuracy.as_ref().and_then(|a| a.order_at_end[c]);
+                PredictedUnknown {
+                    status: v.status,
+                    degree: v.degree,
+                    accuracy_order,
+                    determined: determined(accuracy_order, v.degree),
+                    order_at_end,
+                    determined_at_end: determined(order_at_end, v.degree),
+                    partners,
+                }
             })
             .collect();
         let numbers = |terms: &Sparse| -> Option<Combination> {
@@ -96,12 +121,17 @@ impl Prediction {
         };
         let of_functional =
             |row: &[u64], degree| accuracy.as_ref().and_then(|a| a.of_functional(row, degree));
+        let at_end =
+            |row: &[u64], degree| accuracy.as_ref().and_then(|a| a.of_functional_at_end(row, degree));
         let asked = requested.into_iter().filter_map(|r| {
+            let order_at_end = at_end(&r.row, r.verdict.degree);
             Some(PredictedCombination {
                 terms: numbers(&r.terms).filter(|t| !t.is_empty())?,
                 status: r.verdict.status,
                 degree: r.verdict.degree,
                 accuracy_order: of_functional(&r.row, r.verdict.degree),
+                order_at_end,
+                determined_at_end: determined(order_at_end, r.verdict.degree),
                 expression: r.text,
             })
         });
@@ -109,29 +139,41 @@ impl Prediction {
             .into_iter()
             .filter_map(|c| {
                 let functional = c.functional.as_ref()?;
+                let order_at_end = at_end(&c.vector, Some(c.degree));
                 Some(PredictedCombination {
                     expression: expression(platform, &c.support, Some(&functional.terms)),
                     terms: numbers(&functional.terms)?,
                     status: Status::Observable,
                     degree: Some(c.degree),
                     accuracy_order: of_functional(&c.vector, Some(c.degree)),
+                    order_at_end,
+                    determined_at_end: determined(order_at_end, Some(c.degree)),
                 })
             })
             .chain(asked)
             .collect();
         // with dwells, a direction may be seen that derivatives do not see (at a pole)
-        let seen = |c: usize| unknowns[c].accuracy_order.is_some() && unknowns[c].degree.is_none();
-        let unseen = |v: &Combination| !v.iter().any(|(c, _)| seen(*c));
-        let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).map(|c| vec![(c, 1.0)]);
-        let null_space = null
-            .iter()
+        let unseen = |v: &[u64]| !accuracy.as_ref().is_some_and(|a| a.sees(v));
+        let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).filter(|&c| {
+            let mut unit = vec![0; n];
+            unit[c] = 1;
+            unseen(&unit)
+        });
+        let null_space = (null.iter().filter(|v| unseen(&v.vector)))
             .filter_map(|v| numbers(v.components.as_ref()?))
-            .chain(silent)
-            .filter(unseen)
+            .chain(silent.map(|c| vec![(c, 1.0)]))
             .collect();
         let rank = accuracy.as_ref().and_then(Accuracy::rank).unwrap_or_else(|| verdicts.degrees.rank());
+        let has_accuracy_orders = accuracy.is_some();
         let error_bound = accuracy.map_or(verdicts.error_bound, |a| verdicts.error_bound.max(a.error_bound));
-        Ok(Self { unknowns, combinations, null_space, rank, error_bound })
+        Ok(Self { unknowns, combinations, null_space, rank, has_accuracy_orders, error_bound })
+    }
+}
+
+impl Prediction {
+    /// The null space, if all of it is known.
+    pub fn whole_null_space(&self) -> Option<&[Combination]> {
+        (self.null_space.len() + self.rank == self.unknowns.len()).then_some(&self.null_space)
     }
 }
 

@@ -180,9 +180,16 @@ impl SeriesEchelon {
     /// none. Exact when the precision exceeds twice the largest valuation: with `v` the largest, `T^v c` is
     /// in the module whenever any multiple of c is.
     pub fn order(&self, c: &[u64]) -> Option<usize> {
+        let constants: Vec<u64> = c.iter().flat_map(|&x| self.ring.monomial(x, 0)).collect();
+        self.order_of_series(&constants)
+    }
+
+    /// The same for a functional that is a series itself (shape of `c`: columns x N).
+    pub fn order_of_series(&self, c: &[u64]) -> Option<usize> {
         let n = self.ring.precision;
         let largest = self.largest_valuation();
-        let mut rest: Vec<u64> = c.iter().flat_map(|&x| self.ring.monomial(x, largest)).collect();
+        let shifted = |e: &[u64]| [&vec![0; largest][..], &e[..n - largest]].concat();
+        let mut rest: Vec<u64> = c.chunks_exact(n).flat_map(shifted).collect();
         let mut spare = largest;
         for pivot in &self.rows {
             let entry = valuation(&rest[pivot.column * n..(pivot.column + 1) * n]);

@@ -4,15 +4,11 @@ use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::crosscheck::answer::{Check, Statistic};
 
 use crate::document::{Block, Document, number, optional};
-use crate::simulation::{conditions, validity};
-use crate::words;
+use crate::simulation::{conditions, validity, warning};
+use crate::words::{self, band};
 
 fn mark(pass: bool) -> String {
     if pass { "pass" } else { "FAIL" }.into()
-}
-
-fn band((low, high): (f64, f64)) -> String {
-    format!("{}..{}", number(low), number(high))
 }
 
 fn measured(c: &Check) -> String {
@@ -27,9 +23,8 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
             blocks.push(Block::Table { heading: heading.into(), header, numbers, rows });
         }
     };
-    let order = |k: Option<usize>| words::degree(k);
     table(
-        "a. slope of log sigma against log dwell; b. factor on sigma for a prior variance times 100",
+        "a. slope of log sigma (psi: of the start) against log dwell; b. factor on sigma (psi: of the end) for a prior variance times 100",
         vec![
             "unknown",
             "degree",
@@ -47,8 +42,8 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
             .map(|q| {
                 vec![
                     q.name.clone(),
-                    order(q.degree),
-                    order(q.accuracy_order),
+                    words::degree(q.degree),
+                    words::accuracy_order(q.degree, q.accuracy_order, true),
                     format!("{:.1}", q.slope.predicted),
                     measured(&q.slope),
                     mark(q.slope.pass),
@@ -149,7 +144,7 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
     list("Assumed", assumed);
     let verdict =
         if c.passed { "filter and exact verdicts agree" } else { "filter and exact verdicts DISAGREE" };
-    let mut lead = Vec::new();
+    let mut lead: Vec<String> = warning(&c.conditions).into_iter().collect();
     if c.timeline.iter().any(|t| t.slew) {
         lead.push(
             "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \

@@ -77,9 +77,9 @@ pub struct QuantityEvidence {
     pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
-    /// a: log-log slope of sigma against the dwell; 0 when sigma stays at the prior.
+    /// a: log-log slope of sigma (psi: of the start) against the dwell; 0, or more, when nothing is learnt.
     pub slope: Check,
-    /// b: factor on sigma when the prior variance is multiplied by 100.
+    /// b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100.
     pub inflation: Check,
 }
 

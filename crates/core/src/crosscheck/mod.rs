@@ -17,7 +17,7 @@ use obsdeg_ekf::{Form, SquareRootInformation};
 pub use answer::CrossCheck;
 pub use ranking::kendall_tau_b;
 
-use crate::model::{Carry, Latitude, Scheme};
+use crate::model::{Carry, Latitude, Platform, Scheme};
 use crate::prediction::Prediction;
 use crate::simulation::batch::batch;
 use crate::simulation::conditions::resolve;
@@ -109,17 +109,19 @@ pub fn crosscheck(
         return Err(SimulationError::DroppedSlew);
     }
     let filter_scheme = options.filter.apply(scheme);
-    let filter = Plan::new(&filter_scheme, conditions)?;
+    // another carry has other unknowns
+    let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
+    let filter = Plan::new(&filter_scheme, &filter_conditions)?;
     let rates = [truth.point.w_n, truth.point.w_u];
     let prediction = Prediction::new(&truth.platform, rates, options.seed)?;
-    let structure = structure(&truth, &prediction, &filter_scheme, conditions)?;
-    let covariance = covariances(&filter_scheme, conditions)?;
+    let structure = structure(&truth, &prediction, &filter_scheme, &filter_conditions)?;
+    let covariance = covariances(&filter_scheme, &filter_conditions)?;
 
     let experiment = Experiment {
         filter: &filter,
         truth: &truth,
         conditions,
-        null_space: &prediction.null_space,
+        null_space: prediction.whole_null_space(),
         seed: options.seed,
     };
     let prepared = Prepared::new(experiment)?;
@@ -196,12 +198,14 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
 /// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last.
 fn ranking(quantities: &[QuantityEvidence]) -> Ranking {
     const LAST: i64 = 1000;
-    let predicted: Vec<i64> =
-        quantities.iter().map(|q| q.accuracy_order.map_or(LAST, |d| d as i64)).collect();
+    // determined at the start and at the end
+    let both = |q: &&QuantityEvidence| q.inflation.predicted < 5.0;
+    let predicted = |q| Some(q).filter(both).and_then(|q| q.accuracy_order).map_or(LAST, |d| d as i64);
+    let predicted: Vec<i64> = quantities.iter().map(predicted).collect();
     let measured: Vec<i64> = quantities
         .iter()
         .map(|q| match (q.slope.measured, q.inflation.measured) {
-            (Some(slope), Some(ratio)) if ratio < 5.0 => (-slope - 0.5).round() as i64,
+            (Some(slope), Some(ratio)) if ratio < 5.0 && slope < -0.25 => (-slope - 0.5).round() as i64,
             _ => LAST,
         })
         .collect();
@@ -231,13 +235,14 @@ fn controls(
     let mut out = Vec::new();
     for change in changes.iter().filter(|c| !c.is_none()) {
         let filter_scheme = change.apply(scheme);
-        let filter = Plan::new(&filter_scheme, conditions)?;
+        let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
+        let filter = Plan::new(&filter_scheme, &filter_conditions)?;
         // a repeated position, say: the change changes nothing
         if filter.stages == truth.stages {
             continue;
         }
-        let (failed, checks) = structure(&truth, prediction, &filter_scheme, conditions)?.failures();
-        let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: &[], seed };
+        let (failed, checks) = structure(&truth, prediction, &filter_scheme, &filter_conditions)?.failures();
+        let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: None, seed };
         let prepared = Prepared::new(experiment)?;
         let statistics = prepared.statistics(&prepared.run(CONTROL_RUNS, &|_| true));
         let Some(nis) = statistics.last() else { continue };

@@ -30,8 +30,8 @@ pub struct Experiment<'a> {
     pub truth: &'a Plan,
     /// Conditions of both.
     pub conditions: &'a Conditions,
-    /// Directions that Z does not see (SI units).
-    pub null_space: &'a [Vec<(usize, f64)>],
+    /// A basis of the directions that Z does not see (SI units), if all of them are known.
+    pub null_space: Option<&'a [Vec<(usize, f64)>]>,
     /// Seed of all streams.
     pub seed: u64,
 }
@@ -97,7 +97,7 @@ impl<'a> Prepared<'a> {
     /// [`SimulationError`].
     pub fn new(experiment: Experiment<'a>) -> Result<Self, SimulationError> {
         let (filter, conditions) = (experiment.filter, experiment.conditions);
-        let start = Start::new(filter, conditions)?;
+        let start = Start::new(filter, &conditions.within(&filter.platform))?;
         let same = filter.platform.names() == experiment.truth.platform.names();
         let truth_start = if same { start.clone() } else { Start::new(experiment.truth, conditions)? };
         let total: usize = filter.segments.iter().map(|s| s.steps).sum();
@@ -110,9 +110,10 @@ impl<'a> Prepared<'a> {
             }
         })?;
         let nees = covariances.iter().map(Nees::of_covariance).collect::<Result<_, _>>()?;
-        let basis = observable_basis(&start.sigma, experiment.null_space);
-        let observable = match (covariances.last(), basis.ncols()) {
-            (Some(p), r) if r > 0 => {
+        let null_space = experiment.null_space.filter(|_| same);
+        let basis = null_space.map(|null| observable_basis(&start.sigma, null));
+        let observable = match (covariances.last(), basis) {
+            (Some(p), Some(basis)) if basis.ncols() > 0 => {
                 let nees = Nees::new(&symmetric(basis.transpose() * p.matrix() * &basis))?;
                 Some((basis, nees))
             }

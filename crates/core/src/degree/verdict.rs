@@ -26,6 +26,8 @@ pub struct Combination {
 /// A null vector: a direction in which the unknowns change without any change of Z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NullVector {
+    /// Its components in the first field of the verdicts (up to a factor).
+    pub vector: Vec<u64>,
     /// The columns that occur.
     pub support: Vec<usize>,
     /// Its components, if they could be computed.
@@ -122,7 +124,7 @@ pub fn null_space(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<
         .map(|v| {
             let support = support(&v);
             let components = null_components(solver, &support);
-            NullVector { support, components }
+            NullVector { vector: v, support, components }
         })
         .collect()
 }

@@ -66,6 +66,15 @@ impl DriftNoise {
             Self::RandomWalk(x) => x.to_radians() / 60.0 / dt.sqrt(),
         }
     }
+
+    /// Its density in deg/sqrt(h) (angle random walk) with steps of `dt` seconds: a bias held for one step turns by
+    /// `x dt`, and independent steps add up in squares.
+    pub fn density_deg_sqrt_h(self, dt: f64) -> f64 {
+        match self {
+            Self::OneStep(x) => x * (dt / 3600.0).sqrt(),
+            Self::RandomWalk(x) => x,
+        }
+    }
 }
 
 impl FromStr for DriftNoise {
@@ -154,6 +163,8 @@ pub struct Conditions {
     pub azimuth_noise_deg: f64,
     /// Random drift.
     pub drift_noise: DriftNoise,
+    /// The step in s for which it was given: a bias of one step has another density with other steps.
+    pub drift_noise_step_s: f64,
     /// How the filter is propagated.
     pub propagation: Propagation,
     /// True values, later ones override.
@@ -191,6 +202,7 @@ impl Default for Conditions {
             accelerometer_noise_g: 1e-5,
             azimuth_noise_deg: 0.001,
             drift_noise: DriftNoise::OneStep(0.01),
+            drift_noise_step_s: 10.0,
             propagation: Propagation::Exponential,
             values: values.chain(first_order(5.0)).chain(drift).collect(),
             drift_scale: 1.0,
@@ -250,7 +262,10 @@ impl Conditions {
         set(&mut self.dwell_s, settings.dwell_s);
         set(&mut self.accelerometer_noise_g, settings.accelerometer_noise_g);
         set(&mut self.azimuth_noise_deg, settings.azimuth_noise_deg);
-        set(&mut self.drift_noise, settings.drift_noise);
+        if let Some(noise) = settings.drift_noise {
+            self.drift_noise = noise;
+            self.drift_noise_step_s = self.step_s;
+        }
         set(&mut self.propagation, settings.propagation);
         set(&mut self.drift_scale, settings.drift_scale);
         self.slew_rate_deg_s = settings.slew_rate_deg_s.or(self.slew_rate_deg_s);
@@ -269,6 +284,11 @@ impl Conditions {
         out.apply(&scheme.simulation);
         out.requirements.extend(by_family(&scheme.requirements));
         out
+    }
+
+    /// Whether the requirements are those of the program: neither file nor option states one.
+    pub fn requires_by_default(&self) -> bool {
+        self.requirements == Self::default().requirements
     }
 
     /// The rate in deg/s at which a position is reached; `None`: at once.
@@ -310,6 +330,23 @@ impl Conditions {
             (PRIOR, &self.priors, ranges::PRIOR),
             (REQUIRED, &self.requirements, ranges::REQUIREMENT),
         ]
+    }
+
+    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or other positions.
+    pub(crate) fn within(&self, platform: &Platform) -> Self {
+        let kept = |list: &[Assignment]| -> Vec<Assignment> {
+            let has = |a: &&Assignment| {
+                is_family(&a.name) || platform.names().iter().any(|name| concerns(&a.name, name))
+            };
+            list.iter().filter(has).cloned().collect()
+        };
+        Self {
+            values: kept(&self.values),
+            estimates: kept(&self.estimates),
+            priors: kept(&self.priors),
+            requirements: kept(&self.requirements),
+            ..self.clone()
+        }
     }
 
     /// Checks that every assignment concerns an unknown of `platform`, or a family that a gyro model may have.
