@@ -374,7 +374,7 @@ fn the_information_confirms_the_verdicts() {
 #[test]
 fn filters_of_models() {
     let (run, traces) = simulate_system(&example("two-position-alignment"), 1).expect("a run");
-    assert!(run.consistent, "{run:?}");
+    assert!(run.consistency.consistent, "{run:?}");
     for e in &run.estimates {
         assert!(e.sigma < e.prior_sigma && e.error_over_sigma.abs() < 4.0, "{e:?}");
     }
@@ -387,7 +387,7 @@ fn filters_of_models() {
     let (prey, _) = simulate_system(&example("lotka-volterra"), 1).expect("a run");
     let beyond: Vec<&str> =
         prey.estimates.iter().filter(|e| e.error_over_sigma.abs() > 4.0).map(|e| e.name.as_str()).collect();
-    assert_eq!((beyond, prey.consistent), (vec!["x2", "b"], false));
+    assert_eq!((beyond, prey.consistency.consistent), (vec!["x2", "b"], false));
     // the product that is observable comes out all the same
     let of = |name: &str| prey.estimates.iter().find(|e| e.name == name).expect("an unknown");
     let product = of("b").estimate * of("x2").estimate / (of("b").truth * of("x2").truth);

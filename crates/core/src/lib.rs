@@ -14,6 +14,7 @@ pub mod degree;
 pub mod design;
 pub mod model;
 pub mod prediction;
+pub mod requirements;
 pub mod review;
 pub mod simulation;
 pub mod solution;

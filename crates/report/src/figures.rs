@@ -62,7 +62,7 @@ fn curve(record: &Traces, i: usize) -> Figure {
         .collect();
     let line = |label: &str, color, stroke, points| Line { label: label.into(), color, stroke, points };
     Figure {
-        title: record.names[i].clone(),
+        title: series_title(record, i),
         x_label: format!("t{}", bracketed(&record.time_unit)),
         y_label: format!("{}{}", record.names[i], bracketed(unit)),
         bands: vec![Band { color: SKY, points: settled.into_iter().map(span).collect() }],
@@ -84,6 +84,13 @@ fn window(series: &Series, scale: f64) -> (f64, f64) {
     let last = 6.0 * series.sigma.last().copied().unwrap_or(0.0) / scale;
     let air = (0.35 * (high - low)).max(last.min(3.0 * (high - low))).max(1e-9);
     (low - air, high + air)
+}
+
+/// The name of a series, and whether it shows the prior alone.
+pub(crate) fn series_title(record: &Traces, i: usize) -> String {
+    let determined = record.determined.get(i).copied().unwrap_or(false);
+    let prior = if determined { "" } else { ", known from the prior only" };
+    format!("{}{prior}", record.names[i])
 }
 
 /// A figure per unknown and combination, and all of them in one.

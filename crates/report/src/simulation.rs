@@ -36,7 +36,8 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
         format!("latitude {} deg{by}", c.latitude_deg),
         format!(
             "noise: Z {:e} g per sample and axis, random drift {}",
-            c.accelerometer_noise_g, c.drift_noise
+            c.accelerometer_noise_g,
+            drift_noise(c)
         ),
         format!("steps of at most {} s, filter propagated by {propagation}", c.step_s),
         format!("repositioning {slew}"),
@@ -45,7 +46,33 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
     if c.drift_scale != 1.0 {
         out.push(format!("true drifts and their priors times {}", c.drift_scale));
     }
+    out.extend(warning(c));
     out
+}
+
+/// A density, or what it is between the shortest and the longest step.
+fn density(c: &ConditionsReport) -> String {
+    let [low, high] = c.drift_noise_density_deg_sqrt_h.map(number);
+    if low == high { format!("{low} deg/sqrt(h)") } else { format!("{low} to {high} deg/sqrt(h)") }
+}
+
+/// The random drift as it was given; a bias of one step as a density too.
+fn drift_noise(c: &ConditionsReport) -> String {
+    match c.drift_noise_step_s {
+        Some(_) => format!("{} held for one step: {}", c.drift_noise, density(c)),
+        None => c.drift_noise.clone(),
+    }
+}
+
+/// Says that a bias of one step was given for another step.
+pub(crate) fn warning(c: &ConditionsReport) -> Option<String> {
+    let step = c.drift_noise_step_s.filter(|_| c.drift_noise_differs)?;
+    Some(format!(
+        "warning: the random drift, {} held for one step, was given for steps of {step} s; with the steps here its density is another, {}: \
+         a density in deg/sqrt(h) does not depend on them",
+        c.drift_noise,
+        density(c)
+    ))
 }
 
 fn number_short(x: f64) -> String {
@@ -107,18 +134,19 @@ fn requirements(quantities: &[Estimate]) -> Vec<String> {
     out
 }
 
+/// What became of the requirements, and what that is worth.
+fn requirements_met(s: &Simulation) -> Vec<String> {
+    let mut out = Vec::new();
+    if !s.consistency.consistent {
+        out.push("the filter is not consistent with this truth: its sigmas are not to be relied upon".into());
+    }
+    out.push(words::requirements(&s.requirements));
+    out
+}
+
 pub(crate) fn document(s: &Simulation) -> Document {
     let header = vec![
-        "unknown",
-        "unit",
-        "degree",
-        "truth",
-        "estimate",
-        "error",
-        "sigma",
-        "error/sigma",
-        "t to required [s]",
-        "verdict",
+        "unknown", "unit", "degree", "truth", "estimate", "error", "sigma", "in sigma", "at [s]", "verdict",
     ];
     let numbers = vec![false, false, true, true, true, true, true, true, true, false];
     let table = |heading: &str, rows: &[Estimate]| Block::Table {
@@ -129,27 +157,15 @@ pub(crate) fn document(s: &Simulation) -> Document {
     };
     let list = |heading: &str, lines: Vec<String>| Block::List { heading: heading.into(), lines };
     let end = s.timeline.last().map_or(0.0, |t| t.end_s);
-    let mut blocks =
-        vec![table("Estimates at the end (degree: exact verdict, - not observable)", &s.quantities)];
+    let mut blocks = vec![table(
+        "Estimates at the end (degree: exact verdict, - not observable; at: when sigma met the requirement)",
+        &s.quantities,
+    )];
     if !s.combinations.is_empty() {
         blocks.push(table("Combinations (psi: of the end)", &s.combinations));
     }
-    let c = &s.consistency;
-    let band = |(low, high): (f64, f64)| format!("{}..{}", number(low), number(high));
-    let verdict = if c.consistent {
-        "the filter is consistent with this truth"
-    } else {
-        "the filter is NOT consistent with this truth"
-    };
-    blocks.push(list(
-        "Consistency",
-        vec![
-            verdict.into(),
-            format!("mean NIS {} (95 %: {})", number(c.nis), band(c.nis_band)),
-            format!("NEES at the end {} (95 %: {})", number(c.nees), band(c.nees_band)),
-            format!("innovations white: probability {}", number(c.whiteness_probability)),
-        ],
-    ));
+    blocks.push(list("Requirements (sigma of the filter at the end)", requirements_met(s)));
+    blocks.push(list("Consistency", words::consistency(&s.consistency)));
     blocks.push(list("Validity of the small-angle model", validity(&s.validity)));
     let mut assumed = conditions(&s.conditions, &s.timeline);
     assumed.push(format!("carry {}; seed {}", s.carry, s.seed));
@@ -163,7 +179,7 @@ pub(crate) fn document(s: &Simulation) -> Document {
             s.carry,
             number_short(end)
         ),
-        lead: Vec::new(),
+        lead: warning(&s.conditions).into_iter().collect(),
         blocks,
     }
 }

@@ -2,6 +2,7 @@
 
 use obsdeg_core::analysis::Status;
 use obsdeg_core::crosscheck::answer::Check;
+use obsdeg_core::simulation::answer::Outcome;
 use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination, SystemQuantity};
 use obsdeg_core::system::evidence::{SystemEvidence, SystemQuantityEvidence};
 use obsdeg_core::system::run::{SystemEstimate, SystemRun};
@@ -145,7 +146,11 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
 /// One run of the filter.
 pub(crate) fn run(r: &SystemRun) -> Document {
     let row = |e: &SystemEstimate| {
-        let verdict = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
+        let exact = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
+        let verdict = match e.verdict {
+            Outcome::Reached | Outcome::Converging => exact,
+            other => format!("{exact}, {other}"),
+        };
         vec![
             e.name.clone(),
             e.unit.clone(),
@@ -160,7 +165,7 @@ pub(crate) fn run(r: &SystemRun) -> Document {
         ]
     };
     let table = Block::Table {
-        heading: "Estimates at the end (verdict and degree: exact)".into(),
+        heading: "Estimates at the end (verdict and degree: exact, and what the run makes of it)".into(),
         header: vec![
             "unknown",
             "unit",
@@ -170,20 +175,13 @@ pub(crate) fn run(r: &SystemRun) -> Document {
             "estimate",
             "error",
             "sigma",
-            "error/sigma",
+            "in sigma",
             "prior sigma",
         ],
         numbers: vec![false, false, false, true, true, true, true, true, true, true],
         rows: r.estimates.iter().map(row).collect(),
     };
-    let verdict = if r.consistent {
-        "the filter is consistent with this truth"
-    } else {
-        "the filter is NOT consistent with this truth"
-    };
-    let (low, high) = r.nis_band;
-    let mut consistency =
-        vec![verdict.into(), format!("mean NIS {} (95 %: {}..{})", number(r.nis), number(low), number(high))];
+    let mut consistency = words::consistency(&r.consistency);
     let beyond = |e: &&SystemEstimate| e.status != Some(Status::Observable) && e.error_over_sigma.abs() > 4.0;
     let beyond: Vec<&str> = r.estimates.iter().filter(beyond).map(|e| e.name.as_str()).collect();
     if !beyond.is_empty() {

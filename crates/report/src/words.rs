@@ -5,11 +5,46 @@ use std::collections::BTreeMap;
 use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Solution, Status, Verdict};
 use obsdeg_core::degree::coefficient::Form;
 use obsdeg_core::model::Carry;
+use obsdeg_core::requirements::{Miss, Requirements};
+use obsdeg_core::simulation::answer::MeasurementReport;
+use obsdeg_core::simulation::consistency::{Consistency, Doubt};
 use obsdeg_core::solution::solver::{Frame, Verification};
+
+use crate::document::number;
 
 pub(crate) fn degree(d: Option<usize>) -> String {
     d.map_or_else(|| "-".into(), |k| k.to_string())
 }
+
+/// An accuracy order in a table: why there is none beside a degree is said there.
+pub(crate) fn accuracy_order(degree: Option<usize>, order: Option<usize>, computed: bool) -> String {
+    match (degree, order) {
+        (_, Some(k)) => k.to_string(),
+        (_, None) if !computed => "not computed".into(),
+        (Some(_), None) => "not with dwell".into(),
+        (None, None) => "-".into(),
+    }
+}
+
+/// What the dwell makes of a degree, where it is something else; empty where the accuracy order is the degree.
+pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usize>) -> String {
+    match (degree, order) {
+        _ if !a.has_accuracy_orders => String::new(),
+        (Some(_), None) => "not determined".into(),
+        (degree, Some(k)) if degree != Some(k) => format!("order {k}"),
+        _ => String::new(),
+    }
+}
+
+/// Whether a row of the answer has something to say of the dwell.
+pub(crate) fn dwell_matters(a: &Analysis) -> bool {
+    let unknowns = a.quantities.iter().map(|q| (q.degree, q.accuracy_order));
+    let combinations = a.combinations.iter().map(|c| (c.degree, c.accuracy_order));
+    unknowns.chain(combinations).any(|(degree, order)| !with_dwell(a, degree, order).is_empty())
+}
+
+/// The column for it.
+pub(crate) const WITH_DWELL: &str = "with dwell";
 
 pub(crate) fn list(items: &[usize]) -> String {
     items.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
@@ -154,15 +189,20 @@ pub(crate) fn turned(angles: &str, rotation: Option<&str>) -> String {
 pub(crate) fn accuracy(a: &Analysis) -> Vec<String> {
     let unknowns = a.quantities.iter().map(|q| (&q.name, q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (&c.expression, c.degree, c.accuracy_order));
-    let mut groups: BTreeMap<(Option<usize>, usize), Vec<&str>> = BTreeMap::new();
-    for (name, degree, order) in unknowns.chain(combinations) {
-        if let Some(order) = order.filter(|&k| Some(k) != degree) {
+    let mut groups: BTreeMap<(Option<usize>, Option<usize>), Vec<&str>> = BTreeMap::new();
+    if a.has_accuracy_orders {
+        for (name, degree, order) in unknowns.chain(combinations).filter(|(_, degree, order)| degree != order)
+        {
             groups.entry((degree, order)).or_default().push(name);
         }
     }
-    let sentence = |((degree, order), names): ((Option<usize>, usize), Vec<&str>)| {
+    let sentence = |((degree, order), names): ((Option<usize>, Option<usize>), Vec<&str>)| {
         let degree = degree.map_or_else(|| "not observable by derivatives".into(), |k| format!("degree {k}"));
-        format!("{}: accuracy order {order} ({degree}), error ~ T^-{order}.5", names.join(", "))
+        let names = names.join(", ");
+        match order {
+            Some(order) => format!("{names}: accuracy order {order} ({degree}), error ~ T^-{order}.5"),
+            None => format!("{names}: {degree}, yet not determined with dwell, during which psi moves"),
+        }
     };
     groups.into_iter().map(sentence).collect()
 }
@@ -220,4 +260,127 @@ pub(crate) fn locus(l: &obsdeg_core::solution::loci::Locus) -> String {
     let changes: Vec<String> = l.changes.iter().map(difference).collect();
     let changes = if changes.is_empty() { String::new() } else { format!("; {}", changes.join("; ")) };
     format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))
+}
+
+/// What a predicted sigma is.
+pub(crate) const PREDICTED: &str =
+    "sigma: information of all samples, no prior, no drift noise; psi at the start";
+
+/// At most a dozen names.
+pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    const SHOWN: usize = 12;
+    let all: Vec<&str> = names.into_iter().collect();
+    let more = all.len().saturating_sub(SHOWN);
+    let tail = if more > 1 { format!(" and {more} more") } else { String::new() };
+    let shown = if more > 1 { SHOWN } else { all.len() };
+    format!("{}{tail}", all[..shown].join(", "))
+}
+
+/// What misses its requirement, by reason.
+pub(crate) fn missed(r: &Requirements) -> String {
+    let reasons = [
+        (Miss::TooLarge, ""),
+        (Miss::NotObservable, " (not observable)"),
+        (Miss::RestsOnPrior, " (resting on the prior)"),
+        (Miss::Inconsistent, " (the filter is wrong about it)"),
+        (Miss::NoNumber, " (no number)"),
+    ];
+    let of = |(why, words): (Miss, &str)| {
+        let mut concerned = r.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).peekable();
+        concerned.peek()?;
+        Some(format!("{}{words}", names(concerned)))
+    };
+    reasons.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// `0.06798 (psi_y)`; `None` when nothing has a margin.
+pub(crate) fn worst_margin(r: &Requirements) -> Option<String> {
+    r.worst.as_ref().map(|w| format!("{} ({})", number(w.margin), w.name))
+}
+
+/// What became of the requirements.
+pub(crate) fn requirements(r: &Requirements) -> String {
+    if r.stated == 0 {
+        return "no requirement is stated".into();
+    }
+    let whose = if r.by_default { " (the program's own: none is stated)" } else { "" };
+    let worst = |of: &str| worst_margin(r).map_or_else(String::new, |w| format!("{of} {w}"));
+    if r.all_met() {
+        return format!(
+            "every requirement{whose} is met, {} of {}{}",
+            r.met,
+            r.stated,
+            worst("; worst margin")
+        );
+    }
+    // what has no margin may be all that misses
+    let met = r.worst.as_ref().is_some_and(|w| w.margin >= 1.0);
+    let worst = worst(if met { "; worst margin of the others" } else { "; worst margin" });
+    format!(
+        "requirements{whose} are NOT met, {} of {} missed: {}{worst}",
+        r.missed.len(),
+        r.stated,
+        missed(r)
+    )
+}
+
+/// What speaks against a run.
+pub(crate) fn doubts(c: &Consistency) -> String {
+    let of = |d: &Doubt| match d {
+        Doubt::NoNumber => "a figure of the run is no number".into(),
+        Doubt::Nis => format!("mean NIS {} is outside {} (99.9 %)", number(c.nis), band(c.nis_wide_band)),
+        Doubt::Nees => {
+            format!("NEES {} at the end is above {} (99.9 %)", number(c.nees), number(c.nees_limit))
+        }
+        Doubt::Error => {
+            format!("errors are beyond four sigma: {}", names(c.beyond.iter().map(String::as_str)))
+        }
+        Doubt::Correlated => {
+            format!("innovations are not white (probability {})", number(c.whiteness_probability))
+        }
+    };
+    c.doubts.iter().map(of).collect::<Vec<String>>().join("; ")
+}
+
+/// `1.7..2.3`.
+pub(crate) fn band((low, high): (f64, f64)) -> String {
+    format!("{}..{}", number(low), number(high))
+}
+
+/// Whether a run is credible, and its figures.
+pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
+    vec![
+        if c.consistent {
+            "the filter is consistent with this truth".into()
+        } else {
+            format!("the filter is NOT consistent with this truth: {}", doubts(c))
+        },
+        format!("mean NIS {} (95 %: {})", number(c.nis), band(c.nis_band)),
+        format!(
+            "NEES at the end {} (95 %: {}; decides: at most {})",
+            number(c.nees),
+            band(c.nees_band),
+            number(c.nees_limit)
+        ),
+        format!("innovations white: probability {}", number(c.whiteness_probability)),
+    ]
+}
+
+/// What predicted sigmas rest on, a sentence each.
+pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
+    let by = if m.latitude_by_default { " (chosen here: the scheme names none)" } else { "" };
+    let azimuth = m.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
+    let slews = m.slew_rate_deg_s.map_or_else(
+        || "repositioning at once unless a position says otherwise".into(),
+        |r| format!("slews at {r} deg/s unless a position says otherwise, Z not used meanwhile"),
+    );
+    vec![
+        PREDICTED.into(),
+        format!(
+            "noise of Z {:e} g per sample and axis{azimuth}; steps of at most {} s, a sample after each",
+            m.accelerometer_noise_g, m.step_s
+        ),
+        format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
+        format!("latitude {} deg{by}", m.latitude_deg),
+    ]
 }

@@ -3,9 +3,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::conditions::{Propagation, Truth};
+use super::conditions::{Conditions, Propagation, Truth, latitude_of};
+use super::consistency::{CREDIBLE, Consistency};
 use crate::analysis::Status;
-use crate::model::Carry;
+use crate::model::{Carry, Scheme};
+use crate::requirements::{Miss, Requirements, meets};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.simulation/1";
@@ -27,6 +29,8 @@ pub struct Simulation {
     pub quantities: Vec<Estimate>,
     /// Observable combinations of unknowns that are not observable alone.
     pub combinations: Vec<Estimate>,
+    /// What became of the requirements: sigma of the filter at the end, with prior and drift noise.
+    pub requirements: Requirements,
     /// Whether errors and innovations are what the filter believes.
     pub consistency: Consistency,
     /// Whether the linear model holds for these drifts.
@@ -52,10 +56,50 @@ pub struct ConditionsReport {
     pub accelerometer_noise_g: f64,
     /// Random drift with its unit.
     pub drift_noise: String,
+    /// Its density in deg/sqrt(h) in the shortest and in the longest step of the timeline.
+    pub drift_noise_density_deg_sqrt_h: [f64; 2],
+    /// The step in s for which a bias of one step was given; null for a density.
+    pub drift_noise_step_s: Option<f64>,
+    /// Whether the density is another than with that step, by more than 1 %.
+    pub drift_noise_differs: bool,
     /// Propagation of the filter.
     pub propagation: Propagation,
     /// Factor on true drifts and their priors.
     pub drift_scale: f64,
+}
+
+/// What a predicted sigma rests on: the information of all samples, without prior and without drift noise.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct MeasurementReport {
+    /// Latitude in degrees.
+    pub latitude_deg: f64,
+    /// Whether the latitude was chosen by the program.
+    pub latitude_by_default: bool,
+    /// Dwell of positions that do not say theirs, in s.
+    pub dwell_s: f64,
+    /// Largest step between samples in s; a position is divided into equal steps.
+    pub step_s: f64,
+    /// Noise of the observation per sample and axis in g.
+    pub accelerometer_noise_g: f64,
+    /// Noise of the azimuth per sample in deg; null where it is not measured.
+    pub azimuth_noise_deg: Option<f64>,
+    /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
+    pub slew_rate_deg_s: Option<f64>,
+}
+
+impl MeasurementReport {
+    /// Of `scheme` under `conditions`.
+    pub fn new(scheme: &Scheme, conditions: &Conditions) -> Self {
+        Self {
+            latitude_deg: latitude_of(scheme).map_or(0.0, |l| l.degrees()),
+            latitude_by_default: scheme.latitude.is_none(),
+            dwell_s: conditions.dwell_s,
+            step_s: conditions.step_s,
+            accelerometer_noise_g: conditions.accelerometer_noise_g,
+            azimuth_noise_deg: scheme.measured_azimuth.then_some(conditions.azimuth_noise_deg),
+            slew_rate_deg_s: conditions.slew_rate_deg_s.filter(|_| conditions.slews),
+        }
+    }
 }
 
 /// A position or slew of the timeline.
@@ -98,7 +142,7 @@ pub struct Estimate {
     pub prior_sigma: f64,
     /// The sigma to be reached.
     pub required_sigma: Option<f64>,
-    /// When it was reached, in s.
+    /// When it was reached first, in s; null for what the samples do not determine.
     pub time_to_requirement_s: Option<f64>,
     /// What came out.
     pub verdict: Outcome,
@@ -110,12 +154,51 @@ pub struct Estimate {
 pub enum Outcome {
     /// Sigma is at or below what is required.
     Reached,
-    /// Sigma fell, but not to what is required.
+    /// Sigma fell, but not to what is required, or nothing is.
     Converging,
-    /// Sigma is (nearly) that of the prior: the data say nothing.
+    /// The samples determine it, but sigma is (nearly) that of the prior.
+    RestsOnPrior,
+    /// The samples do not determine it: whatever sigma says, it comes of the prior.
     PriorOnly,
     /// The error is beyond four sigma: the filter is wrong about it.
     Inconsistent,
+    /// The error or sigma is no number.
+    NoNumber,
+}
+
+impl Outcome {
+    /// The outcome for an unknown that samples determine or not, with its sigma at the start and at the end.
+    pub(crate) fn of(
+        determined: bool,
+        error_over_sigma: f64,
+        [prior, sigma]: [f64; 2],
+        required: Option<f64>,
+    ) -> Self {
+        if !(error_over_sigma.is_finite() && sigma.is_finite()) {
+            Self::NoNumber
+        } else if error_over_sigma.abs() > CREDIBLE {
+            Self::Inconsistent
+        } else if !determined {
+            Self::PriorOnly
+        } else if sigma > 0.9 * prior {
+            Self::RestsOnPrior
+        } else if required.is_some_and(|r| meets(sigma, r)) {
+            Self::Reached
+        } else {
+            Self::Converging
+        }
+    }
+
+    /// Why it meets no requirement, whatever sigma is.
+    pub(crate) fn miss(self) -> Option<Miss> {
+        match self {
+            Self::Reached | Self::Converging => None,
+            Self::RestsOnPrior => Some(Miss::RestsOnPrior),
+            Self::PriorOnly => Some(Miss::NotObservable),
+            Self::Inconsistent => Some(Miss::Inconsistent),
+            Self::NoNumber => Some(Miss::NoNumber),
+        }
+    }
 }
 
 impl std::fmt::Display for Outcome {
@@ -123,27 +206,12 @@ impl std::fmt::Display for Outcome {
         f.write_str(match self {
             Self::Reached => "reached",
             Self::Converging => "converging",
-            Self::PriorOnly => "prior only",
+            Self::RestsOnPrior => "rests on the prior",
+            Self::PriorOnly => "known from the prior only",
             Self::Inconsistent => "inconsistent",
+            Self::NoNumber => "no number",
         })
     }
-}
-
-/// Statistics of one run.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Consistency {
-    /// Mean normalised innovation squared; its expectation is the number of outputs.
-    pub nis: f64,
-    /// The band of the mean NIS, 95 %.
-    pub nis_band: (f64, f64),
-    /// Normalised estimation error squared at the end; its expectation is the number of unknowns.
-    pub nees: f64,
-    /// Its band, 95 %.
-    pub nees_band: (f64, f64),
-    /// Probability that white noise has autocorrelations as large as the innovations', smallest over outputs.
-    pub whiteness_probability: f64,
-    /// Whether the run is credible: NIS within the band of 99.9 %, no error beyond four sigma.
-    pub consistent: bool,
 }
 
 /// Whether the small-angle model holds for the drifts of a run.

@@ -4,23 +4,26 @@ pub mod answer;
 pub(crate) mod attitude_path;
 pub mod batch;
 pub mod conditions;
+pub mod consistency;
 pub mod plan;
 pub mod ranges;
 pub mod record;
 pub mod truth;
 
 use obsdeg_ekf::EkfError;
-use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band, ljung_box};
 
 pub use answer::{Simulation, Validity};
 pub use conditions::Conditions;
 pub use plan::Plan;
 pub use record::{Record, Start, Traces, run};
 
+use crate::analysis::Status;
 use crate::model::{Carry, Scheme, SchemeError};
 use crate::prediction::{Prediction, PredictionError};
-use answer::{ConditionsReport, Consistency, Estimate, Outcome, SCHEMA, TimelineReport};
-use conditions::{resolve, shown_unit, si_per_shown};
+use crate::requirements::{Claim, Requirements, meets};
+use answer::{ConditionsReport, Estimate, Outcome, SCHEMA, TimelineReport};
+use conditions::{DriftNoise, resolve, shown_unit, si_per_shown};
+use consistency::{Consistency, Outcomes};
 use plan::Kind;
 
 /// Why a scheme cannot be simulated.
@@ -123,38 +126,28 @@ fn summary(
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
     let n = plan.unknowns();
-    let units: Vec<&str> = plan.platform.units().to_vec();
+    let (names, units) = (plan.platform.names(), plan.platform.units());
     let requirements = resolve("required sigma", &plan.platform, &conditions.requirements, f64::NAN)?;
-    let mut quantities = Vec::new();
-    for (c, u) in prediction.unknowns.iter().enumerate() {
-        let scale = si_per_shown(units[c]);
-        let series = &record.traces.series[c];
-        quantities.push(Estimate {
-            status: u.status,
-            degree: u.degree,
-            accuracy_order: u.accuracy_order,
-            ..estimate(&plan.platform.names()[c], units[c], scale, series, record, Some(requirements[c]))
-        });
-    }
-    let mut combinations = Vec::new();
-    for (i, c) in prediction.combinations.iter().enumerate() {
-        let unit = units[c.terms[0].0];
-        let series = &record.traces.series[n + i];
-        combinations.push(Estimate {
-            status: c.status,
-            degree: c.degree,
-            accuracy_order: c.accuracy_order,
-            ..estimate(
-                &c.expression,
-                unit,
-                si_per_shown(unit),
-                series,
-                record,
-                Some(requirements[c.terms[0].0]),
-            )
-        });
-    }
-    let consistency = consistency(plan, record, &quantities)?;
+    let required = |c: usize| Some(requirements[c]).filter(|r| !r.is_nan());
+    let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
+        let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
+        estimate(&names[c], units[c], verdict, c, record, required(c))
+    });
+    let quantities: Vec<Estimate> = unknowns.collect();
+    let combinations = prediction.combinations.iter().enumerate().map(|(i, c)| {
+        let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
+        let lead = c.terms[0].0;
+        estimate(&c.expression, units[lead], verdict, n + i, record, required(lead))
+    });
+    let combinations: Vec<Estimate> = combinations.collect();
+    let last = |v: &[f64]| v.last().copied().unwrap_or(f64::NAN);
+    let consistency = Consistency::of(Outcomes {
+        whitened: &record.whitened,
+        outputs: plan.components.len(),
+        error: record.traces.series[..n].iter().map(|s| last(&s.estimate) - last(&s.truth)).collect(),
+        covariance: &record.last_covariance,
+        normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
+    })?;
     let validity = validity(plan, conditions, record, &requirements);
     Ok(Simulation {
         schema: SCHEMA.into(),
@@ -162,6 +155,14 @@ fn summary(
         carry: scheme.carry,
         conditions: conditions_report(scheme, plan, conditions),
         timeline: timeline_report(plan),
+        requirements: Requirements::of(
+            quantities.iter().map(|q| Claim {
+                name: &q.name,
+                required: q.required_sigma,
+                sigma: q.verdict.miss().map_or(Ok(q.sigma), Err),
+            }),
+            conditions.requires_by_default(),
+        ),
         quantities,
         combinations,
         consistency,
@@ -172,6 +173,16 @@ fn summary(
 
 /// The conditions as they are reported.
 pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
+    let noise = conditions.drift_noise;
+    let given = matches!(noise, DriftNoise::OneStep(_)).then_some(conditions.drift_noise_step_s);
+    // a slew takes as many steps as a position would
+    let steps = plan.segments.iter().map(|s| match s.kind {
+        Kind::Slew(_) => s.dt.min(conditions.step_s),
+        _ => s.dt,
+    });
+    let (shortest, longest) = steps.fold((f64::MAX, 0.0f64), |(l, h), dt| (l.min(dt), h.max(dt)));
+    let density = [shortest, longest].map(|dt| noise.density_deg_sqrt_h(dt));
+    let differs = |step: f64| density.iter().any(|d| (d / noise.density_deg_sqrt_h(step) - 1.0).abs() > 0.01);
     ConditionsReport {
         truth: conditions.truth,
         latitude_deg: plan.platform.scheme().latitude.map_or(0.0, |l| l.degrees()),
@@ -179,7 +190,10 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         step_s: conditions.step_s,
         slew_rate_deg_s: conditions.slew_rate_deg_s,
         accelerometer_noise_g: conditions.accelerometer_noise_g,
-        drift_noise: conditions.drift_noise.to_string(),
+        drift_noise: noise.to_string(),
+        drift_noise_density_deg_sqrt_h: density,
+        drift_noise_step_s: given,
+        drift_noise_differs: given.is_some_and(differs),
         propagation: conditions.propagation,
         drift_scale: conditions.drift_scale,
     }
@@ -201,36 +215,29 @@ pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     out
 }
 
+/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it.
 fn estimate(
     name: &str,
     unit: &str,
-    scale: f64,
-    series: &record::Series,
+    verdict: (Status, Option<usize>, Option<usize>, bool),
+    i: usize,
     record: &Record,
-    required: Option<f64>,
+    required_sigma: Option<f64>,
 ) -> Estimate {
-    let last = |v: &[f64]| v.last().copied().unwrap_or(0.0) / scale;
+    let (status, degree, accuracy_order, determined) = verdict;
+    let (series, scale) = (&record.traces.series[i], si_per_shown(unit));
+    let last = |v: &[f64]| v.last().map_or(f64::NAN, |x| x / scale);
     let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
     let prior_sigma = series.sigma[0] / scale;
-    let required_sigma = required.filter(|t| !t.is_nan());
-    let reached = required_sigma.and_then(|t| series.sigma.iter().position(|s| s / scale <= t));
     let error = estimate - truth;
-    let error_over_sigma = if sigma > 0.0 { error / sigma } else { 0.0 };
-    let verdict = if error_over_sigma.abs() > 4.0 {
-        Outcome::Inconsistent
-    } else if sigma > 0.9 * prior_sigma {
-        Outcome::PriorOnly
-    } else if required_sigma.is_none_or(|t| sigma <= t) {
-        Outcome::Reached
-    } else {
-        Outcome::Converging
-    };
+    let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
+    let reached = required_sigma.and_then(|r| series.sigma.iter().position(|s| meets(s / scale, r)));
     Estimate {
         name: name.into(),
         unit: shown_unit(unit).into(),
-        status: crate::analysis::Status::Observable,
-        degree: None,
-        accuracy_order: None,
+        status,
+        degree,
+        accuracy_order,
         truth,
         estimate,
         error,
@@ -238,43 +245,9 @@ fn estimate(
         error_over_sigma,
         prior_sigma,
         required_sigma,
-        time_to_requirement_s: reached.map(|i| record.traces.time[i]),
-        verdict,
+        time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
+        verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], required_sigma),
     }
-}
-
-fn consistency(
-    plan: &Plan,
-    record: &Record,
-    quantities: &[Estimate],
-) -> Result<Consistency, SimulationError> {
-    let n = plan.unknowns();
-    let outputs = plan.components.len();
-    let samples = record.whitened.len() / outputs;
-    let nis = record.whitened.iter().map(|v| v * v).sum::<f64>() / samples as f64;
-    let mut error: Vec<f64> = record.traces.series[..n]
-        .iter()
-        .map(|s| s.estimate.last().copied().unwrap_or(0.0) - s.truth.last().copied().unwrap_or(0.0))
-        .collect();
-    let nees = Nees::of_covariance(&record.last_covariance)?.of(&mut error);
-    let lags = 20.min(samples / 4).max(1);
-    let whiteness = (0..outputs)
-        .map(|j| {
-            let one: Vec<f64> = record.whitened.iter().skip(j).step_by(outputs).copied().collect();
-            ljung_box(&autocorrelation(&one, lags), one.len())
-        })
-        .fold(1.0, f64::min);
-    let strict = chi_square_band(outputs as f64, samples as f64, 0.999);
-    let consistent =
-        nis <= strict.1 && nis >= strict.0 && quantities.iter().all(|q| q.error_over_sigma.abs() <= 4.0);
-    Ok(Consistency {
-        nis,
-        nis_band: chi_square_band(outputs as f64, samples as f64, CONFIDENCE),
-        nees,
-        nees_band: chi_square_band(n as f64, 1.0, CONFIDENCE),
-        whiteness_probability: whiteness,
-        consistent,
-    })
 }
 
 /// The validity of the small-angle model, by the figures that decide it.

@@ -74,6 +74,8 @@ pub struct Traces {
     pub units: Vec<String>,
     /// What a series is divided by to be shown.
     pub scales: Vec<f64>,
+    /// Whether samples determine what a series shows; otherwise it is known from the prior only.
+    pub determined: Vec<bool>,
     /// The unit of the time; empty when none is given.
     pub time_unit: String,
     /// The times, from 0.
@@ -119,6 +121,8 @@ pub fn run(
         ..Traces::default()
     };
     traces.names.extend(prediction.combinations.iter().map(|c| c.expression.clone()));
+    traces.determined.extend(prediction.unknowns.iter().map(|u| u.determined_at_end));
+    traces.determined.extend(prediction.combinations.iter().map(|c| c.determined_at_end));
     let own_units = plan.platform.units();
     let units = own_units.iter().chain(prediction.combinations.iter().map(|c| &own_units[c.terms[0].0]));
     for unit in units {

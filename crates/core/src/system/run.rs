@@ -1,7 +1,6 @@
 //! One run of the extended Kalman filter on any system, against a truth from the same equations.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_ekf::consistency::{CONFIDENCE, chi_square_band};
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
 use schemars::JsonSchema;
@@ -14,6 +13,8 @@ use super::numeric::{FilterState, Numeric};
 use super::symmetry::Symmetries;
 use crate::analysis::Status;
 use crate::simulation::Traces;
+use crate::simulation::answer::Outcome;
+use crate::simulation::consistency::{Consistency, Outcomes};
 use crate::simulation::record::Series;
 use crate::simulation::truth::Noise;
 
@@ -25,8 +26,6 @@ const MAX_SAMPLES: f64 = 1e6;
 const SUBSTEPS: usize = 4;
 /// The standard deviation of a known start, as a part of its value (of 1 for zero): a covariance needs one.
 const KNOWN: f64 = 1e-9;
-/// An error beyond so many sigma is none that the filter believes in.
-const CREDIBLE: f64 = 4.0;
 
 /// A run of a system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -39,12 +38,8 @@ pub struct SystemRun {
     pub name: String,
     /// Estimates at the end.
     pub estimates: Vec<SystemEstimate>,
-    /// Mean normalised innovation squared; its expectation is the number of outputs.
-    pub nis: f64,
-    /// The band of the mean NIS, 95 %.
-    pub nis_band: (f64, f64),
-    /// Whether NIS is within the band of 99.9 % and no error is beyond four sigma.
-    pub consistent: bool,
+    /// Whether errors and innovations are what the filter believes.
+    pub consistency: Consistency,
     /// How long it ran, in the unit of the model.
     pub duration: f64,
     /// Between two samples.
@@ -80,6 +75,20 @@ pub struct SystemEstimate {
     pub error_over_sigma: f64,
     /// Sigma at the start.
     pub prior_sigma: f64,
+    /// What came out; nothing is required.
+    pub verdict: Outcome,
+}
+
+impl SystemEstimate {
+    /// Whether the outputs determine it.
+    pub fn is_determined(&self) -> bool {
+        is_determined(self.status)
+    }
+}
+
+/// A start that is known is no unknown.
+fn is_determined(status: Option<Status>) -> bool {
+    status.is_none_or(|s| s == Status::Observable)
 }
 
 /// Why there is no run.
@@ -203,7 +212,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         }
     };
     record(0.0, 0, &truth, &filter);
-    let mut nis = 0.0;
+    let mut whitened = Vec::new();
     for segment in 0..segments {
         let begin = segment as f64 * samples * dt;
         let (behind, _) = numeric.carry(segment, begin, &truth);
@@ -226,24 +235,26 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             for (z, sigma) in z.iter_mut().zip(&sigmas) {
                 *z += sigma * noise.normal();
             }
-            nis += filter.update(&measurement, t + dt, &z).map_err(stopped(t + dt))?.nis();
+            whitened.extend(filter.update(&measurement, t + dt, &z).map_err(stopped(t + dt))?.whitened);
             record(t + dt, segment, &truth, &filter);
         }
     }
-    let count = samples * segments as f64;
-    let outputs = sigmas.len() as f64;
     let estimates = estimates(model, &analysis, &numeric, &traces);
-    let credible = estimates.iter().all(|e| e.error_over_sigma.abs() <= CREDIBLE);
-    let (low, high) = chi_square_band(outputs, count, 0.999);
+    traces.determined = estimates.iter().map(SystemEstimate::is_determined).collect();
+    let consistency = Consistency::of(Outcomes {
+        whitened: &whitened,
+        outputs: sigmas.len(),
+        error: (filter.x() - &truth).as_slice().to_vec(),
+        covariance: filter.covariance(),
+        normalised: estimates.iter().map(|e| (e.name.as_str(), e.error_over_sigma)).collect(),
+    });
     Ok((
         SystemRun {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             name: model.name.clone(),
             estimates,
-            nis: nis / count,
-            nis_band: chi_square_band(outputs, count, CONFIDENCE),
-            consistent: credible && (low..=high).contains(&(nis / count)),
+            consistency: consistency.map_err(stopped(duration))?,
             duration,
             step: dt,
             noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
@@ -274,17 +285,23 @@ fn estimates(
         let last = |v: &Vec<f64>| v.last().copied().unwrap_or(f64::NAN);
         let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
         let verdict = analysis.quantities.iter().find(|q| q.name == *name);
+        let prior_sigma = series.sigma.first().copied().unwrap_or(f64::NAN);
+        let error = estimate - truth;
+        let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
+        let status = verdict.map(|q| q.status);
+        let determined = is_determined(status);
         SystemEstimate {
             name: name.clone(),
             unit: unit(model, &numeric.states[c]),
-            status: verdict.map(|q| q.status),
+            status,
             degree: verdict.and_then(|q| q.degree),
             truth,
             estimate,
-            error: estimate - truth,
+            error,
             sigma,
-            error_over_sigma: (estimate - truth) / sigma,
-            prior_sigma: series.sigma.first().copied().unwrap_or(f64::NAN),
+            error_over_sigma,
+            prior_sigma,
+            verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], None),
         }
     };
     numeric.names.iter().enumerate().map(of).collect()

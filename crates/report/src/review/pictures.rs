@@ -11,7 +11,7 @@ use obsdeg_core::system::SystemAnalysis;
 
 use crate::document::{Block, Drawing, Picture};
 use crate::figure::{BLACK, BLUE, Band, Figure, GREEN, GREY, Line, ORANGE, SKY, Stroke, heat};
-use crate::figures::{file_name, history_figure, slope_figure};
+use crate::figures::{file_name, history_figure, series_title, slope_figure};
 
 /// At most this many points a curve.
 const POINTS: usize = 160;
@@ -236,7 +236,7 @@ pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
         let end = samples.last().map_or(0.0, |&k| sigma(k));
         let half = (1.2 * largest.max(2.0 * end)).max(f64::MIN_POSITIVE);
         let figure = Figure {
-            title: traces.names[i].clone(),
+            title: series_title(traces, i),
             x_label: format!("t{}", bracketed(&traces.time_unit)),
             y_label: format!("error of {}{}", traces.names[i], bracketed(unit)),
             bands: vec![Band {
@@ -255,7 +255,8 @@ pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
             ..Figure::default()
         };
         let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
-        curves(&name, format!("Error of the estimate of {} with +-3 sigma", traces.names[i]), figure)
+        let caption = format!("Error of the estimate of {}, with +-3 sigma", series_title(traces, i));
+        curves(&name, caption, figure)
     };
     (0..traces.names.len().min(ERRORS)).map(of).collect()
 }

@@ -1,0 +1,151 @@
+//! Requirements against sigmas: the one decision that every command reports.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Whether a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for what is no number.
+pub fn meets(sigma: f64, required: f64) -> bool {
+    sigma <= required
+}
+
+/// An unknown with its requirement and what is held against it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim<'a> {
+    /// The unknown.
+    pub name: &'a str,
+    /// The largest sigma allowed, in the unit of the unknown; an unknown without one does not count.
+    pub required: Option<f64>,
+    /// Its sigma in the same unit, or why there is none that counts.
+    pub sigma: Result<f64, Miss>,
+}
+
+impl Claim<'_> {
+    /// Required over found sigma: at least 1 is met. `None` without a requirement, or without a sigma that counts.
+    pub fn margin(&self) -> Option<f64> {
+        let sigma = self.sigma.ok().filter(|s| s.is_finite() && *s >= 0.0)?;
+        self.required.map(|r| r / sigma).filter(|m| !m.is_nan())
+    }
+
+    /// Why the requirement is missed, if it is.
+    fn miss(&self, required: f64) -> Option<Miss> {
+        match self.sigma {
+            Err(why) => Some(why),
+            Ok(sigma) if meets(sigma, required) => None,
+            Ok(sigma) => Some(if sigma.is_finite() { Miss::TooLarge } else { Miss::NoNumber }),
+        }
+    }
+}
+
+/// Why a requirement is missed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Miss {
+    /// Sigma is above it.
+    TooLarge,
+    /// The unknown is not determined by the outputs.
+    NotObservable,
+    /// Sigma is hardly below the prior's: it says what the prior says.
+    RestsOnPrior,
+    /// The filter is wrong about it: its error is beyond four sigma.
+    Inconsistent,
+    /// Sigma or the estimate is no number.
+    NoNumber,
+}
+
+/// An unknown that misses its requirement.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Missed {
+    /// The unknown.
+    pub name: String,
+    /// Why.
+    pub why: Miss,
+}
+
+/// A margin and whose it is.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Margin {
+    /// The unknown.
+    pub name: String,
+    /// Required over found sigma: at least 1 is met.
+    pub margin: f64,
+}
+
+/// What became of all requirements.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct Requirements {
+    /// Unknowns with a requirement.
+    pub stated: usize,
+    /// How many of them meet it.
+    pub met: usize,
+    /// The smallest margin of those whose sigma counts.
+    pub worst: Option<Margin>,
+    /// Those that miss theirs, in model order.
+    pub missed: Vec<Missed>,
+    /// Nobody stated any: they are those that the program chooses.
+    pub by_default: bool,
+}
+
+impl Requirements {
+    /// Decides about `claims`, in their order.
+    pub fn of<'a>(claims: impl IntoIterator<Item = Claim<'a>>, by_default: bool) -> Self {
+        let mut out = Self { by_default, ..Self::default() };
+        for claim in claims {
+            let Some(required) = claim.required else { continue };
+            out.stated += 1;
+            match claim.miss(required) {
+                None => out.met += 1,
+                Some(why) => out.missed.push(Missed { name: claim.name.into(), why }),
+            }
+            if let Some(margin) = claim.margin()
+                && out.worst.as_ref().is_none_or(|w| margin < w.margin)
+            {
+                out.worst = Some(Margin { name: claim.name.into(), margin });
+            }
+        }
+        out
+    }
+
+    /// Whether none is missed.
+    pub fn all_met(&self) -> bool {
+        self.missed.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn claim(name: &str, required: Option<f64>, sigma: Result<f64, Miss>) -> Claim<'_> {
+        Claim { name, required, sigma }
+    }
+
+    #[test]
+    fn what_is_met_and_what_is_missed() {
+        let judged = Requirements::of(
+            [
+                claim("just", Some(0.1), Ok(0.1)),
+                claim("above", Some(0.1), Ok(0.1000001)),
+                claim("well", Some(0.1), Ok(0.01)),
+                claim("unseen", Some(0.1), Err(Miss::NotObservable)),
+                claim("free", None, Err(Miss::NotObservable)),
+                claim("nan", Some(0.1), Ok(f64::NAN)),
+                claim("infinite", Some(0.1), Ok(f64::INFINITY)),
+                claim("exact", Some(0.1), Ok(0.0)),
+            ],
+            false,
+        );
+        assert_eq!((judged.stated, judged.met, judged.all_met()), (7, 3, false));
+        let missed: Vec<(&str, Miss)> = judged.missed.iter().map(|m| (m.name.as_str(), m.why)).collect();
+        let expected = [
+            ("above", Miss::TooLarge),
+            ("unseen", Miss::NotObservable),
+            ("nan", Miss::NoNumber),
+            ("infinite", Miss::NoNumber),
+        ];
+        assert_eq!(missed, expected);
+        assert_eq!(judged.worst.map(|w| w.name).as_deref(), Some("above"));
+        // nothing asked for, nothing missed
+        let none = Requirements::of([claim("free", None, Ok(1.0))], true);
+        assert_eq!((none.stated, none.met, none.worst.is_none(), none.all_met()), (0, 0, true, true));
+    }
+}

@@ -1,0 +1,185 @@
+//! Whether a run is credible: innovations and errors against what the filter believes of them.
+
+use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band, ljung_box};
+use obsdeg_ekf::{Covariance, EkfError};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// An error beyond so many sigma is none that the filter believes in.
+pub(crate) const CREDIBLE: f64 = 4.0;
+/// A right filter leaves the bands that decide with one part in a thousand.
+const STRICT: f64 = 0.999;
+/// Most lags of the autocorrelation.
+const LAGS: usize = 20;
+
+/// What speaks against a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Doubt {
+    /// A statistic, an estimate or a sigma is no number.
+    NoNumber,
+    /// The mean NIS is outside its band of 99.9 %.
+    Nis,
+    /// The NEES is above the band of 99.9 %.
+    Nees,
+    /// An error is beyond four sigma.
+    Error,
+    /// The innovations are not white.
+    Correlated,
+}
+
+/// Statistics of one run.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Consistency {
+    /// Mean normalised innovation squared; its expectation is the number of outputs.
+    pub nis: f64,
+    /// The band of the mean NIS, 95 %.
+    pub nis_band: (f64, f64),
+    /// The band of 99.9 %, in which it must be.
+    pub nis_wide_band: (f64, f64),
+    /// Normalised estimation error squared at the end; its expectation is the number of unknowns.
+    pub nees: f64,
+    /// Its band, 95 %.
+    pub nees_band: (f64, f64),
+    /// The upper end of its band of 99.9 %, which it must not exceed. A small one says nothing: true values are given, not drawn.
+    pub nees_limit: f64,
+    /// Probability that white noise has autocorrelations as large as the innovations', smallest over outputs.
+    pub whiteness_probability: f64,
+    /// Unknowns whose error is beyond four sigma.
+    pub beyond: Vec<String>,
+    /// What speaks against the run.
+    pub doubts: Vec<Doubt>,
+    /// Whether nothing does.
+    pub consistent: bool,
+}
+
+/// What a run leaves to be judged.
+pub(crate) struct Outcomes<'a> {
+    /// Whitened innovations, one per output and sampled step.
+    pub whitened: &'a [f64],
+    pub outputs: usize,
+    /// Estimate minus truth of all states of the filter, in its units (shape n).
+    pub error: Vec<f64>,
+    /// What it believes of that.
+    pub covariance: &'a Covariance,
+    /// Name and error over sigma of what is reported.
+    pub normalised: Vec<(&'a str, f64)>,
+}
+
+impl Consistency {
+    /// Judges a run.
+    ///
+    /// # Errors
+    /// [`EkfError`] when the covariance is not positive definite.
+    pub(crate) fn of(mut run: Outcomes<'_>) -> Result<Self, EkfError> {
+        let (n, outputs) = (run.error.len() as f64, run.outputs as f64);
+        let samples = run.whitened.len() / run.outputs;
+        let count = samples as f64;
+        let nis = run.whitened.iter().map(|v| v * v).sum::<f64>() / count;
+        let nees = Nees::of_covariance(run.covariance)?.of(&mut run.error);
+        let lags = LAGS.min(samples / 4).max(1);
+        let whiteness = (0..run.outputs)
+            .map(|j| {
+                let one: Vec<f64> = run.whitened.iter().skip(j).step_by(run.outputs).copied().collect();
+                ljung_box(&autocorrelation(&one, lags), one.len())
+            })
+            // a number that is none stays one
+            .fold(1.0, |least: f64, p| if p.is_nan() { p } else { least.min(p) });
+        let nis_wide_band = chi_square_band(outputs, count, STRICT);
+        let (_, nees_limit) = chi_square_band(n, 1.0, STRICT);
+        let beyond = run.normalised.iter().filter(|(_, x)| x.abs() > CREDIBLE);
+        let beyond: Vec<String> = beyond.map(|(name, _)| name.to_string()).collect();
+        let numbers = run.normalised.iter().map(|(_, x)| *x).chain([nis, nees, whiteness]);
+        let found = [
+            (Doubt::NoNumber, !numbers.into_iter().all(f64::is_finite)),
+            (Doubt::Nis, !(nis_wide_band.0..=nis_wide_band.1).contains(&nis)),
+            (Doubt::Nees, nees > nees_limit),
+            (Doubt::Error, !beyond.is_empty()),
+            // of the smallest over the outputs
+            (Doubt::Correlated, whiteness * outputs < 1.0 - STRICT),
+        ];
+        let doubts: Vec<Doubt> = found.into_iter().filter(|(_, there)| *there).map(|(d, _)| d).collect();
+        Ok(Self {
+            nis,
+            nis_band: chi_square_band(outputs, count, CONFIDENCE),
+            nis_wide_band,
+            nees,
+            nees_band: chi_square_band(n, 1.0, CONFIDENCE),
+            nees_limit,
+            whiteness_probability: whiteness,
+            beyond,
+            consistent: doubts.is_empty(),
+            doubts,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+    use obsdeg_ekf::Form;
+    use obsdeg_exact::SplitMix64;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::simulation::truth::Noise;
+
+    /// A run of two outputs and two states, with errors given in sigma.
+    fn judged(whitened: &[f64], error: [f64; 2]) -> Consistency {
+        let p = Covariance::new("P", &DMatrix::identity(2, 2), Form::Ud).expect("a covariance");
+        let run = Outcomes {
+            whitened,
+            outputs: 2,
+            error: error.to_vec(),
+            covariance: &p,
+            normalised: vec![("a", error[0]), ("b", error[1])],
+        };
+        Consistency::of(run).expect("judged")
+    }
+
+    fn white(seed: u64) -> Vec<f64> {
+        let mut noise = Noise::new(seed, 0);
+        (0..400).map(|_| noise.normal()).collect()
+    }
+
+    #[test]
+    fn each_doubt_by_itself() {
+        let right = white(1);
+        assert_eq!(judged(&right, [0.5, -0.5]).doubts, []);
+        // two degrees of freedom: the band of 99.9 % ends at -2 ln 0.0005
+        let limit = judged(&right, [0.0, 0.0]).nees_limit;
+        assert!((limit + 2.0 * 0.0005f64.ln()).abs() < 1e-9, "{limit}");
+        assert_eq!(judged(&right, [2.7, 2.7]).doubts, []);
+        assert_eq!(judged(&right, [2.8, 2.8]).doubts, [Doubt::Nees]);
+        assert_eq!(judged(&right, [0.0, 4.1]).doubts, [Doubt::Nees, Doubt::Error]);
+        assert_eq!(judged(&right, [0.0, 4.1]).beyond, ["b"]);
+        // no error at all is no doubt, neither is a small one
+        assert_eq!(judged(&right, [0.0, 0.0]).doubts, []);
+        for factor in [0.8, 1.2] {
+            let scaled: Vec<f64> = right.iter().map(|x| x * factor).collect();
+            assert_eq!(judged(&scaled, [0.0, 0.0]).doubts, [Doubt::Nis], "{factor}");
+        }
+        // a moving mean of unit variance
+        let slow: Vec<f64> = right.windows(5).map(|w| (w[0] + w[2] + w[4]) / 3f64.sqrt()).collect();
+        assert!(judged(&slow[..396], [0.0, 0.0]).doubts.contains(&Doubt::Correlated));
+        assert!(judged(&right, [f64::NAN, 0.0]).doubts.contains(&Doubt::NoNumber));
+        let mut broken = right.clone();
+        broken[7] = f64::INFINITY;
+        assert!(judged(&broken, [0.0, 0.0]).doubts.contains(&Doubt::NoNumber));
+        assert!(!judged(&broken, [0.0, 0.0]).consistent);
+    }
+
+    proptest! {
+        /// A right run is called one: of 2000 about five are not.
+        #[test]
+        fn right_runs_are_consistent(seed in any::<u64>()) {
+            let mut rng = SplitMix64::new(seed);
+            let wrong = (0..40).filter(|_| {
+                let seed = rng.next_u64();
+                let mut noise = Noise::new(seed, 1);
+                !judged(&white(seed), [noise.normal(), noise.normal()]).consistent
+            });
+            prop_assert!(wrong.count() <= 3);
+        }
+    }
+}
