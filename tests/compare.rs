@@ -4,8 +4,10 @@ use std::process::Command;
 
 use obsdeg_core::compare::answer::Review;
 use obsdeg_core::compare::{Entry, compare};
+use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::requirements::Miss;
 use obsdeg_core::simulation::conditions::{Assignment, Conditions};
 use obsdeg_core::simulation::simulate;
 
@@ -86,6 +88,123 @@ fn sensitivity_says_what_the_assumptions_are_worth() {
     let gain = sigma("dwell x 0.5").expect("there") / here.expect("there");
     assert!((4.5..6.5).contains(&gain), "{gain}");
     assert_eq!(at("reset carry").rank, [30, 30]);
+}
+
+/// Every unknown with a requirement counts, psi of every position too; what is not observable misses it.
+#[test]
+fn requirements_are_those_of_all_unknowns() {
+    let missed = |r: &Review| -> Vec<(String, Miss)> {
+        r.requirements.missed.iter().map(|m| (m.name.clone(), m.why)).collect()
+    };
+    let psi = |names: &[&str]| -> Vec<(String, Miss)> {
+        names.iter().map(|n| (n.to_string(), Miss::TooLarge)).collect()
+    };
+    let five = review(&scheme(&S6[..5], Carry::Inertial));
+    assert_eq!(missed(&five), psi(&["psi_x", "psi_y", "psi_z"]));
+    let worst = five.requirements.worst.clone().expect("a margin");
+    assert!(worst.name == "psi_y" && (worst.margin - 0.068).abs() < 1e-4, "{worst:?}");
+    assert!(!five.meets_requirements && five.worst.as_ref().is_some_and(|w| w.sigma_dph < 0.1));
+    // under reset carry each position has a psi of its own, and a requirement may name one of them
+    let of_position = |name: &str| Conditions {
+        requirements: vec![Assignment { name: name.into(), value: 1e-3 }],
+        ..Conditions::default()
+    };
+    let reset = |name: &str| {
+        let entry =
+            Entry { name: "it".into(), scheme: scheme(&S6, Carry::Reset), conditions: of_position(name) };
+        compare(&[entry], 1).expect("compared").schemes.remove(0)
+    };
+    let six = reset("psi_y@4");
+    assert_eq!((six.requirements.stated, missed(&six)), (1, psi(&["psi_y@4"])));
+    assert_eq!(reset("psi").requirements.stated, 18);
+    // one decision: what is met is what has a margin of at least one, by the numbers of the table
+    let paper = review(&scheme(&["0,0,0", "180,0,0"], Carry::Platform));
+    for r in [&five, &six, &paper] {
+        let asked = r.quantities.iter().filter(|q| q.requirement.is_some());
+        let met: Vec<bool> =
+            asked.clone().map(|q| q.sigma.zip(q.requirement).is_some_and(|(s, r)| s <= r)).collect();
+        assert_eq!(r.requirements.met, met.iter().filter(|m| **m).count());
+        assert_eq!(r.meets_requirements, met.iter().all(|m| *m));
+        let smallest = asked.filter_map(|q| q.margin).reduce(f64::min);
+        assert_eq!(r.requirements.worst.as_ref().map(|w| w.margin), smallest);
+    }
+    let unseen: Vec<String> =
+        (paper.quantities.iter().filter(|q| q.degree.is_none()).map(|q| q.name.clone())).collect();
+    let said = missed(&paper).into_iter().filter(|m| m.1 == Miss::NotObservable).map(|m| m.0);
+    assert_eq!(said.collect::<Vec<_>>(), unseen);
+}
+
+/// The excitation of a rotating segment is the root mean square over its arc: by integrals of squares of sines.
+#[test]
+fn excitation_of_an_arc() {
+    let turning = |angle: &str, terms: &str| {
+        let mut s = scheme(&["NUE", "UEN"], Carry::Inertial);
+        s.unknowns = terms.parse().expect("terms");
+        s.positions[0].rotation = Some(Rotation::new("X_p", angle).expect("a rotation"));
+        review(&s)
+    };
+    let at_first = |r: &Review, name: &str| {
+        r.quantities.iter().find(|q| q.name == name).expect("a coefficient").excitation[0]
+    };
+    // about X_p, horizontal: g goes round in Y_p, Z_p, from -Y_p; gyro Y has I = +y, gyro Z I = +z
+    for angle in ["360", "90", "-135", "30", "7200"] {
+        let a = angle.parse::<f64>().expect("degrees").to_radians();
+        let half = (2.0 * a).sin() / (4.0 * a);
+        let r = turning(angle, "F,I,II");
+        let near =
+            |found: f64, squared: f64| assert!((found - squared.sqrt()).abs() < 1e-8, "{angle}: {found}");
+        near(at_first(&r, "D_FX"), 1.0);
+        near(at_first(&r, "D_IX"), 0.0);
+        near(at_first(&r, "D_IY"), 0.5 + half);
+        near(at_first(&r, "D_IZ"), 0.5 - half);
+        // the mean of sin^4
+        near(at_first(&r, "D_IIZ"), 3.0 / 8.0 - half + (4.0 * a).sin() / (32.0 * a));
+    }
+    // the tumble: whatever is observable is excited somewhere
+    let output = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+        .args(["compare", "examples/tumbling/scheme.toml", "--format", "json"])
+        .output()
+        .expect("it runs");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let coefficients = json["schemes"][0]["quantities"].as_array().expect("a list").iter();
+    for q in coefficients.filter(|q| q["unit"] != "deg" && q["status"] == "observable") {
+        let largest = q["excitation"].as_array().expect("a list").iter().filter_map(|x| x.as_f64());
+        assert!(largest.fold(0.0, f64::max) > 0.5, "{q}");
+    }
+}
+
+/// What the sigmas rest on is in the answer and in the table; what the dwell takes away has no sigma.
+#[test]
+fn conditions_and_dwell() {
+    let run = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+            .arg("compare")
+            .args(arguments)
+            .output()
+            .expect("it runs");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let five = "examples/five-positions/scheme.toml";
+    let given = ["--noise", "2e-6", "--step", "2.5", "--dwell", "300", "--latitude", "40"];
+    let text = run(&[&[five][..], &given].concat()).replace("\n      ", " ");
+    for said in [
+        "sigma: information of all samples, no prior, no drift noise; psi at the start",
+        "noise of Z 2e-6 g per sample and axis; steps of at most 2.5 s",
+        "300 s at a position unless it says otherwise, repositioning at once",
+        "latitude 40 deg",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&run(&[&[five][..], &given, &["--format", "json"]].concat())).expect("JSON");
+    let c = &json["schemes"][0]["conditions"];
+    let found = ["accelerometer_noise_g", "step_s", "dwell_s", "latitude_deg"].map(|k| c[k].as_f64());
+    assert_eq!(found, [Some(2e-6), Some(2.5), Some(300.0), Some(40.0)]);
+    let pole =
+        Scheme { latitude: "90".parse().ok(), ..scheme(&["0,0,0", "0,90,0", "45,0,0"], Carry::Platform) };
+    let r = review(&pole);
+    let psi_y = r.quantities.iter().find(|q| q.name == "psi_y").expect("psi_y");
+    assert_eq!((psi_y.degree, psi_y.accuracy_order, psi_y.sigma), (Some(0), None, None));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use obsdeg_core::compare::Comparison;
 use obsdeg_core::compare::answer::{Quantity, Review, Worst};
+use obsdeg_core::requirements::Requirements;
 
 use crate::document::{Block, Document, number, optional};
 use crate::words;
@@ -12,6 +13,16 @@ pub(crate) fn worst(w: Option<&Worst>) -> String {
 
 fn list(items: &[String]) -> String {
     if items.is_empty() { "-".into() } else { items.join(" ") }
+}
+
+/// `met; 2.231 (D_IX)`.
+fn requirements(r: &Requirements) -> String {
+    let worst = words::worst_margin(r).map_or_else(String::new, |w| format!("; {w}"));
+    match (r.stated, r.all_met()) {
+        (0, _) => "none".into(),
+        (_, true) => format!("met{worst}"),
+        (stated, false) => format!("NOT met, {} of {stated} missed{worst}", r.missed.len()),
+    }
 }
 
 /// One row per scheme.
@@ -25,7 +36,7 @@ fn overview(schemes: &[Review]) -> Block {
             number(r.total_s),
             format!("{} of {}", r.rank[0], r.rank[1]),
             worst(r.worst.as_ref()),
-            if r.meets_requirements { "met" } else { "NOT met" }.into(),
+            requirements(&r.requirements),
             list(&carried.map(|d| d.position.clone()).collect::<Vec<_>>()),
         ]
     };
@@ -38,7 +49,7 @@ fn overview(schemes: &[Review]) -> Block {
             "total [s]",
             "rank",
             "worst sigma(D)",
-            "requirements",
+            "requirements; worst margin",
             "redundant",
         ],
         numbers: vec![false, false, true, true, true, false, false, false],
@@ -62,7 +73,7 @@ fn by_unknown(schemes: &[Review]) -> Block {
                 name.clone(),
                 r.name.clone(),
                 words::degree(q.degree),
-                words::degree(q.accuracy_order),
+                words::accuracy_order(q.degree, q.accuracy_order, r.has_accuracy_orders),
                 optional(q.sigma),
                 q.unit.clone(),
                 optional(q.requirement),
@@ -73,10 +84,17 @@ fn by_unknown(schemes: &[Review]) -> Block {
         }
     }
     Block::Table {
-        heading: "By unknown (sigma: information of all samples, no prior, no drift noise; margin: required over sigma)"
-            .into(),
+        heading: format!("By unknown ({}; margin: required over sigma)", words::PREDICTED),
         header: vec![
-            "unknown", "scheme", "degree", "accuracy", "sigma", "unit", "required", "margin", "excitation per position",
+            "unknown",
+            "scheme",
+            "degree",
+            "accuracy",
+            "sigma",
+            "unit",
+            "required",
+            "margin",
+            "excitation per position",
             "only by",
         ],
         numbers: vec![false, false, true, true, true, false, true, true, false, false],
@@ -132,16 +150,30 @@ pub(crate) fn document(c: &Comparison) -> Document {
         numbers: vec![false, false, true, false],
         rows,
     });
-    let lines = c
-        .schemes
-        .iter()
-        .map(|r| format!("{}: latitude {} deg, positions {}", r.name, r.latitude_deg, r.positions.join(", ")))
-        .chain([
-            "sigma(D) in deg/h, deg/h/g; - where an unknown is not observable".into(),
-            "redundant: without it every unknown stays observable; only by: positions without which it does not".into(),
-            format!("seed {}", c.seed),
-        ]);
-    blocks.push(Block::List { heading: "Assumed".into(), lines: lines.collect() });
+    let missed = |r: &Review| format!("{}: {}", r.name, words::requirements(&r.requirements));
+    blocks
+        .push(Block::List { heading: "Requirements".into(), lines: c.schemes.iter().map(missed).collect() });
+    let mut lines = Vec::new();
+    for r in &c.schemes {
+        // what all schemes share is said once
+        let own = words::measurement(&r.conditions).into_iter().filter(|l| l != words::PREDICTED);
+        lines.push(format!(
+            "{}: {}; positions {}",
+            r.name,
+            own.collect::<Vec<_>>().join("; "),
+            r.positions.join(", ")
+        ));
+    }
+    lines.extend([
+        words::PREDICTED.into(),
+        "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
+        "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
+            .into(),
+        "redundant: without it every unknown stays observable; only by: positions without which it does not"
+            .into(),
+        format!("seed {}", c.seed),
+    ]);
+    blocks.push(Block::List { heading: "Assumed".into(), lines });
     let n = c.schemes.len();
     Document {
         title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),

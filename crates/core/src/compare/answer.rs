@@ -5,6 +5,8 @@ use serde::Serialize;
 
 use crate::analysis::Status;
 use crate::model::Carry;
+use crate::requirements::{Claim, Miss, Requirements};
+use crate::simulation::answer::MeasurementReport;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.comparison/1";
@@ -29,8 +31,8 @@ pub struct Review {
     pub name: String,
     /// What is carried between positions.
     pub carry: Carry,
-    /// Latitude in degrees.
-    pub latitude_deg: f64,
+    /// What its sigmas rest on.
+    pub conditions: MeasurementReport,
     /// Its positions.
     pub positions: Vec<String>,
     /// Total time with slews, in s.
@@ -41,8 +43,12 @@ pub struct Review {
     pub quantities: Vec<Quantity>,
     /// The largest sigma of a coefficient; null when one is not observable.
     pub worst: Option<Worst>,
-    /// Whether every coefficient with a requirement meets it.
+    /// Whether every unknown with a requirement meets it.
     pub meets_requirements: bool,
+    /// What became of the requirements: predicted sigma (psi: of the start, under reset carry of the start of each position).
+    pub requirements: Requirements,
+    /// Whether accuracy orders are computed: none are for rotating segments.
+    pub has_accuracy_orders: bool,
     /// What happens without each of the positions.
     pub drop_one: Vec<DropOne>,
     /// The worst sigma under other conditions.
@@ -62,16 +68,24 @@ pub struct Quantity {
     pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
-    /// Standard deviation by the information of all samples, without prior and drift noise; null when not observable.
+    /// Standard deviation by the information of all samples, without prior and drift noise; null when these do not determine it.
     pub sigma: Option<f64>,
     /// The largest sigma allowed.
     pub requirement: Option<f64>,
     /// Requirement over sigma: above 1 is met.
     pub margin: Option<f64>,
-    /// Per position: how it moves the drift there, as a product of components of g (1 for D_F); empty for psi.
+    /// Per position: how it moves the drift there, as a product of components of g (1 for D_F); its root mean square over the arc of a
+    /// rotating segment; empty for psi.
     pub excitation: Vec<f64>,
     /// Positions without which it is not observable.
     pub carried_by: Vec<String>,
+}
+
+impl Quantity {
+    /// What is held against its requirement.
+    pub(super) fn claim(&self) -> Claim<'_> {
+        Claim { name: &self.name, required: self.requirement, sigma: self.sigma.ok_or(Miss::NotObservable) }
+    }
 }
 
 /// The largest sigma of a coefficient.

@@ -9,9 +9,13 @@ use rayon::prelude::*;
 pub use answer::Comparison;
 
 use crate::analysis::Status;
+use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
-use crate::model::{Carry, Platform, Scheme};
+use crate::model::{Carry, Platform, Position, Scheme};
 use crate::prediction::Prediction;
+use crate::requirements::Requirements;
+use crate::simulation::answer::MeasurementReport;
+use crate::simulation::attitude_path::Slew;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
 use crate::simulation::{Plan, SimulationError};
@@ -71,7 +75,9 @@ struct Judged {
 
 impl Judged {
     fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
-        let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions.clone() };
+        // other carries and fewer positions have other unknowns
+        let conditions = conditions.within(&Platform::new(scheme.clone())?);
+        let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions };
         let plan = Plan::new(scheme, &still)?;
         let prediction = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
         let prior = SquareRootInformation::prior(&diffuse_prior(&plan))?;
@@ -81,10 +87,7 @@ impl Judged {
             .iter()
             .zip(units)
             .zip(&prediction.unknowns)
-            .map(|((s, unit), u)| {
-                let observable = u.degree.is_some() || u.accuracy_order.is_some();
-                observable.then(|| s / si_per_shown(unit))
-            })
+            .map(|((s, unit), u)| u.determined.then(|| s / si_per_shown(unit)))
             .collect();
         Ok(Self { plan, prediction, sigmas })
     }
@@ -128,17 +131,21 @@ impl Judged {
 fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
     let Entry { name, scheme, conditions } = entry;
     let judged = Judged::new(scheme, conditions, seed)?;
+    conditions.concern(judged.platform())?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
     let quantities = quantities(&judged, conditions, &drop_one)?;
-    let met = |q: &Quantity| q.requirement.is_none() || q.margin.is_some_and(|m| m >= 1.0);
+    let requirements =
+        Requirements::of(quantities.iter().map(Quantity::claim), conditions.requires_by_default());
     Ok(Review {
         name: name.clone(),
         carry: scheme.carry,
-        latitude_deg: judged.platform().scheme().latitude.map_or(0.0, |l| l.degrees()),
+        conditions: MeasurementReport::new(scheme, conditions),
         positions: scheme.positions.iter().map(|p| p.name.clone()).collect(),
         total_s: judged.plan.duration_s(),
         rank: judged.rank(),
-        meets_requirements: quantities.iter().filter(|q| !q.name.starts_with("psi")).all(met),
+        meets_requirements: requirements.all_met(),
+        requirements,
+        has_accuracy_orders: judged.prediction.has_accuracy_orders,
         quantities,
         worst: judged.worst(),
         drop_one,
@@ -154,19 +161,17 @@ fn quantities(
     let platform = judged.platform();
     let requirements = resolve("required sigma", platform, &conditions.requirements, f64::NAN)?;
     let first_d = platform.names().len() - platform.coefficients();
-    // eps^n = C E(g) D: the columns of C are orthonormal, so the length of a column is the excitation
-    let columns: Vec<[Vec<f64>; 3]> =
-        judged.plan.attitudes.iter().map(|c| platform.drift_rows(&Float, c)).collect();
+    let excitations = excitations(judged);
     let excitation = |c: usize| -> Vec<f64> {
         let Some(d) = c.checked_sub(first_d) else { return Vec::new() };
-        columns.iter().map(|rows| rows.iter().map(|r| r[d] * r[d]).sum::<f64>().sqrt()).collect()
+        excitations.iter().map(|of| of[d]).collect()
     };
     let of_unknown = |(c, u): (usize, &crate::prediction::PredictedUnknown)| {
         let name = &platform.names()[c];
         let requirement = Some(requirements[c]).filter(|r| !r.is_nan());
         let sigma = judged.sigmas[c];
         let carries = drop_one.iter().filter(|d| d.lost.contains(name));
-        Quantity {
+        let mut out = Quantity {
             name: name.clone(),
             unit: shown_unit(platform.units()[c]).into(),
             status: u.status,
@@ -174,12 +179,52 @@ fn quantities(
             accuracy_order: u.accuracy_order,
             sigma,
             requirement,
-            margin: requirement.zip(sigma).map(|(r, s)| r / s),
+            margin: None,
             excitation: excitation(c),
             carried_by: carries.map(|d| d.position.clone()).collect(),
-        }
+        };
+        out.margin = out.claim().margin();
+        out
     };
     Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
+}
+
+/// Per position and coefficient: the length of its column of `eps^n = C E(g) D` at a position, its root mean square over the arc of a
+/// rotating segment (the columns of C are orthonormal, so this is the product of components of g).
+fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
+    let (plan, platform) = (&judged.plan, judged.platform());
+    let squares = |c: &Matrix3<f64>| -> Vec<f64> {
+        let rows = platform.drift_rows(&Float, c);
+        (0..platform.coefficients()).map(|d| rows.iter().map(|r| r[d] * r[d]).sum()).collect()
+    };
+    let of = |(i, position): (usize, &Position)| -> Vec<f64> {
+        let Some(turn) = &position.rotation else {
+            return squares(&plan.attitudes[i]).iter().map(|x| x.sqrt()).collect();
+        };
+        let arc = Slew::about(&plan.attitudes[i], turn, 1.0);
+        let mut mean = vec![0.0; platform.coefficients()];
+        for (t, weight) in quadrature(arc.rate.iter().map(|x| x * x).sum::<f64>().sqrt()) {
+            for (m, x) in mean.iter_mut().zip(squares(&arc.at(t))) {
+                *m += weight * x;
+            }
+        }
+        mean.iter().map(|x| x.max(0.0).sqrt()).collect()
+    };
+    platform.scheme().positions.iter().enumerate().map(of).collect()
+}
+
+/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five degrees, which is exact to 1e-10
+/// for the squares of second-order terms.
+fn quadrature(arc: f64) -> Vec<(f64, f64)> {
+    const PART: f64 = std::f64::consts::PI / 36.0;
+    const MOST: f64 = 10_000.0;
+    let parts = (arc / PART).ceil().clamp(1.0, MOST);
+    let offset = 0.6f64.sqrt();
+    let of = |i: usize| {
+        let points = [(-offset, 5.0), (0.0, 8.0), (offset, 5.0)];
+        points.map(|(x, weight)| ((i as f64 + 0.5 + x / 2.0) / parts, weight / 18.0 / parts))
+    };
+    (0..parts as usize).flat_map(of).collect()
 }
 
 /// The scheme without each of its positions in turn.
