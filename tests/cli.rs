@@ -125,6 +125,41 @@ fn refused(arguments: &[&str], expected: &[&str]) {
     }
 }
 
+/// Where the dwell makes something else of a degree, or nothing, the row says so in every format.
+#[test]
+fn rows_say_what_the_dwell_makes_of_a_degree() {
+    let pole = ["--angles", "0,0,0", "--angles", "0,90,0", "--angles", "45,0,0", "--latitude", "90"];
+    // four generic positions: psi has degree 0, accuracy order 1
+    let four =
+        ["--angles", "10,25,40", "--angles", "130,-50,70", "--angles", "-95,33,-160", "--angles", "60,80,15"];
+    for (scheme, unknown, latex, expected) in [
+        (&pole[..], "psi_y", "$\\psi_{y}$", "not determined"),
+        (&four[..], "psi_z", "$\\psi_{z}$", "order 1"),
+    ] {
+        let text = |format: &str| {
+            stdout(&run(&[&["analyze", "--solutions", "off", "--format", format], scheme].concat()))
+        };
+        let row = |format: &str, begins: &str, cell: &str| {
+            let text = text(format);
+            let row = text.lines().map(str::trim_start).find(|l| l.starts_with(begins));
+            let row = row.unwrap_or_else(|| panic!("no row {begins}: {text}")).to_string();
+            assert!(row.contains(cell), "{format}: {row}");
+            // what is the same with dwell says nothing of it
+            let other = text.lines().find(|l| l.contains("psi_x") || l.contains("psi_{x}")).expect("psi_x");
+            assert!(!other.contains("determined"), "{other}");
+        };
+        row("table", &format!("{unknown} "), expected);
+        row("markdown", &format!("| `{unknown}` |"), &format!("| {expected} |"));
+        row("csv", &format!("unknown,{unknown},"), &format!(",{expected},"));
+        row("latex", latex, &format!("& {expected} &"));
+    }
+    // where all agree there is no such column; where orders are not computed nothing is said
+    let same = stdout(&run(&["analyze", "--angles", "0,0,0", "--angles", "180,0,0", "--solutions", "off"]));
+    let turning =
+        stdout(&run(&["analyze", "--scheme", "examples/tumbling/scheme.toml", "--solutions", "off"]));
+    assert!(!same.contains("with dwell") && !turning.contains("with dwell"));
+}
+
 #[test]
 fn bad_input_is_refused_by_name() {
     let angles = |text: &'static str| ["analyze", "--angles", text];

@@ -2,7 +2,7 @@
 
 use obsdeg_core::analysis::Analysis;
 
-use crate::ReportError;
+use crate::{ReportError, words};
 
 /// Rows as CSV text.
 pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<String, ReportError> {
@@ -16,9 +16,9 @@ pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<Strin
 
 /// One row per unknown, then one per combination.
 pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
-    let header = ["kind", "name", "unit", "status", "degree", "accuracy_order", "partners", "solution"]
-        .map(String::from)
-        .to_vec();
+    let header =
+        ["kind", "name", "unit", "status", "degree", "accuracy_order", "with_dwell", "partners", "solution"];
+    let header = header.map(String::from).to_vec();
     let degree = |d: Option<usize>| d.map_or_else(String::new, |k| k.to_string());
     let unknowns = a.quantities.iter().map(|q| {
         let solution = q.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
@@ -30,6 +30,7 @@ pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
             status,
             degree(q.degree),
             degree(q.accuracy_order),
+            words::with_dwell(a, q.degree, q.accuracy_order),
             q.partners.join(" "),
             solution,
         ]
@@ -45,6 +46,7 @@ pub(crate) fn analysis(a: &Analysis) -> Result<String, ReportError> {
             status,
             degree(c.degree),
             degree(c.accuracy_order),
+            words::with_dwell(a, c.degree, c.accuracy_order),
             String::new(),
             solution,
         ]

@@ -69,38 +69,55 @@ pub(crate) fn analysis(a: &Analysis) -> String {
             vec![escape(&p.name), angles, p.attitude.clone().unwrap_or_default()]
         }),
     ));
+    let dwell = words::dwell_matters(a).then_some(words::WITH_DWELL);
+    // the last column takes what the others leave
+    let (side, width) = dwell.map_or(("", "0.5"), |_| ("l", "0.4"));
+    let header = |first: &[&'static str]| {
+        first
+            .iter()
+            .copied()
+            .chain(["verdict", "degree"])
+            .chain(dwell)
+            .chain(["solution"])
+            .collect::<Vec<_>>()
+    };
+    let with_dwell = |degree, order| dwell.map(|_| words::with_dwell(a, degree, order));
     out.push_str(&table(
-        "lllrp{0.5\\linewidth}",
-        &["unknown", "unit", "verdict", "degree", "solution"],
+        &format!("lllr{side}p{{{width}\\linewidth}}"),
+        &header(&["unknown", "unit"]),
         a.quantities.iter().map(|q| {
             let how = match &q.solution {
                 Some(s) => format!("${}$", solution(s, a.frame, names)),
                 None => escape(&words::explanation(q)),
             };
-            vec![
+            let mut row = vec![
                 format!("${}$", symbol(&q.name)),
                 escape(&q.unit),
                 q.status.to_string(),
                 words::degree(q.degree),
-                how,
-            ]
+            ];
+            row.extend(with_dwell(q.degree, q.accuracy_order));
+            row.push(how);
+            row
         }),
     ));
     if !a.combinations.is_empty() {
         out.push_str(&table(
-            "llrp{0.5\\linewidth}",
-            &["combination", "verdict", "degree", "solution"],
+            &format!("llr{side}p{{{width}\\linewidth}}"),
+            &header(&["combination"]),
             a.combinations.iter().map(|c| {
                 let how = c
                     .solution
                     .as_ref()
                     .map_or_else(String::new, |s| format!("${}$", solution(s, a.frame, names)));
-                vec![
+                let mut row = vec![
                     format!("${}$", expression(&c.expression)),
                     c.status.to_string(),
                     words::degree(c.degree),
-                    how,
-                ]
+                ];
+                row.extend(with_dwell(c.degree, c.accuracy_order));
+                row.push(how);
+                row
             }),
         ));
     }

@@ -45,24 +45,34 @@ pub(crate) fn analysis(a: &Analysis) -> String {
         }),
     ));
     out.push_str("\n## Unknowns\n\n");
+    let dwell = words::dwell_matters(a).then_some(words::WITH_DWELL);
+    let header = |first: &[&'static str], last: &'static str| {
+        first.iter().copied().chain(["verdict", "degree"]).chain(dwell).chain([last]).collect::<Vec<_>>()
+    };
+    let with_dwell = |degree, order| dwell.map(|_| words::with_dwell(a, degree, order));
     out.push_str(&table(
-        &["unknown", "unit", "verdict", "degree", "solution, or why there is none"],
+        &header(&["unknown", "unit"], "solution, or why there is none"),
         a.quantities.iter().map(|q| {
             let why = if q.solution.is_some() {
                 code(&words::explanation(q))
             } else {
                 escape(&words::explanation(q))
             };
-            vec![code(&q.name), escape(&q.unit), q.status.to_string(), words::degree(q.degree), why]
+            let mut row = vec![code(&q.name), escape(&q.unit), q.status.to_string(), words::degree(q.degree)];
+            row.extend(with_dwell(q.degree, q.accuracy_order));
+            row.push(why);
+            row
         }),
     ));
     if !a.combinations.is_empty() {
         out.push_str("\n## Combinations\n\n");
         out.push_str(&table(
-            &["combination", "verdict", "degree", "solution"],
+            &header(&["combination"], "solution"),
             a.combinations.iter().map(|c| {
-                let solution = c.solution.as_ref().map_or_else(String::new, |s| code(&s.text));
-                vec![code(&c.expression), c.status.to_string(), words::degree(c.degree), solution]
+                let mut row = vec![code(&c.expression), c.status.to_string(), words::degree(c.degree)];
+                row.extend(with_dwell(c.degree, c.accuracy_order));
+                row.push(c.solution.as_ref().map_or_else(String::new, |s| code(&s.text)));
+                row
             }),
         ));
     }

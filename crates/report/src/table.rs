@@ -1,9 +1,12 @@
 //! The table for the terminal.
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
-use obsdeg_core::analysis::Analysis;
+use obsdeg_core::analysis::{Analysis, Status};
 
 use crate::{Layout, words};
+
+/// Status, degree, accuracy order.
+type Verdict = (Status, Option<usize>, Option<usize>);
 
 /// One line under the header, nothing else.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
@@ -71,30 +74,35 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
     out.push_str(&trimmed(&positions));
 
     heading(&mut out, "Unknowns", layout);
-    let mut unknowns =
-        table(&["unknown", "unit", "verdict", "degree", "solution, or why there is none"], layout);
+    let dwell = words::dwell_matters(a).then_some(words::WITH_DWELL);
+    let header = |first: &[&'static str], last: &'static str| {
+        first.iter().copied().chain(["verdict", "degree"]).chain(dwell).chain([last]).collect::<Vec<_>>()
+    };
+    let row = |first: &[&String], (status, degree, order): Verdict, last: String| {
+        let dwell = dwell.map(|_| Cell::new(words::with_dwell(a, degree, order)));
+        let degree = Cell::new(words::degree(degree)).set_alignment(CellAlignment::Right);
+        let first = first.iter().map(Cell::new);
+        first
+            .chain([Cell::new(status.to_string()), degree])
+            .chain(dwell)
+            .chain([Cell::new(last)])
+            .collect::<Vec<_>>()
+    };
+    let mut unknowns = table(&header(&["unknown", "unit"], "solution, or why there is none"), layout);
     for q in &a.quantities {
-        unknowns.add_row(vec![
-            Cell::new(&q.name),
-            Cell::new(&q.unit),
-            Cell::new(q.status.to_string()),
-            Cell::new(words::degree(q.degree)).set_alignment(CellAlignment::Right),
-            Cell::new(words::explanation(q)),
-        ]);
+        let verdict = (q.status, q.degree, q.accuracy_order);
+        unknowns.add_row(row(&[&q.name, &q.unit], verdict, words::explanation(q)));
     }
     out.push_str(&trimmed(&unknowns));
 
     if !a.combinations.is_empty() {
         heading(&mut out, "Observable combinations (and those asked for)", layout);
-        let mut combinations = table(&["combination", "verdict", "degree", "solution"], layout);
+        let mut combinations = table(&header(&["combination"], "solution"), layout);
         for c in &a.combinations {
             let asked = if c.requested { " (asked for)" } else { "" };
-            combinations.add_row(vec![
-                Cell::new(format!("{}{asked}", c.expression)),
-                Cell::new(c.status.to_string()),
-                Cell::new(words::degree(c.degree)).set_alignment(CellAlignment::Right),
-                Cell::new(c.solution.as_ref().map_or("", |s| &s.text)),
-            ]);
+            let solution = c.solution.as_ref().map_or_else(String::new, |s| s.text.clone());
+            let verdict = (c.status, c.degree, c.accuracy_order);
+            combinations.add_row(row(&[&format!("{}{asked}", c.expression)], verdict, solution));
         }
         out.push_str(&trimmed(&combinations));
     }

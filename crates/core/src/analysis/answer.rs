@@ -60,6 +60,8 @@ pub struct Analysis {
     pub rank: usize,
     /// The unknowns in model order.
     pub unknowns: Vec<String>,
+    /// Whether accuracy orders were computed: none are for rotating segments, and notes say why else.
+    pub has_accuracy_orders: bool,
     /// The verdicts, best first.
     pub quantities: Vec<Quantity>,
     /// Observable combinations beyond single unknowns, by degree, and those asked for.

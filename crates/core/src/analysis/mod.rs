@@ -116,6 +116,7 @@ pub fn analyze(
         rank_profile: verdicts.degrees.rank_profile.clone(),
         rank: verdicts.degrees.rank(),
         unknowns: platform.names().to_vec(),
+        has_accuracy_orders: printer.accuracy.is_some(),
         quantities,
         combinations,
         null_space: null.iter().map(|v| null_report(&platform, v)).collect(),
