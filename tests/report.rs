@@ -76,6 +76,40 @@ fn assert_unique_ids(page: &Html) {
     assert!(twice.is_empty(), "{twice:?}");
 }
 
+/// The rows of the boxes at the top: what, grade, text.
+fn statuses(page: &Html) -> Vec<Vec<[String; 3]>> {
+    let parse = |s: &str| Selector::parse(s).expect("a selector");
+    let text = |e: scraper::ElementRef<'_>, s: &str| -> String {
+        let found = e.select(&parse(s)).next().unwrap_or_else(|| panic!("no {s}"));
+        found.text().collect::<Vec<_>>().concat().split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let row = |e: scraper::ElementRef<'_>| {
+        [text(e, "dt"), e.attr("class").unwrap_or_default().to_string(), text(e, "dd")]
+    };
+    let of = |e: scraper::ElementRef<'_>| e.select(&parse("dl > div")).map(row).collect();
+    page.select(&parse("body > .statuses > .status")).map(of).collect()
+}
+
+/// The box and the verdict of a page of one scheme or model say the same, and nothing further down the contrary.
+fn assert_status(page: &Html, verdict: &str) {
+    let boxes = statuses(page);
+    assert_eq!(boxes.len(), 1);
+    let of = |what: &str| boxes[0].iter().find(|r| r[0] == what);
+    let good = |what: &str| of(what).is_none_or(|r| r[1] == "good");
+    let whole: String = texts(page, "main").concat();
+    // by what the rest of the page says
+    let consistent = !whole.contains("the filter is NOT consistent with this truth:");
+    let valid = !whole.contains("the small-angle model does NOT hold for these drifts: a real platform");
+    let prior = whole.contains("known from the prior only") || whole.contains("rests on the prior");
+    let limits = |what: &str| of(what).is_some_and(|r| r[1] == "limited");
+    assert_eq!((!limits("Filter, one run"), !limits("Small-angle model")), (consistent, valid), "{verdict}");
+    assert!(good("Resting on the prior") || prior, "{verdict}");
+    let limited = !(consistent && valid && !prior && good("Filter and exact verdicts"));
+    assert!(!limited || verdict.starts_with("Limited: "), "{verdict}");
+    assert!(!(whole.contains("confirms the verdicts") && limited), "{verdict}");
+    assert_eq!(verdict.contains("confirms the verdicts"), !verdict.starts_with("Limited: "), "{verdict}");
+}
+
 #[test]
 fn every_example_has_a_report() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -96,8 +130,10 @@ fn every_example_has_a_report() {
         assert!(text.len() < 2_000_000 && !text.contains("NaN"), "{}", input.display());
         let verdict = texts(&page, "main > p")
             .into_iter()
-            .find(|p| p.starts_with("The scheme") || p.contains("locally"));
-        assert!(verdict.is_some_and(|v| !v.contains("DISAGREES")), "{}", input.display());
+            .find(|p| p.contains("The scheme determines") || p.contains("locally"))
+            .unwrap_or_else(|| panic!("{}: no verdict", input.display()));
+        assert!(!verdict.contains("DISAGREE"), "{}: {verdict}", input.display());
+        assert_status(&page, &verdict);
         assert!(texts(&page, ".formulas code").is_empty(), "{}: a formula without MathML", input.display());
     }
 }
@@ -135,8 +171,9 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
     };
     assert_eq!(["psi_x", "D_FX", "D_FY", "D_FZ"].map(degree), ["0", "1", "2", "-"]);
     let verdict = &texts(&page, "main > p")[0];
-    assert!(verdict.starts_with("The scheme determines 5 of the 12 gyro coefficients"), "{verdict}");
-    assert_eq!(verdict.matches(". ").count(), 1, "two sentences: {verdict}");
+    assert!(verdict.starts_with("Limited: the small-angle model does NOT hold"), "{verdict}");
+    assert!(verdict.contains(". The scheme determines 5 of the 12 gyro coefficients"), "{verdict}");
+    assert_eq!(verdict.matches(". ").count(), 2, "three sentences: {verdict}");
     // formulas are math, pictures are there without scripts, ids are unique, nothing is fetched
     assert!(texts(&page, "li math").len() >= 10);
     assert!(texts(&page, "figure svg").len() > 20);
@@ -163,6 +200,85 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
 }
 
 #[test]
+fn a_verdict_leads_with_what_limits_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let five = "examples/five-positions/scheme.toml";
+    let page_of = |name: &str, inputs: &[&str]| {
+        let page = Html::parse_document(&report(folder.path(), name, inputs).1);
+        let verdict = texts(&page, "main > p").into_iter().find(|p| p.contains("The scheme determines"));
+        let verdict = verdict.expect("a verdict");
+        assert_status(&page, &verdict);
+        (page, verdict)
+    };
+    let row = |page: &Html, what: &str| -> [String; 2] {
+        let all = statuses(page).remove(0);
+        let [_, grade, text] = all.into_iter().find(|r| r[0] == what).unwrap_or_else(|| panic!("no {what}"));
+        [grade, text]
+    };
+    // psi misses its requirement although every coefficient meets its own
+    let (page, verdict) = page_of("five.html", &[five, "--carry", "inertial"]);
+    assert!(!verdict.contains("every requirement"), "{verdict}");
+    let missed = "NOT met, 3 of 15 missed: psi_x, psi_y, psi_z; worst margin 0.06798 (psi_y)";
+    assert!(verdict.contains(missed) && row(&page, "Requirements")[1].contains(missed), "{verdict}");
+    assert_eq!(row(&page, "Requirements")[0], "limited");
+    assert_eq!(row(&page, "Observable"), ["good", "ok 12 of 12 gyro coefficients, 3 of 3 of psi"]);
+    // small drifts, requirements that are met: nothing limits, and only then the filter confirms
+    let file = |name: &str, text: &str| -> String {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let good = file(
+        "good.toml",
+        "terms = ['F']\ncarry = 'inertial'\n[simulation]\ndrift_scale = 1e-4\nvalues = { psi = 0.001 }\n\
+         priors = { D = 1e5, psi = 10 }\n[requirements]\npsi = 1\n[[position]]\nattitude = 'NUE'\n\
+         [[position]]\nattitude = 'UEN'\n",
+    );
+    let (page, verdict) = page_of("good.html", &[&good]);
+    assert!(verdict.starts_with("The scheme determines every one"), "{verdict}");
+    assert!(verdict.contains("every requirement is met, 6 of 6; worst margin "), "{verdict}");
+    assert!(statuses(&page)[0].iter().all(|r| r[1] == "good"), "{:?}", statuses(&page));
+    // a truth that the linear filter cannot follow
+    let (page, verdict) = page_of("exact.html", &[PAPER, "--truth", "exact"]);
+    for limit in ["does NOT hold", "is NOT consistent with its truth (mean NIS", "DISAGREE in "] {
+        let lead = verdict.split(". The scheme").next().unwrap_or_default();
+        assert!(lead.starts_with("Limited: ") && lead.contains(limit), "{limit}: {verdict}");
+    }
+    assert!(row(&page, "Filter and exact verdicts")[1].starts_with("LIMITED DISAGREE"));
+    // what is not taken is said first, too; and a rotating segment excites all along its arc
+    let turning = file(
+        "turning.toml",
+        "terms = ['F', 'S']\ncarry = 'inertial'\n[[position]]\nattitude = 'NUE'\n\
+         rotation = { about = 'X_p', angle_deg = 90 }\n[[position]]\nattitude = 'UEN'\n",
+    );
+    let (page, verdict) = page_of("turning.html", &[&turning]);
+    assert!(
+        verdict.contains("not taken: ") && verdict.contains("accuracy orders are not computed"),
+        "{verdict}"
+    );
+    assert_eq!(row(&page, "Filter and exact verdicts")[0], "open");
+    // D_SZ is not excited at the start of the turn, nor at the second position
+    let excited: Vec<[String; 2]> = (table(&page, "Every unknown").iter())
+        .filter(|r| r[0].starts_with("D_"))
+        .map(|r| [r[0].clone(), r[9].clone()])
+        .collect();
+    assert!(excited.iter().all(|[_, at]| at != "-"), "{excited:?}");
+    // at a pole the dwell takes away what derivatives see
+    let pole = file(
+        "pole.toml",
+        "latitude_deg = 90\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\n\
+         angles_deg = [0, 90, 0]\n[[position]]\nangles_deg = [45, 0, 0]\n",
+    );
+    let (page, verdict) = page_of("pole.html", &[&pole]);
+    assert!(
+        verdict.contains("with dwell, psi_y are not determined although they have a degree"),
+        "{verdict}"
+    );
+    let psi_y = table(&page, "Every unknown").into_iter().find(|r| r[0] == "psi_y").expect("psi_y");
+    assert_eq!([&psi_y[3], &psi_y[4], &psi_y[6]], ["0", "not with dwell", "-"]);
+}
+
+#[test]
 fn text_from_files_is_text_in_every_format() {
     let folder = tempfile::tempdir().expect("a folder");
     let scheme = twelve(folder.path()).display().to_string();
@@ -180,13 +296,18 @@ fn text_from_files_is_text_in_every_format() {
     assert_eq!(parts.len(), 5, "{parts:?}");
     assert_eq!(parts[2], "Comparison of the schemes");
     assert!(table(&page, "Side by side").len() == 2);
+    // a box for each at the top; tables where there are no boxes
+    assert_eq!(texts(&page, ".status > .heading"), [HOSTILE, "paper-p1-p2", "two compartments, one sampled"]);
+    assert!(text.find("class=\"statuses\"") < text.find("<main>"), "at the top");
 
     let (file, text) = report(folder.path(), "review.md", &[&scheme]);
     assert!(!text.contains("<script>") && text.contains("\\<script\\>"), "markup in Markdown");
+    assert!(text.contains("#### Status: ") && text.contains("| Small-angle model | LIMITED |"));
     assert!(file.with_file_name("figures").join("s1_staircase.svg").is_file());
     let other = tempfile::tempdir().expect("a folder");
     let (file, text) = report(other.path(), "review.tex", &[&scheme]);
     assert_eq!(text.matches("\\end{document}").count(), 1);
+    assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & LIMITED & "));
     assert!(text.contains("\\$a\\_b\\textasciicircum{}c\\$ \\#let \\textbackslash{}end\\{document\\}"));
     assert!(file.with_file_name("figures").join("s1_staircase.png").is_file());
 }

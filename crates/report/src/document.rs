@@ -26,6 +26,57 @@ pub(crate) enum Block {
     Formulas { heading: String, lines: Vec<Formula> },
     /// A picture.
     Picture(Picture),
+    /// What a reader must know first, a box for each scheme or model.
+    Status(Vec<Status>),
+}
+
+/// The state of one scheme or model at a glance.
+pub(crate) struct Status {
+    /// Whose it is.
+    pub(crate) title: String,
+    /// A row per question.
+    pub(crate) rows: Vec<Finding>,
+}
+
+/// The answer to one question.
+pub(crate) struct Finding {
+    pub(crate) what: &'static str,
+    pub(crate) grade: Grade,
+    pub(crate) text: String,
+}
+
+/// What an answer means.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Grade {
+    /// As it should be.
+    Good,
+    /// It limits what the rest is worth.
+    Limited,
+    /// Nobody knows: not computed, not taken.
+    Open,
+}
+
+impl Grade {
+    pub(crate) fn mark(self) -> &'static str {
+        match self {
+            Self::Good => "ok",
+            Self::Limited => "LIMITED",
+            Self::Open => "open",
+        }
+    }
+}
+
+impl Status {
+    /// The box as a table, for formats that have no boxes.
+    fn table(&self) -> Block {
+        let row = |f: &Finding| vec![f.what.into(), f.grade.mark().into(), f.text.clone()];
+        Block::Table {
+            heading: format!("Status: {}", self.title),
+            header: vec!["question", "status", "finding"],
+            numbers: vec![false; 3],
+            rows: self.rows.iter().map(row).collect(),
+        }
+    }
 }
 
 /// A formula in program notation and as LaTeX.
@@ -93,6 +144,16 @@ pub(crate) enum Part<'a> {
 }
 
 impl Document {
+    /// The same with status boxes as tables.
+    pub(crate) fn plain(mut self) -> Self {
+        let tables = |b: Block| match b {
+            Block::Status(boxes) => boxes.iter().map(Status::table).collect(),
+            other => vec![other],
+        };
+        self.blocks = self.blocks.into_iter().flat_map(tables).collect();
+        self
+    }
+
     /// The blocks, with pictures that follow each other taken together.
     pub(crate) fn parts(&self) -> Vec<Part<'_>> {
         let mut out: Vec<Part<'_>> = Vec::new();
@@ -148,7 +209,8 @@ impl Document {
                         paragraph(&mut out, &line.text, layout);
                     }
                 }
-                Block::Picture(_) => {}
+                // a status is a table by now
+                Block::Picture(_) | Block::Status(_) => {}
             }
         }
         out
@@ -193,6 +255,7 @@ impl Document {
                     let caption = markdown::escape(&p.caption);
                     out.push_str(&format!("{gap}![{caption}]({PICTURES}/{}.svg)\n", p.name));
                 }
+                Block::Status(_) => {}
             }
         }
         out
@@ -210,7 +273,15 @@ impl Document {
         for block in &self.blocks {
             match block {
                 Block::Table { heading, header, numbers, rows } => {
-                    let columns: String = numbers.iter().map(|&n| if n { 'r' } else { 'l' }).collect();
+                    // a column of sentences is wrapped
+                    const LONG: usize = 70;
+                    let long = |k: usize| rows.iter().any(|r| r[k].chars().count() > LONG);
+                    let column = |(k, &number): (usize, &bool)| match number {
+                        true => "r",
+                        false if long(k) => "p{.5\\linewidth}",
+                        false => "l",
+                    };
+                    let columns: String = numbers.iter().enumerate().map(column).collect();
                     let cells = rows.iter().map(|r| r.iter().map(|c| latex::escape(c)).collect::<Vec<_>>());
                     out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
                     let header: Vec<String> = header.iter().map(|h| latex::escape(h)).collect();
@@ -242,6 +313,7 @@ impl Document {
                     p.name,
                     latex::escape(&p.caption)
                 )),
+                Block::Status(_) => {}
             }
         }
         out

@@ -9,7 +9,7 @@ use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
 use crate::ReportError;
-use crate::document::{Block, Document, Drawing, Formula, Part, Picture};
+use crate::document::{Block, Document, Drawing, Finding, Formula, Grade, Part, Picture, Status};
 use crate::figure::{Figure, Line, Stroke};
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
@@ -65,6 +65,19 @@ fn block(i: usize, part: &Part<'_>) -> Json {
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
         Block::Picture(_) => Json::Null, // in groups
+        Block::Status(boxes) => {
+            let row = |f: &Finding| {
+                let grade = match f.grade {
+                    Grade::Good => "good",
+                    Grade::Limited => "limited",
+                    Grade::Open => "open",
+                };
+                json!({ "what": f.what, "grade": grade, "mark": f.grade.mark(), "text": f.text })
+            };
+            let of =
+                |s: &Status| json!({ "title": s.title, "rows": s.rows.iter().map(row).collect::<Vec<_>>() });
+            json!({ "kind": "status", "boxes": boxes.iter().map(of).collect::<Vec<_>>() })
+        }
     }
 }
 

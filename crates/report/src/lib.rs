@@ -233,7 +233,8 @@ pub enum ReviewFormat {
 /// # Errors
 /// [`ReportError`].
 pub fn review(r: &DesignReview, format: ReviewFormat) -> Result<Vec<File>, ReportError> {
-    let document = review::document(r);
+    let boxes = review::document(r);
+    let document = if format == ReviewFormat::Html { boxes } else { boxes.plain() };
     match format {
         ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),
         ReviewFormat::Markdown => {

@@ -134,6 +134,7 @@ fn part(part: Part<'_>) -> Json {
             let lines: Vec<String> = lines.iter().map(|l| math::typst(&l.latex)).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
-        Block::Picture(_) => Json::Null, // in groups
+        // pictures are in groups, a status is a table by now
+        Block::Picture(_) | Block::Status(_) => Json::Null,
     }
 }

@@ -2,18 +2,20 @@
 
 mod model;
 mod pictures;
+mod verdict;
 
-use obsdeg_core::analysis::{Analysis, Status};
+use obsdeg_core::analysis::Analysis;
 use obsdeg_core::compare::answer::{Quantity, Review};
 use obsdeg_core::crosscheck::CrossCheck;
 use obsdeg_core::review::{DesignReview, SchemeReview};
 
-use crate::document::{Block, Document, Formula, number, optional};
+use crate::document::{Block, Document, Formula, optional};
 use crate::{compare, crosscheck, latex, simulation, words};
 
 /// A review as one document.
 pub(crate) fn document(r: &DesignReview) -> Document {
-    let mut blocks = Vec::new();
+    let schemes = r.schemes.iter().zip(&r.comparison.schemes).map(|(s, review)| verdict::status(s, review));
+    let mut blocks = vec![Block::Status(schemes.chain(r.models.iter().map(model::status)).collect())];
     let alone = r.schemes.len() + r.models.len() == 1;
     let level = if alone { 1 } else { 2 };
     for (i, (s, review)) in r.schemes.iter().zip(&r.comparison.schemes).enumerate() {
@@ -41,9 +43,10 @@ pub(crate) fn document(r: &DesignReview) -> Document {
             "degree: order of the output's derivatives that solves an unknown (J. NUDT 39(1) 2017); sigma ~ T^-(order + 1/2) with the \
              accuracy order"
                 .into(),
-            "verdicts are exact ranks in prime fields; sigmas are the information of all samples, without prior and drift noise; \
-             the filter's runs have both"
-                .into(),
+            format!(
+                "verdicts are exact ranks in prime fields; predicted {}; the filter's runs have both prior and drift noise",
+                words::PREDICTED
+            ),
         ],
     ));
     let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
@@ -74,7 +77,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usi
         review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
     blocks.push(section(level, "Verdict"));
     blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
-    blocks.push(Block::Text(verdict(s, review, &coefficients)));
+    blocks.push(Block::Text(verdict::sentences(s, review, &coefficients)));
     blocks.push(section(level, "Unknowns"));
     blocks.push(unknowns(a, review));
     blocks.push(pictures::staircase(a, &format!("{id}_staircase")));
@@ -94,6 +97,8 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usi
     blocks.push(list("", simulation::validity(&s.simulation.validity)));
     blocks.push(section(level, "Assumptions and certainty"));
     let mut assumed = words::assumptions(a);
+    // carry, latitude and observation are said above
+    assumed.extend(words::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
     assumed.push(words::certainty(a));
     assumed.extend(a.notes.iter().chain(&s.notes).map(|n| format!("note: {n}")));
@@ -111,68 +116,6 @@ fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usiz
     }
 }
 
-/// The verdict in two sentences: what is determined, and how well.
-fn verdict(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> String {
-    let a = &s.analysis;
-    let of = |status: Status| coefficients.iter().filter(move |q| q.status == status);
-    let seen: Vec<&&Quantity> = of(Status::Observable).collect();
-    let all = coefficients.len();
-    let what = match coefficients.first() {
-        Some(q) if q.name.starts_with("eps") => "components of the drift",
-        _ => "gyro coefficients",
-    };
-    let mut first = match (seen.len(), all) {
-        (n, all) if n == all => format!("The scheme determines every one of the {all} {what}"),
-        (n, all) => format!("The scheme determines {n} of the {all} {what}"),
-    };
-    if let Some(worst) = seen.iter().filter_map(|q| q.degree).max() {
-        first
-            .push_str(&format!(", {}", derivatives(worst, seen.iter().map(|q| (q.name.as_str(), q.degree)))));
-    }
-    let partners = |q: &&&Quantity| {
-        let verdict = a.quantities.iter().find(|v| v.name == q.name);
-        let partners = verdict.map_or_else(String::new, |v| v.partners.join(", "));
-        format!("{} from {partners}", q.name)
-    };
-    let lost: Vec<String> = of(Status::Inseparable).map(|q| partners(&q)).collect();
-    let lost = lost.join("; ");
-    let silent = joined(of(Status::NotExcited).map(|q| q.name.as_str()));
-    if !lost.is_empty() {
-        first.push_str(&format!("; it cannot tell {lost}"));
-    }
-    if !silent.is_empty() {
-        first.push_str(&format!("; it does not excite {silent}"));
-    }
-    let worst = seen.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
-    let missed: Vec<&str> = (coefficients.iter())
-        .filter(|q| q.requirement.is_some() && q.margin.is_none_or(|m| m < 1.0))
-        .map(|q| q.name.as_str())
-        .collect();
-    let accuracy = worst.map_or_else(
-        || "None of them has a finite predicted sigma".to_string(),
-        |(q, sigma)| {
-            format!(
-                "The largest predicted sigma of those is {} {} ({}) after {} s",
-                number(sigma),
-                q.unit,
-                q.name,
-                seconds(review.total_s)
-            )
-        },
-    );
-    let required = match (coefficients.iter().any(|q| q.requirement.is_some()), missed.is_empty()) {
-        (false, _) => "no requirement is stated".to_string(),
-        (true, true) => "every requirement is met".to_string(),
-        (true, false) => format!("the requirements on {} are NOT met", missed.join(", ")),
-    };
-    let filter = match &s.evidence {
-        None => String::new(),
-        Some(e) if e.passed => ", and the filter confirms the verdicts".into(),
-        Some(_) => ", and the filter DISAGREES with the verdicts".into(),
-    };
-    format!("{first}. {accuracy}; {required}{filter}.")
-}
-
 fn unknowns(a: &Analysis, review: &Review) -> Block {
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
@@ -186,7 +129,7 @@ fn unknowns(a: &Analysis, review: &Review) -> Block {
             predicted.map_or_else(|| q.unit.clone(), |p| p.unit.clone()),
             q.status.to_string(),
             words::degree(q.degree),
-            words::degree(q.accuracy_order),
+            words::accuracy_order(q.degree, q.accuracy_order, a.has_accuracy_orders),
             if q.partners.is_empty() { "-".into() } else { q.partners.join(" ") },
             of(|p| p.sigma),
             of(|p| p.requirement),
@@ -195,7 +138,7 @@ fn unknowns(a: &Analysis, review: &Review) -> Block {
         ]
     };
     Block::Table {
-        heading: "Every unknown, best first (- where it is not observable)".into(),
+        heading: format!("Every unknown, best first (- where it is not determined; {})", words::PREDICTED),
         header: vec![
             "unknown",
             "unit",
@@ -424,9 +367,15 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
 fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
     match &s.evidence {
         Some(c) => {
+            let outcome = if c.passed { "agree in every check" } else { "DISAGREE, as listed below" };
+            // the run below has the truth of the checks
+            let run = if s.simulation.consistency.consistent {
+                ""
+            } else {
+                ", but the run below is not consistent"
+            };
             blocks.push(Block::Text(format!(
-                "Exact verdicts and a Kalman filter are two independent paths: they {}.",
-                if c.passed { "agree in every check" } else { "DISAGREE, as listed below" }
+                "Exact verdicts and a Kalman filter are two independent paths: they {outcome}{run}."
             )));
             let document = crosscheck::document(c);
             blocks.extend(document.lead.into_iter().map(Block::Text));

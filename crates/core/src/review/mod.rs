@@ -131,7 +131,9 @@ fn scheme(
         Ok(evidence) if evidence.monte_carlo.runs < options.runs => return Err(ReviewError::Interrupted),
         Ok(evidence) => Some(evidence),
         Err(SimulationError::CrosscheckRotation) => {
-            notes.push("the evidence by a filter takes positions; this scheme has a rotating segment".into());
+            notes.push(
+                "this scheme has a rotating segment, and the evidence by a filter takes positions".into(),
+            );
             None
         }
         Err(error) => return Err(failed(error)),
@@ -207,7 +209,10 @@ fn attitudes(plan: &Plan) -> Vec<Attitude> {
                     at(t, &slew.at(t));
                 });
             }
-            Part::Rotation(turn) => at(0.0, &turn.at(0.0)),
+            Part::Rotation(turn) => {
+                at(0.0, &turn.at(0.0));
+                at(duration, &turn.at(duration));
+            }
         }
     }
     out

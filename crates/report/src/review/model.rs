@@ -1,16 +1,17 @@
 //! The part of a model in a review.
 
-use obsdeg_core::analysis::Status;
+use obsdeg_core::analysis::Status as Exact;
 use obsdeg_core::review::ModelReview;
+use obsdeg_core::simulation::answer::Outcome;
 
 use super::{derivatives, is_list, pictures, section};
-use crate::document::Block;
-use crate::system;
+use crate::document::{Block, Finding, Grade, Status};
+use crate::{system, words};
 
-/// The verdict on a model in two sentences.
+/// The verdict on a model: what limits it, and what is determined.
 fn verdict(m: &ModelReview) -> String {
     let a = &m.analysis;
-    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Status::Observable).collect();
+    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
     let worst = seen.iter().filter_map(|q| q.degree).max();
     let derivatives = worst.map_or_else(String::new, |k| {
         format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
@@ -20,16 +21,89 @@ fn verdict(m: &ModelReview) -> String {
         1 => "one direction changes no output".into(),
         n => format!("{n} independent directions change no output"),
     };
+    let limits = limits(m);
     let filter = match &m.evidence {
-        None => "No filter was run",
-        Some(e) if e.passed => "The information of a simulated run confirms the verdicts",
-        Some(_) => "The information of a simulated run DISAGREES with the verdicts",
+        Some(e) if e.passed && limits.is_empty() => {
+            " The information of a simulated run confirms the verdicts."
+        }
+        Some(e) if e.passed => {
+            " Within these limits the information of a simulated run agrees with the verdicts."
+        }
+        _ => "",
     };
+    let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
     format!(
-        "{} of {} unknowns are locally observable{derivatives}; {lost}. {filter}.",
+        "{lead}{} of {} unknowns are locally observable{derivatives}; {lost}.{filter}",
         seen.len(),
         a.quantities.len()
     )
+}
+
+/// Whether the information of a run agrees.
+fn evidence(m: &ModelReview) -> (Grade, String) {
+    match &m.evidence {
+        Some(e) if e.passed => (Grade::Good, format!("agree in all {} checks", e.checks)),
+        Some(e) => (Grade::Limited, format!("DISAGREE in {} of {} checks", e.failures, e.checks)),
+        None => (Grade::Open, "not taken".into()),
+    }
+}
+
+/// The run of the filter: whether it is credible.
+fn credible(m: &ModelReview) -> (Grade, String) {
+    match m.run.as_ref().map(|r| &r.0.consistency) {
+        None => (Grade::Open, "not run".into()),
+        Some(c) if c.consistent => (Grade::Good, "consistent with its truth".into()),
+        Some(c) => (Grade::Limited, format!("NOT consistent with its truth: {}", words::doubts(c))),
+    }
+}
+
+/// Estimates of the run that say what the prior says.
+fn by_prior(m: &ModelReview) -> Vec<&str> {
+    let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
+    let estimates = m.run.iter().flat_map(|(run, _)| &run.estimates);
+    // a start that is known rests on nothing else
+    let unknown = estimates.filter(|e| e.status.is_some() && (!e.is_determined() || rests(e.verdict)));
+    unknown.map(|e| e.name.as_str()).collect()
+}
+
+/// What limits the verdict.
+fn limits(m: &ModelReview) -> Vec<String> {
+    let mut out = Vec::new();
+    match credible(m) {
+        (Grade::Good, _) => {}
+        (_, what) => out.push(format!("the filter is {what}")),
+    }
+    match evidence(m) {
+        (Grade::Good, _) => {}
+        (Grade::Limited, what) => out.push(format!("the information of a run and the exact verdicts {what}")),
+        (Grade::Open, _) => out.push("no evidence by a run is taken".into()),
+    }
+    let prior = by_prior(m);
+    if !prior.is_empty() {
+        out.push(format!("the prior alone speaks for {}", words::names(prior)));
+    }
+    if m.analysis.rests_on_bound {
+        out.push(format!("what is not observable rests on orders up to {}", m.analysis.bound));
+    }
+    out
+}
+
+/// The box of a model.
+pub(super) fn status(m: &ModelReview) -> Status {
+    let a = &m.analysis;
+    let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
+    let row = |what, (grade, text)| Finding { what, grade, text };
+    let every = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
+    let mut rows = vec![
+        row("Observable", (every, format!("{seen} of {} unknowns, locally", a.quantities.len()))),
+        row("Filter, one run", credible(m)),
+        row("Filter and exact verdicts", evidence(m)),
+    ];
+    let prior = by_prior(m);
+    if !prior.is_empty() {
+        rows.push(row("Resting on the prior", (Grade::Limited, words::names(prior))));
+    }
+    Status { title: a.name.clone(), rows }
 }
 
 /// Verdict, unknowns, equations and evidence.

@@ -1,0 +1,201 @@
+//! The verdict on a scheme in words, led by what limits it, and its status at a glance.
+
+use obsdeg_core::analysis::Status as Exact;
+use obsdeg_core::compare::answer::{Quantity, Review};
+use obsdeg_core::review::SchemeReview;
+use obsdeg_core::simulation::answer::Outcome;
+
+use super::{derivatives, joined, seconds};
+use crate::document::{Finding, Grade, Status, number};
+use crate::words;
+
+/// What the unknowns besides psi are.
+fn kind(coefficients: &[&Quantity]) -> &'static str {
+    match coefficients.first() {
+        Some(q) if q.name.starts_with("eps") => "components of the drift",
+        _ => "gyro coefficients",
+    }
+}
+
+/// Why the small-angle model does not hold; `None` when it does.
+fn small_angles(s: &SchemeReview) -> Option<String> {
+    let v = &s.simulation.validity;
+    (!v.holds).then(|| {
+        format!(
+            "the small-angle model does NOT hold for these drifts: |psi| reaches {} deg, which leaves out {} times the noise of Z and {} \
+             deg/h of drift",
+            number(v.largest_psi_deg),
+            number(v.neglected_g / v.accelerometer_noise_g),
+            number(v.neglected_dph)
+        )
+    })
+}
+
+/// Estimates of the run that say what the prior says.
+fn by_prior(s: &SchemeReview) -> Vec<&str> {
+    let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
+    s.simulation.quantities.iter().filter(|q| rests(q.verdict)).map(|q| q.name.as_str()).collect()
+}
+
+/// Unknowns with a degree that the dwell does not leave determined.
+fn lost_with_dwell(s: &SchemeReview) -> Vec<&str> {
+    let a = &s.analysis;
+    let lost = a.quantities.iter().filter(|q| q.degree.is_some() && q.accuracy_order.is_none());
+    lost.filter(|_| a.has_accuracy_orders).map(|q| q.name.as_str()).collect()
+}
+
+/// The evidence: whether the checks of a filter agree.
+fn evidence(s: &SchemeReview) -> (Grade, String) {
+    match &s.evidence {
+        Some(e) if e.passed => {
+            (Grade::Good, format!("agree in every check, {} Monte Carlo runs", e.monte_carlo.runs))
+        }
+        Some(e) => {
+            let n = e.disagreements.len();
+            (Grade::Limited, format!("DISAGREE in {n} check{}", if n == 1 { "" } else { "s" }))
+        }
+        None => (Grade::Open, format!("not taken: {}", s.notes.first().map_or("unknown", String::as_str))),
+    }
+}
+
+/// What limits the verdict, the gravest first.
+fn limits(s: &SchemeReview) -> Vec<String> {
+    let mut out: Vec<String> = small_angles(s).into_iter().collect();
+    if !s.simulation.consistency.consistent {
+        out.push(format!(
+            "the run of the filter is NOT consistent with its truth ({})",
+            words::doubts(&s.simulation.consistency)
+        ));
+    }
+    match evidence(s) {
+        (Grade::Good, _) => {}
+        (Grade::Limited, what) => out.push(format!("filter and exact verdicts {what}")),
+        (Grade::Open, what) => out.push(format!("evidence by a filter is {what}")),
+    }
+    let prior = by_prior(s);
+    if !prior.is_empty() {
+        let (n, all) = (prior.len(), s.simulation.quantities.len());
+        out.push(format!("{n} of {all} estimates rest on the prior ({})", words::names(prior)));
+    }
+    let lost = lost_with_dwell(s);
+    if !lost.is_empty() {
+        out.push(format!(
+            "with dwell, {} are not determined although they have a degree",
+            words::names(lost)
+        ));
+    }
+    if !s.analysis.has_accuracy_orders {
+        out.push("accuracy orders are not computed".into());
+    }
+    out
+}
+
+/// The verdict: what limits it, what is determined, and how well.
+pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> String {
+    let a = &s.analysis;
+    let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
+    let seen: Vec<&&Quantity> = of(Exact::Observable).collect();
+    let (all, what) = (coefficients.len(), kind(coefficients));
+    let mut first = match (seen.len(), all) {
+        (n, all) if n == all => format!("The scheme determines every one of the {all} {what}"),
+        (n, all) => format!("The scheme determines {n} of the {all} {what}"),
+    };
+    if let Some(worst) = seen.iter().filter_map(|q| q.degree).max() {
+        let degrees = seen.iter().map(|q| (q.name.as_str(), q.degree));
+        first.push_str(&format!(", {}", derivatives(worst, degrees)));
+    }
+    let partners = |q: &&&Quantity| {
+        let verdict = a.quantities.iter().find(|v| v.name == q.name);
+        let partners = verdict.map_or_else(String::new, |v| v.partners.join(", "));
+        format!("{} from {partners}", q.name)
+    };
+    let lost: Vec<String> = of(Exact::Inseparable).map(|q| partners(&q)).collect();
+    let lost = lost.join("; ");
+    let silent = joined(of(Exact::NotExcited).map(|q| q.name.as_str()));
+    if !lost.is_empty() {
+        first.push_str(&format!("; it cannot tell {lost}"));
+    }
+    if !silent.is_empty() {
+        first.push_str(&format!("; it does not excite {silent}"));
+    }
+    let worst = seen.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
+    let accuracy = worst.map_or_else(
+        || "None of them has a finite predicted sigma".to_string(),
+        |(q, sigma)| {
+            format!(
+                "The largest predicted sigma of those is {} {} ({}) after {} s",
+                number(sigma),
+                q.unit,
+                q.name,
+                seconds(review.total_s)
+            )
+        },
+    );
+    let limits = limits(s);
+    let filter = match (&s.evidence, limits.is_empty()) {
+        (Some(e), true) if e.passed => ", and the filter confirms the verdicts",
+        (Some(e), false) if e.passed => "; within these limits a filter agrees with the exact verdicts",
+        _ => "",
+    };
+    let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
+    format!("{lead}{first}. {accuracy}; {}{filter}.", words::requirements(&review.requirements))
+}
+
+/// The box of a scheme.
+pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
+    let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
+    let counted = |psi: bool| {
+        let seen = of(psi).filter(|q| q.status == Exact::Observable).count();
+        format!("{seen} of {}", of(psi).count())
+    };
+    let coefficients: Vec<&Quantity> = of(false).collect();
+    let lost = lost_with_dwell(s);
+    let every = review.quantities.iter().all(|q| q.status == Exact::Observable) && lost.is_empty();
+    let dwell = match lost.is_empty() {
+        true => String::new(),
+        false => format!("; with dwell not determined: {}", words::names(lost)),
+    };
+    let grade = |good: bool| if good { Grade::Good } else { Grade::Limited };
+    let consistency = &s.simulation.consistency;
+    let prior = by_prior(s);
+    let (checks, agreement) = evidence(s);
+    let row = |what, grade, text| Finding { what, grade, text };
+    Status {
+        title: s.name.clone(),
+        rows: vec![
+            row(
+                "Observable",
+                grade(every),
+                format!("{} {}, {} of psi{dwell}", counted(false), kind(&coefficients), counted(true)),
+            ),
+            row(
+                "Requirements",
+                match review.requirements.stated {
+                    0 => Grade::Open,
+                    _ => grade(review.requirements.all_met()),
+                },
+                words::requirements(&review.requirements),
+            ),
+            row(
+                "Small-angle model",
+                grade(s.simulation.validity.holds),
+                small_angles(s).unwrap_or_else(|| "holds for these drifts".into()),
+            ),
+            row(
+                "Filter, one run",
+                grade(consistency.consistent),
+                if consistency.consistent {
+                    "consistent with its truth".into()
+                } else {
+                    format!("NOT consistent with its truth: {}", words::doubts(consistency))
+                },
+            ),
+            row("Filter and exact verdicts", checks, agreement),
+            row(
+                "Resting on the prior",
+                grade(prior.is_empty()),
+                if prior.is_empty() { "no estimate of the run".into() } else { words::names(prior) },
+            ),
+        ],
+    }
+}
