@@ -192,6 +192,9 @@ fn module(
     Err(AccuracyError::Precision)
 }
 
+/// A functional of the unknowns in a ring.
+type Row<R> = Vec<<R as Ring>::Element>;
+
 /// The rows `T^j H F^j S_i Phi_{i-1} ... Phi_1` in a ring: `power` gives `T^j`, `phi` the three rows of
 /// `Phi_i` for `psi^n` as functionals of `(psi^n, eps^n)` (the drift is constant). With them psi in the carried axes at the end.
 fn dwell_rows<R: LiftField>(
@@ -200,7 +203,7 @@ fn dwell_rows<R: LiftField>(
     chain: &[LocalRow],
     power: impl Fn(usize) -> R::Element,
     phi: impl Fn(usize) -> [[R::Element; LOCAL]; 3],
-) -> (Vec<Vec<R::Element>>, [Vec<R::Element>; 3]) {
+) -> (Vec<Row<R>>, [Row<R>; 3]) {
     let n = blocks[0].columns.len();
     // psi in the carried axes, as a functional of the unknowns
     let unit = |r: usize| (0..n).map(|c| if c == r { ring.one() } else { ring.zero() }).collect();
