@@ -134,6 +134,10 @@ fn scheme(
             notes.push("the evidence by a filter takes positions; this scheme has a rotating segment".into());
             None
         }
+        Err(error) if error.is_numeric() => {
+            notes.push(format!("no evidence by a filter: {error}"));
+            None
+        }
         Err(error) => return Err(failed(error)),
     };
     step(0.7, "sweeps")?;
