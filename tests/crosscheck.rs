@@ -219,6 +219,82 @@ proptest! {
     }
 }
 
+/// Noise, step and dwell only scale what the samples say: slopes, inflation and null vectors are theirs, not those of a prior.
+#[test]
+fn evidence_does_not_depend_on_noise_and_steps() {
+    let usual = right(&paper(Carry::Platform));
+    for (noise, step, dwell) in
+        [(1e-5, 0.1, 100.0), (1e-5, 0.01, 20.0), (1e-12, 10.0, 1000.0), (1e2, 1.0, 1000.0)]
+    {
+        let conditions = Conditions {
+            accelerometer_noise_g: noise,
+            step_s: step,
+            dwell_s: dwell,
+            ..Conditions::default()
+        };
+        let options = Options { runs: 2, seed: 1, filter: FilterChange::default() };
+        let c = crosscheck(&paper(Carry::Platform), &conditions, &options, &|_| true).expect("checked");
+        for (a, b) in usual.quantities.iter().zip(&c.quantities) {
+            let (slope, factor) =
+                (b.slope.measured.expect("a slope"), b.inflation.measured.expect("a factor"));
+            assert!(
+                (slope - a.slope.measured.expect("a slope")).abs() < 1e-4,
+                "{noise} {step}: {} {slope}",
+                a.name
+            );
+            assert!(b.slope.pass && b.inflation.pass, "{noise} {step}: {} {factor}", a.name);
+        }
+        assert!(c.defect.pass && c.null_space.iter().all(|v| v.seen.pass), "{noise} {step}");
+    }
+}
+
+/// Valid schemes always get an answer. (One of the first has coefficients that never separate, at a latitude and dwells that used to
+/// end in a pivot of nothing.)
+#[test]
+fn every_valid_scheme_is_answered() {
+    let mut first = scheme(&["0,0,180", "180,180,0", "0,-90,180", "90,180,-90", "0,90,0"], Carry::Platform);
+    first.latitude = "-60".parse().ok();
+    first.unknowns = "I,II".parse().expect("terms");
+    first.positions[0].dwell = "500".parse().ok();
+    let options = Options { runs: 2, seed: 1, filter: FilterChange::default() };
+    let answered =
+        |scheme: &Scheme, conditions: &Conditions| crosscheck(scheme, conditions, &options, &|_| true);
+    let c = answered(&first, &Conditions::default()).expect("an answer");
+    assert!(c.quantities.iter().all(|q| q.slope.pass && q.inflation.pass), "{:?}", c.disagreements);
+    let strategy = (
+        prop::collection::vec(prop::array::uniform3(-2i32..=2), 1..4),
+        prop::sample::subsequence(vec!["F", "I", "O", "S", "II", "OO", "SS", "IO", "IS", "OS"], 1..5),
+        prop::sample::select(vec!["-60", "0", "28.2", "89.9", "90"]),
+        prop::sample::select(Carry::ALL.to_vec()),
+        prop::sample::select(vec![1e-9, 1e-5, 1e-2]),
+        prop::sample::select(vec![20.0, 300.0]),
+        prop::sample::select(vec!["100", "500"]),
+    );
+    let config =
+        Config { cases: 40, rng_seed: RngSeed::Fixed(3), failure_persistence: None, ..Config::default() };
+    proptest!(config, |((places, terms, latitude, carry, noise, step, dwell) in strategy)| {
+        let attitudes: Vec<String> =
+            places.iter().map(|a| a.map(|k| (k * 90).to_string()).join(",")).collect();
+        let mut scheme = scheme(&attitudes.iter().map(String::as_str).collect::<Vec<_>>(), carry);
+        scheme.latitude = latitude.parse().ok();
+        scheme.unknowns = terms.join(",").parse().expect("terms");
+        scheme.positions[0].dwell = dwell.parse().ok();
+        let conditions = Conditions { accelerometer_noise_g: noise, step_s: step, ..Conditions::default() };
+        let answer = answered(&scheme, &conditions);
+        prop_assert!(answer.is_ok(), "{:?}", answer.err());
+    });
+}
+
+/// A position cannot be dropped when there is no other.
+#[test]
+fn the_only_position_is_not_dropped() {
+    let filter = FilterChange { dropped: Some(0), ..FilterChange::default() };
+    let options = Options { runs: 2, seed: 1, filter };
+    let one = scheme(&["0,0,0"], Carry::Platform);
+    let refused = crosscheck(&one, &Conditions::default(), &options, &|_| true).expect_err("refused");
+    assert!(refused.to_string().contains("only position"), "{refused}");
+}
+
 #[test]
 fn exit_codes_and_the_same_bytes() {
     let run = |arguments: &[&str]| {

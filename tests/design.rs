@@ -308,7 +308,10 @@ fn the_winner_is_a_scheme_file() {
         (&["design", "--positions", "5", "--max-time", "0"], "more than 0"),
         (&["design", "--positions", "5", "--slew-rate", "1"], "inertial"),
         (&["design", "--positions", "4", "--meet", "--requirement", "D=1e-9"], "every sequence was examined"),
-        (&["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"], "expected 1e-12 to 1e9"),
+        (
+            &["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"],
+            "expected 1e-12 to 1e9",
+        ),
         (&["design"], "--positions"),
         (&["design", "--positions", "0"], "1 to 100"),
         (&["design", "--positions", "3", "--carry", "inertial"], "no scheme of 3"),
@@ -467,7 +470,7 @@ fn what_is_not_required_may_be_lost() {
     let mut scheme = scheme_of(&chosen, Carry::Platform);
     scheme.positions[1].name = "p2".into();
     let plan = Plan::new(&scheme, &quiet()).expect("a plan");
-    let prior = obsdeg_core::simulation::batch::diffuse_prior(&plan);
+    let prior = obsdeg_core::simulation::batch::diffuse_prior(&plan).expect("a prior");
     let prior = SquareRootInformation::prior(&prior).expect("a prior");
     let all = batch(&plan, prior).expect("a batch").information.sigmas().expect("regular");
     for (own, c) in sigmas.iter().zip([3, 12]) {

@@ -302,6 +302,108 @@ fn runge_kutta_and_the_exponential_agree() {
     }
 }
 
+/// The noise of a drift held over a step is that of `(integral of exp(W t)) eps`, however long the step: here the integral is taken by
+/// Simpson's rule on the closed form of a rotation.
+#[test]
+fn held_drift_noise_of_any_step() {
+    for dt in [1.0, 10.0, 3000.0, 50_000.0] {
+        let scheme = scheme(&["0,0,0"], Carry::Platform);
+        let conditions = Conditions {
+            drift_noise: DriftNoise::OneStep(1.0),
+            step_s: dt,
+            dwell_s: dt,
+            ..Conditions::default()
+        };
+        let plan = Plan::new(&scheme, &conditions).expect("a plan");
+        let w = plan.earth_rate();
+        let rate = w.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let axis = w.map(|x| x / rate);
+        // psi' = psi x w: exp(W t) turns by -w t
+        let turned = |t: f64| -> [[f64; 3]; 3] {
+            let (s, c) = (-rate * t).sin_cos();
+            let cross = [[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]];
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    f64::from(u8::from(i == j)) * c + s * cross[i][j] + (1.0 - c) * axis[i] * axis[j]
+                })
+            })
+        };
+        let n = 2000;
+        let mut integral = [[0.0; 3]; 3];
+        for k in 0..=n {
+            let weight = if k == 0 || k == n {
+                1.0
+            } else if k % 2 == 1 {
+                4.0
+            } else {
+                2.0
+            };
+            let m = turned(dt * f64::from(k) / f64::from(n));
+            for i in 0..3 {
+                for j in 0..3 {
+                    integral[i][j] += weight * m[i][j] * dt / f64::from(n) / 3.0;
+                }
+            }
+        }
+        let held = 1f64.to_radians() / 3600.0;
+        let root = plan.noise_roots[0];
+        for i in 0..3 {
+            for j in 0..3 {
+                let found: f64 = (0..3).map(|k| root[i][k] * root[j][k]).sum();
+                let expected: f64 =
+                    (0..3).map(|k| integral[i][k] * integral[j][k]).sum::<f64>() * held * held;
+                assert!(
+                    (found - expected).abs() < 1e-9 * dt * dt * held * held,
+                    "{dt}: {found:e} {expected:e}"
+                );
+            }
+        }
+    }
+}
+
+/// Exact truths take as many integration steps as their drifts need, and those that need too many are refused.
+#[test]
+fn large_drifts_of_an_exact_truth() {
+    let large = |d: f64| Conditions {
+        truth: Truth::Exact,
+        values: vec![Assignment { name: "D_FX".into(), value: d }],
+        drift_noise: DriftNoise::OneStep(0.0),
+        accelerometer_noise_g: 1e-12,
+        step_s: 100.0,
+        dwell_s: 1000.0,
+        ..Conditions::default()
+    };
+    // D_FX turns the platform about X_p, N: after t seconds Z3 = -sin of the angle, whatever the step
+    let (_, record) = simulate(&scheme(&["0,0,0"], Carry::Platform), &large(20_000.0), 1).expect("a run");
+    let psi = record.traces.series[0].truth.last().copied().expect("an end");
+    let drift = 20_000f64.to_radians() / 3600.0 * 1000.0;
+    let turns = (drift - psi) / std::f64::consts::TAU;
+    assert!((turns - turns.round()).abs() < 0.01, "{psi} {drift}");
+    let scale = Conditions { drift_scale: 1e6, ..large(1e6) };
+    let refused = simulate(&paper(Carry::Platform), &scale, 1).expect_err("too many");
+    assert!(matches!(refused, SimulationError::TooManySteps { .. }), "{refused}");
+}
+
+/// Every count is tested in floating point, before anything is made of it.
+#[test]
+fn counts_of_steps_that_cannot_be() {
+    let refused = |scheme: &Scheme, step_s: f64| {
+        let conditions = Conditions { step_s, ..Conditions::default() };
+        Plan::derived(scheme, &conditions).expect_err("too many").to_string()
+    };
+    let mut turning = scheme(&["0,0,0"], Carry::Platform);
+    turning.positions[0].rotation = Some(Rotation::new("X_p", "360").expect("a rotation"));
+    // 2^64 steps, and beyond: no count wraps
+    for step_s in [1e-6, 1.0842021724855044e-16, 1e-300, 0.0] {
+        assert!(refused(&paper(Carry::Platform), step_s).contains("expected at most 1000000"));
+        assert!(refused(&turning, step_s).contains("expected at most"));
+    }
+    assert!(refused(&turning, 0.005).contains("200000 steps of rotating segments; expected at most 100000"));
+    let mut many = scheme(&["0,0,0"; 90], Carry::Reset);
+    many.positions.iter_mut().for_each(|p| p.dwell = "1000".parse().ok());
+    assert!(refused(&many, 0.5).contains("steps times unknowns"));
+}
+
 #[test]
 fn what_cannot_be_simulated_is_refused_by_name() {
     let refused = |scheme: &Scheme, c: &Conditions| simulate(scheme, c, 1).expect_err("refused");
@@ -424,7 +526,7 @@ fn wrong_arguments_name_the_place() {
         (&["--noise", "1e-160"], "expected 1e-15 to 1000 g"),
         (&["--noise", "1e155"], "expected 1e-15 to 1000 g"),
         (&["--prior", "D=1e200"], "expected 1e-9 to 1e9"),
-        (&["--slew-rate", "1e-6"], "expected 1e-4 to 10000 deg/s"),
+        (&["--slew-rate", "1e-6"], "expected 0.001 to 10000 deg/s"),
         (&["--value", "D_FX"], "NAME=NUMBER"),
         (&["--value", "D_FW=1"], "`D_FW`"),
         (&["--prior", "psi=0"], "'--prior <NAME=X>': expected 1e-9 to 1e9"),

@@ -72,7 +72,7 @@ pub(crate) struct ConditionArguments {
     truth: Option<TruthArgument>,
 
     /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
-    /// 1e-4 to 10000 deg/s)
+    /// 0.001 to 10000 deg/s)
     #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
     slew_rate: Option<f64>,
 

@@ -132,7 +132,7 @@ struct WantedArguments {
     #[arg(long, value_name = "S", requires = "slew_rate")]
     max_slew: Option<f64>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous; 1e-4 to 10000 deg/s)
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous; 0.001 to 10000 deg/s)
     #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
     slew_rate: Option<f64>,
 

@@ -80,7 +80,7 @@ impl Judged {
         let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions };
         let plan = Plan::new(scheme, &still)?;
         let prediction = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
-        let prior = SquareRootInformation::prior(&diffuse_prior(&plan))?;
+        let prior = SquareRootInformation::prior(&diffuse_prior(&plan)?)?;
         let sigmas = batch(&plan, prior)?.information.sigmas()?;
         let units = plan.platform.units().iter();
         let sigmas = sigmas

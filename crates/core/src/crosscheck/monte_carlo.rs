@@ -12,7 +12,7 @@ use crate::simulation::SimulationError;
 use crate::simulation::conditions::Conditions;
 use crate::simulation::plan::Plan;
 use crate::simulation::record::{Start, first_steps};
-use crate::simulation::truth::{Noise, TruthModel};
+use crate::simulation::truth::{Noise, TruthModel, check_drifts};
 
 /// Times at which NEES is taken.
 const CHECKPOINTS: usize = 20;
@@ -100,6 +100,14 @@ impl<'a> Prepared<'a> {
         let start = Start::new(filter, &conditions.within(&filter.platform))?;
         let same = filter.platform.names() == experiment.truth.platform.names();
         let truth_start = if same { start.clone() } else { Start::new(experiment.truth, conditions)? };
+        let first = truth_start.sigma.len() - experiment.truth.platform.coefficients();
+        let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).skip(first);
+        // six sigma
+        check_drifts(
+            experiment.truth,
+            conditions,
+            drawn.map(|(mean, sigma)| mean.abs() + 6.0 * sigma).sum(),
+        )?;
         let total: usize = filter.segments.iter().map(|s| s.steps).sum();
         let points = CHECKPOINTS.min(total);
         let checkpoints: Vec<usize> = (1..=points).map(|i| (i * total).div_ceil(points) - 1).collect();

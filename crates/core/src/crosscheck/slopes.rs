@@ -2,7 +2,7 @@
 
 use obsdeg_ekf::SquareRootInformation;
 
-use crate::model::{Dwell, Scheme};
+use crate::model::{Dwell, Scheme, SchemeError};
 use crate::simulation::SimulationError;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise};
@@ -13,8 +13,8 @@ use crate::simulation::plan::Plan;
 const MEASURED: [f64; 5] = [2.0, 3.56, 6.32, 11.2, 20.0];
 /// More dwells for the plot.
 const SHOWN: [f64; 6] = [63.2, 200.0, 632.0, 1120.0, 2000.0, 6320.0];
-/// How much looser the prior is than that of the inflation: the dwells are that much shorter.
-const LOOSER: f64 = 100.0;
+/// The dwell whose measurements say how wide the prior is.
+const PRIOR_AT: f64 = 20.0;
 /// Samples per position: the noise of a sample is scaled so that its density stays.
 const SAMPLES: f64 = 50.0;
 
@@ -40,13 +40,30 @@ pub fn slopes(
 ) -> Result<Slopes, SimulationError> {
     let mut dwells: Vec<f64> = MEASURED.into_iter().chain(SHOWN).collect();
     dwells.sort_by(f64::total_cmp);
-    let mut sigmas = vec![Vec::new(); functionals.len()];
-    for &dwell in &dwells {
-        let (scheme, conditions) = scaled(scheme, conditions, dwell);
-        let plan = Plan::new(&scheme, &conditions)?;
-        let prior: Vec<f64> = diffuse_prior(&plan).iter().map(|s| s * LOOSER).collect();
+    let plan = |dwell: f64| {
+        let scaled = scaled(scheme, conditions, dwell).map_err(|_| too_different());
+        scaled.and_then(|(scheme, conditions)| match Plan::derived(&scheme, &conditions) {
+            Err(SimulationError::TooManySteps { .. }) => Err(too_different()),
+            plan => plan,
+        })
+    };
+    let prior = diffuse_prior(&plan(PRIOR_AT)?)?;
+    let root = |dwell: f64| -> Result<_, SimulationError> {
         let prior = SquareRootInformation::prior(&prior)?;
-        let root = batch(&plan, prior)?.information.inverse_root()?;
+        Ok(batch(&plan(dwell)?, prior)?.information.inverse_root()?)
+    };
+    let mut sigmas = vec![Vec::new(); functionals.len()];
+    let mut roots = Vec::new();
+    for dwell in dwells {
+        match root(dwell) {
+            Ok(root) => roots.push((dwell, root)),
+            // a dwell that is only shown may be too long for this prior
+            Err(e) if MEASURED.contains(&dwell) => return Err(e),
+            Err(_) => {}
+        }
+    }
+    let dwells: Vec<f64> = roots.iter().map(|(dwell, _)| *dwell).collect();
+    for (_, root) in &roots {
         for (s, functional) in sigmas.iter_mut().zip(functionals) {
             // c S^-1: large variances cancel here, not in the covariance
             let entry = |j: usize| functional.iter().map(|&(i, k)| k * root[(i, j)]).sum::<f64>();
@@ -58,25 +75,27 @@ pub fn slopes(
     Ok(Slopes { slopes: sigmas.iter().map(slope).collect(), dwells, sigmas })
 }
 
+/// The dwells differ so much that no slope can be measured.
+fn too_different() -> SimulationError {
+    let what = "the dwells of the positions differ so much that no slope against them can be measured";
+    SimulationError::Unresolvable { what: what.into() }
+}
+
 /// The scheme with its first position lasting `dwell`, the others in proportion.
-fn scaled(scheme: &Scheme, conditions: &Conditions, dwell: f64) -> (Scheme, Conditions) {
+fn scaled(scheme: &Scheme, conditions: &Conditions, dwell: f64) -> Result<(Scheme, Conditions), SchemeError> {
     let seconds = |d: Option<Dwell>| d.map_or(conditions.dwell_s, Dwell::seconds);
     let factor = scheme.positions.first().map_or(1.0, |p| dwell / seconds(p.dwell));
-    let mut scheme = scheme.clone();
-    for p in &mut scheme.positions {
-        p.dwell = p.dwell.and_then(|d| Dwell::from_seconds(d.seconds() * factor));
-    }
+    let scheme = scheme.with_dwells(conditions.dwell_s, factor)?;
     let step = dwell / SAMPLES;
     let conditions = Conditions {
         step_s: step,
-        dwell_s: conditions.dwell_s * factor,
         slews: false,
         accelerometer_noise_g: conditions.accelerometer_noise_g * (conditions.step_s / step).sqrt(),
         azimuth_noise_deg: conditions.azimuth_noise_deg * (conditions.step_s / step).sqrt(),
         drift_noise: DriftNoise::OneStep(0.0),
         ..conditions.clone()
     };
-    (scheme, conditions)
+    Ok((scheme, conditions))
 }
 
 /// The slope of the least-squares line.

@@ -51,7 +51,7 @@ pub(super) fn structure(
     conditions: &Conditions,
 ) -> Result<Structure, SimulationError> {
     let conditions = &still(conditions);
-    let filter = Plan::new(filter_scheme, conditions)?;
+    let filter = Plan::derived(filter_scheme, conditions)?;
     let names = names(truth, prediction);
     let functionals = functionals(truth, &filter, prediction);
     let known: Vec<Combination> = functionals.iter().flatten().cloned().collect();
@@ -103,8 +103,9 @@ struct Inflation {
 }
 
 fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, SimulationError> {
+    let prior = diffuse_prior(plan)?;
     let end = |factor: f64| {
-        let sigma = diffuse_prior(plan).into_iter().map(|s| s * factor).collect();
+        let sigma = prior.iter().map(|s| s * factor).collect();
         last_covariance(plan, &Start { truth: Vec::new(), estimate: Vec::new(), sigma }, Form::Ud)
     };
     let (small, large) = (end(1.0)?, end(10.0)?);
@@ -215,7 +216,8 @@ fn null_evidence(
         let correlation = (comparable && alone && vector.len() > 1).then(|| {
             let pairs = vector.iter().enumerate().flat_map(|(i, a)| vector[..i].iter().map(move |b| (a, b)));
             let signed = pairs.map(|(a, b)| correlation[(a.0, b.0)] * (a.1 * b.1).signum());
-            let smallest = signed.fold(1.0, f64::min);
+            // NaN stays
+            let smallest = signed.fold(1.0, |a: f64, b| if b >= a { a } else { b });
             Check { predicted: 1.0, measured: Some(smallest), pass: smallest > 0.999 }
         });
         evidence.push(NullEvidence {

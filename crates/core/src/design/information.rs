@@ -13,7 +13,7 @@ use crate::model::{Carry, Gimbals, Platform, Scheme, SlewTo};
 use crate::simulation::SimulationError;
 use crate::simulation::attitude_path::Slew;
 use crate::simulation::conditions::{Conditions, latitude_of, si_per_shown};
-use crate::simulation::plan::{Plan, W_IE};
+use crate::simulation::plan::{Plan, W_IE, steps};
 
 /// Most unknowns of a search: psi and the coefficients of ten terms.
 pub const MAX: usize = 33;
@@ -142,7 +142,7 @@ impl Evaluator {
             }
             f[(i, i + 3)] = 1.0;
         }
-        let steps = (dwell_s / self.conditions.step_s - 1e-9).ceil().max(1.0) as usize;
+        let steps = steps(dwell_s, self.conditions.step_s)?;
         let none = DMatrix::zeros(LOCAL, LOCAL);
         let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
         let outputs = local_output(&Float, self.platform.scheme().measured_azimuth);
@@ -203,8 +203,7 @@ impl Evaluator {
     /// `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n behind a turn by psi^n and the coefficients.
     fn turn(&self, slew: &Slew) -> Turn {
         let n = self.n;
-        let angle = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * slew.duration_s;
-        let steps = (angle / TURN_STEP).ceil().max(1.0);
+        let steps = (slew.turn(slew.duration_s) / TURN_STEP).ceil().max(1.0);
         let dt = slew.duration_s / steps;
         let drift_at = |t: f64| self.ordered_columns(self.platform.drift_rows(&Float, &slew.at(t)));
         let slope = |x: &[Vec<f64>; 3], drift: &[Vec<f64>; 3]| -> [Vec<f64>; 3] {

@@ -243,7 +243,8 @@ impl<'a> Task<'a> {
                 if (count, factor) == (k, 1.0) {
                     continue;
                 }
-                let other = evaluator.clone().with_dwell(dwell_s * factor)?;
+                // a dwell of too many steps is no point of the front
+                let Ok(other) = evaluator.clone().with_dwell(dwell_s * factor) else { continue };
                 // the schemes are compared by their criterion alone
                 let there = Search { evaluator: &other, keep: 1, ..*search };
                 let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };

@@ -136,6 +136,10 @@ fn scheme(
             );
             None
         }
+        Err(error) if error.is_numeric() => {
+            notes.push(format!("no evidence by a filter: {error}"));
+            None
+        }
         Err(error) => return Err(failed(error)),
     };
     step(0.7, "sweeps")?;

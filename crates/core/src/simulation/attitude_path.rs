@@ -1,5 +1,6 @@
 //! The computed attitude over time: constant at a position, turning about an eigenaxis during a slew.
 
+use super::plan::W_IE;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
 use crate::model::rotation::{Axis, Rotation, SlewTo};
@@ -116,6 +117,11 @@ impl Slew {
         let duration_s = angle.abs() / rate_rad_s;
         let rate = axis.map(|x| x * angle / duration_s);
         Ok((angle.abs() > 1e-12).then_some(Self { from: *from, rate, duration_s }))
+    }
+
+    /// How far it turns in `t` seconds, with the earth rate, in rad.
+    pub fn turn(&self, t: f64) -> f64 {
+        (self.rate.iter().map(|x| x * x).sum::<f64>().sqrt() + W_IE) * t
     }
 
     /// `C_c^n` after `t` seconds.

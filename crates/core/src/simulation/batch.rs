@@ -5,11 +5,13 @@ use obsdeg_ekf::{EkfError, SquareRootInformation};
 
 use super::plan::Plan;
 
-/// Diffuse prior standard deviation of psi, in rad: with that of the drift in the ratio of the earth rate, so that
-/// a null vector of both is left as loose as either.
-const DIFFUSE_PSI: f64 = 1e6;
-/// Diffuse prior standard deviation of a drift, in rad/s.
-const DIFFUSE_DRIFT: f64 = 1e2;
+/// How many times wider a prior that says nothing is than what the measurements alone say of one unknown, the others known: wide
+/// against all that can be determined, and far enough from 1e16 that rounding does not look like information.
+const WIDER_PSI: f64 = 1e12;
+/// The same for drifts. They enter with the dwell, which in a sweep grows to hundreds of times that at which the prior was taken.
+const WIDER_DRIFT: f64 = 1e10;
+/// Rows that are added at a time.
+const ROWS: usize = 4096;
 
 /// The root of the information on the initial unknowns, and the transition from start to end.
 #[derive(Debug, Clone)]
@@ -28,29 +30,47 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
     let n = plan.unknowns();
     let mut to_now: DMatrix<f64> = DMatrix::identity(n, n);
     let mut scratch = Vec::new();
+    let most = ROWS.max(4 * n);
+    let mut rows: Vec<f64> = Vec::new();
+    let mut add = |rows: &mut Vec<f64>| {
+        let taken = DMatrix::from_row_slice(rows.len() / n, n, rows);
+        rows.clear();
+        information.add(&taken)
+    };
     for stage in &plan.stages {
-        let outputs = stage.outputs.len();
-        let mut rows = DMatrix::zeros(stage.steps * outputs, n);
-        for step in 0..stage.steps {
+        for _ in 0..stage.steps {
             for column in to_now.as_mut_slice().chunks_exact_mut(n) {
                 stage.transition.apply(column, &mut scratch);
             }
-            for (k, output) in stage.outputs.iter().enumerate() {
+            for output in &stage.outputs {
                 let weight = 1.0 / output.r.sqrt();
-                for j in 0..n {
-                    let column = &to_now.as_slice()[j * n..(j + 1) * n];
-                    rows[(step * outputs + k, j)] = weight * output.predict(column);
-                }
+                rows.extend(to_now.as_slice().chunks_exact(n).map(|column| weight * output.predict(column)));
+            }
+            if rows.len() >= most * n {
+                add(&mut rows)?;
             }
         }
-        if outputs > 0 {
-            information.add(&rows)?;
-        }
+    }
+    if !rows.is_empty() {
+        add(&mut rows)?;
     }
     Ok(Batch { information, to_end: to_now })
 }
 
-/// Standard deviations that say nothing.
-pub fn diffuse_prior(plan: &Plan) -> Vec<f64> {
-    plan.platform.units().iter().map(|u| if *u == "rad" { DIFFUSE_PSI } else { DIFFUSE_DRIFT }).collect()
+/// Standard deviations that say nothing beside the measurements of `plan`: in units of what these say, so that noise, steps and
+/// dwells do not matter.
+///
+/// # Errors
+/// [`EkfError`] when a number is not finite.
+pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
+    let information = batch(plan, SquareRootInformation::none(plan.unknowns()))?.information;
+    let units = plan.platform.units();
+    let sigma = |psi: bool, wider: f64| {
+        let own = information.root().column_iter().zip(units).filter(|(_, u)| (**u == "rad") == psi);
+        let largest = own.map(|(column, _)| column.norm()).fold(0.0, f64::max);
+        // nothing is measured of any: any prior will do
+        if largest > 0.0 { wider / largest } else { wider }
+    };
+    let (psi, drift) = (sigma(true, WIDER_PSI), sigma(false, WIDER_DRIFT));
+    Ok(units.iter().map(|u| if *u == "rad" { psi } else { drift }).collect())
 }

@@ -70,10 +70,20 @@ pub enum SimulationError {
         found: usize,
     },
     /// Too many steps.
-    #[error("{found} steps; expected at most {} (take longer steps)", plan::MAX_STEPS)]
+    #[error("{found} {what}; expected at most {most} (take longer steps)")]
     TooManySteps {
-        /// Number of steps.
-        found: usize,
+        /// Their number.
+        found: String,
+        /// What is counted.
+        what: &'static str,
+        /// The most.
+        most: usize,
+    },
+    /// Numbers that are admitted, but that doubles cannot tell apart.
+    #[error("not resolvable in double precision: {what}")]
+    Unresolvable {
+        /// What is not.
+        what: String,
     },
     /// A condition beyond its range.
     #[error(transparent)]
@@ -97,6 +107,17 @@ pub enum SimulationError {
     /// The filter refuses a number.
     #[error(transparent)]
     Filter(#[from] EkfError),
+}
+
+impl SimulationError {
+    /// Whether admitted numbers went beyond what doubles resolve.
+    pub fn is_numeric(&self) -> bool {
+        match self {
+            Self::Unresolvable { .. } => true,
+            Self::Filter(e) => e.is_numeric(),
+            _ => false,
+        }
+    }
 }
 
 /// Simulates `scheme` once: the summary and the time series.

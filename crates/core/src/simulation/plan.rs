@@ -19,8 +19,43 @@ pub const W_IE: f64 = 7.292115e-5;
 pub const MAX_UNKNOWNS: usize = 300;
 /// Most steps of a run.
 pub const MAX_STEPS: usize = 1_000_000;
-/// Largest turn of one integration step during a slew, in rad.
+/// Most steps of rotating segments: each has a model of its own.
+pub const MAX_TURNING_STEPS: usize = 100_000;
+/// Most numbers of a series: steps times unknowns.
+pub const MAX_NUMBERS: usize = 20_000_000;
+/// Most integration steps, of slews and rotations or of a true attitude.
+pub const MAX_INTEGRATION: usize = 2_000_000;
+/// Largest turn of one integration step, in rad.
 const MAX_TURN: f64 = 0.02;
+
+/// A count that has been found in floating point, so that nothing overflows.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`] above `most`, and for what is no number.
+fn counted(what: &'static str, found: f64, most: usize) -> Result<usize, SimulationError> {
+    if found <= most as f64 {
+        return Ok(found as usize);
+    }
+    let found = if found < 1e9 { format!("{found:.0}") } else { format!("{found:.3e}") };
+    Err(SimulationError::TooManySteps { found, what, most })
+}
+
+/// The equal steps of at most `step_s` that a dwell is divided into.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`].
+pub fn steps(dwell_s: f64, step_s: f64) -> Result<usize, SimulationError> {
+    // a hair less, so that 1000 s in steps of 10 s are 100
+    counted("steps", (dwell_s / step_s - 1e-9).ceil().max(1.0), MAX_STEPS)
+}
+
+/// Integration steps for a turn of so many rad.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`].
+pub(super) fn integration_steps(turn: f64) -> Result<usize, SimulationError> {
+    counted("integration steps", (turn / MAX_TURN).ceil().max(1.0), MAX_INTEGRATION)
+}
 
 /// What a part of the timeline is.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +114,14 @@ impl Plan {
     /// or steps, conditions that are not positive.
     pub fn new(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
         conditions.validate()?;
+        Self::derived(scheme, conditions)
+    }
+
+    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond what is admitted.
+    ///
+    /// # Errors
+    /// [`SimulationError`], as [`Self::new`].
+    pub fn derived(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
         let scheme = Scheme { latitude: latitude_of(scheme), ..scheme.clone() };
         if let Some(name) = scheme.generic_names().first() {
             return Err(SimulationError::GenericAngle { name: name.clone() });
@@ -104,11 +147,7 @@ impl Plan {
             .collect();
         let attitudes: Vec<_> = bounds.iter().map(|b| point.attitudes[b.0]).collect();
         let ends: Vec<_> = bounds.iter().map(|b| point.attitudes[b.1]).collect();
-        let segments = timeline(&scheme, conditions, &attitudes, &ends)?;
-        let steps: usize = segments.iter().map(|s| s.steps).sum();
-        if steps > MAX_STEPS {
-            return Err(SimulationError::TooManySteps { found: steps });
-        }
+        let segments = timeline(&scheme, conditions, n, &attitudes, &ends)?;
         let mut blocks: Vec<Option<Block<f64>>> = platform.blocks(&point).into_iter().map(Some).collect();
         let blocks: Vec<_> = bounds.iter().filter_map(|b| blocks[b.0].take()).collect();
         let outputs = local_output(&Float, scheme.measured_azimuth);
@@ -189,7 +228,9 @@ impl Plan {
             Kind::Dwell => {
                 let phi = match conditions.propagation {
                     Propagation::Exponential => self.exponential(block, s.dt)?,
-                    Propagation::Rk4 => runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, 1).phi,
+                    Propagation::Rk4 => {
+                        runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi
+                    }
                 };
                 (phi, self.held_noise(block, s.dt, held))
             }
@@ -254,10 +295,18 @@ impl Plan {
 
     /// The covariance on psi of a drift of standard deviation `held` (rad/s) held over `dt`.
     fn held_noise(&self, block: &Block<f64>, dt: f64, held: f64) -> Matrix3<f64> {
-        // B = integral of exp(W t): 1 dt + W dt^2/2 up to (w dt)^2
+        // B = integral of exp(W t) = 1 dt + (1 - cos x)/x^2 W dt^2 + (x - sin x)/x^3 W^2 dt^3 with x = w dt
         let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
+        let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j] * dt));
+        let x = W_IE * dt;
+        let half = (x / 2.0).sin() / (x / 2.0);
+        let (first, second) = (
+            0.5 * half * half,
+            if x < 0.1 { 1.0 / 6.0 - x * x / 120.0 + x.powi(4) / 5040.0 } else { (x - x.sin()) / x.powi(3) },
+        );
+        let w2 = times(&w, &w);
         let b: Matrix3<f64> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| f64::from(u8::from(i == j)) * dt + f[i][j] * dt * dt / 2.0)
+            std::array::from_fn(|j| (f64::from(u8::from(i == j)) + first * w[i][j] + second * w2[i][j]) * dt)
         });
         let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
         let to_psi = times(&transpose(&p), &b);
@@ -274,9 +323,11 @@ fn point_of(scheme: &Scheme) -> Point<Float> {
     Point { ring: Float, w_n: W_IE * c, w_u: W_IE * s, attitudes }
 }
 
+/// The positions and slews in order; what there would be too much of is refused before it is made.
 fn timeline(
     scheme: &Scheme,
     conditions: &Conditions,
+    unknowns: usize,
     attitudes: &[Matrix3<f64>],
     ends: &[Matrix3<f64>],
 ) -> Result<Vec<Segment>, SimulationError> {
@@ -287,6 +338,7 @@ fn timeline(
         segments.push(Segment { position, kind, start_s, steps, dt });
         start_s += duration;
     };
+    let (mut all, mut turning, mut integration) = (0.0, 0.0, 0.0);
     for (position, p) in scheme.positions.iter().enumerate() {
         if let (Some(rate), true) = (conditions.slew_rate(p), position > 0) {
             let how = p.slew.clone().unwrap_or_default();
@@ -294,17 +346,26 @@ fn timeline(
             let name = || p.name.clone();
             if let Some(slew) = slew.map_err(|_| SimulationError::SlewMisses { name: name() })? {
                 let duration = slew.duration_s;
+                all += 1.0;
+                integration += slew.turn(duration) / MAX_TURN;
+                counted("integration steps", integration, MAX_INTEGRATION)?;
                 push(position, Kind::Slew(slew), duration, 1);
             }
         }
         let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
-        // a hair less, so that 1000 s in steps of 10 s are 100
-        let steps = (dwell / conditions.step_s - 1e-9).ceil().max(1.0) as usize;
+        let steps = steps(dwell, conditions.step_s)?;
+        all += steps as f64;
+        counted("steps", all, MAX_STEPS)?;
+        counted("steps times unknowns", all * unknowns as f64, MAX_NUMBERS)?;
         match p.rotation.as_ref() {
             None => push(position, Kind::Dwell, dwell, steps),
             Some(r) => {
                 let dt = dwell / steps as f64;
                 let whole = Slew::about(&attitudes[position], r, dwell);
+                turning += steps as f64;
+                integration += whole.turn(dwell) / MAX_TURN;
+                counted("steps of rotating segments", turning, MAX_TURNING_STEPS)?;
+                counted("integration steps", integration, MAX_INTEGRATION)?;
                 for k in 0..steps {
                     let from = whole.at(k as f64 * dt);
                     push(position, Kind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }), dt, 1);
@@ -414,16 +475,15 @@ impl Plan {
         }
     }
 
-    /// Integration steps per step of a segment.
+    /// Integration steps per step of a segment: psi turns with the earth rate, and the platform with what is commanded.
     pub(super) fn substeps(&self, segment: usize) -> usize {
         let s = &self.segments[segment];
-        match &s.kind {
-            Kind::Dwell => 1,
-            Kind::Slew(slew) | Kind::Rotation(slew) => {
-                let turn = slew.rate.iter().map(|x| x * x).sum::<f64>().sqrt() * s.dt;
-                (turn / MAX_TURN).ceil().max(1.0) as usize
-            }
-        }
+        let turn = match &s.kind {
+            Kind::Dwell => W_IE * s.dt,
+            Kind::Slew(slew) | Kind::Rotation(slew) => slew.turn(s.dt),
+        };
+        // the timeline has counted them
+        integration_steps(turn).unwrap_or(MAX_INTEGRATION)
     }
 
     /// Whether the unknowns are coefficients, not the drift itself.

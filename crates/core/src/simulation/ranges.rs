@@ -23,7 +23,7 @@ pub const STEP_S: Range = range(1e-6, 1e6, "s");
 /// The dwell of a position.
 pub const DWELL_S: Range = range(1e-3, 1e6, "s");
 /// The rate of a slew.
-pub const SLEW_RATE_DEG_S: Range = range(1e-4, 1e4, "deg/s");
+pub const SLEW_RATE_DEG_S: Range = range(1e-3, 1e4, "deg/s");
 /// White noise of the observation.
 pub const NOISE_G: Range = range(1e-15, 1e3, "g");
 /// Noise of a measured azimuth.

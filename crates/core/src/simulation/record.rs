@@ -7,7 +7,7 @@ use obsdeg_ekf::{Covariance, Form};
 use super::SimulationError;
 use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, Truth, resolve, shown_unit, si_per_shown};
 use super::plan::Plan;
-use super::truth::{Noise, TruthModel};
+use super::truth::{Noise, TruthModel, check_drifts};
 use crate::prediction::Prediction;
 
 /// Where a run starts, in SI units (shape n each).
@@ -102,7 +102,8 @@ pub struct Record {
 /// Runs the filter of `plan` against one truth.
 ///
 /// # Errors
-/// [`SimulationError::Filter`] when the prior is refused.
+/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact truth that turns too fast,
+/// [`SimulationError::Unresolvable`] when something is not finite.
 pub fn run(
     plan: &Plan,
     conditions: &Conditions,
@@ -111,6 +112,8 @@ pub fn run(
     seed: u64,
 ) -> Result<Record, SimulationError> {
     let n = plan.unknowns();
+    let first = n - plan.platform.coefficients();
+    check_drifts(plan, conditions, start.truth[first..].iter().map(|d| d.abs()).sum())?;
     let combinations: Vec<&[(usize, f64)]> = prediction.combinations.iter().map(|c| &c.terms[..]).collect();
     let mut traces = Traces {
         names: plan.platform.names().to_vec(),
@@ -196,6 +199,12 @@ pub fn run(
         s.truth.extend(t);
     }
     record.largest_psi = truth.largest_psi;
+    let finite = |list: &[f64]| list.iter().all(|x| x.is_finite());
+    let ended = |s: &Series| finite(&s.truth) && finite(&s.estimate) && finite(&s.sigma);
+    if !(finite(&record.whitened) && record.traces.series.iter().all(ended)) {
+        let what = "the run of the filter ends in numbers that are none".into();
+        return Err(SimulationError::Unresolvable { what });
+    }
     Ok(record)
 }
 

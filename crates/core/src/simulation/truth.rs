@@ -5,9 +5,10 @@ use rand_pcg::Pcg64;
 
 use obsdeg_exact::SplitMix64;
 
+use super::SimulationError;
 use super::attitude_path::{apply, cross, rotation, rotation_vector, times, transpose};
 use super::conditions::{Conditions, Truth};
-use super::plan::{G_N, Plan};
+use super::plan::{G_N, MAX_INTEGRATION, Plan, W_IE, integration_steps};
 use crate::model::Carry;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
@@ -28,6 +29,28 @@ impl Noise {
     pub fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
+}
+
+/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at most.
+fn drift_turn(drifts: f64, dt: f64) -> f64 {
+    (drifts + W_IE) * dt
+}
+
+/// Refuses an exact truth whose drifts take too many integration steps: `drifts` bounds the sum of the coefficients, in rad/s.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`].
+pub(crate) fn check_drifts(plan: &Plan, conditions: &Conditions, drifts: f64) -> Result<(), SimulationError> {
+    if conditions.truth != Truth::Exact {
+        return Ok(());
+    }
+    let mut turn = 0.0;
+    for s in &plan.segments {
+        // the random drift of a step: six sigma of three axes
+        let kick = 11.0 * conditions.drift_noise.held_rad_s(s.dt);
+        turn += drift_turn(drifts + kick, s.dt) * s.steps as f64;
+    }
+    integration_steps(turn).map(|_| ())
 }
 
 /// A truth that is stepped in time with the filter.
@@ -116,7 +139,12 @@ impl<'a> TruthModel<'a> {
         // the drift noise of the step, in platform axes
         let held = self.conditions.drift_noise.held_rad_s(s.dt);
         let kick = [0; 3].map(|_| held * noise.normal());
-        let substeps = plan.substeps(segment);
+        let kicked = kick.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let drifts =
+            self.x[self.x.len() - plan.platform.coefficients()..].iter().map(|d| d.abs()).sum::<f64>();
+        // as many as have been counted before the run
+        let turn = drift_turn(drifts + kicked, s.dt);
+        let substeps = plan.substeps(segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let h = s.dt / substeps as f64;
         for i in 0..substeps {
             let t = step as f64 * s.dt + i as f64 * h;

@@ -184,7 +184,7 @@ mod tests {
             angles in prop::array::uniform3(angle()),
             dwell in prop::option::of(1_000_000u64..1_000_000_000_000_000),
             turn in prop::option::of((0usize..6, 1_000_000i64..700_000_000_000)),
-            slew in prop::option::of((prop::option::of(0.001f64..5000.0), prop::option::of(0usize..6), 1_000_000i64..700_000_000_000, any::<bool>())),
+            slew in prop::option::of((prop::option::of(1e-3f64..5000.0), prop::option::of(0usize..6), 1_000_000i64..700_000_000_000, any::<bool>())),
         ) -> Position {
             let axis = |i: usize| crate::model::rotation::Axis { index: i % 3, geographic: i >= 3 };
             let dwell = dwell.and_then(|ns| format_decimal(ns as i64).parse::<Dwell>().ok());
@@ -204,7 +204,7 @@ mod tests {
             propagation in prop::option::of(prop::sample::select(vec![Propagation::Exponential, Propagation::Rk4])),
             step_s in prop::option::of(1e-6f64..1e6),
             dwell_s in prop::option::of(1e-3f64..1e6),
-            slew_rate_deg_s in prop::option::of(1e-4f64..1e4),
+            slew_rate_deg_s in prop::option::of(1e-3f64..1e4),
             accelerometer_noise_g in prop::option::of(1e-15f64..1e-3),
             azimuth_noise_deg in prop::option::of(1e-12f64..1e3),
             noise in prop::option::of((1e-12f64..1e6, any::<bool>())),
