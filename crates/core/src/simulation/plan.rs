@@ -5,6 +5,7 @@ use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
 
 use super::SimulationError;
+use super::answer::Turn;
 use super::attitude_path::{Slew, times, transpose};
 use super::conditions::{Conditions, Propagation, latitude_of};
 use crate::model::attitude::Matrix3;
@@ -140,6 +141,14 @@ impl Plan {
     /// The total time in s.
     pub fn duration_s(&self) -> f64 {
         self.segments.last().map_or(0.0, |s| s.start_s + s.dt * s.steps as f64)
+    }
+
+    /// The slews: the position that each leads to, and how it turns.
+    pub fn slews(&self) -> impl Iterator<Item = (usize, Turn)> {
+        self.segments.iter().filter_map(|s| match &s.kind {
+            Kind::Slew(slew) => Some((s.position, slew.turn())),
+            Kind::Dwell | Kind::Rotation(_) => None,
+        })
     }
 
     /// The psi states of a segment: the first three columns of its block.
