@@ -676,17 +676,17 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
             set.dedup();
             let degrees: Option<Vec<usize>> = rows.degrees(&set).into_iter().collect();
             if let Some(degree) = degrees.and_then(|d| d.into_iter().max()) {
-                let two = |i: usize| brute.ways[sequence[i]][sequence[i + 1]].len();
+                let two: Vec<usize> = sequence.windows(2).map(|w| brute.ways[w[0]][w[1]].len()).collect();
                 let mut ways = vec![0; k - 1];
                 'ways: loop {
                     let sigmas = brute.sigmas(&sequence, &ways);
                     all.push((degree, wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max)));
-                    for i in 0..k - 1 {
-                        ways[i] += 1;
-                        if ways[i] < two(i) {
+                    for (way, two) in ways.iter_mut().zip(&two) {
+                        *way += 1;
+                        if *way < *two {
                             continue 'ways;
                         }
-                        ways[i] = 0;
+                        *way = 0;
                     }
                     break;
                 }
