@@ -1,15 +1,24 @@
 //! Schemes found: the fewest positions, the best of five of the cardinal attitudes, and what the filter makes of it.
 
+#[path = "design/brute.rs"]
+mod brute;
+#[path = "design/orders.rs"]
+mod orders;
+
 use std::process::Command;
 
+use brute::Brute;
 use obsdeg_core::analysis::{Options as AnalysisOptions, analyze};
+use obsdeg_core::compare::predicted;
+use obsdeg_core::design::answer::Found;
 use obsdeg_core::design::criterion::Criterion;
 use obsdeg_core::design::information::Evaluator;
 use obsdeg_core::design::observability::Rows;
 use obsdeg_core::design::search::{Constraints, Progress, Search};
+use obsdeg_core::design::symmetry::Symmetry;
 use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design};
 use obsdeg_core::model::attitude::cardinal;
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo};
 use obsdeg_core::simulation::batch::batch;
 use obsdeg_core::simulation::conditions::{Assignment, Conditions};
 use obsdeg_core::simulation::plan::Plan;
@@ -218,7 +227,7 @@ fn turned_schemes_are_equally_good() {
     // every sequence has an image that begins with NUE: the best of all is the best of these
     let rows = rows_of(Carry::Inertial, &candidates);
     let evaluator = evaluator_of(Carry::Inertial, &candidates);
-    let of = |firsts: &[usize]| {
+    let of = |symmetry: &Symmetry| {
         let search = Search {
             rows: &rows,
             evaluator: &evaluator,
@@ -228,10 +237,12 @@ fn turned_schemes_are_equally_good() {
             floor: 2,
             progress: &on,
         };
-        search.exhaust(firsts, 5)
+        search.exhaust(symmetry, 5)
     };
-    let (one, six) = (of(&[0]), of(&[0, 3, 7, 11, 20, 23]));
+    let orbits = Symmetry { order: 4, orbit: (0..24).map(|i| i / 4).collect() };
+    let (one, six) = (of(&rows.symmetry(&|_, _| true)), of(&orbits));
     assert_eq!(one.examined * 6, six.examined);
+    assert_eq!(one.ties.total(24), six.ties.total(4));
     let ratio = six.found[0].worth.value / one.found[0].worth.value;
     assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
 }
@@ -245,10 +256,90 @@ fn threads_and_interruption() {
         pool.install(|| designed(Carry::Inertial, &few))
     };
     assert_eq!(threads(1), threads(3));
-    let stopped = design(&base(Carry::Inertial), &quiet(), &few, &|_| false).expect("designed");
-    assert!(stopped.search.is_some_and(|s| s.interrupted && !s.proven) && !stopped.found.is_empty());
+    // until a sequence has been looked at
+    let stopped = design(&base(Carry::Inertial), &quiet(), &few, &|now| now.examined == 0).expect("designed");
+    let search = stopped.search.expect("a search");
+    assert!(search.interrupted && !search.proven && search.ties.is_none() && !stopped.found.is_empty());
+    // heard within one restart of many evaluations
+    assert!(search.examined < 4 * 256, "{}", search.examined);
     let impossible = design(&base(Carry::Inertial), &quiet(), &options(Some(3)), &on);
     assert!(impossible.expect_err("none").to_string().contains("3 of these candidates"));
+}
+
+/// What takes minutes hears at once that it is to stop: the search for the fewest positions, ways between many candidates, exchange by
+/// a slow criterion, exhaustion.
+#[test]
+fn long_searches_hear_of_an_interruption() {
+    let grid = |deg: i64| Candidates::grid(deg * 1_000_000_000).expect("a grid");
+    let slews = Conditions { slew_rate_deg_s: Some(1.0), ..quiet() };
+    for (options, conditions) in [
+        (Options { candidates: grid(30), ..options(None) }, quiet()),
+        (Options { candidates: grid(30), ..options(Some(4)) }, quiet()),
+        (Options { candidates: grid(45), criterion: Kind::E, ..options(Some(5)) }, quiet()),
+        (Options { candidates: grid(45), ..options(Some(5)) }, slews),
+        (Options { required: vec!["D_F".into()], criterion: Kind::E, ..options(Some(6)) }, quiet()),
+    ] {
+        // the first questions come from the search for the fewest, the others from what comes behind it
+        for patience in [0, 20, 200] {
+            let asked = std::sync::atomic::AtomicU64::new(0);
+            let going = |_: Progress| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < patience;
+            match design(&base(Carry::Inertial), &conditions, &options, &going) {
+                Err(DesignError::Interrupted) => {}
+                Ok(found) => assert!(found.search.is_some_and(|s| s.interrupted) && !found.found.is_empty()),
+                Err(e) => panic!("{e}"),
+            }
+        }
+    }
+}
+
+/// Ctrl-C ends the program with the exit code of a shell when nothing was found.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_program_ends_with_130() {
+    let arguments = ["design", "--minimum", "--candidates", "grid:30", "--quiet"];
+    // a signal that comes before the program listens ends it without a code: then it is tried again
+    let code = [300, 1000, 3000].into_iter().find_map(|wait| {
+        let program = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+            .args(arguments)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("it runs");
+        std::thread::sleep(std::time::Duration::from_millis(wait));
+        let sent = Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+        assert!(sent.expect("a signal").success());
+        let output = program.wait_with_output().expect("it ends");
+        assert!(output.stdout.is_empty());
+        output.status.code()
+    });
+    assert_eq!(code, Some(130));
+}
+
+/// The bound on errors counts every set: angles of nine decimals leave few primes, so more of them are taken.
+#[test]
+fn nothing_is_proven_by_chance() {
+    let mut rng = SplitMix64::new(19);
+    let mut angle =
+        || obsdeg_core::model::Angle::from_nanodeg(rng.below(360_000_000_000) as i64 - 180_000_000_000);
+    let mut candidates = Candidates::default();
+    (0..24).for_each(|_| candidates.add(std::array::from_fn(|_| angle())));
+    let found = designed(Carry::Inertial, &Options { candidates, ..options(None) });
+    assert_eq!((found.minimum.positions, found.minimum.proven), (Some(5), true));
+    assert!(found.error_bound < 1e-12 && found.primes > 2, "{found:?}");
+    // each set is excluded by a rank of at most 15 rows modulo a prime that is 1 modulo 360e9; there are about 2^60 over
+    // phi(360e9) ln 2^61 = 9.6e10 * 42.3 of 61 bits, and a minor of 15 rows of 16 bits is divisible by at most 15 * 16 / 60
+    let one = 15.0 * 16.0 / 60.0 / (2f64.powi(60) / (9.6e10 * 42.28));
+    let sets = 2024.0 + 10626.0;
+    assert!(
+        found.error_bound > sets * f64::powi(one, found.primes as i32),
+        "{:e} {one:e}",
+        found.error_bound
+    );
+    // one prime would not do, and the bound of the cardinal attitudes is counted in the same way
+    assert!(sets * one > 1e-2);
+    let cardinal = designed(Carry::Inertial, &options(Some(5)));
+    assert!(cardinal.primes == 2 && cardinal.error_bound < 1e-12 && cardinal.error_bound > 0.0);
+    assert!(cardinal.search.is_some_and(|s| s.proven));
 }
 
 /// The winner's file is a scheme that `analyze` accepts and that has the sigma promised; wrong arguments are named.
@@ -291,6 +382,51 @@ fn the_winner_is_a_scheme_file() {
     let (promised, kept) = (promised.as_f64().expect("a number"), kept.as_f64().expect("a number"));
     assert!((promised / kept - 1.0).abs() < 1e-6, "{promised} {kept}");
     assert!(run(&["analyze", "--scheme", &winner, "--solutions", "off"]).status.success());
+    // half turns about an axis and about a diagonal, either way, are in the file: what the commands make of it is what was found
+    let two = place.path().join("two.toml").display().to_string();
+    for (attitudes, axes) in [
+        (["NUE", "NDW"], ["about = \"N\", angle_deg = 180", "about = \"N\", angle_deg = -180"]),
+        (["NUE", "WDS"], ["about = [1, 0, -1], angle_deg = 180", "about = [-1, 0, 1], angle_deg = 180"]),
+    ] {
+        let text = attitudes.map(|a| format!("[[position]]\nname = \"{a}\"\nattitude = \"{a}\"\n")).concat();
+        std::fs::write(&two, format!("carry = \"inertial\"\nlatitude_deg = 28.2\n{text}")).expect("written");
+        let list =
+            ["--positions", "4", "--slew-rate", "0.5", "--observable", "D_FY", "--format", "json", "--force"];
+        let found = run(&[&["design", "--candidates", &two, "-o", &folder], &list[..]].concat());
+        assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+        let found: serde_json::Value = serde_json::from_slice(&found.stdout).expect("JSON");
+        let turns = found["found"][0]["half_turns"].as_array().expect("half turns");
+        let text = std::fs::read_to_string(&winner).expect("a winner");
+        assert!(
+            !turns.is_empty() && turns.len() == axes.map(|a| text.matches(a).count()).iter().sum::<usize>(),
+            "{text}"
+        );
+        let promised = found["found"][0]["worst_sigma_dph"].as_f64().expect("a number");
+        let sigma = |rows: &serde_json::Value| {
+            let row = rows.as_array().expect("rows").iter().find(|q| q["name"] == "D_FY").expect("D_FY");
+            row["sigma"].as_f64().expect("a number")
+        };
+        let compared = run(&["compare", &winner, "--format", "json"]);
+        let compared: serde_json::Value = serde_json::from_slice(&compared.stdout).expect("JSON");
+        let simulated = [
+            &["simulate", "--scheme", &winner, "--format", "json", "--drift-noise", "0 deg/h"][..],
+            &["--prior", "psi=1e6", "--prior", "D=1e6"],
+        ];
+        let simulated = run(&simulated.concat());
+        let simulated: serde_json::Value = serde_json::from_slice(&simulated.stdout).expect("JSON");
+        for (kept, within) in
+            [(sigma(&compared["schemes"][0]["quantities"]), 1e-6), (sigma(&simulated["quantities"]), 1e-3)]
+        {
+            assert!((promised / kept - 1.0).abs() < within, "{promised} {kept}");
+        }
+        // lists of slews say how they turn
+        let slews = [&compared["schemes"][0]["slews"], &simulated["timeline"]].map(|rows| {
+            let of = |r: &serde_json::Value| r["turn"]["about"].as_array().cloned();
+            rows.as_array().expect("rows").iter().filter_map(of).collect::<Vec<_>>()
+        });
+        let expected: Vec<_> = turns.iter().filter_map(|t| t["about"].as_array().cloned()).collect();
+        assert!(slews.iter().all(|about| *about == expected), "{slews:?} {expected:?}");
+    }
     let again = ["design", "--candidates", file, "--positions", "5", "-o", &folder, "--force"];
     assert!(run(&again).status.success());
     for (arguments, expected) in [
@@ -478,4 +614,125 @@ fn what_is_not_required_may_be_lost() {
         assert!((own / expected - 1.0).abs() < 1e-6, "{own} {expected}");
     }
     assert_eq!(sigmas.len(), 2);
+}
+
+/// A scheme that was found, with its half turns as they were found.
+fn scheme_found(found: &Found, like: &Scheme) -> Scheme {
+    let angles = found.angles.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("angles"));
+    let mut positions = Scheme::of_angles(angles).positions;
+    for turn in &found.half_turns {
+        let (axis, angle) = (Some(SlewAxis::Direction(turn.about)), "180".parse().ok());
+        positions[turn.to - 1].slew = Some(SlewTo { axis, angle, rate_deg_s: None });
+    }
+    for p in &mut positions {
+        p.dwell = Dwell::from_seconds(found.dwell_s);
+    }
+    Scheme { positions, ..like.clone() }
+}
+
+/// Every scheme that is listed has the sigma and the time that a comparison of schemes gives it.
+#[test]
+fn listed_schemes_are_what_a_comparison_says() {
+    let slews = Conditions { slew_rate_deg_s: Some(0.5), ..quiet() };
+    let scheme = base(Carry::Inertial);
+    let mut skew = 0;
+    for (required, k) in [(vec!["D_F".to_string()], 3), (Vec::new(), 5)] {
+        let options = Options { required: required.clone(), keep: 10, restarts: 2, ..options(Some(k)) };
+        let found = design(&scheme, &slews, &options, &on).expect("designed");
+        assert!(found.found.len() == 10 && found.found.iter().any(|f| !f.half_turns.is_empty()));
+        for f in found.found.iter().chain(&found.front) {
+            let there = scheme_found(f, &scheme);
+            skew += f.half_turns.iter().filter(|t| t.about.iter().all(|x| x.abs() < 0.9)).count();
+            let sigmas = predicted(&there, &slews, 1).expect("predicted");
+            let sigma =
+                |name: &String| sigmas.iter().find(|s| s.0 == *name).and_then(|s| s.1).expect("a sigma");
+            let worst = found.required.iter().map(sigma).fold(0.0, f64::max);
+            assert!((worst / f.worst_sigma_dph - 1.0).abs() < 1e-6, "{worst} {f:?}");
+            let seconds = Plan::new(&there, &slews).expect("a plan").duration_s();
+            assert!((seconds - f.total_s).abs() < 1e-6, "{seconds} {f:?}");
+        }
+    }
+    assert!(skew > 0);
+}
+
+/// All 24^k sequences, with both directions of half turns, by an evaluation of their own: none is better than what the search
+/// calls proven, and as many as it says are as good.
+#[test]
+fn no_sequence_with_slews_is_better_than_the_proven() {
+    let candidates = Candidates::cardinals();
+    let coefficients = ["D_FX", "D_FY", "D_FZ"];
+    let steps = Conditions { slew_rate_deg_s: Some(0.5), step_s: 100.0, ..quiet() };
+    let brute = Brute::new(&candidates.names, 28.2, 1000.0, 100.0, 1e-5, 0.5);
+    for (required, k) in [(1..2, 2), (0..3, 2), (0..3, 3)] {
+        let names: Vec<String> = coefficients[required.clone()].iter().map(ToString::to_string).collect();
+        let wanted: Vec<usize> = required.clone().collect();
+        let rows = Rows::new(&base(Carry::Inertial), &candidates.attitudes, &wanted, 7).expect("rows");
+        // worst degree and worst sigma of every sequence
+        let mut all: Vec<(usize, f64)> = Vec::new();
+        let mut sequence = vec![0; k];
+        'sequences: loop {
+            let mut set = sequence.clone();
+            set.sort_unstable();
+            set.dedup();
+            let degrees: Option<Vec<usize>> = rows.degrees(&set).into_iter().collect();
+            if let Some(degree) = degrees.and_then(|d| d.into_iter().max()) {
+                let two: Vec<usize> = sequence.windows(2).map(|w| brute.ways[w[0]][w[1]].len()).collect();
+                let mut ways = vec![0; k - 1];
+                'ways: loop {
+                    let sigmas = brute.sigmas(&sequence, &ways);
+                    all.push((degree, wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max)));
+                    for (way, two) in ways.iter_mut().zip(&two) {
+                        *way += 1;
+                        if *way < *two {
+                            continue 'ways;
+                        }
+                        *way = 0;
+                    }
+                    break;
+                }
+            }
+            for place in (0..k).rev() {
+                sequence[place] += 1;
+                if sequence[place] < 24 {
+                    continue 'sequences;
+                }
+                sequence[place] = 0;
+            }
+            break;
+        }
+        // what slews bring in beside the attitudes may leave a coefficient undetermined
+        all.retain(|(_, sigma)| *sigma < 1e3);
+        let found =
+            design(&base(Carry::Inertial), &steps, &Options { required: names, ..options(Some(k)) }, &on);
+        let Some(degree) = all.iter().map(|a| a.0).min() else {
+            assert!(matches!(found, Err(DesignError::Impossible { .. })), "{k} {required:?}");
+            continue;
+        };
+        let best = all.iter().filter(|a| a.0 == degree).map(|a| a.1).fold(f64::INFINITY, f64::min);
+        let found = found.expect("designed");
+        let first = &found.found[0];
+        assert_eq!((first.worst_degree, found.symmetry), (degree, if required.len() == 3 { 24 } else { 8 }));
+        assert!((first.worst_sigma_dph / best - 1.0).abs() < 1e-7, "{best} {first:?}");
+        for f in &found.found {
+            let sequence = sequence_of(&candidates, &f.positions);
+            let leg = |i: usize| {
+                let all = &brute.ways[sequence[i]][sequence[i + 1]];
+                let about = f.half_turns.iter().find(|t| t.to == i + 2).map(|t| t.about);
+                let same = |w: &brute::Way| {
+                    about.is_none_or(|a| w.about.iter().zip(a).all(|(x, y)| (x - y).abs() < 1e-9))
+                };
+                assert_eq!(all.len(), 1 + usize::from(about.is_some()), "{f:?}");
+                all.iter().position(same).expect("a way")
+            };
+            let ways: Vec<usize> = (0..k - 1).map(leg).collect();
+            let sigmas = brute.sigmas(&sequence, &ways);
+            let worst = wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max);
+            assert!((worst / f.worst_sigma_dph - 1.0).abs() < 1e-7, "{worst} {f:?}");
+            let slews = (0..k - 1).map(|i| brute.ways[sequence[i]][sequence[i + 1]][ways[i]].seconds);
+            assert!((slews.sum::<f64>() + k as f64 * 1000.0 - f.total_s).abs() < 1e-6, "{f:?}");
+        }
+        let ties = found.search.and_then(|s| s.ties.filter(|_| s.proven)).expect("proven");
+        let near = all.iter().filter(|a| a.0 == degree && a.1 <= best * (1.0 + ties.within)).count();
+        assert_eq!(ties.sequences, near as u64, "{k} {required:?}");
+    }
 }

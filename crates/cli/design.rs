@@ -1,17 +1,16 @@
 //! `obsdeg design`: the fewest positions, and the best of a number of positions.
 
-use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::design::answer::Found;
-use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design};
-use obsdeg_core::model::angle::{format_decimal, parse_decimal};
+use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design, scheme_found};
+use obsdeg_core::model::angle::parse_decimal;
+use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_core::simulation::Conditions;
-use obsdeg_core::simulation::conditions::latitude_of;
 use obsdeg_core::simulation::ranges::SLEW_RATE_DEG_S;
 use obsdeg_report::{File, Format, Layout, ReportError, design_figures};
 
@@ -31,10 +30,10 @@ Examples:
   obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01 --meet
   obsdeg design --positions 5 --carry inertial --candidates grid:45 --gimbal beta=-60:60 --refine
 
-Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. The
-folder of -o holds design.json, winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C
-ends with the best so far.
-Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error.";
+Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. With slews
+half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
+winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
+Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error, 130 interrupted before anything was found.";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum CriterionArgument {
@@ -193,7 +192,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let text = obsdeg_report::design(&found, a.output.format, output::terminal())
         .map_err(|e| Failure::internal(e.to_string()))?;
     if a.output.output.is_some() {
-        let files = files(&found, &base, &conditions).map_err(|e| Failure::internal(e.to_string()))?;
+        let files = files(&found, &base, &conditions)?;
         output::write_folder(&a.output, &files)?;
     }
     output::print(&text)?;
@@ -205,6 +204,7 @@ fn failure(e: DesignError) -> Failure {
         DesignError::Verdict(_) => Failure::internal(e.to_string()),
         DesignError::Filter(e) => crate::simulate::failure(e.into()),
         DesignError::Conditions(e) => crate::simulate::failure(e),
+        DesignError::Interrupted => Failure::interrupted(),
         _ => Failure::input(e.to_string()),
     }
 }
@@ -226,78 +226,35 @@ fn candidates(text: &str) -> Result<(Scheme, Candidates), Failure> {
 }
 
 /// What goes into the folder.
-fn files(found: &Design, base: &Scheme, conditions: &Conditions) -> Result<Vec<File>, ReportError> {
-    let json = obsdeg_report::design(found, Format::Json, Layout::default())?;
+fn files(found: &Design, base: &Scheme, conditions: &Conditions) -> Result<Vec<File>, Failure> {
+    let internal = |e: ReportError| Failure::internal(e.to_string());
+    let json = obsdeg_report::design(found, Format::Json, Layout::default()).map_err(internal)?;
     let mut files = vec![File { name: "design.json".into(), bytes: json.into_bytes() }];
     if let Some(best) = found.found.first() {
-        let winner = scheme_file(found, best, base, conditions);
+        let winner = scheme_file(found, best, base, conditions).map_err(failure)?;
         files.push(File { name: "winner.toml".into(), bytes: winner.into_bytes() });
     }
-    files.extend(design_figures(found)?);
+    files.extend(design_figures(found).map_err(internal)?);
     Ok(files)
 }
 
 /// A scheme that was found, as a file that `obsdeg analyze --scheme` reads.
-fn scheme_file(found: &Design, best: &Found, base: &Scheme, conditions: &Conditions) -> String {
-    let mut out = String::new();
+fn scheme_file(
+    found: &Design,
+    best: &Found,
+    base: &Scheme,
+    conditions: &Conditions,
+) -> Result<String, DesignError> {
     let proven = found.search.as_ref().is_some_and(|s| s.proven) && !best.refined;
     let proven = if proven { "proven best" } else { "best found" };
-    // writing to a String does not fail
-    let _ = writeln!(
-        out,
-        "# {proven}: worst sigma(D) {:.4} deg/h (per g) in {:.0} s, seed {}",
-        best.worst_sigma_dph, best.total_s, found.seed
-    );
-    let _ = writeln!(out, "carry = \"{}\"", found.carry);
-    if let Some(latitude) = latitude_of(base) {
-        let _ = writeln!(out, "latitude_deg = {latitude}");
-    }
-    let terms: Vec<String> = base.unknowns.to_string().split(',').map(|t| format!("\"{t}\"")).collect();
-    let _ = writeln!(out, "terms = [{}]", terms.join(", "));
-    for (letter, g) in ["X", "Y", "Z"].iter().zip(base.geometry.gyros()) {
-        let _ = writeln!(out, "geometry.{letter} = {{ I = \"{}\", O = \"{}\", S = \"{}\" }}", g.I, g.O, g.S);
-    }
-    if base.measured_azimuth {
-        out.push_str("measured_azimuth = true\n");
-    }
-    let _ = writeln!(
-        out,
-        "\n[simulation]\nstep_s = {}\naccelerometer_noise_g = {:e}\nazimuth_noise_deg = {}",
-        conditions.step_s, conditions.accelerometer_noise_g, conditions.azimuth_noise_deg
-    );
-    if let Some(rate) = conditions.slew_rate_deg_s {
-        let _ = writeln!(out, "slew_rate_deg_s = {rate}");
-    }
-    // the defaults come first
-    let given = conditions.requirements.iter().skip(Conditions::default().requirements.len());
-    let mut requirements: Vec<(&str, f64)> = Vec::new();
-    for r in given {
-        requirements.retain(|(name, _)| *name != r.name);
-        requirements.push((&r.name, r.value));
-    }
-    if !requirements.is_empty() {
-        out.push_str("\n[requirements]\n");
-    }
-    for (name, value) in requirements {
-        let _ = writeln!(out, "{name} = {value}");
-    }
-    if !base.gimbals.are_free() {
-        out.push_str("\n[gimbals]\n");
-        for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(base.gimbals.limits) {
-            if let Some([low, high]) = limit {
-                let _ = writeln!(out, "{name}_deg = [{}, {}]", format_decimal(low), format_decimal(high));
-            }
-        }
-    }
-    for (i, (name, angles)) in best.positions.iter().zip(&best.angles).enumerate() {
-        let _ = writeln!(
-            out,
-            "\n[[position]] # {}\nname = \"p{}\"\nangles_deg = [{}]\ndwell_s = {}",
-            name.replace(['\r', '\n'], " "),
-            i + 1,
-            angles.replace(',', ", "),
-            best.dwell_s
-        );
-    }
-    out
+    let positions = best.positions.iter().enumerate().map(|(i, name)| format!("p{} {name}", i + 1));
+    let positions = positions.collect::<Vec<_>>().join(", ").replace(char::is_control, " ");
+    let scheme = scheme_found(best, base, conditions)?;
+    Ok(format!(
+        "# {proven}: worst sigma(D) {:.4} deg/h (per g) in {:.0} s, no prior, no drift noise, seed {}\n# {positions}\n{}",
+        best.worst_sigma_dph,
+        best.total_s,
+        found.seed,
+        write(&scheme)
+    ))
 }

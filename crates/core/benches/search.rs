@@ -54,8 +54,8 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
         floor: 2,
         progress: &|_| true,
     };
-    let firsts = rows.symmetry(&|_, _| true).representatives();
-    bencher.counter(ItemsCount::new(2_897_280usize)).bench(|| search.exhaust(&firsts, 5));
+    let symmetry = rows.symmetry(&|_, _| true);
+    bencher.counter(ItemsCount::new(2_897_280usize)).bench(|| search.exhaust(&symmetry, 5));
 }
 
 /// The same with the front, as the command runs it.

@@ -102,6 +102,14 @@ fn by_unknown(schemes: &[Review]) -> Block {
     }
 }
 
+/// `; half turns to p2 about -N, to p3 about N`.
+fn half_turns(r: &Review) -> String {
+    let half = r.slews.iter().filter(|s| s.turn.is_half());
+    let parts: Vec<String> =
+        half.map(|s| format!("to {} about {}", s.to, words::direction(&s.turn.about))).collect();
+    if parts.is_empty() { String::new() } else { format!("; half turns {}", parts.join(", ")) }
+}
+
 /// `1 0.7 0`.
 fn excitation(q: &Quantity) -> String {
     let short = |x: &f64| {
@@ -158,10 +166,11 @@ pub(crate) fn document(c: &Comparison) -> Document {
         // what all schemes share is said once
         let own = words::measurement(&r.conditions).into_iter().filter(|l| l != words::PREDICTED);
         lines.push(format!(
-            "{}: {}; positions {}",
+            "{}: {}; positions {}{}",
             r.name,
             own.collect::<Vec<_>>().join("; "),
-            r.positions.join(", ")
+            r.positions.join(", "),
+            half_turns(r)
         ));
     }
     lines.extend([

@@ -1,11 +1,12 @@
 //! Schemes that were found.
 
 use obsdeg_core::design::Design;
-use obsdeg_core::design::answer::{Found, Minimum, SearchReport};
+use obsdeg_core::design::answer::{Found, SearchReport};
 
 use crate::document::{Block, Document, number};
 use crate::figure::{BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
+use crate::words;
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -19,11 +20,22 @@ fn criterion(name: &str) -> &'static str {
     }
 }
 
+/// `NUE (-N) NDW`: the positions in order, with the axes of the half turns between them.
+fn route(f: &Found) -> String {
+    let mut out = Vec::new();
+    for (i, position) in f.positions.iter().enumerate() {
+        let turn = f.half_turns.iter().find(|t| t.to == i + 1);
+        out.extend(turn.map(|t| format!("({})", words::direction(&t.about))));
+        out.push(position.clone());
+    }
+    out.join(" ")
+}
+
 fn table(heading: &str, found: &[Found]) -> Block {
     let row = |(i, f): (usize, &Found)| {
         vec![
             (i + 1).to_string(),
-            format!("{}{}", f.positions.join(" "), if f.refined { " (refined)" } else { "" }),
+            format!("{}{}", route(f), if f.refined { " (refined)" } else { "" }),
             number(f.total_s),
             f.worst_degree.to_string(),
             f.worst_accuracy_order.map_or_else(|| "-".into(), |o| o.to_string()),
@@ -59,15 +71,43 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         String::new()
     };
     let mut out = vec![if s.proven {
+        let unrefined = if d.found.first().is_some_and(|f| f.refined) {
+            "the first that is not refined"
+        } else {
+            "the first"
+        };
         format!(
-            "the first of the candidates' sequences is proven to be the best: all {} within the constraints were examined{images}",
-            s.examined
+            "{unrefined} is proven to be the best: of all sequences of {} of the candidates within the constraints none has a smaller worst \
+             degree, or the same and a smaller criterion ({} evaluated{images})",
+            s.positions, s.examined
+        )
+    } else if s.ties.is_some() {
+        format!(
+            "not proven: all sequences were searched ({} evaluated{images}), but one may be overlooked with a probability of {:.0e}",
+            s.examined, d.error_bound
         )
     } else if s.interrupted {
         format!("interrupted after {} sequences: the best so far", s.examined)
     } else {
         format!("not proven: coordinate exchange from random starts, {} sequences examined", s.examined)
     }];
+    if s.ties.is_some() && s.interrupted {
+        out.push("interrupted before the front was complete".into());
+    }
+    if s.lost > 0 {
+        out.push(format!(
+            "{} of them are observable by the exact verdict (of repositioning at once), but their samples do not determine what is required \
+             in double precision: they count as worse than all others",
+            s.lost
+        ));
+    }
+    out.extend(s.ties.map(|t| match t.sequences {
+        1 => format!("no other sequence is as good (worst degree equal, criterion within {:e} of it)", t.within),
+        n => format!(
+            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within {:e} of it)",
+            t.within
+        ),
+    }));
     out.push(
         if s.order_matters {
             "orders of the same positions are different schemes: the dwell lets psi move in between; a position may be repeated"
@@ -76,6 +116,13 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         }
         .into(),
     );
+    if s.conditions.slew_rate_deg_s.is_some() {
+        out.push(
+            "half turns are tried in both directions, which are different schemes: the axis about which they are right-handed stands \
+             before the position"
+                .into(),
+        );
+    }
     out.push(format!(
         "a smaller worst degree comes first (no scheme of these candidates is below {}), then the criterion, {}",
         s.degree_floor,
@@ -85,19 +132,54 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     out
 }
 
-fn minimum(m: &Minimum) -> Vec<String> {
+fn minimum(d: &Design) -> Vec<String> {
+    let m = &d.minimum;
+    let chance = format!("not proven: wrong with a probability of up to {:.0e}", d.error_bound);
     if !m.never.is_empty() {
-        return vec![format!("all candidates together leave {} unobservable", m.never.join(", "))];
+        let never = format!("all candidates together leave {} unobservable", m.never.join(", "));
+        return std::iter::once(never).chain((!m.proven).then_some(chance)).collect();
     }
     let mut out = match m.positions {
         Some(k) => vec![format!("{k} positions: {}", m.witness.join(" "))],
         None => vec!["not known: the sets are too many to examine all".into()],
     };
-    out.push(format!("fewer than {} cannot do: too few derivative rows", m.counting_bound));
+    out.extend((m.positions.is_some() && !m.proven).then_some(chance));
+    if m.counting_bound > 1 {
+        out.push(format!("fewer than {} cannot do: too few derivative rows", m.counting_bound));
+    }
+    let images = if d.symmetry > 1 { ", up to turns of the platform axes" } else { "" };
     for [size, sets] in &m.none_of {
-        out.push(format!("none of the {sets} sets of {size} does (exact ranks, every set examined)"));
+        out.push(format!("none of the {sets} sets of {size} does (exact ranks, every set examined{images})"));
     }
     out
+}
+
+/// What the sigmas rest on.
+fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
+    let c = &s.conditions;
+    let slews = c.slew_rate_deg_s.map_or_else(
+        || "repositioning at once".into(),
+        |r| format!("slews at {r} deg/s about the eigenaxis, Z not used meanwhile"),
+    );
+    let azimuth = c.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
+    let none = |what: &Option<String>| what.clone().unwrap_or_else(|| "none".into());
+    vec![
+        format!(
+            "{} s at each position, steps of at most {} s, a sample after each; {slews}",
+            c.dwell_s, c.step_s
+        ),
+        format!(
+            "noise of Z {:e} g per sample and axis{azimuth}; random drift: {}; prior: {}",
+            c.accelerometer_noise_g,
+            none(&s.drift_noise),
+            none(&s.prior)
+        ),
+        format!(
+            "estimated together: psi and all coefficients of the terms {}; {}",
+            d.terms,
+            words::gyros(&d.geometry)
+        ),
+    ]
 }
 
 pub(crate) fn document(d: &Design) -> Document {
@@ -115,31 +197,24 @@ pub(crate) fn document(d: &Design) -> Document {
     }
     blocks.push(Block::List {
         heading: "Fewest positions that make every required coefficient observable".into(),
-        lines: minimum(&d.minimum),
+        lines: minimum(d),
     });
-    let mut assumed = vec![format!(
-        "{} carry, latitude {} deg{}; seed {}",
-        d.carry,
-        d.latitude_deg,
-        d.search.as_ref().map_or_else(String::new, |s| {
-            let slews = s.slew_rate_deg_s.map_or_else(
-                || "repositioning at once".into(),
-                |r| format!("slews at {r} deg/s about the eigenaxis"),
-            );
-            format!(", {} s at each position, {slews}", s.dwell_s)
-        }),
-        d.seed
-    )];
+    let by = if d.latitude_by_default { " (chosen here: nothing names one)" } else { "" };
+    let mut assumed =
+        vec![format!("{} carry, latitude {} deg{by}; seed {}", d.carry, d.latitude_deg, d.seed)];
+    match &d.search {
+        Some(s) => assumed.extend(conditions(d, s)),
+        None => assumed.push(format!("terms {}; {}", d.terms, words::gyros(&d.geometry))),
+    }
     assumed.push(format!("required: {}", d.required.join(", ")));
     assumed.push(candidates(&d.candidates));
     if !d.beyond_gimbals.is_empty() {
         assumed.push(format!("beyond the gimbal limits: {}", shortened(&d.beyond_gimbals)));
     }
-    let bound = format!(
-        "ranks of sets modulo one random 61-bit prime: an observable set is overlooked with probability below {:.0e}",
-        d.error_bound
-    );
-    assumed.extend((d.error_bound > 0.0).then_some(bound));
+    assumed.push(format!(
+        "ranks of sets modulo {} random 61-bit primes: an observable set is overlooked with probability below {:.0e}",
+        d.primes, d.error_bound
+    ));
     blocks.push(Block::List { heading: "Assumed".into(), lines: assumed });
     let what = d.search.as_ref().map_or_else(
         || "fewest positions".into(),
@@ -171,7 +246,8 @@ pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
         "worst" => "largest sigma [deg/h, /g]".into(),
         other => format!("{other}-criterion [deg/h, /g]"),
     };
-    let slews = search.slew_rate_deg_s.map_or_else(String::new, |r| format!(", slews at {r} deg/s"));
+    let slews =
+        search.conditions.slew_rate_deg_s.map_or_else(String::new, |r| format!(", slews at {r} deg/s"));
     let ends = |of: fn(&Found) -> f64| {
         let (low, high) = d.front.iter().map(of).fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
         Some((low / 1.3, high * 1.3))

@@ -7,6 +7,7 @@ mod verdict;
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::compare::answer::{Quantity, Review};
 use obsdeg_core::crosscheck::CrossCheck;
+use obsdeg_core::review::answer::PositionReview;
 use obsdeg_core::review::{DesignReview, SchemeReview};
 
 use crate::document::{Block, Document, Formula, optional};
@@ -212,6 +213,11 @@ fn seconds(t: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), String::from)
 }
 
+/// ` by 180 deg about -N`.
+fn turn(numbers: &PositionReview) -> String {
+    numbers.turn.map_or_else(String::new, |turn| format!(" by {}", words::turn(&turn)))
+}
+
 fn positions(
     blocks: &mut Vec<Block>,
     s: &SchemeReview,
@@ -229,7 +235,7 @@ fn positions(
             p.attitude.clone().unwrap_or_else(|| "-".into()),
             seconds(numbers.start_s),
             seconds(numbers.dwell_s),
-            numbers.slew_s.map_or_else(|| "-".into(), seconds),
+            numbers.slew_s.map_or_else(|| "-".into(), |s| format!("{}{}", seconds(s), turn(numbers))),
             g(numbers.g[0]),
             g(numbers.g[1]),
             g(numbers.g[2]),

@@ -28,7 +28,8 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
         .iter()
         .map(|t| {
             let what = if t.slew { "slew to " } else { "" };
-            format!("{what}{} {}-{} s", t.position, number_short(t.start_s), number_short(t.end_s))
+            let turn = t.turn.map_or_else(String::new, |turn| format!(" by {}", words::turn(&turn)));
+            format!("{what}{}{turn} {}-{} s", t.position, number_short(t.start_s), number_short(t.end_s))
         })
         .collect();
     let mut out = vec![

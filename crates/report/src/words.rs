@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Solution, Status, Verdict};
 use obsdeg_core::degree::coefficient::Form;
-use obsdeg_core::model::Carry;
+use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_core::requirements::{Miss, Requirements};
-use obsdeg_core::simulation::answer::MeasurementReport;
+use obsdeg_core::simulation::answer::{MeasurementReport, Turn};
 use obsdeg_core::simulation::consistency::{Consistency, Doubt};
 use obsdeg_core::solution::solver::{Frame, Verification};
 
@@ -116,6 +116,13 @@ pub(crate) fn differences(c: &CarryReport) -> String {
     c.differs.iter().map(difference).collect::<Vec<_>>().join("; ")
 }
 
+/// `gyros X: I=+x O=-z S=+y, Y: ...`.
+pub(crate) fn gyros(geometry: &Geometry) -> String {
+    let gyros = ["X", "Y", "Z"].iter().zip(geometry.gyros());
+    let parts: Vec<String> = gyros.map(|(g, x)| format!("{g}: I={} O={} S={}", x.I, x.O, x.S)).collect();
+    format!("gyros {}", parts.join(", "))
+}
+
 /// What was assumed, a sentence each.
 pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let carry = match a.carry {
@@ -131,11 +138,6 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         || "generic: wN and wU independent, not zero".to_string(),
         |l| format!("{l} deg: wN = w_ie cos, wU = w_ie sin"),
     );
-    let gyros: Vec<String> = ["X", "Y", "Z"]
-        .iter()
-        .zip(a.geometry.gyros())
-        .map(|(g, x)| format!("{g}: I={} O={} S={}", x.I, x.O, x.S))
-        .collect();
     let z = match a.frame {
         Frame::N => {
             "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
@@ -145,7 +147,7 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let mut out = vec![
         format!("carry {carry}"),
         format!("latitude {latitude}"),
-        format!("gyros {}; drift terms {}", gyros.join(", "), a.terms),
+        format!("{}; drift terms {}", gyros(&a.geometry), a.terms),
         format!("observation {z}"),
         "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g; a blank multiplies"
             .into(),
@@ -383,4 +385,43 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
         format!("latitude {} deg{by}", m.latitude_deg),
     ]
+}
+
+/// A direction in n as `N`, `-U`, `N-E` or `0.6N+0.8U`.
+pub(crate) fn direction(v: &[f64; 3]) -> String {
+    let largest = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let plain = v.iter().all(|x| x.abs() < 1e-9 || x.abs() > largest - 1e-9);
+    let part = |(x, letter): (&f64, char)| {
+        let size = if plain { String::new() } else { format!("{:.3}", x.abs()) };
+        let shown = x.abs() >= if plain { 1e-9 } else { 5e-4 };
+        let size = if size.contains('.') { size.trim_end_matches('0').trim_end_matches('.') } else { "" };
+        shown.then(|| format!("{}{size}{letter}", if *x < 0.0 { '-' } else { '+' }))
+    };
+    let text: String = v.iter().zip(['N', 'U', 'E']).filter_map(part).collect();
+    text.strip_prefix('+').unwrap_or(&text).to_string()
+}
+
+/// `180 deg about -N`.
+pub(crate) fn turn(t: &Turn) -> String {
+    format!("{} deg about {}", (t.angle_deg * 100.0).round() / 100.0, direction(&t.about))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_read_as_sums_of_axes() {
+        let r = 0.5f64.sqrt();
+        for (v, expected) in [
+            ([1.0, 0.0, 0.0], "N"),
+            ([0.0, -1.0, 0.0], "-U"),
+            ([r, 0.0, -r], "N-E"),
+            ([-r, -r, 1e-17], "-N-U"),
+            ([0.6, 0.0, -0.8], "0.6N-0.8E"),
+            ([-0.1234567, 0.99235, 1e-7], "-0.123N+0.992U"),
+        ] {
+            assert_eq!(direction(&v), expected);
+        }
+    }
 }

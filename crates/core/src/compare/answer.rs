@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::analysis::Status;
 use crate::model::Carry;
 use crate::requirements::{Claim, Miss, Requirements};
-use crate::simulation::answer::MeasurementReport;
+use crate::simulation::answer::{MeasurementReport, Turn};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.comparison/1";
@@ -35,6 +35,8 @@ pub struct Review {
     pub conditions: MeasurementReport,
     /// Its positions.
     pub positions: Vec<String>,
+    /// The turns between them that take time, with the position that each leads to.
+    pub slews: Vec<Slew>,
     /// Total time with slews, in s.
     pub total_s: f64,
     /// The rank and the number of unknowns.
@@ -53,6 +55,15 @@ pub struct Review {
     pub drop_one: Vec<DropOne>,
     /// The worst sigma under other conditions.
     pub sensitivity: Vec<Sensitivity>,
+}
+
+/// A turn to a position.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Slew {
+    /// The position.
+    pub to: String,
+    /// How it turns.
+    pub turn: Turn,
 }
 
 /// One unknown of a scheme.

@@ -15,11 +15,11 @@ use crate::model::{Carry, Platform, Position, Scheme};
 use crate::prediction::Prediction;
 use crate::requirements::Requirements;
 use crate::simulation::answer::MeasurementReport;
-use crate::simulation::attitude_path::Slew;
+use crate::simulation::attitude_path;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
 use crate::simulation::{Plan, SimulationError};
-use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Worst};
+use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
 
 /// Latitudes of the sweep, in degrees.
 const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
@@ -136,11 +136,13 @@ fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
     let quantities = quantities(&judged, conditions, &drop_one)?;
     let requirements =
         Requirements::of(quantities.iter().map(Quantity::claim), conditions.requires_by_default());
+    let slews = judged.plan.slews();
     Ok(Review {
         name: name.clone(),
         carry: scheme.carry,
         conditions: MeasurementReport::new(scheme, conditions),
         positions: scheme.positions.iter().map(|p| p.name.clone()).collect(),
+        slews: slews.map(|(p, turn)| Slew { to: scheme.positions[p].name.clone(), turn }).collect(),
         total_s: judged.plan.duration_s(),
         rank: judged.rank(),
         meets_requirements: requirements.all_met(),
@@ -201,7 +203,7 @@ fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
         let Some(turn) = &position.rotation else {
             return squares(&plan.attitudes[i]).iter().map(|x| x.sqrt()).collect();
         };
-        let arc = Slew::about(&plan.attitudes[i], turn, 1.0);
+        let arc = attitude_path::Slew::about(&plan.attitudes[i], turn, 1.0);
         let mut mean = vec![0.0; platform.coefficients()];
         for (t, weight) in quadrature(arc.rate.iter().map(|x| x * x).sum::<f64>().sqrt()) {
             for (m, x) in mean.iter_mut().zip(squares(&arc.at(t))) {

@@ -185,7 +185,8 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
         let scale = |i: usize, j: usize| (expected[(i, i)] * expected[(j, j)]).sqrt();
         let relative = |k: usize| (p[(k / n, k % n)] - expected[(k / n, k % n)]).abs() / scale(k / n, k % n);
         // NaN stays
-        let difference = (0..n * n).map(relative).fold(0.0, |a: f64, b| if b <= a || a.is_nan() { a } else { b });
+        let difference =
+            (0..n * n).map(relative).fold(0.0, |a: f64, b| if b <= a || a.is_nan() { a } else { b });
         out.push(Difference {
             name: format!("{name} against the inverse information"),
             difference,

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::model::Carry;
+use crate::model::{Carry, Geometry};
+use crate::simulation::answer::MeasurementReport;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.design/1";
@@ -19,6 +20,12 @@ pub struct Design {
     pub carry: Carry,
     /// Latitude in degrees.
     pub latitude_deg: f64,
+    /// Whether the latitude was chosen by the program.
+    pub latitude_by_default: bool,
+    /// Axes of the gyros.
+    pub geometry: Geometry,
+    /// Unknown besides psi; all of them are estimated.
+    pub terms: String,
     /// The attitudes to choose from.
     pub candidates: Vec<String>,
     /// Attitudes that the gimbals do not reach.
@@ -35,8 +42,10 @@ pub struct Design {
     pub found: Vec<Found>,
     /// Schemes that none found beats in both total time and criterion, by total time.
     pub front: Vec<Found>,
-    /// Bound on the probability that an observable set was overlooked: sets are judged modulo one random 61-bit prime (the
-    /// schemes listed modulo two).
+    /// How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so.
+    pub primes: usize,
+    /// Bound on the probability that an observable set was overlooked, or a degree taken too large; nothing is called proven unless it is
+    /// below 1e-12.
     pub error_bound: f64,
     /// Seed of all random choices.
     pub seed: u64,
@@ -55,6 +64,9 @@ pub struct Minimum {
     pub none_of: Vec<[u64; 2]>,
     /// Coefficients that all candidates together leave unobservable.
     pub never: Vec<String>,
+    /// Whether `positions` is the fewest, or `never` is never, by more than rounding and chance: nothing smaller was left out, and the
+    /// bound on the probability of an error is below 1e-12.
+    pub proven: bool,
 }
 
 /// What was searched, and how.
@@ -62,24 +74,42 @@ pub struct Minimum {
 pub struct SearchReport {
     /// The number of positions.
     pub positions: usize,
-    /// Dwell of each, in s.
-    pub dwell_s: f64,
-    /// Rate of the turns between positions in deg/s; null: they take no time.
-    pub slew_rate_deg_s: Option<f64>,
+    /// What every sigma rests on: the information of all samples on psi and all coefficients. Every position has the dwell, slews are about
+    /// the eigenaxis, Z is not used meanwhile.
+    pub conditions: MeasurementReport,
+    /// Random drift that sigmas allow for; null: none.
+    pub drift_noise: Option<String>,
+    /// Knowledge beforehand that sigmas rest on; null: none.
+    pub prior: Option<String>,
     /// What makes a scheme better: worst, A, D, E or margin.
     pub criterion: String,
     /// Sequences whose sigma was computed.
     pub examined: u64,
-    /// Whether the first is proven to be the best sequence of candidates, by exhaustion.
+    /// Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
+    /// required coefficient as far as double precision tells: they count as worse than all others.
+    pub lost: u64,
+    /// Whether no sequence of candidates within the constraints is better than the first, by exhaustion: none has a smaller worst degree, or
+    /// the same and a smaller criterion.
     pub proven: bool,
+    /// How many sequences are as good as the first; null where not all were searched.
+    pub ties: Option<TiesReport>,
     /// Whether orders of the same positions count as different schemes.
     pub order_matters: bool,
-    /// Whether the search was interrupted.
+    /// Whether the search was interrupted; if the first is proven nevertheless, before the front was complete.
     pub interrupted: bool,
     /// The smallest worst degree that all candidates together allow.
     pub degree_floor: usize,
     /// The constraints in words.
     pub constraints: Vec<String>,
+}
+
+/// Sequences that are as good as the best.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct TiesReport {
+    /// How many, the best and all their images under turns of the platform axes among them.
+    pub sequences: u64,
+    /// Two tie when their worst degrees are equal and their criteria differ by less than this part.
+    pub within: f64,
 }
 
 /// A scheme that was found.
@@ -89,6 +119,8 @@ pub struct Found {
     pub positions: Vec<String>,
     /// Their Euler angles in degrees.
     pub angles: Vec<String>,
+    /// The half turns between them, each with its direction: the other one is another scheme.
+    pub half_turns: Vec<HalfTurn>,
     /// Its angles were refined continuously.
     pub refined: bool,
     /// Dwell of each position, in s.
@@ -107,4 +139,13 @@ pub struct Found {
     pub worst_accuracy_order: Option<usize>,
     /// Its exact rank and the number of unknowns.
     pub rank: [usize; 2],
+}
+
+/// Half a turn to a position.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct HalfTurn {
+    /// Which position it leads to, counted from 1.
+    pub to: usize,
+    /// The axis, about which it is right-handed: a unit vector (North, Up, East).
+    pub about: [f64; 3],
 }

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::information::{Evaluator, MAX, State};
+use super::ways::Stop;
 use crate::model::Carry;
 
 /// What makes one scheme better than another, of the coefficients that count.
@@ -115,17 +116,17 @@ impl Evaluator {
     }
 
     /// The state behind a whole sequence.
-    pub fn state_of(&self, sequence: &[usize]) -> State {
+    pub fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
         let (mut now, mut next) = (self.start(), self.start());
-        for &c in sequence {
-            self.extend(&now, c, &mut next);
+        for &stop in sequence {
+            self.extend(&now, stop.into(), &mut next);
             std::mem::swap(&mut now, &mut next);
         }
         now
     }
 
     /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not determined.
-    pub fn sigmas(&self, sequence: &[usize]) -> Vec<f64> {
+    pub fn sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<f64> {
         let mut root = Vec::new();
         if !self.root(&self.state_of(sequence), &mut root) {
             return Vec::new();
@@ -134,7 +135,7 @@ impl Evaluator {
     }
 
     /// The criterion of a whole sequence.
-    pub fn of_sequence(&self, sequence: &[usize], criterion: &Criterion) -> f64 {
+    pub fn of_sequence<S: Copy + Into<Stop>>(&self, sequence: &[S], criterion: &Criterion) -> f64 {
         self.value(&self.state_of(sequence), criterion, &mut Vec::new())
     }
 }

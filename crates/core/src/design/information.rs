@@ -3,48 +3,32 @@
 use nalgebra::DMatrix;
 use obsdeg_ekf::integrate::van_loan;
 
-use rayon::prelude::*;
-
 use super::DesignError;
+use super::ways::{Stop, Way};
 use crate::model::attitude::{Euler, Matrix3, c_n};
 use crate::model::platform::{LOCAL, local_dynamics, local_output};
 use crate::model::ring::Float;
-use crate::model::{Carry, Gimbals, Platform, Scheme, SlewTo};
+use crate::model::{Carry, Gimbals, Platform, Scheme};
 use crate::simulation::SimulationError;
-use crate::simulation::attitude_path::Slew;
 use crate::simulation::conditions::{Conditions, latitude_of, si_per_shown};
 use crate::simulation::plan::{Plan, W_IE, steps};
 
 /// Most unknowns of a search: psi and the coefficients of ten terms.
 pub const MAX: usize = 33;
-/// Most candidates when it takes time to turn from one to another.
-pub const MAX_TURNING: usize = 256;
-/// Largest turn of an integration step, in rad.
-const TURN_STEP: f64 = 0.05;
 
 /// One candidate: its attitude, and how coefficients become drift there.
 #[derive(Debug, Clone)]
-struct Candidate {
+pub(super) struct Candidate {
     c: Matrix3<f64>,
     /// `C E(g)` (3 x d), columns in the order of the evaluator.
-    drift: [Vec<f64>; 3],
-}
-
-/// The turn from one candidate to another.
-#[derive(Debug, Clone)]
-struct Turn {
-    seconds: f64,
-    /// `psi^n` behind it by `psi^n` before.
-    phi: Matrix3<f64>,
-    /// `psi^n` behind it by the coefficients (3 x d).
     drift: [Vec<f64>; 3],
 }
 
 /// What every evaluation shares.
 #[derive(Debug, Clone)]
 pub struct Evaluator {
-    platform: Platform,
-    conditions: Conditions,
+    pub(super) platform: Platform,
+    pub(super) conditions: Conditions,
     /// The column of every coefficient in the order of the evaluator: those that count come last.
     order: Vec<usize>,
     /// How many coefficients do not count.
@@ -52,16 +36,16 @@ pub struct Evaluator {
     /// Unknowns: psi, then d coefficients.
     pub(super) n: usize,
     /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
-    w: Matrix3<f64>,
+    pub(super) w: Matrix3<f64>,
     /// Dwell of each position, in s.
     dwell_s: f64,
     /// Information of one position on its `(psi^n, eps^n)`.
     local: [[f64; LOCAL]; LOCAL],
     /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
     phi: [[f64; LOCAL]; 3],
-    candidates: Vec<Candidate>,
+    pub(super) candidates: Vec<Candidate>,
     /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
-    turns: Vec<Turn>,
+    pub(super) ways: Vec<Way>,
     /// deg/h per unit of each coefficient.
     pub(super) dph: f64,
 }
@@ -90,6 +74,17 @@ impl Evaluator {
         candidates: &[Euler],
         required: &[usize],
         conditions: &Conditions,
+    ) -> Result<Self, DesignError> {
+        Self::while_going(base, candidates, required, conditions, &|| true)
+    }
+
+    /// The same, as long as `going` says so: the ways between many candidates take a while.
+    pub(super) fn while_going(
+        base: &Scheme,
+        candidates: &[Euler],
+        required: &[usize],
+        conditions: &Conditions,
+        going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         let scheme = Scheme {
             positions: Scheme::of_angles(candidates.iter().take(1).cloned()).positions,
@@ -123,11 +118,11 @@ impl Evaluator {
             local: [[0.0; LOCAL]; LOCAL],
             phi: [[0.0; LOCAL]; 3],
             candidates: Vec::new(),
-            turns: Vec::new(),
+            ways: Vec::new(),
             dph: si_per_shown("deg/h"),
         };
         let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(attitude).collect();
-        empty.with_dwell(conditions.dwell_s)?.among(&attitudes)
+        empty.with_dwell(conditions.dwell_s)?.among(&attitudes, going)
     }
 
     /// The same with another dwell.
@@ -165,76 +160,17 @@ impl Evaluator {
         Ok(self)
     }
 
-    /// The same with other candidates.
-    ///
-    /// # Errors
-    /// [`DesignError::Pairs`] when there are too many ways between them.
-    pub fn among(mut self, attitudes: &[Matrix3<f64>]) -> Result<Self, DesignError> {
+    /// The candidates without the ways between them.
+    pub(super) fn stand_at(&mut self, attitudes: &[Matrix3<f64>]) {
         self.candidates = attitudes
             .iter()
             .map(|c| Candidate { drift: self.ordered_columns(self.platform.drift_rows(&Float, c)), c: *c })
             .collect();
-        self.turns.clear();
-        if let Some(rate) = self.conditions.slew_rate_deg_s {
-            let found = attitudes.len();
-            if found > MAX_TURNING {
-                return Err(DesignError::Pairs { found });
-            }
-            let turns = (0..found * found).into_par_iter().map(|k| {
-                let (from, to) = (&attitudes[k / found], &attitudes[k % found]);
-                // there is always a shortest way
-                let slew = Slew::to(from, to, &SlewTo::default(), rate.to_radians()).ok().flatten();
-                slew.map_or_else(|| self.stay(), |slew| self.turn(&slew))
-            });
-            self.turns = turns.collect();
-        }
-        Ok(self)
+        self.ways.clear();
     }
 
-    fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
+    pub(super) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
         rows.map(|row| self.order.iter().map(|&c| row[c]).collect())
-    }
-
-    fn stay(&self) -> Turn {
-        let phi = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
-        Turn { seconds: 0.0, phi, drift: std::array::from_fn(|_| vec![0.0; self.n - 3]) }
-    }
-
-    /// `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n behind a turn by psi^n and the coefficients.
-    fn turn(&self, slew: &Slew) -> Turn {
-        let n = self.n;
-        let steps = (slew.turn(slew.duration_s) / TURN_STEP).ceil().max(1.0);
-        let dt = slew.duration_s / steps;
-        let drift_at = |t: f64| self.ordered_columns(self.platform.drift_rows(&Float, &slew.at(t)));
-        let slope = |x: &[Vec<f64>; 3], drift: &[Vec<f64>; 3]| -> [Vec<f64>; 3] {
-            std::array::from_fn(|i| {
-                let own = |k: usize| if k < 3 { 0.0 } else { drift[i][k - 3] };
-                (0..n).map(|k| own(k) + (0..3).map(|j| self.w[i][j] * x[j][k]).sum::<f64>()).collect()
-            })
-        };
-        let moved = |x: &[Vec<f64>; 3], k: &[Vec<f64>; 3], h: f64| -> [Vec<f64>; 3] {
-            std::array::from_fn(|i| x[i].iter().zip(&k[i]).map(|(x, k)| x + h * k).collect())
-        };
-        let mut x: [Vec<f64>; 3] =
-            std::array::from_fn(|i| (0..n).map(|k| f64::from(u8::from(i == k))).collect());
-        let mut before = drift_at(0.0);
-        for step in 0..steps as usize {
-            let t = step as f64 * dt;
-            let (middle, after) = (drift_at(t + dt / 2.0), drift_at(t + dt));
-            let k1 = slope(&x, &before);
-            let k2 = slope(&moved(&x, &k1, dt / 2.0), &middle);
-            let k3 = slope(&moved(&x, &k2, dt / 2.0), &middle);
-            let k4 = slope(&moved(&x, &k3, dt), &after);
-            for (k, weight) in [(k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)] {
-                x = moved(&x, &k, weight * dt / 6.0);
-            }
-            before = after;
-        }
-        Turn {
-            seconds: slew.duration_s,
-            phi: std::array::from_fn(|i| std::array::from_fn(|j| x[i][j])),
-            drift: x.map(|row| row[3..].to_vec()),
-        }
     }
 
     /// Nothing yet.
@@ -262,17 +198,12 @@ impl Evaluator {
         self.dwell_s
     }
 
-    /// How long it takes to get from one candidate to another, in s.
-    pub fn slew_s(&self, from: usize, to: usize) -> f64 {
-        self.turns.get(from * self.candidates.len() + to).map_or(0.0, |t| t.seconds)
-    }
-
     /// Adds a position to `state`; the result goes to `out`.
-    pub fn extend(&self, state: &State, candidate: usize, out: &mut State) {
+    pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
         let n = self.n;
         let carry = self.carry();
-        let Candidate { c, drift } = &self.candidates[candidate];
-        let turn = state.last.and_then(|last| self.turns.get(last * self.candidates.len() + candidate));
+        let Candidate { c, drift } = &self.candidates[stop.candidate];
+        let turn = self.way_to(state.last, stop);
         let mut local = [[0.0; MAX]; LOCAL];
         for r in 0..3 {
             match (carry, turn) {
@@ -295,7 +226,7 @@ impl Evaluator {
             }
             local[3 + r][3..n].copy_from_slice(&drift[r]);
         }
-        out.last = Some(candidate);
+        out.last = Some(stop.candidate);
         out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
         // G L, then L^T (G L)
         let mut weighted = [[0.0; MAX]; LOCAL];

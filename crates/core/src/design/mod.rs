@@ -1,8 +1,8 @@
 //! Finding schemes: the fewest positions, and the best of a number of positions.
 //!
-//! Sets of candidates are first judged exactly ([`observability`]); those that make the required coefficients observable with the
-//! smallest worst degree are then ranked by a criterion of optimal design ([`information`]), in every order where the carry makes
-//! order matter ([`search`]), up to turns of the platform axes ([`symmetry`]).
+//! Sets of candidates are first judged exactly ([`observability`]). Sequences of those that make the required coefficients observable, in
+//! every order where the carry makes order matter and by both ways of half turns ([`ways`]), are then ranked ([`search`]): constraints
+//! first, then the worst degree, then a criterion of optimal design ([`information`]), up to turns of the platform axes ([`symmetry`]).
 
 pub mod answer;
 pub mod candidates;
@@ -13,24 +13,34 @@ mod refine;
 pub mod search;
 pub mod symmetry;
 mod task;
+pub mod ties;
+pub mod ways;
+mod winner;
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use obsdeg_ekf::EkfError;
 
 pub use answer::Design;
 pub use candidates::Candidates;
+pub use winner::scheme as scheme_found;
 
 use crate::degree::ensemble::EnsembleError;
 use crate::model::{Scheme, SchemeError};
 use crate::simulation::SimulationError;
+use crate::simulation::answer::MeasurementReport;
 use crate::simulation::conditions::{Conditions, latitude_of};
-use answer::{Found, SCHEMA, SearchReport};
+use answer::{Found, SCHEMA, SearchReport, TiesReport};
 use candidates::MAX_CANDIDATES;
 use information::Evaluator;
 use search::{Progress, Search};
 use task::Task;
+use ties::TIE;
 
 /// Most sequences that are searched exhaustively, up to symmetry.
 pub const EXHAUSTIVE: u64 = 50_000_000;
+/// What may be wrong with a larger probability is not proven.
+const PROOF: f64 = 1e-12;
 
 /// Why no scheme is found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,7 +52,7 @@ pub enum DesignError {
         found: usize,
     },
     /// Too many turns between candidates.
-    #[error("{found} candidates with slews; expected at most {}", information::MAX_TURNING)]
+    #[error("{found} candidates with slews; expected at most {}", ways::MAX_TURNING)]
     Pairs {
         /// Their number.
         found: usize,
@@ -112,6 +122,9 @@ pub enum DesignError {
         /// What is missed.
         why: String,
     },
+    /// Stopped before anything was found.
+    #[error("interrupted before anything was found")]
+    Interrupted,
     /// The scheme.
     #[error(transparent)]
     Scheme(#[from] SchemeError),
@@ -174,7 +187,7 @@ pub enum Kind {
 }
 
 /// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise, the dwell, the rate of
-/// slews and the requirements. `progress` says whether to go on.
+/// slews and the requirements. `progress` says whether to go on: a search that is stopped gives the best so far.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -184,17 +197,30 @@ pub fn design(
     options: &Options,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Design, DesignError> {
+    let stopped = AtomicBool::new(false);
+    // once stopped, always stopped
+    let progress = |now: Progress| {
+        if !stopped.load(Ordering::Relaxed) && !progress(now) {
+            stopped.store(true, Ordering::Relaxed);
+        }
+        !stopped.load(Ordering::Relaxed)
+    };
+    let nothing_yet = Progress { done: 0, total: 1, examined: 0, best: f64::INFINITY };
+    let going = || progress(nothing_yet);
     let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
     let task = Task::new(base, conditions, options, reached)?;
     let every: Vec<usize> = (0..task.rows.candidates()).collect();
     let best_degrees = task.rows.degrees(&every);
-    let minimum = task.minimum(&best_degrees);
-    let below = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
+    let minimum = task.minimum(&best_degrees, &going)?;
+    let mut sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
     let mut out = Design {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         carry: base.carry,
         latitude_deg: latitude_of(base).map_or(0.0, |l| l.degrees()),
+        latitude_by_default: base.latitude.is_none(),
+        geometry: base.geometry,
+        terms: base.unknowns.to_string(),
         candidates: task.candidates.names.clone(),
         beyond_gimbals: beyond,
         symmetry: task.symmetry.order,
@@ -203,16 +229,18 @@ pub fn design(
         search: None,
         found: Vec::new(),
         front: Vec::new(),
-        error_bound: below * task.rows.miss,
+        primes: task.rows.fields(),
+        error_bound: task.rows.error_bound(sets),
         seed: options.seed,
     };
+    out.minimum.proven &= out.error_bound < PROOF;
     let Some(k) = options.positions else { return Ok(out) };
     if !out.minimum.never.is_empty() {
         let why = format!("all together leave {} unobservable", out.minimum.never.join(", "));
         return Err(DesignError::Impossible { positions: k, why });
     }
     let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
-    let evaluator = Evaluator::new(base, &task.candidates.attitudes, &indices, conditions)?;
+    let evaluator = Evaluator::while_going(base, &task.candidates.attitudes, &indices, conditions, &going)?;
     let floor = best_degrees.iter().flatten().max().copied().unwrap_or(0);
     let search = Search {
         rows: &task.rows,
@@ -221,51 +249,64 @@ pub fn design(
         constraints: &task.constraints,
         keep: options.keep,
         floor,
-        progress,
+        progress: &progress,
     };
-    let ordered = evaluator.ordered();
-    let exhaustive = task.space(k, ordered);
-    let best = if let Some(sets) = exhaustive {
-        out.error_bound += sets as f64 * task.rows.miss;
-        search.exhaust(&task.symmetry.representatives(), k)
+    let exhaustive = task.space(k, &evaluator);
+    let best = if let Some(more) = exhaustive {
+        sets += more as f64;
+        out.error_bound = task.rows.error_bound(sets);
+        search.exhaust(&task.symmetry, k)
     } else {
         search.exchange(k, &[], options.restarts, options.seed)
     };
-    out.search = Some(SearchReport {
-        positions: k,
-        dwell_s: conditions.dwell_s,
-        slew_rate_deg_s: conditions.slew_rate_deg_s,
-        criterion: task.criterion.name().into(),
-        examined: best.examined,
-        proven: exhaustive.is_some() && best.complete,
-        order_matters: ordered,
-        interrupted: !best.complete,
-        degree_floor: floor,
-        constraints: task.constraints_in_words(),
-    });
-    for scored in &best.found {
-        out.found.extend(task.found(&evaluator, scored)?);
-    }
+    let all = exhaustive.is_some() && best.complete;
+    out.found = task.all_found(&evaluator, &best.found)?;
     let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
-        let why = match &exhaustive {
-            Some(_) if best.complete => "every sequence was examined".into(),
-            _ => format!("none of {} sequences examined", best.examined),
-        };
-        return Err(DesignError::Impossible { positions: k, why });
+        return Err(match (best.complete, exhaustive) {
+            (false, _) => DesignError::Interrupted,
+            (true, Some(_)) => DesignError::Impossible { positions: k, why: examined(best.lost) },
+            (true, None) => {
+                let why = format!("none of {} sequences examined", best.examined);
+                DesignError::Impossible { positions: k, why }
+            }
+        });
     };
-    for scored in &best.front {
-        out.front.extend(task.found(&evaluator, scored)?);
-    }
+    out.front = task.all_found(&evaluator, &best.front)?;
     if best.complete {
         task.front(&evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
     }
-    if options.refine && best.complete {
-        let refined = task.refined(&evaluator, &first.sequence)?;
+    if options.refine && going() {
+        let refined = task.refined(&evaluator, first, &going)?;
         out.front.extend(refined.iter().cloned());
         out.found.splice(0..0, refined);
     }
     out.front = pareto(std::mem::take(&mut out.front));
+    out.search = Some(SearchReport {
+        positions: k,
+        conditions: MeasurementReport::new(base, conditions),
+        drift_noise: None,
+        prior: None,
+        criterion: task.criterion.name().into(),
+        examined: best.examined,
+        lost: best.lost,
+        proven: all && out.error_bound < PROOF,
+        ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
+        order_matters: evaluator.ordered(),
+        interrupted: stopped.load(Ordering::Relaxed),
+        degree_floor: floor,
+        constraints: task.constraints_in_words(),
+    });
     Ok(out)
+}
+
+/// Why an exhaustive search found nothing.
+fn examined(lost: u64) -> String {
+    match lost {
+        0 => "every sequence was examined".into(),
+        _ => format!(
+            "every sequence was examined; the samples of {lost} with observable positions do not determine what is required in double precision"
+        ),
+    }
 }
 
 /// Those that none beats in both total time and criterion, by time.

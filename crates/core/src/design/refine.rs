@@ -2,9 +2,9 @@
 
 use cobyla::{RhoBeg, StopTols, minimize};
 
-use super::DesignError;
 use super::criterion::Criterion;
 use super::information::{Evaluator, attitude};
+use super::ways::Stop;
 use crate::model::attitude::Euler;
 use crate::model::{Angle, Gimbals};
 
@@ -16,37 +16,32 @@ const STEPS: [f64; 3] = [20.0, 5.0, 1.0];
 const ROUNDED: i64 = 10_000_000;
 
 /// A sequence of attitudes near `start` with a smaller criterion, within the gimbal limits and `allowed` (given the evaluator of the
-/// attitudes); angles in hundredths of a degree. `None` when there is none.
-///
-/// # Errors
-/// [`DesignError`].
+/// attitudes, which are its candidates); angles in hundredths of a degree. `path` goes through them. `None` when there is none.
 pub(super) fn refine(
     evaluator: &Evaluator,
     start: &[Euler],
+    path: &[Stop],
     criterion: &Criterion,
     gimbals: &Gimbals,
     allowed: &dyn Fn(&Evaluator) -> bool,
-) -> Result<Option<(f64, Vec<Euler>)>, DesignError> {
-    let sequence: Vec<usize> = (0..start.len()).collect();
+) -> Option<(f64, Vec<Euler>)> {
     let euler = |x: &[f64], unit: i64| -> Vec<Euler> {
         let angle = |deg: f64| Angle::from_nanodeg((deg * 1e9 / unit as f64).round() as i64 * unit);
         x.chunks_exact(3).map(|a| std::array::from_fn(|k| angle(a[k]))).collect()
     };
-    let at = |attitudes: &[Euler]| {
-        let matrices: Vec<_> = attitudes.iter().map(attitude).collect();
-        evaluator.clone().among(&matrices)
-    };
-    let value = |attitudes: &[Euler]| -> Result<f64, DesignError> {
-        let there = at(attitudes)?;
-        let kept = attitudes.iter().all(|a| gimbals.reach(a)) && allowed(&there);
-        Ok(if kept { there.of_sequence(&sequence, criterion) } else { f64::INFINITY })
+    let value = |attitudes: &[Euler]| {
+        if !attitudes.iter().all(|a| gimbals.reach(a)) {
+            return f64::INFINITY;
+        }
+        let there = evaluator.along(&attitudes.iter().map(attitude).collect::<Vec<_>>());
+        if allowed(&there) { there.of_sequence(path, criterion) } else { f64::INFINITY }
     };
     let degrees = |e: &Euler| e.each_ref().map(|a| a.nanodeg() as f64 / 1e9);
     let mut x: Vec<f64> = start.iter().flat_map(degrees).collect();
-    let first = value(start)?;
+    let first = value(start);
     let mut best = first;
     // a wall for what is not allowed: ten times the value at the start
-    let objective = |x: &[f64], _: &mut ()| value(&euler(x, 1)).unwrap_or(f64::INFINITY).min(10.0 * first);
+    let objective = |x: &[f64], _: &mut ()| value(&euler(x, 1)).min(10.0 * first);
     let no_constraints: [fn(&[f64], &mut ()) -> f64; 0] = [];
     let bounds = vec![(-400.0, 400.0); x.len()];
     for step in STEPS {
@@ -54,10 +49,10 @@ pub(super) fn refine(
         let found =
             minimize(objective, &x, &bounds, &no_constraints, (), EVALUATIONS, RhoBeg::All(step), Some(stop));
         let (_, found, _) = found.unwrap_or_else(|(_, x, _)| (cobyla::SuccessStatus::Success, x, 0.0));
-        let there = value(&euler(&found, ROUNDED))?;
+        let there = value(&euler(&found, ROUNDED));
         if there < best {
             (x, best) = (found, there);
         }
     }
-    Ok((best < first).then(|| (best, euler(&x, ROUNDED))))
+    (best < first).then(|| (best, euler(&x, ROUNDED)))
 }

@@ -21,23 +21,35 @@ pub struct Symmetry {
 }
 
 impl Symmetry {
-    /// The symmetry of candidates given by `C_c^n` in a field; `same(i, j)` says whether coefficients i and j count alike.
+    /// The symmetry of candidates given by their `C_c^n` in some fields, all of which must agree; `same(i, j)` says whether coefficients
+    /// i and j count alike.
     pub fn new(
-        f: &Field,
+        fields: &[(Field, &[Matrix3<u64>])],
         platform: &Platform,
-        attitudes: &[Matrix3<u64>],
         same: &dyn Fn(usize, usize) -> bool,
     ) -> Self {
-        let places: HashMap<&Matrix3<u64>, usize> =
-            attitudes.iter().enumerate().map(|(i, c)| (c, i)).collect();
-        let maps: Vec<Vec<usize>> = rotations(f)
-            .iter()
-            .filter(|p| renames(f, platform, p, same))
-            .filter_map(|p| attitudes.iter().map(|c| places.get(&product(f, c, p)).copied()).collect())
-            .collect();
-        let mut orbit = vec![usize::MAX; attitudes.len()];
+        let candidates = fields.first().map_or(0, |(_, attitudes)| attitudes.len());
+        let maps_in = |(f, attitudes): &(Field, &[Matrix3<u64>])| -> Vec<Option<Vec<usize>>> {
+            let places: HashMap<&Matrix3<u64>, usize> =
+                attitudes.iter().enumerate().map(|(i, c)| (c, i)).collect();
+            let map = |p: &Matrix3<u64>| -> Option<Vec<usize>> {
+                attitudes.iter().map(|c| places.get(&product(f, c, p)).copied()).collect()
+            };
+            rotations(f).iter().map(|p| map(p).filter(|_| renames(f, platform, p, same))).collect()
+        };
+        let mut agreed: Vec<Option<Vec<usize>>> = Vec::new();
+        for (i, here) in fields.iter().map(maps_in).enumerate() {
+            if i == 0 {
+                agreed = here;
+            } else {
+                agreed =
+                    agreed.into_iter().zip(here).map(|(a, b)| a.filter(|a| Some(a) == b.as_ref())).collect();
+            }
+        }
+        let maps: Vec<Vec<usize>> = agreed.into_iter().flatten().collect();
+        let mut orbit = vec![usize::MAX; candidates];
         let mut orbits = 0;
-        for i in 0..attitudes.len() {
+        for i in 0..candidates {
             if orbit[i] == usize::MAX {
                 for map in &maps {
                     orbit[map[i]] = orbits;
@@ -47,6 +59,20 @@ impl Symmetry {
             }
         }
         Self { order: maps.len().max(1), orbit }
+    }
+
+    /// No symmetry.
+    pub fn none(candidates: usize) -> Self {
+        Self { order: 1, orbit: (0..candidates).collect() }
+    }
+
+    /// How many schemes a searched one stands for, as a fraction: it has `order` images (counted once for every turn of the axes); of these
+    /// so many are searched, where only the smallest of a set must be the first of its orbit. A turn of the axes that is not the identity
+    /// moves every attitude, so one turn brings each member of the lowest orbit to its first.
+    pub(super) fn searched_images(&self, set: &[usize]) -> usize {
+        let lowest = set.iter().map(|&c| self.orbit[c]).min();
+        let members = |(i, c): (usize, &usize)| Some(self.orbit[*c]) == lowest && !set[..i].contains(c);
+        set.iter().enumerate().filter(|&x| members(x)).count()
     }
 
     /// The first candidate of every orbit.

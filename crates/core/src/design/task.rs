@@ -1,12 +1,15 @@
 //! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
 
-use super::answer::{Found, Minimum};
+use rayon::prelude::*;
+
+use super::answer::{Found, HalfTurn, Minimum};
 use super::candidates::{Candidates, MAX_CANDIDATES};
 use super::criterion::Criterion;
 use super::information::{self, Evaluator};
 use super::observability::Rows;
 use super::search::{Best, Constraints, Scored, Search};
 use super::symmetry::Symmetry;
+use super::ways::Stop;
 use super::{Design, DesignError, EXHAUSTIVE, Kind, Options, refine};
 use crate::accuracy::Accuracy;
 use crate::degree::ensemble::judge;
@@ -133,8 +136,15 @@ impl<'a> Task<'a> {
         Ok(Self { base, options, candidates, required, criterion, constraints, rows, symmetry })
     }
 
-    /// The fewest candidates that do, with the proof.
-    pub(super) fn minimum(&self, best_degrees: &[Option<usize>]) -> Minimum {
+    /// The fewest candidates that do, with the proof; `proven` without regard to the bound on errors.
+    ///
+    /// # Errors
+    /// [`DesignError::Interrupted`].
+    pub(super) fn minimum(
+        &self,
+        best_degrees: &[Option<usize>],
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Minimum, DesignError> {
         let names = |set: &[usize]| set.iter().map(|&c| self.candidates.names[c].clone()).collect();
         let lost = self.required.iter().zip(best_degrees).filter(|(_, d)| d.is_none());
         let mut out = Minimum {
@@ -143,49 +153,69 @@ impl<'a> Task<'a> {
             counting_bound: self.rows.counting_bound(),
             none_of: Vec::new(),
             never: lost.map(|(c, _)| c.0.clone()).collect(),
+            proven: true,
         };
         if !out.never.is_empty() {
-            return out;
+            return Ok(out);
         }
         let most = if self.options.positions.is_none() { EXHAUSTIVE } else { MINIMUM_SETS };
         let firsts = self.symmetry.representatives();
         let n = self.rows.candidates() as u64;
         for size in out.counting_bound..=self.rows.candidates() {
             let sets = choose(n, size as u64).unwrap_or(u64::MAX);
-            match self.rows.first_observable_set(size, &firsts, most) {
-                (Some(set), _) => {
+            let (set, all) = self.rows.first_observable_set(size, &firsts, most, going);
+            if !going() {
+                return Err(DesignError::Interrupted);
+            }
+            match set {
+                Some(set) => {
                     out.positions = Some(size);
                     out.witness = names(&set);
-                    return out;
+                    return Ok(out);
                 }
-                (None, true) => out.none_of.push([size as u64, sets]),
-                (None, false) => return out,
+                None if all => out.none_of.push([size as u64, sets]),
+                None => break,
             }
         }
-        out
+        out.proven = false;
+        Ok(out)
     }
 
     /// The number of sets behind an exhaustive search of `k` positions; `None` where the space is too large.
-    pub(super) fn space(&self, k: usize, ordered: bool) -> Option<u64> {
+    pub(super) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<u64> {
         let n = self.rows.candidates() as u64;
         let sets: u64 = (1..=k as u64).try_fold(0u64, |sum, size| sum.checked_add(choose(n, size)?))?;
-        let sequences = if ordered { n.checked_pow(k as u32)? } else { choose(n + k as u64 - 1, k as u64)? };
-        let searched = sequences / self.symmetry.order as u64;
-        (searched <= EXHAUSTIVE && (!ordered || sets <= MOST_SETS)).then_some(sets)
+        let searched = if evaluator.ordered() {
+            evaluator.sequences(&self.symmetry.representatives(), k).filter(|_| sets <= MOST_SETS)?
+        } else {
+            choose(n + k as u64 - 1, k as u64)? / self.symmetry.order as u64
+        };
+        (searched <= EXHAUSTIVE).then_some(sets)
     }
 
     /// A sequence with its exact verdict; `None` when rounding called it determined and it is not.
-    pub(super) fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
+    fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
         let attitudes: Vec<Euler> =
-            scored.sequence.iter().map(|&c| self.candidates.attitudes[c].clone()).collect();
-        let names = scored.sequence.iter().map(|&c| self.candidates.names[c].clone()).collect();
+            scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
+        let names = scored.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
         self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)
+    }
+
+    /// Those of some sequences that are what they seem.
+    pub(super) fn all_found(
+        &self,
+        evaluator: &Evaluator,
+        list: &[Scored],
+    ) -> Result<Vec<Found>, DesignError> {
+        let found: Vec<Option<Found>> =
+            list.par_iter().map(|scored| self.found(evaluator, scored)).collect::<Result<_, _>>()?;
+        Ok(found.into_iter().flatten().collect())
     }
 
     fn judged(
         &self,
         evaluator: &Evaluator,
-        sequence: &[usize],
+        sequence: &[Stop],
         attitudes: Vec<Euler>,
         positions: Vec<String>,
         value: f64,
@@ -203,16 +233,18 @@ impl<'a> Task<'a> {
         let first = platform.names().len() - platform.coefficients();
         let columns = || self.required.iter().map(|r| first + r.1);
         let degrees: Option<Vec<usize>> = columns().map(|c| verdicts.degrees.degree[c]).collect();
-        let Some(degrees) = degrees else { return Ok(None) };
+        let Some(degrees) = degrees.filter(|d| self.constraints.cap(d)) else { return Ok(None) };
         // beyond the precision of the series the order is not known
         let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
         let orders = accuracy.and_then(|a| columns().map(|c| a.order[c]).collect::<Option<Vec<_>>>());
+        let half_turns = evaluator.half_turns(sequence).into_iter();
         let sigmas = evaluator.sigmas(sequence);
         let worst = sigmas.iter().zip(&self.required).max_by(|a, b| a.0.total_cmp(b.0));
         let Some((&worst_sigma_dph, (worst, _))) = worst else { return Ok(None) };
         Ok(Some(Found {
             positions,
             angles,
+            half_turns: half_turns.map(|(k, turn)| HalfTurn { to: k + 1, about: turn.about }).collect(),
             refined: false,
             dwell_s: evaluator.dwell_s(),
             total_s: evaluator.state_of(sequence).seconds,
@@ -238,7 +270,7 @@ impl<'a> Task<'a> {
         counts.extend(self.options.front.iter().filter(|f| **f != k));
         for count in counts {
             let known = main.found.iter().filter(|s| s.sequence.len() == count);
-            let mut given: Vec<Vec<usize>> = known.map(|s| s.sequence.clone()).collect();
+            let mut given: Vec<Vec<Stop>> = known.map(|s| s.sequence.clone()).collect();
             for factor in DWELLS {
                 if (count, factor) == (k, 1.0) {
                     continue;
@@ -253,46 +285,34 @@ impl<'a> Task<'a> {
                     return Ok(());
                 }
                 given.extend(best.found.iter().map(|s| s.sequence.clone()));
-                for scored in &best.front {
-                    out.front.extend(self.found(&other, scored)?);
-                }
+                out.front.extend(self.all_found(&other, &best.front)?);
             }
         }
         Ok(())
     }
 
-    /// The best sequence with its angles refined, if that makes it better.
+    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a smaller criterion.
     pub(super) fn refined(
         &self,
         evaluator: &Evaluator,
-        sequence: &[usize],
+        best: &Scored,
+        going: &dyn Fn() -> bool,
     ) -> Result<Option<Found>, DesignError> {
-        let start: Vec<Euler> = sequence.iter().map(|&c| self.candidates.attitudes[c].clone()).collect();
-        let places: Vec<usize> = (0..start.len()).collect();
+        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
+        let start: Vec<Euler> = best.sequence.iter().map(attitude).collect();
+        let path: Vec<Stop> =
+            best.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s }).collect();
         let c = &self.constraints;
-        let allowed = |there: &Evaluator| {
-            let slews = places.windows(2).all(|w| c.slew_s.is_none_or(|l| there.slew_s(w[0], w[1]) <= l));
-            let total = c.total_s.is_none_or(|l| there.state_of(&places).seconds <= l);
-            let met = c
-                .sigmas
-                .as_ref()
-                .is_none_or(|limits| there.of_sequence(&places, &Criterion::Margin(limits.clone())) <= 1.0);
-            slews && total && met
-        };
-        let refined = refine::refine(evaluator, &start, &self.criterion, &self.base.gimbals, &allowed)?;
+        let allowed = |there: &Evaluator| going() && c.keep(there, &path);
+        let refined = refine::refine(evaluator, &start, &path, &self.criterion, &self.base.gimbals, &allowed);
         let Some((value, attitudes)) = refined else { return Ok(None) };
         let matrices: Vec<_> = attitudes.iter().map(information::attitude).collect();
-        let there = evaluator.clone().among(&matrices)?;
+        let there = evaluator.along(&matrices);
         let mut names = Candidates::default();
         attitudes.iter().for_each(|a| names.add(a.clone()));
-        let found = self.judged(&there, &places, attitudes, names.names, value)?;
-        let caps = |f: &Found| c.degrees.is_none() || f.worst_degree <= self.worst_cap();
-        Ok(found.filter(caps).map(|f| Found { refined: true, ..f }))
-    }
-
-    /// The smallest cap on a degree.
-    fn worst_cap(&self) -> usize {
-        self.constraints.degrees.iter().flatten().copied().min().unwrap_or(usize::MAX)
+        let found = self.judged(&there, &path, attitudes, names.names, value)?;
+        let found = found.filter(|f| f.worst_degree <= best.worth.degree);
+        Ok(found.map(|f| Found { refined: true, ..f }))
     }
 
     pub(super) fn constraints_in_words(&self) -> Vec<String> {

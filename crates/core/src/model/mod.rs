@@ -20,5 +20,5 @@ pub use dwell::Dwell;
 pub use geometry::{Geometry, Term, Unknowns};
 pub use gimbals::Gimbals;
 pub use platform::Platform;
-pub use rotation::{Rotation, SlewTo};
+pub use rotation::{Rotation, SlewAxis, SlewTo};
 pub use scheme::{Carry, Latitude, Position, Scheme, SchemeError};

@@ -93,13 +93,39 @@ impl fmt::Display for Rotation {
     }
 }
 
+/// What a slew turns about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SlewAxis {
+    /// One of the six axes.
+    Named(Axis),
+    /// A direction in n (North, Up, East), of any length but 0.
+    Direction([f64; 3]),
+}
+
+impl SlewAxis {
+    /// A direction in n, if it is one.
+    pub fn direction(components: &[f64]) -> Option<Self> {
+        let direction: [f64; 3] = components.try_into().ok()?;
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (length.is_normal() && length < 1e100).then_some(Self::Direction(direction))
+    }
+}
+
+impl FromStr for SlewAxis {
+    type Err = AxisError;
+    fn from_str(text: &str) -> Result<Self, AxisError> {
+        text.parse().map(Self::Named)
+    }
+}
+
 /// The way to a position from the one before: a turn at a constant rate, without observation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SlewTo {
     /// The rate in deg/s; `None`: that of the conditions.
     pub rate_deg_s: Option<f64>,
-    /// About this axis; `None`: about the eigenaxis, the shortest way.
-    pub axis: Option<Axis>,
-    /// By this angle, right-handed; `None`: the shorter way about the axis.
+    /// About this axis; `None`: the shortest way, half turns about the axis in n (North, Up, East) whose first component that is not
+    /// zero is positive.
+    pub axis: Option<SlewAxis>,
+    /// By this angle, right-handed; `None`: the shorter way about the axis, half turns right-handed.
     pub angle: Option<Angle>,
 }

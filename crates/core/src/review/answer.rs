@@ -4,6 +4,7 @@ use crate::analysis::Analysis;
 use crate::compare::Comparison;
 use crate::crosscheck::CrossCheck;
 use crate::design::answer::{Found, Minimum};
+use crate::simulation::answer::Turn;
 use crate::simulation::{Simulation, Traces};
 use crate::system::{SystemAnalysis, SystemEvidence, SystemRun};
 
@@ -64,6 +65,8 @@ pub struct PositionReview {
     pub dwell_s: f64,
     /// How long the way there takes, in s; `None`: no time.
     pub slew_s: Option<f64>,
+    /// How it turns.
+    pub turn: Option<Turn>,
     /// Components of g along I, O, S of gyro X, Y, Z, in g.
     pub g: [[f64; 3]; 3],
 }

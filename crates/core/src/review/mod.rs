@@ -187,6 +187,7 @@ fn positions(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Vec<Posit
             start_s: start(i),
             dwell_s: p.dwell.map_or(conditions.dwell_s, Dwell::seconds),
             slew_s: slew(i),
+            turn: plan.slews().find(|s| s.0 == i).map(|s| s.1),
             g: scheme.geometry.gyros().map(|gyro| [along(gyro.I), along(gyro.O), along(gyro.S)]),
         }
     };

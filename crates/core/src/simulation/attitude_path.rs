@@ -1,9 +1,10 @@
 //! The computed attitude over time: constant at a position, turning about an eigenaxis during a slew.
 
+use super::answer::Turn;
 use super::plan::W_IE;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
-use crate::model::rotation::{Axis, Rotation, SlewTo};
+use crate::model::rotation::{Axis, Rotation, SlewAxis, SlewTo};
 
 /// `a b` in floating point.
 pub(crate) fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
@@ -39,26 +40,44 @@ pub(crate) fn cross(v: &[f64; 3]) -> Matrix3<f64> {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
 
-/// The rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi.
+/// Turns that differ by less are one, in rad: rounding leaves 1e-15, angles of nine decimals are 1.7e-11 apart.
+const SAME: f64 = 1e-12;
+/// A component of an axis that counts for the sense of a half turn.
+const COMPONENT: f64 = 1e-6;
+
+/// The rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi. Of the two vectors of a half turn the one whose
+/// first component that is not zero is positive.
 pub(crate) fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
     let sine = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]].map(|x| x / 2.0);
-    let length = sine.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let length = norm(&sine);
     let cosine = (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0;
     let angle = length.atan2(cosine);
-    if length > 1e-7 {
-        return sine.map(|x| x * angle / length);
+    if cosine > -0.5 {
+        return if length > 1e-7 { sine.map(|x| x * angle / length) } else { sine };
     }
-    if cosine > 0.0 {
-        return sine;
-    }
-    // half a turn: r = 2 a a^T - 1
+    // towards half a turn the sine loses its direction; r + r^T = 2 cos + 2 (1 - cos) a a^T keeps it
     let largest = (0..3).fold(0, |b, i| if r[i][i] > r[b][b] { i } else { b });
-    let scale = ((r[largest][largest] + 1.0) * 2.0).sqrt();
-    let axis: [f64; 3] = std::array::from_fn(|i| {
-        if i == largest { scale / 2.0 } else { (r[i][largest] + r[largest][i]) / (2.0 * scale) }
+    let scale = 2.0 * (1.0 - cosine);
+    let column = std::array::from_fn(|i| {
+        (r[i][largest] + r[largest][i] - if i == largest { 2.0 * cosine } else { 0.0 }) / scale
     });
-    let norm = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-    axis.map(|x| x * std::f64::consts::PI / norm)
+    let axis = column.map(|x| x / norm(&column));
+    let along: f64 = sine.iter().zip(&axis).map(|(s, a)| s * a).sum();
+    let forward = if along.abs() > SAME {
+        along > 0.0
+    } else {
+        axis.iter().find(|x| x.abs() > COMPONENT).is_some_and(|x| *x > 0.0)
+    };
+    axis.map(|x| if forward { x * angle } else { -x * angle })
+}
+
+fn norm(v: &[f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Whether a rotation by so many rad leads as well the other way round.
+fn is_half_turn(angle: f64) -> bool {
+    (angle.abs() - std::f64::consts::PI).abs() <= SAME
 }
 
 /// The unit vector of `axis` in the axes of c.
@@ -89,7 +108,9 @@ impl Slew {
         Self { from: *from, rate: axis_in_c(from, rotation.axis).map(|x| x * rate), duration_s }
     }
 
-    /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn.
+    /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn. Without an axis it is the shortest
+    /// way; of two shortest ways, half turns, the one about the axis in n (North, Up, East) whose first component that is not zero is
+    /// positive. So `from -> from P`, `to -> to P`, a turn of the platform axes, leaves the turn in n as it is.
     ///
     /// # Errors
     /// [`NoWay`] when a turn about its axis, or by its angle, does not lead there.
@@ -99,15 +120,17 @@ impl Slew {
         slew: &SlewTo,
         rate_rad_s: f64,
     ) -> Result<Option<Self>, NoWay> {
-        let shortest = rotation_vector(&times(&transpose(from), to));
-        let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let axis = match slew.axis {
-            Some(axis) => axis_in_c(from, axis),
-            None if length(&shortest) < 1e-12 => return Ok(None),
-            None => shortest.map(|x| x / length(&shortest)),
+        let shortest = apply(&transpose(from), &rotation_vector(&times(to, &transpose(from))));
+        let length = norm(&shortest);
+        let axis = match &slew.axis {
+            Some(SlewAxis::Named(axis)) => axis_in_c(from, *axis),
+            Some(SlewAxis::Direction(n)) => apply(&transpose(from), &n.map(|x| x / norm(n))),
+            None if length < SAME => return Ok(None),
+            None => shortest.map(|x| x / length),
         };
-        // about a given axis the shorter way; by a given angle whatever it is
+        // about a given axis the shorter way, a half turn right-handed; by a given angle whatever it is
         let along: f64 = shortest.iter().zip(&axis).map(|(x, a)| x * a).sum();
+        let along = if is_half_turn(length) { along.abs() } else { along };
         let angle = slew.angle.as_ref().map_or(along, |a| (a.nanodeg() as f64 / 1e9).to_radians());
         let reached = times(from, &rotation(&axis.map(|x| x * angle)));
         let missed = (0..9).map(|k| (reached[k / 3][k % 3] - to[k / 3][k % 3]).abs()).fold(0.0, f64::max);
@@ -116,12 +139,28 @@ impl Slew {
         }
         let duration_s = angle.abs() / rate_rad_s;
         let rate = axis.map(|x| x * angle / duration_s);
-        Ok((angle.abs() > 1e-12).then_some(Self { from: *from, rate, duration_s }))
+        Ok((angle.abs() > SAME).then_some(Self { from: *from, rate, duration_s }))
+    }
+
+    /// How it turns, seen from n.
+    pub fn turn(&self) -> Turn {
+        let rate = norm(&self.rate);
+        // what rounding leaves of a component that is zero
+        let clean = |x: f64| (x / rate * 1e12).round() / 1e12 + 0.0;
+        let angle_deg = (rate * self.duration_s).to_degrees();
+        let angle_deg = (angle_deg * 1e10).round() / 1e10;
+        Turn { about: apply(&self.from, &self.rate).map(clean), angle_deg }
+    }
+
+    /// The same two attitudes by the other way round, if both are half a turn.
+    pub fn reversed(&self) -> Option<Self> {
+        let half = is_half_turn(norm(&self.rate) * self.duration_s);
+        half.then(|| Self { rate: self.rate.map(|x| -x), ..self.clone() })
     }
 
     /// How far it turns in `t` seconds, with the earth rate, in rad.
-    pub fn turn(&self, t: f64) -> f64 {
-        (self.rate.iter().map(|x| x * x).sum::<f64>().sqrt() + W_IE) * t
+    pub fn turned(&self, t: f64) -> f64 {
+        (norm(&self.rate) + W_IE) * t
     }
 
     /// `C_c^n` after `t` seconds.
@@ -157,6 +196,59 @@ mod tests {
         }
     }
 
+    /// Half turns in n are the same for every turn of the platform axes, and go about the axis that the rule says.
+    #[test]
+    fn half_turns_are_chosen_in_n() {
+        let names = crate::model::attitude::cardinal_names();
+        let matrix = |name: &String| {
+            let angles = crate::model::attitude::cardinal(name).expect("an attitude");
+            crate::design::information::attitude(&angles)
+        };
+        let all: Vec<Matrix3<f64>> = names.iter().map(matrix).collect();
+        let mut half_turns = 0;
+        for from in &all {
+            for to in &all {
+                let slew = |p: &Matrix3<f64>| {
+                    Slew::to(&times(from, p), &times(to, p), &SlewTo::default(), 0.02).expect("a way")
+                };
+                let plain = slew(&all[0]).map(|s| s.turn());
+                if let Some(turn) = plain.filter(|t| t.angle_deg == 180.0) {
+                    half_turns += 1;
+                    let first = turn.about.iter().find(|x| **x != 0.0);
+                    assert!(first.is_some_and(|x| *x > 0.0), "{turn:?}");
+                }
+                for p in &all {
+                    assert_eq!(slew(p).map(|s| s.turn()), plain);
+                }
+                // the other way leads there too, in the same time
+                if let Some(slew) = slew(&all[0]) {
+                    let back = slew.reversed();
+                    assert_eq!(back.is_some(), slew.turn().angle_deg == 180.0);
+                    for way in back.into_iter().chain([slew]) {
+                        assert!(distance(&way.at(way.duration_s), to) < 1e-12);
+                    }
+                }
+            }
+        }
+        // about three axes and six diagonals
+        assert_eq!(half_turns, 24 * 9);
+    }
+
+    proptest! {
+        /// Short of half a turn, by as little as the last of nine decimals, the shorter way is taken; at it, the rule.
+        #[test]
+        fn close_to_half_a_turn(v in prop::array::uniform3(-1f64..1.0), short in 1e-11f64..1e-3) {
+            prop_assume!(norm(&v) > 0.1 && v[0].abs() > 1e-3);
+            let axis = v.map(|x| x / norm(&v));
+            let by = |angle: f64| rotation_vector(&rotation(&axis.map(|x| x * angle)));
+            let back = by(std::f64::consts::PI - short);
+            prop_assert!((norm(&back) - (std::f64::consts::PI - short)).abs() < 1e-14);
+            prop_assert!((0..3).all(|i| (back[i] / norm(&back) - axis[i]).abs() < 1e-14), "{axis:?} {back:?}");
+            let half = by(std::f64::consts::PI);
+            prop_assert!(half[0] > 0.0 && (half[0] - axis[0].abs() * std::f64::consts::PI).abs() < 1e-14);
+        }
+    }
+
     #[test]
     fn a_slew_ends_where_it_should() {
         let (from, to) = (rotation(&[0.3, -0.2, 1.0]), rotation(&[-1.3, 0.7, 0.4]));
@@ -187,5 +279,27 @@ mod tests {
         assert_eq!(degrees(&about(Some(-290))), -290.0);
         assert_eq!(degrees(&about(Some(430))), 430.0);
         assert_eq!(Slew::to(&unit, &to, &about(Some(71)), 0.01), Err(NoWay));
+    }
+
+    /// About a direction in n, by a signed angle or right-handed.
+    #[test]
+    fn half_turns_about_skew_axes() {
+        let unit = rotation(&[0.3, -0.2, 1.0]);
+        let axis = [0.6, -0.8, 0.0];
+        let to = times(&rotation(&axis.map(|x| x * std::f64::consts::PI)), &unit);
+        let turn = |direction: [f64; 3], angle: Option<i32>| {
+            let angle = angle.map(crate::model::Angle::from_degrees);
+            let how = SlewTo { axis: Some(SlewAxis::Direction(direction)), angle, rate_deg_s: None };
+            let slew = Slew::to(&unit, &to, &how, 0.01).expect("a way").expect("a turn");
+            assert!(distance(&slew.at(slew.duration_s), &to) < 1e-12);
+            slew.turn()
+        };
+        let forward = Turn { about: axis, angle_deg: 180.0 };
+        let back = Turn { about: [-0.6, 0.8, 0.0], angle_deg: 180.0 };
+        assert_eq!(turn([3.0, -4.0, 0.0], Some(180)), forward);
+        assert_eq!(turn([3.0, -4.0, 0.0], Some(-180)), back);
+        assert_eq!((turn([3.0, -4.0, 0.0], None), turn([-3.0, 4.0, 0.0], None)), (forward, back));
+        let eigenaxis = Slew::to(&unit, &to, &SlewTo::default(), 0.01).expect("a way").expect("a turn");
+        assert_eq!(eigenaxis.turn(), forward);
     }
 }

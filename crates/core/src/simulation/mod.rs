@@ -230,7 +230,16 @@ pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
         match out.last_mut() {
             // a rotation is one segment per step
             Some(last) if last.position == *position && last.slew == slew => last.end_s = end_s,
-            _ => out.push(TimelineReport { position: position.clone(), slew, start_s: s.start_s, end_s }),
+            _ => {
+                let turn = if let Kind::Slew(slew) = &s.kind { Some(slew.turn()) } else { None };
+                out.push(TimelineReport {
+                    position: position.clone(),
+                    slew,
+                    start_s: s.start_s,
+                    end_s,
+                    turn,
+                });
+            }
         }
     }
     out

@@ -5,6 +5,7 @@ use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
 
 use super::SimulationError;
+use super::answer::Turn;
 use super::attitude_path::{Slew, times, transpose};
 use super::conditions::{Conditions, Propagation, latitude_of};
 use crate::model::attitude::Matrix3;
@@ -181,6 +182,14 @@ impl Plan {
         self.segments.last().map_or(0.0, |s| s.start_s + s.dt * s.steps as f64)
     }
 
+    /// The slews: the position that each leads to, and how it turns.
+    pub fn slews(&self) -> impl Iterator<Item = (usize, Turn)> {
+        self.segments.iter().filter_map(|s| match &s.kind {
+            Kind::Slew(slew) => Some((s.position, slew.turn())),
+            Kind::Dwell | Kind::Rotation(_) => None,
+        })
+    }
+
     /// The psi states of a segment: the first three columns of its block.
     pub fn psi_columns(&self, segment: usize) -> &[usize] {
         &self.blocks[self.segments[segment].position].columns[..3]
@@ -347,7 +356,7 @@ fn timeline(
             if let Some(slew) = slew.map_err(|_| SimulationError::SlewMisses { name: name() })? {
                 let duration = slew.duration_s;
                 all += 1.0;
-                integration += slew.turn(duration) / MAX_TURN;
+                integration += slew.turned(duration) / MAX_TURN;
                 counted("integration steps", integration, MAX_INTEGRATION)?;
                 push(position, Kind::Slew(slew), duration, 1);
             }
@@ -363,7 +372,7 @@ fn timeline(
                 let dt = dwell / steps as f64;
                 let whole = Slew::about(&attitudes[position], r, dwell);
                 turning += steps as f64;
-                integration += whole.turn(dwell) / MAX_TURN;
+                integration += whole.turned(dwell) / MAX_TURN;
                 counted("steps of rotating segments", turning, MAX_TURNING_STEPS)?;
                 counted("integration steps", integration, MAX_INTEGRATION)?;
                 for k in 0..steps {
@@ -480,7 +489,7 @@ impl Plan {
         let s = &self.segments[segment];
         let turn = match &s.kind {
             Kind::Dwell => W_IE * s.dt,
-            Kind::Slew(slew) | Kind::Rotation(slew) => slew.turn(s.dt),
+            Kind::Slew(slew) | Kind::Rotation(slew) => slew.turned(s.dt),
         };
         // the timeline has counted them
         integration_steps(turn).unwrap_or(MAX_INTEGRATION)

@@ -151,12 +151,22 @@ pub(super) struct SlewEntry {
     /// The rate in deg/s; slew_rate_deg_s of the simulation when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
     pub(super) rate_deg_s: Option<Spanned<f64>>,
-    /// X_p, Y_p, Z_p (platform) or N, U, E (geographic); the shortest way about any axis when left out.
-    #[schemars(with = "Option<String>", extend("enum" = AXES))]
-    pub(super) about: Option<Spanned<String>>,
-    /// The whole angle about that axis in degrees, right-handed; the shorter way when left out.
+    /// X_p, Y_p, Z_p (platform), N, U, E (geographic), or a direction [North, Up, East] such as [1, 1, 0]. When left out: the shortest way,
+    /// half turns about the direction whose first component that is not zero is positive.
+    #[schemars(with = "Option<AboutEntry>")]
+    pub(super) about: Literal,
+    /// The whole angle about that axis in degrees, right-handed; the shorter way when left out, half turns right-handed.
     #[schemars(with = "Option<f64>")]
     pub(super) angle_deg: Literal,
+}
+
+/// An axis by its name, or a direction in n.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "says what a file may hold")]
+enum AboutEntry {
+    Named(#[schemars(extend("enum" = AXES))] String),
+    Direction([f64; 3]),
 }
 
 /// Limits of the Euler angles as [low, high] in degrees.

@@ -231,7 +231,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Carry;
+    use crate::model::{Carry, SlewAxis, SlewTo};
 
     #[test]
     fn reads_every_key() {
@@ -255,6 +255,7 @@ rotation = { about = "E", rate_deg_s = -0.3 }
 slew = { rate_deg_s = 2, about = "N", angle_deg = 180 }
 [[position]]
 angles_deg = [0, 0, 0]
+slew = { about = [1, -0.5, 0] }
 rotation = { about = "Z_p", angle_deg = 45, rate_deg_s = 0.5 }
 [requirements]
 D_F = 0.01
@@ -279,6 +280,8 @@ alpha_deg = [-180, 180.5]
             (slew.rate_deg_s, slew.axis, slew.angle),
             (Some(2.0), "N".parse().ok(), "180".parse().ok())
         );
+        let direction = SlewAxis::Direction([1.0, -0.5, 0.0]);
+        assert_eq!(p3.slew, Some(SlewTo { axis: Some(direction), ..SlewTo::default() }));
         assert_eq!(scheme.requirements["D_F"], 0.01);
         assert_eq!(scheme.gimbals.limits, [Some([-180_000_000_000, 180_500_000_000]), None, None]);
         assert_eq!(scheme.validate(), Ok(()));
@@ -323,6 +326,9 @@ alpha_deg = [-180, 180.5]
         assert_eq!(slew("rate_deg_s=0").as_deref(), Some("0"));
         assert_eq!(slew("angle_deg=180").as_deref(), Some("180"));
         assert_eq!(slew("about=\"X\"").as_deref(), Some("\"X\""));
+        for wrong in ["[0, 0, 0]", "[1, 2]", "[1, 0, nan]", "[1, 0, \"E\"]", "3"] {
+            assert_eq!(slew(&format!("about={wrong}")).as_deref(), Some(wrong));
+        }
         let gimbals = |keys: &str| place(&format!("[[position]]\nangles_deg=[0,90,0]\n[gimbals]\n{keys}"));
         assert_eq!(gimbals("beta_deg=[80,-80]").0.as_deref(), Some("[80,-80]"));
         assert!(gimbals("beta_deg=[-80,80]").1.contains("(0,90,0); expected beta from -80 to 80 deg"));

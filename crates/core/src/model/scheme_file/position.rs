@@ -7,7 +7,7 @@ use super::{Reader, SchemeFileError};
 use crate::model::angle::{Angle, MAX_DEGREES, parse_decimal};
 use crate::model::attitude::Euler;
 use crate::model::dwell::Dwell;
-use crate::model::rotation::{AxisError, MIN_ROTATION, Rotation, SlewTo, whole_angle};
+use crate::model::rotation::{AxisError, MIN_ROTATION, Rotation, SlewAxis, SlewTo, whole_angle};
 use crate::model::scheme::{Position, parse_attitude};
 use crate::simulation::ranges::DWELL_S;
 
@@ -115,15 +115,30 @@ impl Reader<'_> {
         if let (Some(angle), None) = (angle_deg, about) {
             return Err(self.at(angle.span(), "an angle without an axis; expected `about` too"));
         }
-        let axis = about
-            .as_ref()
-            .map(|a| a.get_ref().parse().map_err(|e: AxisError| self.at(a.span(), e.to_string())));
+        let axis = about.as_ref().map(|a| slew_axis(a.get_ref()).map_err(|e| self.at(a.span(), e)));
         let angle = angle_deg
             .as_ref()
             .map(|a| whole_angle(&self.number(a)?).map_err(|e| self.at(a.span(), e.to_string())));
         let (axis, angle) = (axis.transpose()?, angle.transpose()?);
         let rate_deg_s = self.keep(format!("{key}.slew.rate_deg_s"), rate_deg_s.as_ref());
         Ok(SlewTo { rate_deg_s, axis, angle })
+    }
+}
+
+/// What a slew turns about: a name, or three numbers.
+fn slew_axis(about: &toml::Value) -> Result<SlewAxis, String> {
+    let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+    let direction = |list: &Vec<toml::Value>| {
+        let components: Option<Vec<f64>> = list.iter().map(number).collect();
+        components.and_then(|c| SlewAxis::direction(&c))
+    };
+    match about {
+        toml::Value::String(name) => name
+            .parse()
+            .map_err(|e: AxisError| format!("{e}, or a direction [North, Up, East] such as [1, 1, 0]")),
+        other => other.as_array().and_then(direction).ok_or_else(|| {
+            "expected X_p, Y_p, Z_p, N, U, E, or a direction [North, Up, East] such as [1, 1, 0]".into()
+        }),
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
-use crate::model::{Geometry, Unknowns};
+use crate::model::{Geometry, SlewAxis, Unknowns};
 use crate::simulation::conditions::{Propagation, Settings, Truth};
 
 /// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
@@ -149,7 +149,10 @@ fn position(out: &mut String, p: &Position) {
     if let Some(s) = &p.slew {
         let keys = [
             s.rate_deg_s.map(|rate| format!("rate_deg_s = {}", number(rate))),
-            s.axis.map(|axis| format!("about = \"{axis}\"")),
+            s.axis.map(|axis| match axis {
+                SlewAxis::Named(axis) => format!("about = \"{axis}\""),
+                SlewAxis::Direction(direction) => format!("about = {}", list(direction.map(number))),
+            }),
             s.angle.as_ref().map(|angle| format!("angle_deg = {angle}")),
         ];
         let keys: Vec<String> = keys.into_iter().flatten().collect();
@@ -185,14 +188,15 @@ mod tests {
             dwell in prop::option::of(1_000_000u64..1_000_000_000_000_000),
             turn in prop::option::of((0usize..6, 1_000_000i64..700_000_000_000)),
             slew in prop::option::of((prop::option::of(1e-3f64..5000.0), prop::option::of(0usize..6), 1_000_000i64..700_000_000_000, any::<bool>())),
+            direction in prop::option::of(prop::array::uniform3(-2f64..2.0)),
         ) -> Position {
             let axis = |i: usize| crate::model::rotation::Axis { index: i % 3, geographic: i >= 3 };
             let dwell = dwell.and_then(|ns| format_decimal(ns as i64).parse::<Dwell>().ok());
             let rotation = turn.map(|(i, n)| Rotation { axis: axis(i), angle: Angle::from_nanodeg(n) });
-            let slew = slew.filter(|_| !first).map(|(rate_deg_s, about, n, whole)| SlewTo {
-                rate_deg_s,
-                axis: about.map(axis),
-                angle: (whole && about.is_some()).then(|| Angle::from_nanodeg(-n)),
+            let slew = slew.filter(|_| !first).map(|(rate_deg_s, about, n, whole)| {
+                let axis = direction.map(SlewAxis::Direction).or(about.map(|i| SlewAxis::Named(axis(i))));
+                let angle = (whole && axis.is_some()).then(|| Angle::from_nanodeg(-n));
+                SlewTo { rate_deg_s, axis, angle }
             });
             Position { name, angles, dwell, rotation, slew }
         }
