@@ -308,7 +308,10 @@ fn the_winner_is_a_scheme_file() {
         (&["design", "--positions", "5", "--max-time", "0"], "more than 0"),
         (&["design", "--positions", "5", "--slew-rate", "1"], "inertial"),
         (&["design", "--positions", "4", "--meet", "--requirement", "D=1e-9"], "every sequence was examined"),
-        (&["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"], "expected 1e-12 to 1e9"),
+        (
+            &["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"],
+            "expected 1e-12 to 1e9",
+        ),
         (&["design"], "--positions"),
         (&["design", "--positions", "0"], "1 to 100"),
         (&["design", "--positions", "3", "--carry", "inertial"], "no scheme of 3"),
