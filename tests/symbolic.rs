@@ -1,23 +1,28 @@
 //! The symbolic worker as the program runs it: real process, real lock.
 #![cfg(feature = "symbolica")]
 
-use std::time::Duration;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 
 use obsdeg_symbolic::protocol::CheckTerm;
-use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, Worker, WorkerConfig, WorkerError};
+use obsdeg_symbolic::{Check, Dynamics, Job, Order, Request, System, Worker, WorkerConfig, WorkerError};
 
-#[allow(dead_code, reason = "shared with the command line")]
 #[path = "../crates/cli/lock.rs"]
 mod lock;
 
-fn worker() -> Worker {
+fn worker_of(limit: u64) -> Worker {
     Worker::new(WorkerConfig {
         program: env!("CARGO_BIN_EXE_obsdeg").into(),
         arguments: vec!["symbolic-worker".into()],
-        lock_file: lock::symbolic_lock_file(),
-        lock_limit: Duration::from_secs(60),
-        time_limit: Duration::from_secs(60),
+        limit,
+        waiting: || {},
     })
+}
+
+fn worker() -> Worker {
+    worker_of(1000)
 }
 
 fn strings<const N: usize>(texts: [&str; N]) -> Vec<String> {
@@ -95,4 +100,91 @@ fn factors_of_a_minor() {
     let r = Request { generators: vec![], ..request(Job::MinorFactors { matrix }) };
     let (factors, _) = worker().ask(&r).expect("factored");
     assert_eq!(factors, strings(["-1+x", "1+x"]));
+}
+
+/// `(1 + x)^40000` in an equation: hours, product by product.
+fn endless() -> Request {
+    solve(vec![strings(["(1+x+wN)^40000"])], strings(["1"]))
+}
+
+/// Derivatives grow without any product being counted.
+fn uncounted() -> Request {
+    let equations = strings(["(1+p+v)^9", "(1+p*v)^9"]);
+    let dynamics = Dynamics { states: strings(["p", "v"]), equations, outputs: strings(["p"]) };
+    request(Job::Derive { dynamics, order: 1000 })
+}
+
+/// The limit is one of work, where it is counted, and of processor time elsewhere; the next question is answered.
+#[test]
+fn work_ends_at_its_limit() {
+    let mut w = worker_of(1);
+    for job in [endless(), uncounted()] {
+        assert_eq!(w.ask(&job), Err(WorkerError::OverLimit { limit: 1 }));
+        assert_eq!(w.ask(&solve(vec![strings(["2"])], strings(["1"]))), Ok((strings(["1/2"]), false)));
+    }
+    // no limit is too large to be counted with (one process at a time)
+    w.rest();
+    let mut w = worker_of(u64::MAX);
+    assert_eq!(w.ask(&solve(vec![strings(["2"])], strings(["1"]))), Ok((strings(["1/2"]), false)));
+}
+
+/// Whoever started it may be killed at any time: its pipe is closed then, and the worker leaves in the middle of its work.
+#[test]
+fn a_worker_ends_with_whoever_started_it() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+        .arg("symbolic-worker")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let mut input = child.stdin.take().expect("a pipe");
+    let order = Order { limit: u64::MAX, request: endless() };
+    writeln!(input, "{}", serde_json::to_string(&order).expect("JSON")).expect("written");
+    drop(input);
+    assert!(child.wait().expect("it ends").success());
+}
+
+/// Holds the lock as another process does.
+fn hold(path: &Path) -> File {
+    let file = obsdeg_symbolic::lock::open(path).expect("a lock file");
+    obsdeg_symbolic::lock::wait(&file, || Ok(())).expect("the lock");
+    file
+}
+
+/// A command that wants formulas, and the first line that it says on stderr.
+fn waiting(command: &mut Command) -> (Child, BufReader<std::process::ChildStderr>, String) {
+    command.args(["analyze", "--angles", "0,0,0", "--angles", "180,0,0", "--format", "json"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut errors = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut line = String::new();
+    errors.read_line(&mut line).expect("text");
+    (child, errors, line)
+}
+
+/// While another process has the engine, everybody waits and says so; then everybody has formulas.
+#[test]
+fn everybody_waits_for_a_turn() {
+    let held = hold(&lock::symbolic_lock_file());
+    let started: Vec<_> = (0..3).map(|_| waiting(&mut Command::new(env!("CARGO_BIN_EXE_obsdeg")))).collect();
+    drop(held);
+    for (child, mut errors, line) in started {
+        assert!(line.contains("waiting for another obsdeg process"), "{line}");
+        errors.read_to_string(&mut String::new()).expect("text");
+        let output = child.wait_with_output().expect("it ends");
+        let answer: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(answer["quantities"][2]["solution"]["verification"], "symbolic");
+    }
+}
+
+#[test]
+fn an_interrupt_is_heard_while_waiting() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let _held = hold(&folder.path().join("obsdeg-symbolic.lock"));
+    let (child, _errors, line) =
+        waiting(Command::new(env!("CARGO_BIN_EXE_obsdeg")).env("XDG_RUNTIME_DIR", folder.path()));
+    assert!(line.contains("waiting"), "{line}");
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(130), &[][..]));
 }

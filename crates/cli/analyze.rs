@@ -2,19 +2,18 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::{AnalysisError, Options, analyze};
 use obsdeg_core::solution::solver::Frame;
 use obsdeg_core::system::analyze_system;
-use obsdeg_symbolic::{Worker, WorkerConfig};
 
 use crate::arguments::{OutputArguments, SchemeArguments};
+use crate::engine::{EngineArguments, notice, rest};
 use crate::failure::Failure;
 use crate::model::ModelFile;
 use crate::progress::Spinner;
-use crate::{lock, output};
+use crate::{interrupt, output};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -28,7 +27,7 @@ Examples:
   obsdeg analyze --model model.toml                     any system x' = f(x, u, p, t), z = h
 
 Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in
-rad/s and Z in g. Exit codes: 0 done, 2 bad input, 3 internal error.";
+rad/s and Z in g. Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Switch {
@@ -72,15 +71,15 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Seconds that the symbolic engine may take for one formula
-    #[arg(long, value_name = "SECONDS", default_value_t = 5)]
-    symbolic_limit: u64,
+    #[command(flatten)]
+    engine: EngineArguments,
 
     #[command(flatten)]
     output: OutputArguments,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    interrupt::ends()?;
     output::check(&a.output)?;
     if let Some(path) = &a.model {
         return system(a, path);
@@ -95,10 +94,11 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         formulas: a.formulas,
         frame: if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform },
     };
-    let mut worker = worker(a.symbolic_limit)?;
+    let mut worker = a.engine.worker(a.output.quiet)?;
     let spinner = Spinner::start("solving symbolically (--solutions off leaves it out)", a.output.quiet);
     let analysed = analyze(&scheme, options, worker.as_mut());
     drop(spinner);
+    rest(worker.as_mut());
     let analysis = analysed.map_err(|e| match e {
         AnalysisError::Combination { text, reason, span } => {
             Failure::at(&format!("combination: {reason}"), "--combination", &text, span)
@@ -113,41 +113,19 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The banner of the engine is its licence notice.
-pub(crate) fn notice(worker: Option<&Worker>, quiet: bool) {
-    for line in worker.into_iter().flat_map(Worker::banner).filter(|_| !quiet) {
-        eprintln!("{line}");
-    }
-}
-
 /// A model file.
 fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
     let file = ModelFile::read(path)?;
-    let mut worker = worker(a.symbolic_limit)?;
+    let mut worker = a.engine.worker(a.output.quiet)?;
     let spinner = Spinner::start("judging the model", a.output.quiet);
     let engine = (a.solutions == Switch::On).then_some(worker.as_mut());
     let analysed = analyze_system(&file.model, a.seed, a.order.map(Into::into), engine);
     drop(spinner);
+    rest(worker.as_mut());
     let analysis = analysed.map_err(|e| file.wrong(&e))?;
     notice(worker.as_ref(), a.output.quiet);
     let text = obsdeg_report::system(&analysis, a.output.format, output::layout(&a.output))
         .map_err(|e| Failure::internal(e.to_string()))?;
     output::write(&a.output, &text)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The symbolic engine in a process of its own, if this build has one; nothing starts yet.
-pub(crate) fn worker(limit_s: u64) -> Result<Option<Worker>, Failure> {
-    if !cfg!(feature = "symbolica") {
-        return Ok(None);
-    }
-    let program = std::env::current_exe()
-        .map_err(|e| Failure::internal(format!("cannot find the program itself: {e}")))?;
-    Ok(Some(Worker::new(WorkerConfig {
-        program,
-        arguments: vec!["symbolic-worker".into()],
-        lock_file: lock::symbolic_lock_file(),
-        lock_limit: Duration::from_secs(60),
-        time_limit: Duration::from_secs(limit_s),
-    })))
 }

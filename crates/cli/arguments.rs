@@ -11,6 +11,7 @@ use obsdeg_core::system::model_file;
 use obsdeg_report::Format;
 
 use crate::failure::Failure;
+use crate::input::read_text;
 
 /// What is analysed.
 #[derive(Debug, Args)]
@@ -98,22 +99,6 @@ impl SchemeArguments {
     }
 }
 
-/// Largest input file, in bytes.
-const MAX_FILE: u64 = 50_000_000;
-
-/// The text of a file; `what` it is stands in the errors.
-pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Failure> {
-    let name = path.display();
-    let wrong = |e: std::io::Error| Failure::input(format!("cannot read the {what} file {name}: {e}"));
-    let size = std::fs::metadata(path).map_err(wrong)?.len();
-    if size > MAX_FILE {
-        return Err(Failure::input(format!(
-            "the {what} file {name} has {size} bytes; expected at most {MAX_FILE}"
-        )));
-    }
-    std::fs::read_to_string(path).map_err(wrong)
-}
-
 /// Whether a file that is no scheme is meant as a model.
 fn is_model(path: &Path, text: &str) -> bool {
     let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -122,13 +107,17 @@ fn is_model(path: &Path, text: &str) -> bool {
 
 /// The scheme of a file.
 pub(crate) fn read_scheme(path: &Path) -> Result<Scheme, Failure> {
+    scheme_of(path, &read_text(path, "scheme")?)
+}
+
+/// The scheme of a file that was read.
+pub(crate) fn scheme_of(path: &Path, text: &str) -> Result<Scheme, Failure> {
     let name = path.display().to_string();
-    let text = read_text(path, "scheme")?;
-    scheme_file::read(&text).map_err(|e| match e.span {
-        _ if is_model(path, &text) => Failure::input(format!(
+    scheme_file::read(text).map_err(|e| match e.span {
+        _ if is_model(path, text) => Failure::input(format!(
             "{name} is a model file; expected a scheme file, with [[position]] tables (models go with --model, or to report)"
         )),
-        Some(span) => Failure::at(&e.message, &name, &text, span),
+        Some(span) => Failure::at(&e.message, &name, text, span),
         None => Failure::input(format!("{name}: {}", e.message)),
     })
 }

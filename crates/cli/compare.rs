@@ -10,9 +10,9 @@ use obsdeg_core::model::{Carry, Latitude};
 use crate::arguments::{OutputArguments, read_scheme};
 use crate::conditions::MeasurementArguments;
 use crate::failure::Failure;
-use crate::output;
 use crate::progress::Spinner;
 use crate::simulate::failure;
+use crate::{interrupt, output};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -20,7 +20,7 @@ Examples:
   obsdeg compare a.toml b.toml --carry inertial --requirement D=0.05 --format markdown -o review.md
 
 Requirements are those of a scheme file, [requirements], or --requirement.
-Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error.";
+Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
@@ -49,6 +49,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    interrupt::ends()?;
     output::check(&a.output)?;
     let mut entries = Vec::with_capacity(a.schemes.len());
     for path in &a.schemes {

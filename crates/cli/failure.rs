@@ -11,6 +11,8 @@ pub(crate) const CHECK: u8 = 1;
 pub(crate) const INPUT: u8 = 2;
 /// A defect of the program.
 pub(crate) const INTERNAL: u8 = 3;
+/// The user did not want to wait: the code that a shell gives a program ended by Ctrl-C.
+pub(crate) const INTERRUPTED: u8 = 130;
 
 /// Why a command stopped.
 #[derive(Debug)]
@@ -23,11 +25,6 @@ impl Failure {
     /// The input is wrong.
     pub(crate) fn input(message: String) -> Self {
         Self { message: format!("error: {message}"), code: INPUT }
-    }
-
-    /// The user did not want to wait: the code that a shell gives a program ended by Ctrl-C.
-    pub(crate) fn interrupted() -> Self {
-        Self { message: "interrupted; nothing was written".into(), code: 130 }
     }
 
     /// The program is wrong.

@@ -1,21 +1,38 @@
-//! Ctrl-C ends long work with what it has; a second one ends the program.
+//! Ctrl-C: it ends the program, or long work that has something to show.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, INTERRUPTED};
+use crate::files;
 
-/// True once the user has interrupted.
+/// From now on an interrupt ends the program at once, with the code that a shell gives a program ended by Ctrl-C. Files that are
+/// being put in place are all there first; otherwise there is none.
+pub(crate) fn ends() -> Result<(), Failure> {
+    listen(|| {
+        eprintln!("interrupted");
+        end();
+    })
+}
+
+/// True once the user has interrupted: work ends with what it has. A second interrupt ends the program.
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&interrupted);
-    let handler = move || {
+    listen(move || {
         if seen.swap(true, Ordering::Relaxed) {
-            // as a shell reports a program ended by SIGINT
-            #[allow(clippy::exit, reason = "the user asked twice")]
-            std::process::exit(130);
+            end();
         }
-    };
-    ctrlc::set_handler(handler).map_err(|e| Failure::internal(format!("cannot listen to Ctrl-C: {e}")))?;
+    })?;
     Ok(interrupted)
+}
+
+fn listen(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
+    ctrlc::set_handler(handler).map_err(|e| Failure::internal(format!("cannot listen to Ctrl-C: {e}")))
+}
+
+fn end() {
+    files::abandon();
+    #[allow(clippy::exit, reason = "the user asked for it")]
+    std::process::exit(INTERRUPTED.into());
 }

@@ -8,8 +8,12 @@ mod completions;
 mod conditions;
 mod crosscheck;
 mod design;
+mod engine;
 mod failure;
+mod files;
+mod input;
 mod interrupt;
+#[cfg(feature = "symbolica")]
 mod lock;
 mod model;
 mod output;
@@ -36,7 +40,7 @@ Examples:
   obsdeg report scheme.toml -o review.html
   obsdeg paper
 
-Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error.";
+Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error, 130 interrupted.";
 
 /// Exact observable degrees: which unknowns a scheme determines, and with how many derivatives.
 #[derive(Debug, Parser)]
@@ -104,7 +108,11 @@ fn run() -> Result<ExitCode, Failure> {
 
 #[cfg(feature = "symbolica")]
 fn symbolic_worker() -> Result<ExitCode, Failure> {
-    let served = obsdeg_symbolic::worker::serve(std::io::stdin().lock(), std::io::stdout());
+    let input = std::io::BufReader::new(std::io::stdin());
+    // whoever started it has left, or the time is up: at once, in the middle of whatever is computed
+    #[allow(clippy::exit, reason = "nobody waits for the other thread")]
+    let end = || std::process::exit(0);
+    let served = obsdeg_symbolic::worker::serve(&lock::symbolic_lock_file(), input, std::io::stdout(), end);
     served.map_err(|e| Failure::internal(format!("the symbolic worker lost its pipe: {e}")))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -6,8 +6,8 @@ use obsdeg_core::model::scheme_file;
 use obsdeg_core::system::run::RunError;
 use obsdeg_core::system::{ModelError, SystemModel, json, model_file};
 
-use crate::arguments::read_text;
 use crate::failure::Failure;
+use crate::input::read_text;
 
 /// A model with the file it came from.
 pub(crate) struct ModelFile {
@@ -42,8 +42,12 @@ pub(crate) fn is_json(path: &Path) -> bool {
 impl ModelFile {
     /// Reads TOML, or JSON by the ending of the file.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let name = path.display().to_string();
-        let source = Source { name, text: read_text(path, "model")? };
+        Self::of(path, read_text(path, "model")?)
+    }
+
+    /// The model of a file that was read.
+    pub(crate) fn of(path: &Path, text: String) -> Result<Self, Failure> {
+        let source = Source { name: path.display().to_string(), text };
         let read = if is_json(path) { json::read(&source.text) } else { model_file::read(&source.text) };
         let model = read.map_err(|e| source.wrong(&e))?;
         Ok(Self { model, source })

@@ -1,12 +1,13 @@
 //! Results to stdout or to a file, whole or not at all.
 
 use std::io::{IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use obsdeg_report::{File, Layout};
 
 use crate::arguments::{FolderArguments, OutputArguments};
 use crate::failure::Failure;
+use crate::files;
 
 /// Columns of a table that does not go to a terminal.
 const PIPE: Layout = Layout { width: Some(120), color: false };
@@ -36,12 +37,22 @@ pub(crate) fn check(out: &OutputArguments) -> Result<(), Failure> {
     }
 }
 
-/// Refuses a file that exists.
+/// Refuses a file that exists, and what is no file.
 pub(crate) fn check_file(path: &Path, force: bool) -> Result<(), Failure> {
+    files::destination(path).map_err(|e| cannot_write(path, &e))?;
     match path.exists() && !force {
         true => Err(Failure::input(format!("{} exists; --force replaces it", path.display()))),
         false => Ok(()),
     }
+}
+
+fn cannot_write(path: &Path, e: &std::io::Error) -> Failure {
+    Failure::input(format!("cannot write {}: {e}", path.display()))
+}
+
+/// Puts files in place; `target` is what the user named.
+fn place(target: &Path, files: &[(PathBuf, &[u8])]) -> Result<(), Failure> {
+    files::place(target, files).map_err(|(path, e)| cannot_write(&path, &e))
 }
 
 /// Refuses a folder with something in it.
@@ -56,24 +67,12 @@ pub(crate) fn check_emptiness(path: &Path, force: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes the first file to `path` and the others into `folder`: first beside it, then moved in place, the first one last.
+/// Writes the first file to `path` and the others into `folder`; the first one comes last.
 pub(crate) fn write_review(path: &Path, folder: &Path, files: &[File]) -> Result<(), Failure> {
     let Some((first, pictures)) = files.split_first() else { return Ok(()) };
-    let place = || -> std::io::Result<()> {
-        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let new = tempfile::Builder::new().prefix(".obsdeg").tempdir_in(parent)?;
-        for file in files {
-            std::fs::write(new.path().join(&file.name), &file.bytes)?;
-        }
-        if !pictures.is_empty() {
-            std::fs::create_dir_all(folder)?;
-        }
-        for file in pictures {
-            std::fs::rename(new.path().join(&file.name), folder.join(&file.name))?;
-        }
-        std::fs::rename(new.path().join(&first.name), path)
-    };
-    place().map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))
+    let pictures = pictures.iter().map(|file| (folder.join(&file.name), file.bytes.as_slice()));
+    let all: Vec<_> = pictures.chain([(path.to_path_buf(), first.bytes.as_slice())]).collect();
+    place(path, &all)
 }
 
 /// The file's name without its ending; the folder's for a `scheme.toml`.
@@ -83,12 +82,11 @@ pub(crate) fn name(path: &Path) -> String {
     folder.unwrap_or(stem).to_string_lossy().into_owned()
 }
 
-/// Writes `text` to the file of the arguments (by a temporary file and a rename) or to stdout.
+/// Writes `text` to the file of the arguments or to stdout.
 pub(crate) fn write(out: &OutputArguments, text: &str) -> Result<(), Failure> {
     check(out)?;
     match &out.output {
-        Some(path) => write_file(path, text)
-            .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display()))),
+        Some(path) => place(path, &[(path.clone(), text.as_bytes())]),
         None => print(text),
     }
 }
@@ -104,36 +102,16 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-pub(crate) fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".obsdeg").tempfile_in(folder)?;
-    file.write_all(text.as_bytes())?;
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|e| e.error)?;
-    Ok(())
-}
-
 /// Refuses early what `write_folder` would refuse.
 pub(crate) fn check_folder(out: &FolderArguments) -> Result<(), Failure> {
     let Some(path) = &out.output else { return Ok(()) };
     check_emptiness(path, out.force)
 }
 
-/// Writes all files into the folder of the arguments, if there is one: first beside it, then moved in place.
+/// Writes all files into the folder of the arguments, if there is one.
 pub(crate) fn write_folder(out: &FolderArguments, files: &[File]) -> Result<(), Failure> {
     let Some(path) = &out.output else { return Ok(()) };
     check_folder(out)?;
-    let place = || -> std::io::Result<()> {
-        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let new = tempfile::Builder::new().prefix(".obsdeg").tempdir_in(parent)?;
-        for file in files {
-            std::fs::write(new.path().join(&file.name), &file.bytes)?;
-        }
-        std::fs::create_dir_all(path)?;
-        for file in files {
-            std::fs::rename(new.path().join(&file.name), path.join(&file.name))?;
-        }
-        Ok(())
-    };
-    place().map_err(|e| Failure::input(format!("cannot write to {}: {e}", path.display())))
+    let files: Vec<_> = files.iter().map(|file| (path.join(&file.name), file.bytes.as_slice())).collect();
+    place(path, &files)
 }

@@ -7,7 +7,7 @@ use obsdeg_core::audit::audit;
 
 use crate::arguments::OutputArguments;
 use crate::failure::Failure;
-use crate::output;
+use crate::{interrupt, output};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -15,7 +15,7 @@ Examples:
   obsdeg paper --format json --seed 7
 
 The paper: Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06.
-Exit codes: 0 done (whatever the findings), 2 bad input, 3 internal error.";
+Exit codes: 0 done (whatever the findings), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
@@ -29,6 +29,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    interrupt::ends()?;
     output::check(&a.output)?;
     let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
     let text = obsdeg_report::audit(&audit, a.output.format, output::layout(&a.output))

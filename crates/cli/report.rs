@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::compare::Entry;
@@ -11,10 +10,11 @@ use obsdeg_core::review::{Options, ReviewError, review};
 use obsdeg_core::system::{SystemModel, model_file};
 use obsdeg_report::{PICTURES, ReviewFormat};
 
-use crate::analyze::{notice, worker};
-use crate::arguments::{read_scheme, read_text};
+use crate::arguments::scheme_of;
 use crate::conditions::ConditionArguments;
+use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
+use crate::input::read_text;
 use crate::model::{ModelFile, is_json};
 use crate::progress::Bar;
 use crate::simulate::failure;
@@ -78,15 +78,15 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// Seconds that the symbolic engine may take for one formula
-    #[arg(long, value_name = "SECONDS", default_value_t = 5)]
-    symbolic_limit: u64,
+    #[command(flatten)]
+    engine: EngineArguments,
 
     #[command(flatten)]
     conditions: ConditionArguments,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    interrupt::ends()?;
     let format = format(a)?;
     let pictures = matches!(format, ReviewFormat::Markdown | ReviewFormat::Latex);
     let parent = a.output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -97,11 +97,12 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut files: Vec<ModelFile> = Vec::new();
     for path in &a.files {
-        if is_json(path) || model_file::is_model(&read_text(path, "scheme or model")?) {
-            files.push(ModelFile::read(path)?);
+        let text = read_text(path, "scheme or model")?;
+        if is_json(path) || model_file::is_model(&text) {
+            files.push(ModelFile::of(path, text)?);
             continue;
         }
-        let mut scheme = read_scheme(path)?;
+        let mut scheme = scheme_of(path, &text)?;
         scheme.carry = a.carry.unwrap_or(scheme.carry);
         scheme.latitude = a.latitude.or(scheme.latitude);
         let conditions = a.conditions.conditions(&scheme);
@@ -109,20 +110,18 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         entries.push(Entry { name, scheme, conditions });
     }
     let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
-    let mut worker = worker(a.symbolic_limit)?;
-    let interrupted = interrupt::flag()?;
+    let mut worker = a.engine.worker(a.quiet)?;
     let bar = Bar::start(1000, "", a.quiet);
     let options = Options { runs: a.runs as usize, seed: a.seed };
     let reviewed = review(&entries, &models, options, worker.as_mut(), &|what, share| {
         bar.says(what);
         bar.at((share * 900.0) as u64);
-        !interrupted.load(Ordering::Relaxed)
+        true
     });
     let reviewed = reviewed.map_err(|e| match e {
         ReviewError::Simulation { name, error } => failure(error).in_file(&name),
-        ReviewError::Interrupted => Failure::interrupted(),
         ReviewError::Model { model, error } => files[model].wrong(&error),
-        e @ ReviewError::Analysis { .. } => Failure::input(e.to_string()),
+        e @ (ReviewError::Analysis { .. } | ReviewError::Interrupted) => Failure::input(e.to_string()),
     })?;
     bar.says("writing");
     let written = obsdeg_report::review(&reviewed, format).map_err(|e| match e {

@@ -14,8 +14,8 @@ use crate::arguments::{FolderArguments, SchemeArguments};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
 use crate::model::ModelFile;
-use crate::output;
 use crate::progress::Spinner;
+use crate::{interrupt, output};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -27,7 +27,7 @@ Examples:
 Left to itself it is the paper's run: psi(0) 0.1 deg each, D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g, random
 drift 0.01 deg/h, noise 1e-5 g, steps of 10 s, 1000 s a position. With -o it writes summary.json, series.csv,
 series.parquet and a figure per unknown as SVG and PNG.
-Exit codes: 0 done (whatever the verdict), 2 bad input, 3 internal error.";
+Exit codes: 0 done (whatever the verdict), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
@@ -51,6 +51,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+    interrupt::ends()?;
     output::check_folder(&a.output)?;
     if let Some(path) = &a.model {
         return system(a, path);

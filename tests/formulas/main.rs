@@ -1,10 +1,6 @@
 //! Every printed formula is read back, from text, JSON and LaTeX, and evaluated on derivatives of Z that are simulated from the
 //! equations alone. Nothing here but the printing under test comes from the engine: readers, motion and values are the test's own.
 
-#[cfg(feature = "symbolica")]
-#[allow(dead_code, reason = "shared with the command line")]
-#[path = "../../crates/cli/lock.rs"]
-mod lock;
 mod platform;
 mod tex;
 mod text;
@@ -460,14 +456,11 @@ fn formulas_without_the_engine_give_the_truth() {
 #[cfg(feature = "symbolica")]
 #[test]
 fn formulas_of_the_engine_give_the_truth() {
-    use std::time::Duration;
-
     let mut worker = Worker::new(obsdeg_symbolic::WorkerConfig {
         program: env!("CARGO_BIN_EXE_obsdeg").into(),
         arguments: vec!["symbolic-worker".into()],
-        lock_file: lock::symbolic_lock_file(),
-        lock_limit: Duration::from_secs(600),
-        time_limit: Duration::from_secs(60),
+        limit: 60,
+        waiting: || {},
     });
     let mut seen = Seen::default();
     for (kind, most, n, turning) in [

@@ -1,13 +1,19 @@
-//! The worker process as seen from the program: lock, start, ask, give up in time.
+//! The worker process as seen from the program: start, wait for its turn, ask, give up.
 
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-use crate::protocol::{PREFIX, Request, Response};
+use crate::protocol::{Order, PREFIX, Request, Response};
+
+/// The longest line of a worker, in bytes.
+const MAX_LINE: usize = 4 << 20;
+/// The most that a worker may print besides its answers, in bytes.
+const MAX_BANNER: usize = 64 << 10;
+/// How long another process may hold the lock before that is said.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// How to start the worker.
 #[derive(Debug, Clone)]
@@ -16,30 +22,20 @@ pub struct WorkerConfig {
     pub program: PathBuf,
     /// Its arguments, normally the hidden subcommand.
     pub arguments: Vec<String>,
-    /// One per user: whoever holds its lock may run a worker.
-    pub lock_file: PathBuf,
-    /// How long to wait for the lock.
-    pub lock_limit: Duration,
-    /// How long one answer may take.
-    pub time_limit: Duration,
+    /// How many [`UNIT`](crate::protocol::UNIT)s of work one answer may take.
+    pub limit: u64,
+    /// Called once when the worker has waited a second for its turn.
+    pub waiting: fn(),
 }
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WorkerError {
-    /// The lock file cannot be used.
-    #[error("cannot lock {path}: {reason}")]
+    /// The lock cannot be had.
+    #[error("{reason}")]
     Lock {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
+        /// The file, and what is wrong with it.
         reason: String,
-    },
-    /// Another process of this user holds the lock.
-    #[error("another obsdeg process has been using the symbolic engine for {seconds} s")]
-    Busy {
-        /// How long was waited.
-        seconds: u64,
     },
     /// The process did not start.
     #[error("cannot start the symbolic worker {program}: {reason}")]
@@ -54,16 +50,16 @@ pub enum WorkerError {
         "the symbolic worker ended before it answered; is another Symbolica process of this user running?"
     )]
     Ended,
-    /// The time is up.
-    #[error("the symbolic worker took longer than {seconds} s")]
-    TimedOut {
+    /// More work than the limit.
+    #[error("the symbolic engine reached its limit, {limit} units of work")]
+    OverLimit {
         /// The limit.
-        seconds: u64,
+        limit: u64,
     },
     /// The answer makes no sense.
     #[error("the symbolic worker answered with something else: {found}")]
     Garbled {
-        /// The start of the answer.
+        /// The start of the answer, or what is wrong with it.
         found: String,
     },
     /// The job itself failed.
@@ -77,13 +73,14 @@ pub enum WorkerError {
 struct Running {
     child: Child,
     input: Option<ChildStdin>,
-    lines: Receiver<String>,
-    _lock: File,
+    lines: Receiver<Vec<u8>>,
+    /// Bytes of what was no answer.
+    chatter: usize,
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
-        self.input.take(); // end of input: the worker leaves by itself
+        self.input.take(); // end of input: the worker leaves by itself, whatever it is doing
         let patience = Instant::now() + Duration::from_millis(500);
         while Instant::now() < patience {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
@@ -97,7 +94,7 @@ impl Drop for Running {
     }
 }
 
-/// A worker that starts with the first request. After a time-out it starts afresh with the next one;
+/// A worker that starts with the first request; from then on no other has its turn until this one rests. After work beyond its limit it starts afresh with the next one;
 /// after any other failure of the process it stays down and repeats the reason.
 pub struct Worker {
     config: WorkerConfig,
@@ -122,60 +119,110 @@ impl Worker {
         self.failure.as_ref()
     }
 
+    /// Ends the process, so that another may take its turn; it starts again with the next request.
+    pub fn rest(&mut self) {
+        self.running = None;
+    }
+
     /// Sends one request and waits for its answer: the expressions, and whether a check held.
     ///
     /// # Errors
     /// [`WorkerError::Failed`] when the job failed; anything else when the process did, now or before.
     pub fn ask(&mut self, request: &Request) -> Result<(Vec<String>, bool), WorkerError> {
         match &self.failure {
-            None | Some(WorkerError::TimedOut { .. }) => {}
+            None | Some(WorkerError::OverLimit { .. }) => {}
             Some(reason) => return Err(reason.clone()),
         }
         match self.exchange(request) {
             Ok(Response::Values { values, verified }) => Ok((values, verified)),
             Ok(Response::Failed { reason }) => Err(WorkerError::Failed { reason }),
-            Err(error) => {
-                if let Some(running) = &mut self.running {
-                    let _ = running.child.kill(); // already failing: the first error is the one to tell
-                }
-                self.running = None;
-                self.failure = Some(error.clone());
-                Err(error)
-            }
+            Ok(other) => Err(self.down(garbled(format!("{other:?} in place of an answer")))),
+            Err(error) => Err(self.down(error)),
         }
+    }
+
+    /// Ends the process and remembers why.
+    fn down(&mut self, error: WorkerError) -> WorkerError {
+        if let Some(running) = &mut self.running {
+            let _ = running.child.kill(); // already failing: the first error is the one to tell
+        }
+        self.running = None;
+        self.failure = Some(error.clone());
+        error
     }
 
     fn exchange(&mut self, request: &Request) -> Result<Response, WorkerError> {
         if self.running.is_none() {
             self.running = Some(start(&self.config)?);
+            self.take_turn()?;
         }
-        let Some(running) = &mut self.running else { return Err(WorkerError::Ended) };
-        let line =
-            serde_json::to_string(request).map_err(|e| WorkerError::Garbled { found: e.to_string() })?;
-        let input = running.input.as_mut().ok_or(WorkerError::Ended)?;
+        let order = Order { limit: self.config.limit, request: request.clone() };
+        let line = serde_json::to_string(&order).map_err(|e| garbled(e.to_string()))?;
+        let input = self.running.as_mut().and_then(|r| r.input.as_mut()).ok_or(WorkerError::Ended)?;
         writeln!(input, "{line}").and_then(|()| input.flush()).map_err(|_| WorkerError::Ended)?;
-        let deadline = Instant::now() + self.config.time_limit;
+        let response = self.response(None)?.ok_or(WorkerError::Ended)?;
+        match (&response, request.answers()) {
+            (Response::OverLimit, _) => Err(WorkerError::OverLimit { limit: self.config.limit }),
+            (Response::Values { values, .. }, Some(expected)) if values.len() != expected => {
+                Err(garbled(format!("{} expressions, expected {expected}", values.len())))
+            }
+            _ => Ok(response),
+        }
+    }
+
+    /// Waits until the worker holds the lock, and says so once when that takes long.
+    fn take_turn(&mut self) -> Result<(), WorkerError> {
+        let mut patience = None;
         loop {
-            let left = deadline.saturating_duration_since(Instant::now());
-            let line = running.lines.recv_timeout(left).map_err(|e| match e {
-                RecvTimeoutError::Timeout => {
-                    WorkerError::TimedOut { seconds: self.config.time_limit.as_secs() }
+            match self.response(patience)? {
+                None => {
+                    (self.config.waiting)();
+                    patience = None;
                 }
-                RecvTimeoutError::Disconnected => WorkerError::Ended,
-            })?;
-            match line.strip_prefix(PREFIX) {
-                None => self.banner.push(line),
-                Some(answer) => {
-                    let found = || answer.chars().take(80).collect();
-                    return serde_json::from_str(answer).map_err(|_| WorkerError::Garbled { found: found() });
-                }
+                Some(Response::Waiting) => patience = Some(PATIENCE),
+                Some(Response::Ready) => return Ok(()),
+                Some(Response::Unusable { reason }) => return Err(WorkerError::Lock { reason }),
+                Some(other) => return Err(garbled(format!("{other:?} before it was asked"))),
+            }
+        }
+    }
+
+    /// The next thing that the worker says; `None` when it says nothing for so long.
+    fn response(&mut self, patience: Option<Duration>) -> Result<Option<Response>, WorkerError> {
+        let Some(running) = &mut self.running else { return Err(WorkerError::Ended) };
+        loop {
+            let line = match patience {
+                None => running.lines.recv().map_err(|_| WorkerError::Ended)?,
+                Some(time) => match running.lines.recv_timeout(time) {
+                    Ok(line) => line,
+                    Err(RecvTimeoutError::Timeout) => return Ok(None),
+                    Err(RecvTimeoutError::Disconnected) => return Err(WorkerError::Ended),
+                },
+            };
+            if line.len() > MAX_LINE {
+                return Err(garbled(format!("a line of more than {MAX_LINE} bytes")));
+            }
+            let line = String::from_utf8_lossy(&line);
+            if let Some(answer) = line.strip_prefix(PREFIX) {
+                let wrong = |_| garbled(answer.chars().take(80).collect());
+                return serde_json::from_str(answer).map(Some).map_err(wrong);
+            }
+            running.chatter += line.len() + 1;
+            if running.chatter > MAX_BANNER {
+                return Err(garbled(format!("more than {MAX_BANNER} bytes that are no answer")));
+            }
+            if !self.banner.iter().any(|known| *known == line) {
+                self.banner.push(line.into_owned());
             }
         }
     }
 }
 
+fn garbled(found: String) -> WorkerError {
+    WorkerError::Garbled { found }
+}
+
 fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
-    let lock = acquire(config)?;
     let mut child = Command::new(&config.program)
         .args(&config.arguments)
         .stdin(Stdio::piped())
@@ -184,113 +231,130 @@ fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
         .spawn()
         .map_err(|e| WorkerError::Start { program: config.program.clone(), reason: e.to_string() })?;
     let input = child.stdin.take();
-    let (sender, lines) = channel();
+    // a worker that talks without end waits for us, and no line is longer than one that is refused
+    let (sender, lines) = sync_channel(1);
     if let Some(output) = child.stdout.take() {
         std::thread::spawn(move || {
-            for line in BufReader::new(output).lines().map_while(Result::ok) {
-                if sender.send(line).is_err() {
+            let mut output = BufReader::new(output);
+            loop {
+                let mut line = Vec::new();
+                let read = output.by_ref().take(MAX_LINE as u64 + 2).read_until(b'\n', &mut line);
+                if !matches!(read, Ok(n) if n > 0) {
+                    break;
+                }
+                line.pop_if(|last| *last == b'\n');
+                let too_long = line.len() > MAX_LINE;
+                if sender.send(line).is_err() || too_long {
                     break;
                 }
             }
         });
     }
-    Ok(Running { child, input, lines, _lock: lock })
-}
-
-fn acquire(config: &WorkerConfig) -> Result<File, WorkerError> {
-    let lock_error =
-        |e: std::io::Error| WorkerError::Lock { path: config.lock_file.clone(), reason: e.to_string() };
-    let file = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(&config.lock_file)
-        .map_err(lock_error)?;
-    let deadline = Instant::now() + config.lock_limit;
-    loop {
-        match file.try_lock() {
-            Ok(()) => return Ok(file),
-            Err(TryLockError::Error(e)) => return Err(lock_error(e)),
-            Err(TryLockError::WouldBlock) if Instant::now() < deadline => {
-                std::thread::sleep(Duration::from_millis(3));
-            }
-            Err(TryLockError::WouldBlock) => {
-                return Err(WorkerError::Busy { seconds: config.lock_limit.as_secs() });
-            }
-        }
-    }
+    Ok(Running { child, input, lines, chatter: 0 })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::Job;
+    use crate::protocol::{Job, System};
 
+    /// A request that one expression answers.
     fn request() -> Request {
+        let system = System { matrix: vec![vec!["1".into()]], right: vec!["x".into()], outputs: vec![] };
         Request {
             symbols: vec![],
             generators: vec![],
             angles: vec![],
-            job: Job::MinorFactors { matrix: vec![] },
+            job: Job::Solve { system, check: None },
         }
     }
 
     /// A worker that is a shell script.
-    fn scripted(script: &str, lock_file: PathBuf) -> Worker {
+    fn scripted(script: &str) -> Worker {
         Worker::new(WorkerConfig {
             program: "/bin/sh".into(),
             arguments: vec!["-c".into(), script.into()],
-            lock_file,
-            lock_limit: Duration::from_millis(50),
-            time_limit: Duration::from_millis(400),
+            limit: u64::MAX,
+            waiting: || {},
         })
     }
 
-    fn lock() -> (tempfile::TempDir, PathBuf) {
-        let dir = tempfile::tempdir().expect("a folder");
-        let path = dir.path().join("lock");
-        (dir, path)
-    }
+    const READY: &str = r#"echo 'obsdeg:"ready"'; read line; "#;
 
     #[test]
     fn answers_are_told_from_the_banner() {
-        let (_dir, path) = lock();
-        let script = r#"echo banner; read line; echo 'obsdeg:{"values":{"values":["x"],"verified":true}}'"#;
-        let mut worker = scripted(script, path);
-        assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], true)));
+        let answer = r#"echo banner; echo 'obsdeg:{"values":{"values":["x"],"verified":true}}'"#;
+        let mut worker = scripted(&format!("echo banner; {READY} {answer}; read line; {answer}"));
+        for _ in 0..2 {
+            assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], true)));
+        }
         assert_eq!(worker.banner(), ["banner"]);
+        // the process may rest between two questions
+        worker.rest();
+        assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], true)));
     }
 
     #[test]
-    fn crashes_time_outs_and_nonsense_are_told_and_stay() {
+    fn crashes_and_nonsense_are_told_and_stay() {
+        let garbled = |found: &str| WorkerError::Garbled { found: found.into() };
         for (script, expected) in [
             ("exit 3", WorkerError::Ended),
-            ("read line; exec sleep 5", WorkerError::TimedOut { seconds: 0 }),
-            ("read line; echo obsdeg:nonsense", WorkerError::Garbled { found: "nonsense".into() }),
+            ("READY exit 3", WorkerError::Ended),
+            ("READY echo obsdeg:nonsense", garbled("nonsense")),
+            (
+                r#"echo 'obsdeg:{"values":{"values":[],"verified":true}}'"#,
+                garbled("Values { values: [], verified: true } before it was asked"),
+            ),
+            (r#"READY echo 'obsdeg:"ready"'"#, garbled("Ready in place of an answer")),
+            (
+                r#"READY echo 'obsdeg:{"values":{"values":["a","b"],"verified":true}}'"#,
+                garbled("2 expressions, expected 1"),
+            ),
+            (
+                r#"echo 'obsdeg:{"unusable":{"reason":"cannot lock"}}'"#,
+                WorkerError::Lock { reason: "cannot lock".into() },
+            ),
+            // one line without end, lines without end
+            ("READY cat /dev/zero", garbled("a line of more than 4194304 bytes")),
+            ("READY printf obsdeg:; cat /dev/zero", garbled("a line of more than 4194304 bytes")),
+            ("READY yes", garbled("more than 65536 bytes that are no answer")),
         ] {
-            let (_dir, path) = lock();
-            let mut worker = scripted(script, path);
+            let mut worker = scripted(&script.replace("READY", READY));
             assert_eq!(worker.ask(&request()), Err(expected.clone()), "{script}");
             assert_eq!(worker.ask(&request()), Err(expected.clone()));
             assert_eq!(worker.failure(), Some(&expected));
         }
     }
 
+    /// Work beyond the limit ends the process, and the next question starts another.
     #[test]
-    fn one_at_a_time() {
-        let (_dir, path) = lock();
-        let holder = File::create(&path).expect("a file");
-        holder.lock().expect("the lock");
-        let mut worker = scripted("exit 0", path.clone());
-        assert_eq!(worker.ask(&request()), Err(WorkerError::Busy { seconds: 0 }));
-        let mut worker = scripted("exit 0", path.join("no/such/folder"));
-        assert!(matches!(worker.ask(&request()), Err(WorkerError::Lock { .. })));
+    fn work_beyond_the_limit_is_told_each_time() {
+        let mut worker = scripted(&format!("{READY} echo 'obsdeg:\"over_limit\"'; exec sleep 60"));
+        for _ in 0..2 {
+            assert_eq!(worker.ask(&request()), Err(WorkerError::OverLimit { limit: u64::MAX }));
+        }
+    }
+
+    /// Whoever holds the lock is waited for, however long it takes, and that is said once.
+    #[test]
+    fn a_long_wait_is_said() {
+        static SAID: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
+        let wait = |seconds: &str| {
+            let answer = r#"echo 'obsdeg:{"values":{"values":["x"],"verified":false}}'"#;
+            let script = format!("echo 'obsdeg:\"waiting\"'; sleep {seconds}; {READY} {answer}");
+            let mut worker = scripted(&script);
+            worker.config.waiting = || {
+                SAID.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            };
+            assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], false)));
+        };
+        wait("1.5");
+        assert_eq!(SAID.load(std::sync::atomic::Ordering::Relaxed), 1);
     }
 
     #[test]
     fn a_missing_program_is_named() {
-        let (_dir, path) = lock();
-        let mut worker = scripted("", path);
+        let mut worker = scripted("");
         worker.config.program = "/no/such/program".into();
         assert!(matches!(worker.ask(&request()), Err(WorkerError::Start { .. })));
     }

@@ -5,6 +5,21 @@ use serde::{Deserialize, Serialize};
 /// Starts every answer of the worker, so that a banner is told from an answer.
 pub const PREFIX: &str = "obsdeg:";
 
+/// The unit of work: so many products of terms, about half a second.
+pub const UNIT: u64 = 5_000_000;
+
+/// Seconds of processor time that go with a unit of work: what cannot be counted ends there.
+pub const SECONDS_PER_UNIT: u64 = 2;
+
+/// What the program sends: a request, and how many [`UNIT`]s of work its answer may take.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Order {
+    /// Units of work.
+    pub limit: u64,
+    /// What is asked.
+    pub request: Request,
+}
+
 /// A job and the numbers it is about: rational functions of `symbols` and of the cosines and sines of
 /// `angles`, extended by square roots.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -126,10 +141,36 @@ pub struct CheckTerm {
     pub order: usize,
 }
 
-/// An answer.
+impl Request {
+    /// How many expressions answer it, where that does not depend on their values.
+    pub fn answers(&self) -> Option<usize> {
+        match &self.job {
+            Job::Solve { system, .. } if system.outputs.is_empty() => {
+                Some(system.matrix.first().map_or(0, Vec::len))
+            }
+            Job::Solve { system, .. } => Some(system.outputs.len()),
+            Job::Derive { dynamics, order } => Some(dynamics.outputs.len() * (order + 1)),
+            Job::Unknowns { system } => Some(system.states.len() + system.parameters.len()),
+            Job::MinorFactors { .. } => None,
+        }
+    }
+}
+
+/// What the worker says.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Response {
+    /// Another process holds the lock; the worker waits for it.
+    Waiting,
+    /// The lock is held: requests are answered.
+    Ready,
+    /// There is no lock to be had.
+    Unusable {
+        /// Why.
+        reason: String,
+    },
+    /// The work of a request was beyond its limit.
+    OverLimit,
     /// Expressions, in the order that the job states, and whether the check, if any, held.
     Values {
         /// The expressions.

@@ -272,7 +272,7 @@ fn engine_note(built: bool, solver: &mut Solver<'_>) -> Option<String> {
         );
     }
     let failure = solver.worker().and_then(|w| w.failure().cloned())?;
-    if matches!(failure, WorkerError::TimedOut { .. }) && !solver.given_up() {
+    if matches!(failure, WorkerError::OverLimit { .. }) && !solver.given_up() {
         return None;
     }
     Some(format!(

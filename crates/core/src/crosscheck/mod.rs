@@ -87,10 +87,10 @@ pub struct Options {
 }
 
 /// Holds the exact verdicts on `scheme` against a filter. `progress` hears how many of the
-/// runs are done and says whether to go on: when it does not, those done are what is reported.
+/// runs are done and says whether to go on.
 ///
 /// # Errors
-/// [`SimulationError`].
+/// [`SimulationError`]; `Interrupted` when `progress` wants no more.
 pub fn crosscheck(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -126,6 +126,9 @@ pub fn crosscheck(
     };
     let prepared = Prepared::new(experiment)?;
     let totals = prepared.run(options.runs, progress);
+    if totals.runs < options.runs {
+        return Err(SimulationError::Interrupted);
+    }
     let whiteness_probability = prepared.whiteness(&totals);
     let monte_carlo = MonteCarlo {
         runs: totals.runs,

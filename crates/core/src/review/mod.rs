@@ -110,7 +110,7 @@ pub fn review(
 fn scheme(
     entry: &Entry,
     options: Options,
-    worker: Option<&mut Worker>,
+    mut worker: Option<&mut Worker>,
     step: &dyn Fn(f64, &str) -> Result<(), ReviewError>,
 ) -> Result<SchemeReview, ReviewError> {
     let Entry { name, scheme, conditions } = entry;
@@ -119,8 +119,9 @@ fn scheme(
     let plan = Plan::new(scheme, conditions).map_err(failed)?;
     step(0.0, "verdicts")?;
     let verdicts = analysis::Options { seed: options.seed, ..analysis::Options::default() };
-    let analysis = analyze(scheme, verdicts, worker)
+    let analysis = analyze(scheme, verdicts, worker.as_deref_mut())
         .map_err(|error| ReviewError::Analysis { name: name.clone(), error })?;
+    rest(worker);
     step(0.2, "a run of the filter")?;
     let (simulation, record) = simulate(scheme, conditions, options.seed).map_err(failed)?;
     step(0.3, "evidence")?;
@@ -128,8 +129,8 @@ fn scheme(
     let check = crosscheck::Options { runs: options.runs, seed: options.seed, filter: Default::default() };
     let going = |done: usize| step(0.3 + 0.4 * done as f64 / options.runs.max(1) as f64, "evidence").is_ok();
     let evidence = match crosscheck(scheme, conditions, &check, &going) {
-        Ok(evidence) if evidence.monte_carlo.runs < options.runs => return Err(ReviewError::Interrupted),
         Ok(evidence) => Some(evidence),
+        Err(SimulationError::Interrupted) => return Err(ReviewError::Interrupted),
         Err(SimulationError::CrosscheckRotation) => {
             notes.push(
                 "this scheme has a rotating segment, and the evidence by a filter takes positions".into(),
@@ -301,8 +302,16 @@ fn alternatives(
 }
 
 /// A model with its run and its evidence, where it has the numbers for them.
-fn model(model: &SystemModel, seed: u64, worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
-    let analysis = analyze_system(model, seed, None, Some(worker))?;
+/// What follows needs no formulas, and may take long: another process may have the engine.
+fn rest(worker: Option<&mut Worker>) {
+    if let Some(worker) = worker {
+        worker.rest();
+    }
+}
+
+fn model(model: &SystemModel, seed: u64, mut worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
+    let analysis = analyze_system(model, seed, None, Some(worker.as_deref_mut()))?;
+    rest(worker);
     let mut note = None;
     let run = simulate_system(model, seed);
     let evidence = run.as_ref().ok().map(|_| crosscheck_system(model, seed));

@@ -57,6 +57,9 @@ pub enum SimulationError {
     /// The only position cannot be dropped.
     #[error("the only position cannot be dropped; expected a scheme of at least two positions")]
     DroppedOnly,
+    /// Whoever asked wanted no more.
+    #[error("interrupted before the runs were done")]
+    Interrupted,
     /// The accuracy orders of a rotation are not known.
     #[error("the cross-check takes positions; found a rotating segment")]
     CrosscheckRotation,

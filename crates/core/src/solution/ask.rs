@@ -27,10 +27,10 @@ impl Solver<'_> {
         Some(self.ask(&request)?.0)
     }
 
-    /// Asks for a formula; after one that took too long no other is attempted.
+    /// Asks for a formula; after one that was too much work no other is attempted.
     fn ask(&mut self, request: &Request) -> Option<(Vec<String>, bool)> {
         let answer = self.worker.as_deref_mut()?.ask(request);
-        if matches!(answer, Err(WorkerError::TimedOut { .. })) {
+        if matches!(answer, Err(WorkerError::OverLimit { .. })) {
             self.text.clear();
         }
         answer.ok()

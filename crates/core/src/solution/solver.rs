@@ -182,7 +182,7 @@ impl<'a> Solver<'a> {
         self.symbols.angles() > MAX_SYMBOLIC_ANGLES
     }
 
-    /// Whether a formula took too long, so that no other was attempted.
+    /// Whether a formula was too much work, so that no other was attempted.
     pub fn given_up(&self) -> bool {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
     }

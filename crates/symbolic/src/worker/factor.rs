@@ -30,7 +30,11 @@ pub(crate) fn minor_factors(tower: &Tower, matrix: &[Vec<String>]) -> Result<Vec
             }
             let factor = -(&other[c] * &inverse);
             for (o, e) in other.iter_mut().zip(&row).filter(|(_, e)| !e.is_zero()) {
-                *o = &*o + &(&factor * e);
+                tower.charge(&factor, e);
+                let product = &factor * e;
+                tower.charge(o, &product);
+                *o = &*o + &product;
+                tower.go_on()?;
             }
         }
     }

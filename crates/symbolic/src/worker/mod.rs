@@ -7,9 +7,17 @@ mod tower;
 mod unknowns;
 
 use std::io::{BufRead, Write};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
-use crate::protocol::{Job, PREFIX, Request, Response};
+use crate::lock;
+use crate::protocol::{Job, Order, PREFIX, Request, Response, SECONDS_PER_UNIT, UNIT};
 use tower::Tower;
+
+/// How often the processor time of a job is looked at.
+const WATCH: Duration = Duration::from_millis(20);
 
 /// Why a job failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -26,36 +34,125 @@ pub(crate) enum JobError {
     /// The solution does not satisfy the check.
     #[error("the solution failed its verification by substitution")]
     NotVerified,
+    /// The work counted is beyond the limit.
+    #[error("more work than the limit")]
+    OverLimit,
 }
 
-/// Answers requests, one per line, until the input ends. Whatever the engine itself writes to stdout
-/// has no [`PREFIX`].
+/// Answers requests, one per line, as soon as this process holds `lock_file`. Whatever the engine itself writes to stdout has no [`PREFIX`].
+///
+/// `end` ends the process: it is called in the middle of whatever is going on when the input ends, since then nobody waits for an answer
+/// any more, and when a job has used up its processor time.
+///
+/// The work of a job is counted where that is possible (products of terms), so that it ends at the same place on every machine and under
+/// any load. What cannot be counted, such as a factorisation, is bounded by the time that this process has spent on the processor.
 ///
 /// # Errors
-/// Whatever `input` or `output` report.
-pub fn serve(input: impl BufRead, mut output: impl Write) -> std::io::Result<()> {
-    for line in input.lines() {
-        let response = match serde_json::from_str::<Request>(&line?) {
-            Ok(request) => answer(&request),
-            Err(e) => Response::Failed { reason: format!("the request is malformed: {e}") },
+/// Whatever `output` reports.
+pub fn serve(
+    lock_file: &Path,
+    input: impl BufRead + Send + 'static,
+    output: impl Write + Send + 'static,
+    end: fn() -> !,
+) -> std::io::Result<()> {
+    let output = Arc::new(Mutex::new(output));
+    let say =
+        |response: &Response| write(&mut *output.lock().unwrap_or_else(PoisonError::into_inner), response);
+    let (sender, lines) = channel();
+    std::thread::spawn(move || {
+        for line in input.lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+        end();
+    });
+    // held until the process ends
+    let _held = match lock::open(lock_file).and_then(|file| {
+        lock::wait(&file, || say(&Response::Waiting))?;
+        Ok(file)
+    }) {
+        Ok(file) => file,
+        Err(e) => {
+            let reason = format!("cannot lock {}: {e}", lock_file.display());
+            return say(&Response::Unusable { reason });
+        }
+    };
+    say(&Response::Ready)?;
+    for line in lines {
+        let order: Order = match serde_json::from_str(&line) {
+            Ok(order) => order,
+            Err(e) => {
+                say(&Response::Failed { reason: format!("the request is malformed: {e}") })?;
+                continue;
+            }
         };
-        let text = serde_json::to_string(&response)?;
-        writeln!(output, "{PREFIX}{text}")?;
-        output.flush()?;
+        let (done, watched) = channel::<()>();
+        let seconds = order.limit.saturating_mul(SECONDS_PER_UNIT);
+        let watch = std::thread::spawn({
+            let output = Arc::clone(&output);
+            move || {
+                if watch(&watched, seconds) {
+                    // nobody else writes any more
+                    let mut output = output.lock().unwrap_or_else(PoisonError::into_inner);
+                    let _ = write(&mut *output, &Response::OverLimit); // nobody listens: nobody waits
+                    end();
+                }
+            }
+        });
+        let response = answer(&order.request, order.limit.saturating_mul(UNIT));
+        drop(done);
+        let _ = watch.join(); // it does not panic
+        say(&response)?;
     }
     Ok(())
 }
 
-fn answer(request: &Request) -> Response {
-    let tower = Tower::new(&request.symbols, &request.generators, &request.angles);
-    let result = tower.and_then(|tower| match &request.job {
-        Job::Solve { system, check } => solve::solve(&tower, system, check.as_ref()),
-        Job::Derive { dynamics, order } => derive::formulas(dynamics, *order).map(|v| (v, false)),
-        Job::Unknowns { system } => unknowns::unknowns(&tower, system).map(|v| (v, false)),
-        Job::MinorFactors { matrix } => factor::minor_factors(&tower, matrix).map(|v| (v, false)),
+fn write(output: &mut impl Write, response: &Response) -> std::io::Result<()> {
+    let text = serde_json::to_string(response)?;
+    writeln!(output, "{PREFIX}{text}")?;
+    output.flush()
+}
+
+/// Whether a job has spent so many seconds on the processor before it was done.
+fn watch(done: &Receiver<()>, seconds: u64) -> bool {
+    let start = processor_time();
+    while done.recv_timeout(WATCH) == Err(RecvTimeoutError::Timeout) {
+        if processor_time().saturating_sub(start).as_secs() >= seconds {
+            return true;
+        }
+    }
+    false
+}
+
+/// The time that this process has spent on the processor.
+#[cfg(unix)]
+fn processor_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    // never negative
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
+}
+
+/// Unknown here: only work that is counted is limited.
+#[cfg(not(unix))]
+fn processor_time() -> Duration {
+    Duration::ZERO
+}
+
+fn answer(request: &Request, limit: u64) -> Response {
+    let tower = Tower::new(&request.symbols, &request.generators, &request.angles, limit);
+    let result = tower.and_then(|tower| {
+        tower.go_on()?;
+        match &request.job {
+            Job::Solve { system, check } => solve::solve(&tower, system, check.as_ref()),
+            Job::Derive { dynamics, order } => derive::formulas(dynamics, *order).map(|v| (v, false)),
+            Job::Unknowns { system } => unknowns::unknowns(&tower, system).map(|v| (v, false)),
+            Job::MinorFactors { matrix } => factor::minor_factors(&tower, matrix).map(|v| (v, false)),
+        }
     });
     match result {
         Ok((values, verified)) => Response::Values { values, verified },
+        Err(JobError::OverLimit) => Response::OverLimit,
         Err(e) => Response::Failed { reason: e.to_string() },
     }
 }

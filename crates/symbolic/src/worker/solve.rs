@@ -26,7 +26,7 @@ pub(crate) fn solve(
         verify(tower, &x, check)?;
     }
     let values = if system.outputs.is_empty() {
-        x.iter().map(|e| tower.print(e)).collect()
+        x.iter().map(|e| tower.print(e)).collect::<Result<_, _>>()?
     } else {
         let mut out = Vec::new();
         for row in &system.outputs {
@@ -35,7 +35,7 @@ pub(crate) fn solve(
             for (text, value) in row.iter().zip(&x) {
                 sum = tower.add(&sum, &tower.mul(&tower.element(text)?, value));
             }
-            out.push(tower.print(&sum));
+            out.push(tower.print(&sum)?);
         }
         out
     };
@@ -67,6 +67,7 @@ fn eliminate(tower: &Tower, mut rows: Vec<Vec<Element>>, unknowns: usize) -> Res
         let scale = tower.inv(&row[pivot]);
         for e in row.iter_mut().filter(|e| !tower.is_zero(e)) {
             *e = tower.mul(e, &scale);
+            tower.go_on()?;
         }
         for other in rows.iter_mut().chain(solved.iter_mut().map(|(_, r)| r)) {
             if tower.is_zero(&other[pivot]) {
@@ -75,6 +76,7 @@ fn eliminate(tower: &Tower, mut rows: Vec<Vec<Element>>, unknowns: usize) -> Res
             let factor = tower.neg(&other[pivot]);
             for (o, e) in other.iter_mut().zip(&row).filter(|(_, e)| !tower.is_zero(e)) {
                 *o = tower.add(o, &tower.mul(&factor, e));
+                tower.go_on()?;
             }
         }
         solved.push((pivot, row));
@@ -111,6 +113,7 @@ fn verify(tower: &Tower, x: &[Element], check: &Check) -> Result<(), JobError> {
             for (slot, unknown) in rest.iter_mut().zip(&unknowns) {
                 let coefficient = expression.coefficient(unknown.clone());
                 *slot = tower.add(slot, &tower.mul(&factor, &tower.element_of(&coefficient)?));
+                tower.go_on()?;
             }
         }
     }

@@ -4,6 +4,7 @@
 //! An angle `a` is carried by `t_a = tan(a/2)`: `c_a = (1-t^2)/(1+t^2)`, `s_a = 2t/(1+t^2)`, so that
 //! `c_a^2 + s_a^2 = 1` needs no rule. Printed, a function of `t_a` is one of `c_a` and `s_a` again.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use symbolica::domains::rational_polynomial::RationalPolynomial;
@@ -31,7 +32,14 @@ pub(crate) struct Tower {
     generators: Vec<(Symbol, Scalar)>,
     /// The names of the angles; their half tangents are the last variables.
     angles: Vec<String>,
+    /// Products of terms that may still be formed.
+    work: Cell<u64>,
 }
+
+/// What an operation costs besides its products of terms.
+const OPERATION: u64 = 200;
+/// What it costs to write a term with its angles.
+const PRINTED: u64 = 10_000;
 
 pub(crate) fn atom(text: &str) -> Result<Atom, JobError> {
     try_parse!(text).map_err(|_| JobError::NotAnElement { text: text.into() })
@@ -42,11 +50,12 @@ fn variable(name: &str) -> PolyVariable {
 }
 
 impl Tower {
-    /// Creates the symbols in the order given.
+    /// Creates the symbols in the order given; `limit` is the work that may be done, in products of terms.
     pub(crate) fn new(
         symbols: &[String],
         generators: &[(String, String)],
         angles: &[String],
+        limit: u64,
     ) -> Result<Self, JobError> {
         let tangents = angles.iter().map(|a| format!("t_{a}"));
         let variables = symbols.iter().cloned().chain(tangents).map(|s| variable(&s)).collect();
@@ -55,6 +64,7 @@ impl Tower {
             scalars: Vec::new(),
             generators: Vec::new(),
             angles: angles.to_vec(),
+            work: Cell::new(limit),
         };
         for s in symbols {
             tower.scalars.push((symbol!(s), tower.scalar(s)?));
@@ -88,6 +98,21 @@ impl Tower {
     pub(crate) fn place(&self, name: &str) -> usize {
         let wanted = variable(name);
         self.variables.iter().position(|v| *v == wanted).unwrap_or(usize::MAX)
+    }
+
+    /// Accounts for an operation on two scalars: its cost follows their products of terms (a common divisor is sought among them).
+    pub(crate) fn charge(&self, x: &Scalar, y: &Scalar) {
+        let terms = |s: &Scalar| (s.numerator.nterms() + s.denominator.nterms()) as u64;
+        self.spend(OPERATION.saturating_add(terms(x).saturating_mul(terms(y))));
+    }
+
+    fn spend(&self, work: u64) {
+        self.work.set(self.work.get().saturating_sub(work));
+    }
+
+    /// An error when the work is used up.
+    pub(crate) fn go_on(&self) -> Result<(), JobError> {
+        if self.work.get() == 0 { Err(JobError::OverLimit) } else { Ok(()) }
     }
 
     fn size(&self) -> usize {
@@ -144,7 +169,10 @@ impl Tower {
                     base = self.inv(&base);
                 }
                 let one = self.lift(self.one_scalar());
-                Ok((0..exponent.unsigned_abs()).fold(one, |product, _| self.mul(&product, &base)))
+                (0..exponent.unsigned_abs()).try_fold(one, |product, _| {
+                    self.go_on()?;
+                    Ok(self.mul(&product, &base))
+                })
             }
             AtomView::Mul(m) => m.iter().try_fold(self.lift(self.one_scalar()), |product, x| {
                 Ok(self.mul(&product, &self.element_of_view(x)?))
@@ -167,7 +195,11 @@ impl Tower {
     }
 
     pub(crate) fn add(&self, a: &Element, b: &Element) -> Element {
-        Element(a.0.iter().zip(&b.0).map(|(x, y)| x + y).collect())
+        let sum = |(x, y): (&Scalar, &Scalar)| {
+            self.charge(x, y);
+            x + y
+        };
+        Element(a.0.iter().zip(&b.0).map(sum).collect())
     }
 
     pub(crate) fn neg(&self, a: &Element) -> Element {
@@ -178,12 +210,14 @@ impl Tower {
         let mut out = self.zero();
         for (i, x) in a.0.iter().enumerate().filter(|(_, x)| !x.is_zero()) {
             for (j, y) in b.0.iter().enumerate().filter(|(_, y)| !y.is_zero()) {
+                self.charge(x, y);
                 let mut value = x * y;
                 for (k, (_, square)) in self.generators.iter().enumerate() {
                     if i & j & (1 << k) != 0 {
                         value = &value * square;
                     }
                 }
+                self.charge(&out.0[i ^ j], &value);
                 out.0[i ^ j] = &out.0[i ^ j] + &value;
             }
         }
@@ -206,7 +240,11 @@ impl Tower {
             norm = self.mul(&norm, &conjugate);
         }
         let scale = norm.0[0].clone().inv();
-        Element(numerator.0.iter().map(|x| x * &scale).collect())
+        let scaled = |x: &Scalar| {
+            self.charge(x, &scale);
+            x * &scale
+        };
+        Element(numerator.0.iter().map(scaled).collect())
     }
 
     fn one_scalar(&self) -> Scalar {
@@ -215,10 +253,12 @@ impl Tower {
 
     /// The element as text over one denominator, both factored; of two ways to write it, with powers of
     /// cosines or of sines, the shorter.
-    pub(crate) fn print(&self, e: &Element) -> String {
+    pub(crate) fn print(&self, e: &Element) -> Result<String, JobError> {
         if self.is_zero(e) {
-            return "0".into();
+            return Ok("0".into());
         }
+        self.spend((self.terms(e) as u64).saturating_mul(PRINTED));
+        self.go_on()?;
         // common denominator: the product of denominators that do not divide what is there already
         let mut denominator = self.one_scalar();
         for x in e.0.iter().filter(|x| !x.is_zero()) {
@@ -231,23 +271,20 @@ impl Tower {
         let halves: Vec<u32> = (first..self.variables.len())
             .map(|v| polynomials().map(|p| degree(p, v)).max().unwrap_or(0).div_ceil(2))
             .collect();
-        [Powers::OfSine, Powers::OfCosine]
-            .map(|powers| {
-                let mut numerator = Atom::num(0);
-                for (i, x) in parts.iter().enumerate() {
-                    let product = (0..self.generators.len())
-                        .filter(|k| i & (1 << k) != 0)
-                        .fold(self.in_angles(&x.numerator, &halves, powers), |product, k| {
-                            product * Atom::var(self.generators[k].0)
-                        });
-                    numerator += product;
-                }
-                let below = self.in_angles(&denominator.numerator, &halves, powers);
-                (numerator.expand().factor() / below.expand().factor()).to_string()
-            })
-            .into_iter()
-            .min_by_key(String::len)
-            .unwrap_or_default()
+        let ways = [Powers::OfSine, Powers::OfCosine].map(|powers| {
+            let mut numerator = Atom::num(0);
+            for (i, x) in parts.iter().enumerate() {
+                let product = (0..self.generators.len())
+                    .filter(|k| i & (1 << k) != 0)
+                    .fold(self.in_angles(&x.numerator, &halves, powers), |product, k| {
+                        product * Atom::var(self.generators[k].0)
+                    });
+                numerator += product;
+            }
+            let below = self.in_angles(&denominator.numerator, &halves, powers);
+            (numerator.expand().factor() / below.expand().factor()).to_string()
+        });
+        Ok(ways.into_iter().min_by_key(String::len).unwrap_or_default())
     }
 
     /// A polynomial over `product (1 + t_a^2)^half_a` as one in cosines and sines.
