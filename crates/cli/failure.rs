@@ -27,6 +27,11 @@ impl Failure {
         Self { message: format!("error: {message}"), code: INPUT }
     }
 
+    /// Interrupted before there was anything to show.
+    pub(crate) fn interrupted() -> Self {
+        Self { message: "interrupted; nothing was written".into(), code: INTERRUPTED }
+    }
+
     /// The program is wrong.
     pub(crate) fn internal(message: String) -> Self {
         Self { message: format!("internal error: {message}"), code: INTERNAL }
