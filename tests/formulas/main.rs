@@ -31,6 +31,7 @@ const SIX_DIGITS: f64 = 1.1e-5;
 
 /// How the angles of a scheme are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(not(feature = "symbolica"), allow(dead_code, reason = "generic angles need the engine"))]
 enum Angles {
     /// Multiples of 90 degrees.
     Cardinal,
