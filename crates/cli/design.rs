@@ -12,7 +12,7 @@ use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_core::simulation::Conditions;
 use obsdeg_core::simulation::ranges::SLEW_RATE_DEG_S;
-use obsdeg_report::{File, Format, Layout, ReportError, design_figures};
+use obsdeg_report::{File, Format, Layout, ReportError, design_figures, visible};
 
 use crate::arguments::{FolderArguments, read_scheme};
 use crate::conditions::{MeasurementArguments, within};
@@ -248,13 +248,14 @@ fn scheme_file(
     let proven = found.search.as_ref().is_some_and(|s| s.proven) && !best.refined;
     let proven = if proven { "proven best" } else { "best found" };
     let positions = best.positions.iter().enumerate().map(|(i, name)| format!("p{} {name}", i + 1));
-    let positions = positions.collect::<Vec<_>>().join(", ").replace(char::is_control, " ");
+    let positions = positions.collect::<Vec<_>>().join(", ");
     let scheme = scheme_found(best, base, conditions)?;
     Ok(format!(
-        "# {proven}: worst sigma(D) {:.4} deg/h (per g) in {:.0} s, no prior, no drift noise, seed {}\n# {positions}\n{}",
+        "# {proven}: worst sigma(D) {:.4} deg/h (per g) in {:.0} s, no prior, no drift noise, seed {}\n# {}\n{}",
         best.worst_sigma_dph,
         best.total_s,
         found.seed,
+        visible(&positions),
         write(&scheme)
     ))
 }

@@ -3,7 +3,7 @@
 use clap::Args;
 use obsdeg_symbolic::{Worker, WorkerConfig};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, say};
 
 /// How much the engine may do.
 #[derive(Debug, Args)]
@@ -48,6 +48,6 @@ pub(crate) fn rest(worker: Option<&mut Worker>) {
 /// The banner of the engine is its licence notice.
 pub(crate) fn notice(worker: Option<&Worker>, quiet: bool) {
     for line in worker.into_iter().flat_map(Worker::banner).filter(|_| !quiet) {
-        eprintln!("{line}");
+        say(line);
     }
 }

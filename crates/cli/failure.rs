@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+use obsdeg_report::visible;
 
 /// A check failed.
 pub(crate) const CHECK: u8 = 1;
@@ -13,6 +14,14 @@ pub(crate) const INPUT: u8 = 2;
 pub(crate) const INTERNAL: u8 = 3;
 /// The user did not want to wait: the code that a shell gives a program ended by Ctrl-C.
 pub(crate) const INTERRUPTED: u8 = 130;
+
+/// Says something of several lines on stderr. Names, paths and keys come from whoever wrote the input: nothing in them reaches a
+/// terminal but text.
+pub(crate) fn say(message: &str) {
+    for line in message.lines() {
+        eprintln!("{}", visible(line));
+    }
+}
 
 /// Why a command stopped.
 #[derive(Debug)]
@@ -53,7 +62,7 @@ impl Failure {
     }
 
     pub(crate) fn report(&self) -> ExitCode {
-        eprintln!("{}", self.message);
+        say(&self.message);
         ExitCode::from(self.code)
     }
 }

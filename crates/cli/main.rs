@@ -27,7 +27,8 @@ use std::process::ExitCode;
 
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use failure::Failure;
+use failure::{Failure, say};
+use obsdeg_report::visible;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -88,9 +89,26 @@ fn command() -> clap::Command {
     })
 }
 
+/// The arguments; what is wrong with them is said, and nothing of theirs but text.
+fn arguments() -> Result<Cli, ExitCode> {
+    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.map_err(|e| {
+        let message = e.render().to_string();
+        if !e.use_stderr() || message.lines().all(|line| visible(line) == line) {
+            // in colour, where there is any; nobody listens if that fails
+            let _ = e.print();
+        } else {
+            say(&message);
+        }
+        ExitCode::from(if e.use_stderr() { failure::INPUT } else { 0 })
+    })
+}
+
 fn run() -> Result<ExitCode, Failure> {
-    let matches = command().get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    let cli = match arguments() {
+        Ok(cli) => cli,
+        Err(code) => return Ok(code),
+    };
     match cli.command {
         Command::Analyze(a) => analyze::run(&a),
         Command::Simulate(a) => simulate::run(&a),

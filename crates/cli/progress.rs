@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use obsdeg_core::design::search::Progress;
+use obsdeg_report::visible;
 
 /// Shows a spinner on a terminal until it is dropped, if that takes longer than a second.
 pub(crate) struct Spinner {
@@ -73,7 +74,7 @@ impl Bar {
 
     /// What is being done.
     pub(crate) fn says(&self, what: &str) {
-        self.bar.set_message(what.to_string());
+        self.bar.set_message(visible(what).into_owned());
     }
 
     /// So much is done.

@@ -2,13 +2,24 @@
 
 use obsdeg_core::analysis::Analysis;
 
-use crate::{ReportError, words};
+use crate::{ReportError, visible, words};
+
+/// A field: a text that a spreadsheet would take for a formula has an apostrophe before it, as one types it there. Numbers are left alone.
+fn field(text: &str) -> String {
+    let text = visible(text);
+    let formula = text.starts_with(['=', '+', '-', '@', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}']);
+    if formula && text != "-" && text.parse::<f64>().is_err() {
+        format!("'{text}")
+    } else {
+        text.into_owned()
+    }
+}
 
 /// Rows as CSV text.
 pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<String, ReportError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
-        writer.write_record(&row)?;
+        writer.write_record(row.iter().map(|text| field(text)))?;
     }
     let bytes = writer.into_inner().map_err(|e| csv::Error::from(e.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())

@@ -1,9 +1,9 @@
 //! Headings, tables and lists, in every text format. Text from files is escaped where it is written.
 
-use comfy_table::{Cell, CellAlignment};
+use comfy_table::CellAlignment;
 
 use crate::figure::Figure;
-use crate::table::{heading, paragraph, table as new_table};
+use crate::table::{cell, heading, paragraph, table as new_table};
 use crate::{Layout, ReportError, csv_text, latex, markdown};
 
 /// A part of a document.
@@ -186,11 +186,11 @@ impl Document {
                     heading(&mut out, title, layout);
                     let mut table = new_table(header, layout);
                     for row in rows {
-                        let cell = |(text, &right): (&String, &bool)| {
+                        let aligned = |(text, &right): (&String, &bool)| {
                             let side = if right { CellAlignment::Right } else { CellAlignment::Left };
-                            Cell::new(text).set_alignment(side)
+                            cell(text).set_alignment(side)
                         };
-                        table.add_row(row.iter().zip(numbers).map(cell).collect::<Vec<_>>());
+                        table.add_row(row.iter().zip(numbers).map(aligned).collect::<Vec<_>>());
                     }
                     let text = table.to_string();
                     out.extend(text.lines().flat_map(|l| [l.trim_end(), "\n"]));
@@ -262,7 +262,7 @@ impl Document {
     }
 
     pub(crate) fn latex(&self) -> String {
-        let mut out = format!("% {}\n", latex::escape(&self.title.replace('\n', " ")));
+        let mut out = format!("% {}\n", latex::escape(&self.title));
         let item = |lines: &[String]| {
             let items: String = lines.iter().map(|l| format!("\\item {}\n", latex::escape(l))).collect();
             format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")

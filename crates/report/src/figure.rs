@@ -8,6 +8,8 @@ use kuva::prelude::{
 use kuva::render::figure::Figure as Grid;
 use resvg::{tiny_skia, usvg};
 
+use crate::visible;
+
 /// Colours that stay apart for colour-blind readers (Okabe and Ito).
 pub(crate) const BLACK: &str = "#000000";
 pub(crate) const BLUE: &str = "#0072B2";
@@ -15,6 +17,11 @@ pub(crate) const SKY: &str = "#56B4E9";
 pub(crate) const ORANGE: &str = "#D55E00";
 pub(crate) const GREEN: &str = "#009E73";
 pub(crate) const GREY: &str = "#999999";
+
+/// A text in a picture, which is XML.
+fn shown(text: &str) -> String {
+    visible(text).into_owned()
+}
 
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,16 +89,16 @@ impl Figure {
                 Stroke::Dashed => plot.with_dashed(),
                 Stroke::Dotted => plot.with_dotted(),
             };
-            Plot::from(if l.label.is_empty() { plot } else { plot.with_legend(l.label.clone()) })
+            Plot::from(if l.label.is_empty() { plot } else { plot.with_legend(shown(&l.label)) })
         });
         bands.chain(lines).collect()
     }
 
     fn layout(&self, plots: &[Plot]) -> Layout {
         let mut layout = Layout::auto_from_plots(plots)
-            .with_title(self.title.clone())
-            .with_x_label(self.x_label.clone())
-            .with_y_label(self.y_label.clone())
+            .with_title(shown(&self.title))
+            .with_x_label(shown(&self.x_label))
+            .with_y_label(shown(&self.y_label))
             .with_width(SIZE.0)
             .with_height(SIZE.1)
             .with_font_family(FONT)
@@ -134,7 +141,7 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
     let plots: Vec<Vec<Plot>> = figures.iter().map(Figure::plots).collect();
     let layouts = figures.iter().zip(&plots).map(|(f, p)| f.layout(p)).collect();
     let scene = Grid::new(figures.len().div_ceil(columns), columns)
-        .with_title(title)
+        .with_title(shown(title))
         .with_plots(plots)
         .with_layouts(layouts)
         .with_cell_size(SIZE.0 * 0.75, SIZE.1 * 0.8)
@@ -152,7 +159,9 @@ pub(crate) fn heat(
     low: f64,
 ) -> String {
     // the library stretches colours over the data; here they mean low to 1
-    let (rows, values): (Vec<String>, Vec<Vec<f64>>) = rows.iter().cloned().zip(values).rev().unzip();
+    let (rows, values): (Vec<String>, Vec<Vec<f64>>) =
+        rows.iter().map(|row| shown(row)).zip(values).rev().unzip();
+    let columns: Vec<String> = columns.iter().map(|column| shown(column)).collect();
     let all = || values.iter().flatten().copied();
     let (least, most) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
     let color = move |t: f64| {
@@ -161,12 +170,12 @@ pub(crate) fn heat(
     };
     let map = Heatmap::new()
         .with_data(values)
-        .with_labels(rows.clone(), columns.to_vec())
+        .with_labels(rows.clone(), columns.clone())
         .with_color_map(kuva::prelude::ColorMap::Custom(Arc::new(color)));
     let plots = vec![Plot::from(map)];
     let layout = Layout::auto_from_plots(&plots)
-        .with_title(title)
-        .with_x_categories(columns.to_vec())
+        .with_title(shown(title))
+        .with_x_categories(columns.clone())
         .with_y_categories(rows.clone())
         .with_x_tick_rotate(-60.0)
         .with_width(180.0 + 30.0 * columns.len().max(8) as f64)

@@ -3,14 +3,14 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::value::{Serde, Value};
-use minijinja::{AutoEscape, Environment, context};
+use minijinja::{AutoEscape, Environment, context, escape_formatter};
 use pulldown_latex::config::{DisplayMode, RenderConfig};
 use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
-use crate::ReportError;
 use crate::document::{Block, Document, Drawing, Finding, Formula, Grade, Part, Picture, Status};
 use crate::figure::{Figure, Line, Stroke};
+use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
 const STYLE: &str = include_str!("../assets/page.css");
@@ -24,6 +24,10 @@ pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
     let blocks: Vec<Json> = d.parts().iter().enumerate().map(|(i, part)| block(i, part)).collect();
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.set_formatter(|out, state, value| match value.as_str() {
+        Some(text) if !value.is_safe() => escape_formatter(out, state, &Value::from(visible(text))),
+        _ => escape_formatter(out, state, value),
+    });
     environment.add_template("page", TEMPLATE)?;
     let interactive =
         d.blocks.iter().any(|b| matches!(b, Block::Picture(Picture { drawing: Drawing::Curves(_), .. })));
@@ -138,7 +142,7 @@ fn curves(f: &Figure) -> Json {
                 xs.push(rounded(x, 8));
                 ys.push(rounded(y, 4));
             }
-            series.push(json!({ "label": label, "color": color, "dash": dash, "width": width }));
+            series.push(json!({ "label": visible(label), "color": color, "dash": dash, "width": width }));
             match tables.last_mut() {
                 Some(table) if table[0] == xs => table.push(ys),
                 _ => tables.push(vec![xs, ys]),
@@ -161,7 +165,7 @@ fn curves(f: &Figure) -> Json {
         add(&l.label, l.color, dash(l), 1.6, &mut l.points.iter().copied());
     }
     json!({
-        "title": f.title, "x": f.x_label, "y": f.y_label, "log_x": f.log, "log_y": f.log || f.log_y,
+        "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label), "log_x": f.log, "log_y": f.log || f.log_y,
         "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
         "series": series, "tables": tables, "bands": bands,
     })

@@ -4,7 +4,7 @@ mod math;
 
 use obsdeg_core::analysis::Analysis;
 
-use crate::words;
+use crate::{visible, words};
 use math::left;
 #[cfg(feature = "pdf")]
 pub(crate) use math::{FUNCTIONS, GREEK};
@@ -13,7 +13,7 @@ pub(crate) use math::{expression, solution, symbol};
 /// Plain text with LaTeX's special characters escaped.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::new();
-    for c in text.replace("->", "\u{2192}").chars() {
+    for c in visible(text).replace("->", "\u{2192}").chars() {
         match c {
             '\u{2192}' => out.push_str("$\\to$"),
             '\\' => out.push_str("\\textbackslash{}"),

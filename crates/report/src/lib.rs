@@ -18,12 +18,14 @@ mod series;
 mod simulation;
 mod system;
 mod table;
+mod visible;
 mod words;
 
 pub use document::PICTURES;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use series::{series_csv, series_parquet};
+pub use visible::visible;
 
 use std::fmt;
 use std::str::FromStr;
@@ -129,7 +131,7 @@ pub enum ReportError {
 pub fn analysis(a: &Analysis, format: Format, layout: Layout) -> Result<String, ReportError> {
     Ok(match format {
         Format::Table => table::analysis(a, layout),
-        Format::Json => serde_json::to_string_pretty(a)? + "\n",
+        Format::Json => visible::json(a)?,
         Format::Markdown => markdown::analysis(a),
         Format::Csv => csv_text::analysis(a)?,
         Format::Latex => latex::analysis(a),
@@ -265,7 +267,7 @@ fn written(
 ) -> Result<String, ReportError> {
     Ok(match format {
         Format::Table => document.table(layout),
-        Format::Json => serde_json::to_string_pretty(answer)? + "\n",
+        Format::Json => visible::json(answer)?,
         Format::Markdown => document.markdown(),
         Format::Csv => document.csv()?,
         Format::Latex => document.latex(),
@@ -279,7 +281,7 @@ fn written(
 pub fn audit(a: &Audit, format: Format, layout: Layout) -> Result<String, ReportError> {
     Ok(match format {
         Format::Table => audit::table(a, layout),
-        Format::Json => serde_json::to_string_pretty(a)? + "\n",
+        Format::Json => visible::json(a)?,
         Format::Markdown => audit::markdown(a),
         Format::Csv => audit::csv(a)?,
         Format::Latex => audit::latex(a),

@@ -2,12 +2,12 @@
 
 use obsdeg_core::analysis::Analysis;
 
-use crate::words;
+use crate::{visible, words};
 
 /// Text in a table cell or paragraph, with what Markdown would read as markup escaped.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::new();
-    for c in text.chars() {
+    for c in visible(text).chars() {
         if matches!(c, '\\' | '|' | '*' | '_' | '`' | '<' | '>' | '[' | ']' | '#') {
             out.push('\\');
         }
@@ -26,9 +26,15 @@ pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>
     out
 }
 
-/// A formula as code; the bar is escaped, since tables split at bars even in code.
+/// A formula as code between more backticks than it has in a row; the bar is escaped, since tables split at bars even in code.
 fn code(text: &str) -> String {
-    if text.is_empty() { String::new() } else { format!("`{}`", text.replace('|', "\\|")) }
+    if text.is_empty() {
+        return String::new();
+    }
+    let text = visible(text).replace('|', "\\|");
+    let most = text.split(|c| c != '`').map(str::len).max().unwrap_or(0);
+    let fence = "`".repeat(most + 1);
+    if most == 0 { format!("`{text}`") } else { format!("{fence} {text} {fence}") }
 }
 
 pub(crate) fn analysis(a: &Analysis) -> String {

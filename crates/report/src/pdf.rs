@@ -17,8 +17,8 @@ use typst::{Library, LibraryExt, World};
 use typst_layout::PagedDocument;
 use typst_pdf::PdfOptions;
 
-use crate::ReportError;
 use crate::document::{Block, Document, Part};
+use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
 
@@ -98,7 +98,7 @@ pub(crate) fn pages(d: &Document) -> Result<Vec<u8>, ReportError> {
 
 /// A string of the typesetter's language: nothing in it is markup.
 fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', " "))
+    format!("\"{}\"", visible(text).replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 fn source(d: &Document) -> Result<String, ReportError> {

@@ -3,7 +3,7 @@
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use obsdeg_core::analysis::{Analysis, Status};
 
-use crate::{Layout, words};
+use crate::{Layout, visible, words};
 
 /// Status, degree, accuracy order.
 type Verdict = (Status, Option<usize>, Option<usize>);
@@ -16,6 +16,7 @@ pub(crate) fn heading(out: &mut String, text: &str, layout: Layout) {
     if !out.is_empty() {
         out.push('\n');
     }
+    let text = visible(text);
     if layout.color {
         out.push_str(&format!("\u{1b}[1m{text}\u{1b}[0m\n"));
     } else {
@@ -33,11 +34,16 @@ pub(crate) fn table(header: &[&str], layout: Layout) -> Table {
     table
 }
 
+/// A cell of a table.
+pub(crate) fn cell(text: impl AsRef<str>) -> Cell {
+    Cell::new(visible(text.as_ref()))
+}
+
 /// Adds lines that are wrapped to the width, with a hanging indent.
 pub(crate) fn paragraph(out: &mut String, text: &str, layout: Layout) {
     let width = layout.width.map_or(usize::MAX, usize::from).max(20);
     let (mut line, mut first) = (String::from("  "), true);
-    for word in text.split(' ') {
+    for word in visible(text).split(' ') {
         if !first && line.chars().count() + 1 + word.chars().count() > width {
             out.push_str(line.trim_end());
             out.push('\n');
@@ -69,7 +75,7 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
         let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
         let g = p.g_c.map_or_else(String::new, |g| g.map(short).join(", "));
         let angles = words::turned(&angles.join(", "), p.rotation.as_deref());
-        positions.add_row(vec![p.name.clone(), angles, p.attitude.clone().unwrap_or_default(), g]);
+        positions.add_row([&p.name, &angles, p.attitude.as_deref().unwrap_or_default(), &g].map(cell));
     }
     out.push_str(&trimmed(&positions));
 
@@ -79,14 +85,10 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
         first.iter().copied().chain(["verdict", "degree"]).chain(dwell).chain([last]).collect::<Vec<_>>()
     };
     let row = |first: &[&String], (status, degree, order): Verdict, last: String| {
-        let dwell = dwell.map(|_| Cell::new(words::with_dwell(a, degree, order)));
-        let degree = Cell::new(words::degree(degree)).set_alignment(CellAlignment::Right);
-        let first = first.iter().map(Cell::new);
-        first
-            .chain([Cell::new(status.to_string()), degree])
-            .chain(dwell)
-            .chain([Cell::new(last)])
-            .collect::<Vec<_>>()
+        let dwell = dwell.map(|_| cell(words::with_dwell(a, degree, order)));
+        let degree = cell(words::degree(degree)).set_alignment(CellAlignment::Right);
+        let first = first.iter().map(cell);
+        first.chain([cell(status.to_string()), degree]).chain(dwell).chain([cell(last)]).collect::<Vec<_>>()
     };
     let mut unknowns = table(&header(&["unknown", "unit"], "solution, or why there is none"), layout);
     for q in &a.quantities {

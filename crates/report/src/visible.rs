@@ -1,0 +1,72 @@
+//! What a reader would not see, written out.
+
+use std::borrow::Cow;
+
+/// The text on one line, with everything in it that is not text written out, as in `\u{1b}`: control characters, which move the cursor of a
+/// terminal, colour it or ring its bell, and are not allowed in pictures and pages; marks that turn the direction of writing, so
+/// that a text reads otherwise than it is; what is no character. Line breaks and tabs become blanks.
+///
+/// ```
+/// use obsdeg_report::visible;
+/// assert_eq!(visible("D_FX \u{1b}[31m"), "D_FX \\u{1b}[31m");
+/// assert_eq!(visible("two\nlines"), "two lines");
+/// ```
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '\n' | '\r' | '\t' => out.push(' '),
+            c if hidden(c) => out.extend(c.escape_unicode()),
+            c => out.push(c),
+        }
+    }
+    Cow::Owned(out)
+}
+
+fn hidden(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+        || matches!(c, '\u{fff9}'..='\u{fffb}' | '\u{fffe}' | '\u{ffff}')
+}
+
+/// JSON with the same characters as `\u001b`, which reads as what it was.
+pub(crate) fn json(answer: &impl serde::Serialize) -> Result<String, serde_json::Error> {
+    let text = serde_json::to_string_pretty(answer)?;
+    let is_hidden = |c: char| c != '\n' && hidden(c);
+    let mut out = String::with_capacity(text.len() + 1);
+    for c in text.chars() {
+        if is_hidden(c) {
+            out.push_str(&format!("\\u{:04x}", u32::from(c)));
+        } else {
+            out.push(c);
+        }
+    }
+    Ok(out + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_stays_and_the_rest_is_written_out() {
+        for text in ["D_FX", "µ ω ½ 惯性平台 é", "a\\u{1b}", "𝛼 \u{1f600}"] {
+            assert_eq!(visible(text), text);
+        }
+        for c in "\0\u{7}\u{8}\u{1b}\u{7f}\u{85}\u{9b}\u{9d}\u{61c}\u{200e}\u{200f}\u{2028}\u{202a}\u{202e}\u{2066}\u{2069}\u{ffff}".chars() {
+            assert_eq!(visible(&format!("a{c}b")), format!("a\\u{{{:x}}}b", u32::from(c)));
+        }
+    }
+
+    #[test]
+    fn json_reads_as_what_it_was() {
+        let nasty: String =
+            (0..0x300).chain(0x2000..0x2070).chain([0xffff, 0x1f600]).filter_map(char::from_u32).collect();
+        let text = json(&nasty).expect("JSON");
+        assert_eq!(text.trim_end().chars().find(|&c| hidden(c)), None);
+        assert_eq!(serde_json::from_str::<String>(&text).expect("JSON"), nasty);
+    }
+}
