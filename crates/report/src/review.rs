@@ -79,6 +79,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usi
     blocks.push(section(level, "Verdict"));
     blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
     blocks.push(Block::Text(verdict::sentences(s, review, &coefficients)));
+    blocks.extend(simulation::warning(&s.simulation.conditions).map(Block::Text));
     blocks.push(section(level, "Unknowns"));
     blocks.push(unknowns(a, review));
     blocks.push(pictures::staircase(a, &format!("{id}_staircase")));
@@ -192,9 +193,13 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
     }
     let combination = |c: &obsdeg_core::analysis::CombinationReport| {
         let asked = if c.requested { ", asked for" } else { "" };
+        let dwell = match words::with_dwell(a, c.degree, c.accuracy_order) {
+            same if same.is_empty() => same,
+            other => format!(", with dwell {other}"),
+        };
         let verdict = match c.degree {
-            Some(k) => format!("degree {k}{asked}"),
-            None => format!("{}{asked}", c.status),
+            Some(k) => format!("degree {k}{dwell}{asked}"),
+            None => format!("{}{dwell}{asked}", c.status),
         };
         Formula {
             text: format!("{}: {verdict}", c.expression),

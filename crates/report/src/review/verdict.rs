@@ -138,7 +138,10 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
         _ => "",
     };
     let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
-    format!("{lead}{first}. {accuracy}; {}{filter}.", words::requirements(&review.requirements))
+    let requirements = words::requirements(&review.requirements);
+    format!(
+        "{lead}{first}. {accuracy}; by predicted sigma, without prior and drift noise, {requirements}{filter}."
+    )
 }
 
 /// The box of a scheme.
