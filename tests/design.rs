@@ -11,7 +11,7 @@ use brute::Brute;
 use obsdeg_core::analysis::{Options as AnalysisOptions, analyze};
 use obsdeg_core::compare::predicted;
 use obsdeg_core::design::answer::Found;
-use obsdeg_core::design::criterion::Criterion;
+use obsdeg_core::design::criterion::{Criterion, Limits};
 use obsdeg_core::design::information::Evaluator;
 use obsdeg_core::design::observability::Rows;
 use obsdeg_core::design::search::{Constraints, Progress, Search};
@@ -520,7 +520,7 @@ fn criteria_are_those_of_the_covariance() {
             (Criterion::D, block.clone().determinant().powf(1.0 / 24.0)),
             (Criterion::E, block.clone().symmetric_eigenvalues().max().sqrt()),
             (
-                Criterion::Margin(requirements.clone()),
+                Criterion::Margin(Limits { coefficients: requirements.clone(), psi: [f64::INFINITY; 3] }),
                 largest(&mut sigmas.iter().zip(&requirements).map(|(s, t)| s / t)),
             ),
         ] {
@@ -532,6 +532,117 @@ fn criteria_are_those_of_the_covariance() {
             );
         }
     }
+}
+
+/// psi has a requirement like everything else: the sigma that a search holds against it is that of a comparison, and what is found is the best
+/// of all sequences, judged one by one by comparisons.
+#[test]
+fn requirements_on_psi_count() {
+    let mut candidates = Candidates::default();
+    for name in ["NUE", "UEN", "DNE", "20,-40,70", "110,15,-35"] {
+        candidates.add(obsdeg_core::model::scheme::parse_attitude(name).expect("an attitude"));
+    }
+    let require = |name: &str, value| Assignment { name: name.into(), value };
+    let base_of = |carry| Scheme { unknowns: "F".parse().expect("terms"), ..base(carry) };
+    for (carry, slew) in
+        [(Carry::Platform, None), (Carry::Inertial, None), (Carry::Inertial, Some(0.5)), (Carry::Reset, None)]
+    {
+        let like = base_of(carry);
+        let k = if carry == Carry::Reset { 3 } else { 2 };
+        let mut seen: Vec<Vec<(String, Option<f64>)>> = Vec::new();
+        let free = Conditions { slew_rate_deg_s: slew, requirements: Vec::new(), ..quiet() };
+        let evaluator =
+            Evaluator::new(&like, &candidates.attitudes, &[0, 1, 2], &free).expect("an evaluator");
+        let n = candidates.names.len();
+        let sequences: Vec<Vec<usize>> =
+            (0..n.pow(k as u32)).map(|i| (0..k).map(|p| i / n.pow(p as u32) % n).collect()).collect();
+        for sequence in &sequences {
+            let mut scheme = Scheme {
+                positions: Scheme::of_angles(sequence.iter().map(|&c| candidates.attitudes[c].clone()))
+                    .positions,
+                ..like.clone()
+            };
+            // the way that a search takes first
+            for (i, turn) in evaluator.half_turns(&sequence.iter().map(|&c| c.into()).collect::<Vec<_>>()) {
+                let (axis, angle) = (Some(SlewAxis::Direction(turn.about)), "180".parse().ok());
+                scheme.positions[i].slew = Some(SlewTo { axis, angle, rate_deg_s: None });
+            }
+            let of = obsdeg_core::compare::predicted(&scheme, &free, 1).expect("predicted");
+            let psi = evaluator.psi_sigmas(sequence).concat();
+            if of.iter().all(|(_, sigma)| sigma.is_some()) {
+                for ((name, sigma), found) in of.iter().zip(&psi) {
+                    let sigma = sigma.expect("determined");
+                    assert!(
+                        (found / sigma - 1.0).abs() < 1e-5,
+                        "{carry} {sequence:?} {name}: {found} {sigma}"
+                    );
+                }
+            }
+            seen.push(of);
+        }
+        // the largest sigma over requirement of every sequence; infinite where something is not determined
+        let worst = |asked: &dyn Fn(&str) -> f64| -> Vec<f64> {
+            let over =
+                |(name, sigma): &(String, Option<f64>)| sigma.map_or(f64::INFINITY, |s| s / asked(name));
+            seen.iter().map(|of| of.iter().map(over).fold(0.0, f64::max)).collect()
+        };
+        let requirement = |name: &str| match name {
+            n if n.starts_with("psi_y") => 0.002,
+            n if n.starts_with("psi") => 0.02,
+            _ => 0.05,
+        };
+        let all = worst(&requirement);
+        let best = all.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(best.is_finite() && psi_decides(&seen, &all, &requirement), "{carry}: nothing is tested");
+        for (factor, meet) in [(1.0, false), (best * 1.0001, true), (best * 0.9999, true)] {
+            let conditions = Conditions {
+                requirements: vec![
+                    require("D", 0.05 * factor),
+                    require("psi", 0.02 * factor),
+                    require("psi_y", 0.002 * factor),
+                ],
+                ..free.clone()
+            };
+            let options =
+                Options { candidates: candidates.clone(), meet, criterion: Kind::Margin, ..options(Some(k)) };
+            let found = design(&like, &conditions, &options, &on);
+            if meet && factor < best {
+                assert!(matches!(found, Err(DesignError::Impossible { .. })), "{carry}: {found:?}");
+                continue;
+            }
+            let found = found.expect("designed");
+            let first = &found.found[0];
+            // the smallest worst degree comes first; here all that determine everything have the same
+            assert!((first.value * factor / best - 1.0).abs() < 1e-5, "{carry}: {} {best}", first.value);
+            let margin = first.requirements.worst.as_ref().expect("a margin");
+            assert!((margin.margin * first.value - 1.0).abs() < 1e-9, "{margin:?}");
+            assert_eq!(first.requirements.all_met(), first.value <= 1.0);
+            let count = 3 + 3 * if carry == Carry::Reset { k } else { 1 };
+            assert_eq!(first.requirements.stated, count);
+        }
+        // asked for some coefficients, psi is not
+        let some = Options {
+            candidates: candidates.clone(),
+            meet: true,
+            required: vec!["D_FX".into()],
+            ..options(Some(k))
+        };
+        let conditions =
+            Conditions { requirements: vec![require("D", 1.0), require("psi", 1e-9)], ..free.clone() };
+        let found = design(&like, &conditions, &some, &on).expect("designed");
+        assert_eq!(found.found[0].requirements.stated, 1);
+    }
+    let one = Conditions { requirements: vec![require("psi_x@1", 0.1)], ..quiet() };
+    let error = design(&base_of(Carry::Reset), &one, &options(Some(3)), &on).expect_err("of one position");
+    assert!(error.to_string().contains("`psi_x@1`"), "{error}");
+}
+
+/// Whether psi is what misses most in some sequence that is determined.
+fn psi_decides(seen: &[Vec<(String, Option<f64>)>], worst: &[f64], asked: &dyn Fn(&str) -> f64) -> bool {
+    seen.iter().zip(worst).any(|(of, worst)| {
+        let psi = of.iter().filter(|(name, _)| name.starts_with("psi"));
+        worst.is_finite() && psi.filter_map(|(name, s)| Some(s.as_ref()? / asked(name))).any(|x| x == *worst)
+    })
 }
 
 /// What must be kept is kept, and what is found is as good as a search through all sequences says.

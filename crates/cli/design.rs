@@ -114,12 +114,13 @@ struct WantedArguments {
     #[arg(long, value_name = "[NAME=]K", value_parser = degree_cap)]
     max_degree: Vec<(Option<String>, usize)>,
 
-    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement);
+    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement, as for --meet);
     /// a smaller worst degree comes before it
     #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true)]
     criterion: CriterionArgument,
 
-    /// Only schemes that meet every requirement
+    /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
+    /// coefficients
     #[arg(long)]
     meet: bool,
 

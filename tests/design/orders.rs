@@ -1,7 +1,7 @@
 //! The order of the criteria, constraints, worst degree, criterion, against every sequence of small random tasks, one by one.
 
 use obsdeg_core::compare::predicted;
-use obsdeg_core::design::criterion::Criterion;
+use obsdeg_core::design::criterion::{Criterion, Limits};
 use obsdeg_core::design::information::Evaluator;
 use obsdeg_core::design::observability::Rows;
 use obsdeg_core::design::search::{Constraints, Search};
@@ -114,6 +114,11 @@ fn task(seed: u64) -> Task {
     Task { base, conditions, options }
 }
 
+/// Some coefficients are asked for: requirements on psi do not count.
+fn limits_of(coefficients: &[f64]) -> Limits {
+    Limits { coefficients: coefficients.to_vec(), psi: [f64::INFINITY; 3] }
+}
+
 /// A sequence that keeps every constraint: worst degree and criterion.
 struct Kept {
     degree: usize,
@@ -174,12 +179,12 @@ fn judged(t: &Task) -> Judged {
         Kind::A => Criterion::A,
         Kind::D => Criterion::D,
         Kind::E => Criterion::E,
-        Kind::Margin => Criterion::Margin(limits.clone()),
+        Kind::Margin => Criterion::Margin(limits_of(&limits)),
     };
     let constraints = Constraints {
         total_s: t.options.total_s,
         slew_s: t.options.slew_s,
-        sigmas: t.options.meet.then(|| limits.clone()),
+        sigmas: t.options.meet.then(|| limits_of(&limits)),
         degrees: caps.iter().any(|c| *c != usize::MAX).then(|| caps.clone()),
     };
     let every: Vec<usize> = (0..candidates.names.len()).collect();
@@ -220,7 +225,7 @@ impl Judged {
         let degrees: Vec<usize> = self.rows.degrees(&set).into_iter().collect::<Option<_>>()?;
         let value = self.evaluator.of_sequence(s, &self.criterion);
         let seconds = s.len() as f64 * t.conditions.dwell_s + slews.iter().sum::<f64>();
-        let margin = Criterion::Margin(limits.to_vec());
+        let margin = Criterion::Margin(limits_of(limits));
         let kept = degrees.iter().zip(caps).all(|(d, cap)| d <= cap)
             && slews.iter().all(|s| t.options.slew_s.is_none_or(|limit| *s <= limit + 1e-6))
             && t.options.total_s.is_none_or(|limit| seconds <= limit + 1e-6)
@@ -319,7 +324,7 @@ fn hold_refinement(
     );
     let sigmas = predicted(&scheme, &t.conditions, 1).expect("predicted");
     let of = |c: usize| sigmas.iter().find(|s| s.0 == NAMES[c]).and_then(|s| s.1);
-    let limits = all.constraints.sigmas.iter().flatten();
+    let limits = all.constraints.sigmas.iter().flat_map(|l| &l.coefficients);
     let required = (0..12).filter(|&c| {
         t.options.required.is_empty() || t.options.required.iter().any(|r| NAMES[c].starts_with(r.as_str()))
     });

@@ -3,6 +3,8 @@
 use obsdeg_core::design::Design;
 use obsdeg_core::design::answer::{Found, SearchReport};
 
+use obsdeg_core::requirements::{Miss, Requirements};
+
 use crate::document::{Block, Document, number};
 use crate::figure::{BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
@@ -14,7 +16,7 @@ fn criterion(name: &str) -> &'static str {
         "D" => "D: geometric mean of the principal sigmas of the coefficients",
         "E" => "E: largest principal sigma of the coefficients",
         "margin" => {
-            "margin: largest sigma of a coefficient over what is required; below 1 all requirements are met"
+            "margin: largest sigma over what is required, of psi too where every coefficient is asked for; up to 1 all requirements are met"
         }
         _ => "worst: largest sigma of a coefficient",
     }
@@ -31,6 +33,14 @@ fn route(f: &Found) -> String {
     out.join(" ")
 }
 
+/// `0.5 (psi_y)`, and what has none.
+fn margin(r: &Requirements) -> String {
+    let unseen: Vec<&str> =
+        r.missed.iter().filter(|m| m.why != Miss::TooLarge).map(|m| m.name.as_str()).collect();
+    let none = (!unseen.is_empty()).then(|| format!("none ({})", words::names(unseen)));
+    none.or_else(|| words::worst_margin(r)).unwrap_or_else(|| "-".into())
+}
+
 fn table(heading: &str, found: &[Found]) -> Block {
     let row = |(i, f): (usize, &Found)| {
         vec![
@@ -41,6 +51,7 @@ fn table(heading: &str, found: &[Found]) -> Block {
             f.worst_accuracy_order.map_or_else(|| "-".into(), |o| o.to_string()),
             number(f.value),
             format!("{} ({})", number(f.worst_sigma_dph), f.worst),
+            margin(&f.requirements),
             format!("{} of {}", f.rank[0], f.rank[1]),
         ]
     };
@@ -54,9 +65,10 @@ fn table(heading: &str, found: &[Found]) -> Block {
             "accuracy",
             "criterion",
             "worst sigma [deg/h, /g]",
+            "worst margin",
             "rank",
         ],
-        numbers: vec![true, false, true, true, true, true, false, true],
+        numbers: vec![true, false, true, true, true, true, false, false, true],
         rows: found.iter().enumerate().map(row).collect(),
     }
 }

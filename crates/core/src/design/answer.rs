@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::{Carry, Geometry};
+use crate::requirements::Requirements;
 use crate::simulation::answer::MeasurementReport;
 
 /// Name and version of the JSON layout.
@@ -127,12 +128,15 @@ pub struct Found {
     pub dwell_s: f64,
     /// Total time with turns, in s.
     pub total_s: f64,
-    /// The criterion: a sigma in deg/h (per g), or for margin the largest sigma over its requirement.
+    /// The criterion: a sigma in deg/h (per g), or for margin the largest sigma over its requirement, psi's too where it counts.
     pub value: f64,
     /// The largest sigma of a required coefficient in deg/h (per g): information of all samples, no prior, no drift noise.
     pub worst_sigma_dph: f64,
     /// The coefficient that has it.
     pub worst: String,
+    /// What became of the requirements on what must be observable, and on psi (of the start, under reset carry of every position) when that is
+    /// every coefficient.
+    pub requirements: Requirements,
     /// Its largest degree of a required coefficient.
     pub worst_degree: usize,
     /// Its largest accuracy order of a required coefficient.

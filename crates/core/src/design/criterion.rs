@@ -18,8 +18,17 @@ pub enum Criterion {
     D,
     /// The largest principal sigma (E-optimal).
     E,
-    /// The largest sigma over its requirement (shape d, in deg/h per g).
-    Margin(Vec<f64>),
+    /// The largest sigma over its requirement.
+    Margin(Limits),
+}
+
+/// The largest sigmas allowed; infinite where there is no requirement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Of the coefficients that count, in deg/h (per g) (shape d).
+    pub coefficients: Vec<f64>,
+    /// Of psi_x, psi_y, psi_z at the start, under reset carry at the start of every position, in deg.
+    pub psi: [f64; 3],
 }
 
 impl Criterion {
@@ -38,7 +47,7 @@ impl Criterion {
 impl Evaluator {
     /// The root of the information, psi and the coefficients that do not count first: the block of the others is the root of the
     /// inverse of their covariance. False when one of them is not determined.
-    fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+    pub(super) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
         let n = self.n;
         let first = if self.carry() == Carry::Reset { 3 } else { 0 };
         root.resize(n * n, 0.0);
@@ -84,19 +93,14 @@ impl Evaluator {
             let information = &block * block.transpose();
             return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
         }
-        let (mut worst, mut sum) = (0.0f64, 0.0);
-        for i in begin..n {
-            let variance = self.variance(l, i);
-            sum += variance;
-            worst = worst.max(match criterion {
-                Criterion::Margin(required) => variance / (required[i - begin] * required[i - begin]),
-                _ => variance,
-            });
-        }
+        let variances = (begin..n).map(|i| self.variance(l, i));
         match criterion {
-            Criterion::A => (sum / d as f64).sqrt() / self.dph,
-            // requirements are in deg/h already
-            _ => worst.sqrt() / self.dph,
+            Criterion::A => (variances.sum::<f64>() / d as f64).sqrt() / self.dph,
+            Criterion::Margin(limits) => {
+                let over = variances.zip(&limits.coefficients).map(|(v, limit)| v.sqrt() / self.dph / limit);
+                over.fold(self.psi_over(state, l, &limits.psi), f64::max)
+            }
+            _ => variances.fold(0.0, f64::max).sqrt() / self.dph,
         }
     }
 

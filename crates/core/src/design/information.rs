@@ -19,9 +19,9 @@ pub const MAX: usize = 33;
 /// One candidate: its attitude, and how coefficients become drift there.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
-    c: Matrix3<f64>,
+    pub(super) c: Matrix3<f64>,
     /// `C E(g)` (3 x d), columns in the order of the evaluator.
-    drift: [Vec<f64>; 3],
+    pub(super) drift: [Vec<f64>; 3],
 }
 
 /// What every evaluation shares.
@@ -40,7 +40,7 @@ pub struct Evaluator {
     /// Dwell of each position, in s.
     dwell_s: f64,
     /// Information of one position on its `(psi^n, eps^n)`.
-    local: [[f64; LOCAL]; LOCAL],
+    pub(super) local: [[f64; LOCAL]; LOCAL],
     /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
     phi: [[f64; LOCAL]; 3],
     pub(super) candidates: Vec<Candidate>,
@@ -57,8 +57,8 @@ pub struct State {
     pub(super) information: Vec<f64>,
     /// psi in the carried axes as a functional of the unknowns (3 x n).
     psi: [Vec<f64>; 3],
-    /// The candidate it ends with.
-    last: Option<usize>,
+    /// The candidates in order.
+    pub(super) path: Vec<usize>,
     /// Dwells and turns, in s.
     pub seconds: f64,
 }
@@ -179,7 +179,7 @@ impl Evaluator {
         State {
             information: vec![0.0; self.n * self.n],
             psi: std::array::from_fn(unit),
-            last: None,
+            path: Vec::new(),
             seconds: 0.0,
         }
     }
@@ -203,7 +203,7 @@ impl Evaluator {
         let n = self.n;
         let carry = self.carry();
         let Candidate { c, drift } = &self.candidates[stop.candidate];
-        let turn = self.way_to(state.last, stop);
+        let turn = self.way_to(state.path.last().copied(), stop);
         let mut local = [[0.0; MAX]; LOCAL];
         for r in 0..3 {
             match (carry, turn) {
@@ -226,7 +226,8 @@ impl Evaluator {
             }
             local[3 + r][3..n].copy_from_slice(&drift[r]);
         }
-        out.last = Some(stop.candidate);
+        out.path.clone_from(&state.path);
+        out.path.push(stop.candidate);
         out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
         // G L, then L^T (G L)
         let mut weighted = [[0.0; MAX]; LOCAL];

@@ -9,6 +9,7 @@ pub mod candidates;
 pub mod criterion;
 pub mod information;
 pub mod observability;
+mod psi;
 mod refine;
 pub mod search;
 pub mod symmetry;
@@ -100,6 +101,14 @@ pub enum DesignError {
         /// The number found.
         found: f64,
     },
+    /// Positions are what is searched for.
+    #[error(
+        "the requirement for `{found}` is that of one position; expected psi, psi_x, psi_y or psi_z, for every position"
+    )]
+    OnePosition {
+        /// The name found.
+        found: String,
+    },
     /// A limit that cannot be.
     #[error("{what} of {found} s; expected more than 0")]
     Limit {
@@ -150,7 +159,7 @@ pub struct Options {
     pub required: Vec<String>,
     /// Largest degrees: of a coefficient or family, or of all that are required.
     pub degree_caps: Vec<(Option<String>, usize)>,
-    /// Only schemes that meet the requirements of the conditions.
+    /// Only schemes that meet the requirements of the conditions on what is required, and on psi when that is everything.
     pub meet: bool,
     /// Largest total time, in s.
     pub total_s: Option<f64>,

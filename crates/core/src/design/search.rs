@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
 
-use super::criterion::Criterion;
+use super::criterion::{Criterion, Limits};
 use super::information::{Evaluator, State};
 use super::observability::{Patience, Rows};
 use super::symmetry::Symmetry;
@@ -83,8 +83,8 @@ pub struct Constraints {
     pub total_s: Option<f64>,
     /// Longest turn between successive positions, in s.
     pub slew_s: Option<f64>,
-    /// Largest sigma of every required coefficient, in deg/h (per g).
-    pub sigmas: Option<Vec<f64>>,
+    /// Largest sigmas.
+    pub sigmas: Option<Limits>,
     /// Largest degree of every required coefficient.
     pub degrees: Option<Vec<usize>>,
 }
@@ -99,7 +99,7 @@ impl Constraints {
     fn violation(&self, evaluator: &Evaluator, sequence: &[Stop], state: &State, root: &mut Vec<f64>) -> f64 {
         let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);
         let slews = sequence.windows(2).map(|w| beyond(slew(w), self.slew_s)).sum::<f64>();
-        let margin = |limits: &Vec<f64>| {
+        let margin = |limits: &Limits| {
             // a margin has no unit: largest sigma over requirement
             let over = evaluator.value(state, &Criterion::Margin(limits.clone()), root);
             if meets(over, 1.0) { 0.0 } else { over - 1.0 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::answer::{Found, HalfTurn, Minimum};
 use super::candidates::{Candidates, MAX_CANDIDATES};
-use super::criterion::Criterion;
+use super::criterion::{Criterion, Limits};
 use super::information::{self, Evaluator};
 use super::observability::Rows;
 use super::search::{Best, Constraints, Scored, Search};
@@ -15,6 +15,7 @@ use crate::accuracy::Accuracy;
 use crate::degree::ensemble::judge;
 use crate::model::attitude::Euler;
 use crate::model::{Platform, Scheme, Unknowns};
+use crate::requirements::{Claim, Miss, Requirements};
 use crate::simulation::conditions::{Conditions, concerns, latitude_of, resolve};
 
 /// Most sets whose keys are held.
@@ -35,6 +36,10 @@ pub(super) struct Task<'a> {
     pub(super) required: Vec<(String, usize)>,
     pub(super) criterion: Criterion,
     pub(super) constraints: Constraints,
+    /// Requirements on what must be observable; on psi when that is everything.
+    limits: Limits,
+    /// Whether the requirements are those of the program.
+    by_default: bool,
     pub(super) rows: Rows,
     pub(super) symmetry: Symmetry,
 }
@@ -91,8 +96,17 @@ impl<'a> Task<'a> {
                 }
             }
         }
-        let requirements = resolve("required sigma", &platform, &conditions.requirements, f64::NAN)?;
-        let requirements: Vec<f64> = required.iter().map(|c| requirements[first + c.1]).collect();
+        if let Some(of_one) = conditions.requirements.iter().find(|r| r.name.contains('@')) {
+            return Err(DesignError::OnePosition { found: of_one.name.clone() });
+        }
+        let all_requirements = resolve("required sigma", &platform, &conditions.requirements, f64::NAN)?;
+        let requirements: Vec<f64> = required.iter().map(|c| all_requirements[first + c.1]).collect();
+        // with some coefficients asked for, psi is not
+        let psi = |k: usize| Some(all_requirements[k]).filter(|x| !x.is_nan() && options.required.is_empty());
+        let limits = Limits {
+            coefficients: requirements.iter().map(|x| if x.is_nan() { f64::INFINITY } else { *x }).collect(),
+            psi: [0, 1, 2].map(|k| psi(k).unwrap_or(f64::INFINITY)),
+        };
         if options.meet || options.criterion == Kind::Margin {
             let wrong = |x: &f64| !(x.is_finite() && *x > 0.0);
             if let Some((c, found)) = required.iter().zip(&requirements).find(|(_, x)| wrong(x)) {
@@ -104,7 +118,7 @@ impl<'a> Task<'a> {
             Kind::A => Criterion::A,
             Kind::D => Criterion::D,
             Kind::E => Criterion::E,
-            Kind::Margin => Criterion::Margin(requirements.clone()),
+            Kind::Margin => Criterion::Margin(limits.clone()),
         };
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let rows = Rows::new(base, &candidates.attitudes, &indices, options.seed)?;
@@ -113,7 +127,10 @@ impl<'a> Task<'a> {
         let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
         let place = |c: usize| required.iter().position(|r| r.1 == c);
         let uses_requirements = options.meet || options.criterion == Kind::Margin;
+        // a turn of the platform axes renames psi as well
+        let turned = !uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]);
         let same = |i: usize, j: usize| match (place(i), place(j)) {
+            _ if !turned && i != j => false,
             (None, None) => true,
             (Some(i), Some(j)) => {
                 caps[i] == caps[j] && (!uses_requirements || requirements[i] == requirements[j])
@@ -130,10 +147,22 @@ impl<'a> Task<'a> {
         let constraints = Constraints {
             total_s: options.total_s,
             slew_s: options.slew_s,
-            sigmas: options.meet.then_some(requirements),
+            sigmas: options.meet.then(|| limits.clone()),
             degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
         };
-        Ok(Self { base, options, candidates, required, criterion, constraints, rows, symmetry })
+        let by_default = conditions.requires_by_default();
+        Ok(Self {
+            base,
+            options,
+            candidates,
+            required,
+            criterion,
+            constraints,
+            limits,
+            by_default,
+            rows,
+            symmetry,
+        })
     }
 
     /// The fewest candidates that do, with the proof; `proven` without regard to the bound on errors.
@@ -236,11 +265,37 @@ impl<'a> Task<'a> {
         let Some(degrees) = degrees.filter(|d| self.constraints.cap(d)) else { return Ok(None) };
         // beyond the precision of the series the order is not known
         let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
-        let orders = accuracy.and_then(|a| columns().map(|c| a.order[c]).collect::<Option<Vec<_>>>());
+        let order_of = |c: usize| accuracy.as_ref().and_then(|a| a.order[c]);
+        let orders = columns().map(order_of).collect::<Option<Vec<_>>>();
         let half_turns = evaluator.half_turns(sequence).into_iter();
         let sigmas = evaluator.sigmas(sequence);
         let worst = sigmas.iter().zip(&self.required).max_by(|a, b| a.0.total_cmp(b.0));
         let Some((&worst_sigma_dph, (worst, _))) = worst else { return Ok(None) };
+        let determined = |c: usize| match accuracy {
+            Some(_) => order_of(c).is_some(),
+            None => verdicts.degrees.degree[c].is_some(),
+        };
+        let limit = |x: f64| Some(x).filter(|x| x.is_finite());
+        let psi: Vec<f64> = evaluator.psi_sigmas(sequence).concat();
+        let psi = platform.names()[..first].iter().enumerate().map(|(c, name)| Claim {
+            name,
+            required: limit(self.limits.psi[c % 3]),
+            sigma: if determined(c) {
+                Ok(psi.get(c).copied().unwrap_or(f64::NAN))
+            } else {
+                Err(Miss::NotObservable)
+            },
+        });
+        let coefficients = self.required.iter().zip(&sigmas).zip(&self.limits.coefficients);
+        let coefficients = coefficients.map(|(((name, c), sigma), required)| Claim {
+            name,
+            required: limit(*required),
+            sigma: if determined(first + c) { Ok(*sigma) } else { Err(Miss::NotObservable) },
+        });
+        let requirements = Requirements::of(psi.chain(coefficients), self.by_default);
+        if self.options.meet && !requirements.all_met() {
+            return Ok(None);
+        }
         Ok(Some(Found {
             positions,
             angles,
@@ -251,6 +306,7 @@ impl<'a> Task<'a> {
             value,
             worst_sigma_dph,
             worst: worst.clone(),
+            requirements,
             worst_degree: degrees.into_iter().max().unwrap_or(0),
             worst_accuracy_order: orders.and_then(|o| o.into_iter().max()),
             rank: [verdicts.degrees.rank(), platform.names().len()],
@@ -321,7 +377,13 @@ impl<'a> Task<'a> {
         out.extend(c.total_s.map(|s| format!("at most {s} s in all")));
         out.extend(c.slew_s.map(|s| format!("slews of at most {s} s")));
         if c.sigmas.is_some() {
-            out.push("every requirement met".into());
+            out.push(match self.options.required.is_empty() {
+                true => "every requirement met, on psi too".into(),
+                false => {
+                    "the requirements on what must be observable met; those on psi and the rest do not count"
+                        .into()
+                }
+            });
         }
         for (name, cap) in &self.options.degree_caps {
             let name = name.as_deref().unwrap_or("every required coefficient");
