@@ -4,15 +4,18 @@ use obsdeg_core::analysis::Analysis;
 
 use crate::{ReportError, visible, words};
 
-/// A field: a text that a spreadsheet would take for a formula has an apostrophe before it, as one types it there. Numbers are left alone.
+/// A field: a text that a spreadsheet would take for a formula has an apostrophe before it, as one types it there. Numbers are left
+/// alone, and so is what begins with a minus and holds nothing but what formulas of ours do: no function with a text, no other program.
 fn field(text: &str) -> String {
     let text = visible(text);
-    let formula = text.starts_with(['=', '+', '-', '@', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}']);
-    if formula && text != "-" && text.parse::<f64>().is_err() {
-        format!("'{text}")
-    } else {
-        text.into_owned()
-    }
+    let ours = |c: char| c.is_alphanumeric() || " _+-*/^()[].,'@".contains(c);
+    let formula = match text.chars().next() {
+        Some('-') => !text.chars().all(ours),
+        Some('+') => text.parse::<f64>().is_err(),
+        Some(c) => "=@\u{ff1d}\u{ff0b}\u{ff0d}\u{ff20}".contains(c),
+        None => false,
+    };
+    if formula { format!("'{text}") } else { text.into_owned() }
 }
 
 /// Rows as CSV text.
