@@ -292,11 +292,50 @@ fn long_searches_hear_of_an_interruption() {
     }
 }
 
+/// An answer says what its sigmas rest on, in words and in JSON, and how many schemes are as good.
+#[test]
+fn an_answer_says_what_it_rests_on() {
+    let run = |more: &[&str]| {
+        let arguments =
+            ["design", "--positions", "3", "--carry", "inertial", "--observable", "D_F", "--dwell", "500"];
+        let arguments =
+            [&arguments[..], &["--step", "20", "--noise", "2e-5", "--slew-rate", "0.5"], more].concat();
+        let output = Command::new(env!("CARGO_BIN_EXE_obsdeg")).args(arguments).output().expect("it runs");
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let table = run(&[]).replace("\n      ", " ");
+    for said in [
+        "latitude 28.2 deg (chosen here: nothing names one)",
+        "500 s at each position, steps of at most 20 s, a sample after each; slews at 0.5 deg/s",
+        "noise of Z 2e-5 g per sample and axis; random drift: none; prior: none",
+        "psi and all coefficients of the terms F,I,O,S",
+        "24 sequences are as good, itself and its images counted",
+        "half turns are tried in both directions",
+        "NUE (-N) NDW (-N) NUE",
+    ] {
+        assert!(table.contains(said), "{said}: {table}");
+    }
+    assert!(!run(&["--latitude", "28.2"]).contains("chosen here"));
+    let json: serde_json::Value = serde_json::from_str(&run(&["--format", "json"])).expect("JSON");
+    let search = &json["search"];
+    let conditions = serde_json::json!({
+        "latitude_deg": 28.2, "latitude_by_default": true, "dwell_s": 500.0, "step_s": 20.0, "accelerometer_noise_g": 2e-5,
+        "azimuth_noise_deg": null, "slew_rate_deg_s": 0.5
+    });
+    assert_eq!(search["conditions"], conditions);
+    assert!(search["drift_noise"].is_null() && search["prior"].is_null());
+    assert_eq!(search["ties"], serde_json::json!({ "sequences": 24, "within": 1e-6 }));
+    let turns =
+        serde_json::json!([{ "to": 2, "about": [-1.0, 0.0, 0.0] }, { "to": 3, "about": [-1.0, 0.0, 0.0] }]);
+    assert_eq!(json["found"][0]["half_turns"], turns);
+}
+
 /// Ctrl-C ends the program with the exit code of a shell when nothing was found.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_program_ends_with_130() {
-    let arguments = ["design", "--minimum", "--candidates", "grid:30", "--quiet"];
+    // minutes of work, whatever the machine
+    let arguments = ["design", "--minimum", "--carry", "inertial", "--candidates", "grid:30", "--quiet"];
     // a signal that comes before the program listens ends it without a code: then it is tried again
     let code = [300, 1000, 3000].into_iter().find_map(|wait| {
         let program = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
@@ -450,7 +489,32 @@ fn the_winner_is_a_scheme_file() {
         ),
         (&["design"], "--positions"),
         (&["design", "--positions", "0"], "1 to 100"),
-        (&["design", "--positions", "3", "--carry", "inertial"], "no scheme of 3"),
+        (
+            &["design", "--positions", "3", "--carry", "inertial"],
+            "no scheme of 3 of these candidates makes every coefficient observable: every sequence was examined",
+        ),
+        (
+            &["design", "--positions", "5", "--max-time", "10"],
+            "at most 10 s in all: 5 times 1000 s at a position are more",
+        ),
+        (
+            &["design", "--positions", "3", "--observable", "D_F", "--max-degree", "1"],
+            "makes D_FX, D_FY, D_FZ observable with degree of every required coefficient at most 1",
+        ),
+        (
+            &[
+                "design",
+                "--positions",
+                "4",
+                "--carry",
+                "inertial",
+                "--candidates",
+                "grid:45",
+                "--restarts",
+                "2",
+            ],
+            "sequences of 4 of these candidates that were looked at makes every coefficient observable",
+        ),
         (&["design", "--minimum", "--terms", "drift"], "coefficients"),
         (&["design", "--minimum", "--candidates", "examples/generic-angles/scheme.toml"], "generic"),
         (&["design", "--positions", "5", "--dwell", "0"], "'--dwell <S>': expected"),

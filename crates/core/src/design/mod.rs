@@ -123,13 +123,27 @@ pub enum DesignError {
         /// Number of unknowns.
         found: usize,
     },
-    /// No sequence of that many candidates does.
-    #[error("no scheme of {positions} of these candidates does: {why}")]
+    /// No sequence of that many candidates is what is wanted.
+    #[error("no scheme of {positions} of these candidates {wanted}: {why}")]
     Impossible {
         /// The number of positions.
         positions: usize,
-        /// What is missed.
+        /// What is wanted, with all limits.
+        wanted: String,
+        /// What is missed, or how that is known.
         why: String,
+    },
+    /// Of those that were looked at, no sequence is what is wanted.
+    #[error(
+        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were looked at {wanted}; there are too many to look at all"
+    )]
+    NotFound {
+        /// The number of positions.
+        positions: usize,
+        /// What is wanted, with all limits.
+        wanted: String,
+        /// How many were looked at.
+        examined: u64,
     },
     /// Stopped before anything was found.
     #[error("interrupted before anything was found")]
@@ -244,9 +258,15 @@ pub fn design(
     };
     out.minimum.proven &= out.error_bound < PROOF;
     let Some(k) = options.positions else { return Ok(out) };
+    if let Some(limit) = options.total_s
+        && limit < k as f64 * conditions.dwell_s
+    {
+        let why = format!("{k} times {} s at a position are more than {limit} s", conditions.dwell_s);
+        return Err(DesignError::Impossible { positions: k, wanted: task.wanted(), why });
+    }
     if !out.minimum.never.is_empty() {
         let why = format!("all together leave {} unobservable", out.minimum.never.join(", "));
-        return Err(DesignError::Impossible { positions: k, why });
+        return Err(DesignError::Impossible { positions: k, wanted: task.wanted(), why });
     }
     let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
     let evaluator = Evaluator::while_going(base, &task.candidates.attitudes, &indices, conditions, &going)?;
@@ -271,13 +291,11 @@ pub fn design(
     let all = exhaustive.is_some() && best.complete;
     out.found = task.all_found(&evaluator, &best.found)?;
     let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
+        let (positions, wanted) = (k, task.wanted());
         return Err(match (best.complete, exhaustive) {
             (false, _) => DesignError::Interrupted,
-            (true, Some(_)) => DesignError::Impossible { positions: k, why: examined(best.lost) },
-            (true, None) => {
-                let why = format!("none of {} sequences examined", best.examined);
-                DesignError::Impossible { positions: k, why }
-            }
+            (true, Some(_)) => DesignError::Impossible { positions, wanted, why: examined(best.lost) },
+            (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
         });
     };
     out.front = task.all_found(&evaluator, &best.front)?;

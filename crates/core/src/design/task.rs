@@ -187,8 +187,9 @@ impl<'a> Task<'a> {
         if !out.never.is_empty() {
             return Ok(out);
         }
-        let most = if self.options.positions.is_none() { EXHAUSTIVE } else { MINIMUM_SETS };
         let firsts = self.symmetry.representatives();
+        let asked = self.options.positions.is_none();
+        let most = if asked { EXHAUSTIVE } else { MINIMUM_SETS / firsts.len() as u64 };
         let n = self.rows.candidates() as u64;
         for size in out.counting_bound..=self.rows.candidates() {
             let sets = choose(n, size as u64).unwrap_or(u64::MAX);
@@ -369,6 +370,16 @@ impl<'a> Task<'a> {
         let found = self.judged(&there, &path, attitudes, names.names, value)?;
         let found = found.filter(|f| f.worst_degree <= best.worth.degree);
         Ok(found.map(|f| Found { refined: true, ..f }))
+    }
+
+    /// `makes D_FX, D_FY observable with at most 10 s in all`.
+    pub(super) fn wanted(&self) -> String {
+        let every = self.options.required.is_empty();
+        let names: Vec<&str> = self.required.iter().map(|r| r.0.as_str()).collect();
+        let what = if every { "every coefficient".into() } else { names.join(", ") };
+        let limits = self.constraints_in_words();
+        let limits = if limits.is_empty() { String::new() } else { format!(" with {}", limits.join(", ")) };
+        format!("makes {what} observable{limits}")
     }
 
     pub(super) fn constraints_in_words(&self) -> Vec<String> {
