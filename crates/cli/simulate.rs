@@ -109,6 +109,9 @@ pub(crate) fn failure(e: SimulationError) -> Failure {
         SimulationError::Filter(e) if e.is_numeric() => Failure::input(format!(
             "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
         )),
+        // too many unknowns, or accuracy orders beyond the series
+        SimulationError::Prediction(PredictionError::Analysis(AnalysisError::Scheme(_)))
+        | SimulationError::Prediction(PredictionError::Accuracy(_)) => Failure::input(e.to_string()),
         SimulationError::Prediction(_) | SimulationError::Filter(_) => Failure::internal(e.to_string()),
         _ => Failure::input(e.to_string()),
     }

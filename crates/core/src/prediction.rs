@@ -2,7 +2,7 @@
 
 use crate::accuracy::{Accuracy, AccuracyError};
 use crate::analysis::requested::requested_combinations;
-use crate::analysis::{AnalysisError, Status, verdict};
+use crate::analysis::{AnalysisError, Status, few_enough, verdict};
 use crate::degree::coefficient::{Coefficient, Number};
 use crate::degree::ensemble::judge;
 use crate::degree::verdict::{combinations, expression, null_space, partners};
@@ -85,6 +85,7 @@ impl Prediction {
     /// # Errors
     /// [`PredictionError`].
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
+        few_enough(platform).map_err(AnalysisError::from)?;
         let verdicts = judge(platform, seed).map_err(AnalysisError::from)?;
         let requested = requested_combinations(platform, &verdicts, seed)?;
         let accuracy = match Accuracy::new(platform, &verdicts, seed) {

@@ -214,11 +214,25 @@ impl Echelon {
     }
 }
 
+/// The columns, out of `n`, in which some row is not zero.
+pub fn nonzero_columns<'a>(n: usize, rows: impl Iterator<Item = &'a [u64]>) -> Vec<usize> {
+    let mut seen = vec![0; n];
+    for row in rows {
+        for (s, x) in seen.iter_mut().zip(row) {
+            *s |= x;
+        }
+    }
+    (0..n).filter(|&c| seen[c] != 0).collect()
+}
+
 /// Solves `sum_i y_i rows[i] = target` (each of shape n): a solution `y` with zeros for the rows that
 /// depend on earlier ones, or `None` when `target` is not in their span.
 pub fn express(field: Field, rows: &[&[u64]], target: &[u64]) -> Option<Vec<u64>> {
+    // columns that are zero everywhere say nothing
+    let used = nonzero_columns(target.len(), rows.iter().copied().chain([target]));
+    let short = |row: &[u64]| -> Vec<u64> { used.iter().map(|&c| row[c]).collect() };
     // echelon form of [rows | identity]: the right part remembers how each basis row was made
-    let (m, n) = (rows.len(), target.len());
+    let (m, n) = (rows.len(), used.len());
     let mut basis: Vec<(usize, Vec<u64>, Vec<u64>)> = Vec::new();
     let reduce = |basis: &[(usize, Vec<u64>, Vec<u64>)], row: &mut [u64], made: &mut [u64]| {
         for (pivot, b, how) in basis {
@@ -234,7 +248,7 @@ pub fn express(field: Field, rows: &[&[u64]], target: &[u64]) -> Option<Vec<u64>
         }
     };
     for (i, row) in rows.iter().enumerate() {
-        let mut row = row.to_vec();
+        let mut row = short(row);
         let mut made = vec![0; m];
         made[i] = field.one();
         reduce(&basis, &mut row, &mut made);
@@ -246,7 +260,7 @@ pub fn express(field: Field, rows: &[&[u64]], target: &[u64]) -> Option<Vec<u64>
             basis.push((pivot, row, made));
         }
     }
-    let mut rest = target.to_vec();
+    let mut rest = short(target);
     let mut made = vec![0; m];
     reduce(&basis, &mut rest, &mut made);
     rest.iter().all(|&a| a == 0).then(|| made.iter().map(|&a| field.neg(a)).collect())

@@ -11,7 +11,7 @@ pub use answer::*;
 
 use crate::accuracy::Accuracy;
 use crate::degree::coefficient::{Coefficient, readable};
-use crate::degree::ensemble::{EnsembleError, Verdicts, judge};
+use crate::degree::ensemble::{EnsembleError, Verdicts, degrees, judge};
 use crate::degree::staircase::Degrees;
 use crate::degree::verdict::{Combination, NullVector, combinations, expression, null_space, partners};
 use crate::model::attitude::c_n_from_euler;
@@ -77,6 +77,7 @@ pub fn analyze(
     worker: Option<&mut Worker>,
 ) -> Result<Analysis, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
+    few_enough(&platform)?;
     let verdicts = judge(&platform, options.seed)?;
     let requested = requested_combinations(&platform, &verdicts, options.seed)?;
     let built = worker.is_some();
@@ -132,6 +133,15 @@ pub fn analyze(
         },
         notes: printer.notes,
     })
+}
+
+/// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.
+pub const MAX_UNKNOWNS: usize = 1000;
+
+/// Refuses more unknowns than an analysis takes, before anything grows.
+pub(crate) fn few_enough(platform: &Platform) -> Result<(), SchemeError> {
+    let found = platform.names().len();
+    if found <= MAX_UNKNOWNS { Ok(()) } else { Err(SchemeError::TooManyUnknowns { found }) }
 }
 
 /// Turns functionals into printed solutions and collects what could not be said.
@@ -292,7 +302,7 @@ pub(crate) fn verdict(degrees: &Degrees, column: usize) -> Verdict {
 }
 
 fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, AnalysisError> {
-    Ok(judge(&Platform::new(scheme.clone())?, seed)?.degrees.degree)
+    Ok(degrees(&Platform::new(scheme.clone())?, seed)?.degree)
 }
 
 /// The same scheme with a name for every angle; `None` when some are names already.
@@ -343,17 +353,17 @@ fn carry_reports(
     let mut out = Vec::new();
     for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
         let other = Platform::new(Scheme { carry, ..scheme.clone() })?;
-        let there = judge(&other, seed)?;
+        let there = degrees(&other, seed)?;
         let differs = platform.names().iter().enumerate().filter_map(|(c, name)| {
             let d = other.names().iter().position(|n| n == name)?;
-            let (here, there) = (verdict(&verdicts.degrees, c), verdict(&there.degrees, d));
+            let (here, there) = (verdict(&verdicts.degrees, c), verdict(&there, d));
             (here != there).then(|| Difference { name: name.clone(), here, there })
         });
         out.push(CarryReport {
             carry,
             unknowns: other.names().len(),
             differs: differs.collect(),
-            rank_profile: there.degrees.rank_profile.clone(),
+            rank_profile: there.rank_profile.clone(),
         });
     }
     Ok(out)

@@ -18,6 +18,7 @@ use crate::simulation::answer::MeasurementReport;
 use crate::simulation::attitude_path;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
+use crate::simulation::plan::MAX_UNKNOWNS;
 use crate::simulation::{Plan, SimulationError};
 use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
 
@@ -37,11 +38,23 @@ pub struct Entry {
     pub conditions: Conditions,
 }
 
+/// Refuses, before anything is computed, a scheme that is too large under one of the carries that are looked at.
+///
+/// # Errors
+/// [`SimulationError::ComparedUnknowns`].
+pub(crate) fn comparable(scheme: &Scheme) -> Result<(), SimulationError> {
+    let found = Platform::new(Scheme { carry: Carry::Reset, ..scheme.clone() })?.names().len();
+    if found <= MAX_UNKNOWNS { Ok(()) } else { Err(SimulationError::ComparedUnknowns { found }) }
+}
+
 /// Compares schemes.
 ///
 /// # Errors
 /// The name of the scheme that cannot be judged, and why.
 pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, SimulationError)> {
+    for e in entries {
+        comparable(&e.scheme).map_err(|error| (e.name.clone(), error))?;
+    }
     let schemes = entries.iter().map(|e| review(e, seed).map_err(|error| (e.name.clone(), error)));
     Ok(Comparison {
         schema: SCHEMA.into(),

@@ -5,9 +5,10 @@ use obsdeg_exact::radical::embeddings;
 use obsdeg_exact::{Echelon, PrimeError, RootField};
 
 use super::platform_rows::PlatformRows;
+use super::reset::reset_degrees;
 use super::staircase::{Degrees, climb};
-use crate::model::Platform;
 use crate::model::platform::{RandomValues, Sample};
+use crate::model::{Carry, Platform, Unknowns};
 use crate::solution::local::{LocalObservable, RateZeros, local_observables, rows_at};
 use crate::solution::turning::motion_rows;
 
@@ -45,6 +46,29 @@ pub struct Verdicts {
 /// # Errors
 /// [`EnsembleError`].
 pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> {
+    let (degrees, stairs, values) = agreed(platform, seed, &|sample| staircase(platform, sample))?;
+    let claim = claim(platform, &degrees, values[0].roots().order);
+    Ok(Verdicts { error_bound: error_bound(&claim, 2), degrees, stairs, values })
+}
+
+/// The degrees alone, as [`judge`] finds them.
+///
+/// # Errors
+/// [`EnsembleError`].
+pub fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, EnsembleError> {
+    let scheme = platform.scheme();
+    if scheme.carry != Carry::Reset || scheme.unknowns == Unknowns::Drift {
+        return Ok(judge(platform, seed)?.degrees);
+    }
+    Ok(agreed(platform, seed, &|sample| (reset_degrees(platform, sample), ()))?.0)
+}
+
+/// What two random fields agree on, with what else was found in the first.
+fn agreed<T>(
+    platform: &Platform,
+    seed: u64,
+    climbed: &dyn Fn(&Sample) -> (Degrees, T),
+) -> Result<(Degrees, T, [RandomValues; 2]), EnsembleError> {
     let scheme = platform.scheme();
     for attempt in 0..ATTEMPTS {
         let draw = |field: usize| {
@@ -52,11 +76,10 @@ pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> 
             RandomValues::draw(scheme, &mut rng)
         };
         let values = [draw(0)?, draw(1)?];
-        let (degrees, stairs) = staircase(platform, &values[0].sample(scheme, 1));
-        let (second, _) = staircase(platform, &values[1].sample(scheme, 1));
+        let (second, _) = climbed(&values[1].sample(scheme, 1));
+        let (degrees, rest) = climbed(&values[0].sample(scheme, 1));
         if degrees == second {
-            let claim = claim(platform, &degrees, values[0].roots().order);
-            return Ok(Verdicts { error_bound: error_bound(&claim, 2), degrees, stairs, values });
+            return Ok((degrees, rest, values));
         }
     }
     Err(EnsembleError::Disagreement)

@@ -3,6 +3,7 @@
 pub mod coefficient;
 pub mod ensemble;
 pub mod platform_rows;
+mod reset;
 pub mod rows;
 pub mod sparse;
 pub mod staircase;

@@ -296,6 +296,15 @@ pub enum SchemeError {
         /// Number of positions.
         found: usize,
     },
+    /// More unknowns than an analysis takes.
+    #[error(
+        "{found} unknowns; expected at most {} (under reset carry every position has three of its own)",
+        crate::analysis::MAX_UNKNOWNS
+    )]
+    TooManyUnknowns {
+        /// Their number.
+        found: usize,
+    },
     /// Two positions of one name.
     #[error("two positions are named `{name}`; expected different names")]
     DuplicateName {
@@ -404,7 +413,7 @@ impl SchemeError {
     /// The key of the offender in a scheme file, as in `position.1.name`; `None` when it is the whole scheme.
     pub fn key(&self) -> Option<String> {
         match self {
-            Self::Empty | Self::Dwell { .. } => None,
+            Self::Empty | Self::Dwell { .. } | Self::TooManyUnknowns { .. } => None,
             Self::TooMany { .. } => Some(format!("position.{MAX_POSITIONS}")),
             Self::DuplicateName { index, .. } | Self::PositionName { index, .. } => {
                 Some(format!("position.{index}.name"))

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 pub use answer::{DesignReview, ModelReview, SchemeReview};
 
 use crate::analysis::{self, AnalysisError, Status, analyze};
-use crate::compare::{Entry, compare, predicted};
+use crate::compare::{Entry, comparable, compare, predicted};
 use crate::crosscheck::{self, crosscheck};
 use crate::design::{self, Candidates, DesignError, Kind, design};
 use crate::model::{Dwell, Scheme};
@@ -84,6 +84,9 @@ pub fn review(
         true => Ok(()),
         false => Err(ReviewError::Interrupted),
     };
+    for Entry { name, scheme, .. } in entries {
+        comparable(scheme).map_err(|error| ReviewError::Simulation { name: name.clone(), error })?;
+    }
     let mut schemes = Vec::new();
     for (i, entry) in entries.iter().enumerate() {
         let step = |share: f64, what: &str| step(i, share, &format!("{}: {what}", entry.name));

@@ -72,6 +72,15 @@ pub enum SimulationError {
         /// Number of unknowns.
         found: usize,
     },
+    /// Too many unknowns under a carry that is looked at for comparison.
+    #[error(
+        "{found} unknowns under reset carry, which is compared too; expected at most {}",
+        plan::MAX_UNKNOWNS
+    )]
+    ComparedUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
     /// Too many steps.
     #[error("{found} {what}; expected at most {most} (take longer steps)")]
     TooManySteps {

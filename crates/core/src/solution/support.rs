@@ -1,6 +1,7 @@
 //! Which observable rows a short solution uses.
 
-use obsdeg_exact::{Echelon, Field, echelon::express};
+use obsdeg_exact::echelon::{express, nonzero_columns};
+use obsdeg_exact::{Echelon, Field};
 
 /// How many orders of the rows are tried.
 const ORDERS: usize = 12;
@@ -17,8 +18,9 @@ pub fn short_support(
 ) -> Option<Vec<usize>> {
     let mut best: Option<(usize, usize, Vec<usize>)> = None;
     // rows that share a column with the target come first, and none is taken once it is in the span
+    let wanted: Vec<usize> = (0..target.len()).filter(|&c| target[c] != 0).collect();
     let (near, far): (Vec<usize>, Vec<usize>) =
-        allowed.iter().partition(|&&j| rows[j].iter().zip(target).any(|(&x, &t)| x != 0 && t != 0));
+        allowed.iter().partition(|&&j| wanted.iter().any(|&c| rows[j][c] != 0));
     let rotated = |list: &[usize], k: usize| -> Vec<usize> {
         let shift = k * list.len().div_ceil(ORDERS / 2);
         let (head, tail) = list.split_at(shift.min(list.len()));
@@ -28,16 +30,7 @@ pub fn short_support(
         let (near, far) = (rotated(&near, k), rotated(&far, k));
         let backward: Vec<usize> = near.iter().rev().chain(far.iter().rev()).copied().collect();
         for order in [[near, far].concat(), backward] {
-            let mut basis = Echelon::new(field, target.len());
-            let mut independent: Vec<usize> = Vec::new();
-            for j in order {
-                if basis.insert(&rows[j]) {
-                    independent.push(j);
-                    if basis.contains(target) {
-                        break;
-                    }
-                }
-            }
+            let independent = spanning(field, rows, &order, target);
             let refs: Vec<&[u64]> = independent.iter().map(|&j| rows[j].as_slice()).collect();
             let y = express(field, &refs, target)?;
             let mut used: Vec<usize> =
@@ -50,6 +43,31 @@ pub fn short_support(
         }
     }
     best.map(|(_, _, used)| used)
+}
+
+/// The first independent rows of an order up to that with which `target` is in their span. Most targets are in the span of a few rows
+/// out of many columns, so the columns grow with the rows that are looked at.
+fn spanning(field: Field, rows: &[Vec<u64>], order: &[usize], target: &[u64]) -> Vec<usize> {
+    let mut looked_at = 16.min(order.len());
+    loop {
+        let seen = order[..looked_at].iter().map(|&j| rows[j].as_slice());
+        let columns = nonzero_columns(target.len(), seen.chain([target]));
+        let short = |row: &[u64]| -> Vec<u64> { columns.iter().map(|&c| row[c]).collect() };
+        let (mut basis, target) = (Echelon::new(field, columns.len()), short(target));
+        let mut independent: Vec<usize> = Vec::new();
+        for &j in &order[..looked_at] {
+            if basis.insert(&short(&rows[j])) {
+                independent.push(j);
+                if basis.contains(&target) {
+                    return independent;
+                }
+            }
+        }
+        if looked_at == order.len() {
+            return independent;
+        }
+        looked_at = (4 * looked_at).min(order.len());
+    }
 }
 
 #[cfg(test)]
