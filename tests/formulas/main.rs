@@ -57,6 +57,8 @@ struct Draw {
     latitude: Option<&'static str>,
     azimuth: bool,
     terms: &'static str,
+    /// Combinations asked for.
+    asked: &'static [&'static str],
     values: Vec<f64>,
 }
 
@@ -91,7 +93,7 @@ fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Va
             // the drift alone is that of one position at rest
             let single = angles.len() == 1 && turns[0].is_none();
             let terms = if single && values[0] < 0.5 { "drift" } else { terms };
-            Draw { angles, turns, carry, latitude, azimuth, terms, values }
+            Draw { angles, turns, carry, latitude, azimuth, terms, asked: &[], values }
         })
 }
 
@@ -122,16 +124,24 @@ impl Draw {
             latitude: self.latitude.map(|l| l.parse().expect("a latitude")),
             measured_azimuth: self.azimuth,
             unknowns: self.terms.parse().expect("terms"),
+            combinations: self.asked.iter().map(ToString::to_string).collect(),
             ..scheme
         }
     }
 
     /// Values for all that is unknown, of both signs, none near zero.
     fn case(&self) -> Case {
+        self.case_at(&HashMap::from([
+            ("alpha".into(), 0.4 + self.values[62]),
+            ("a1".into(), -0.3 - self.values[63]),
+        ]))
+    }
+
+    /// The same with these values for generic angles, in rad.
+    fn case_at(&self, names: &HashMap<String, f64>) -> Case {
         let mut values =
             self.values.iter().enumerate().map(|(i, x)| if i % 3 == 0 { -x } else { *x }).cycle();
         let mut next = || values.next().expect("endless");
-        let names: HashMap<&str, f64> = [("alpha", next()), ("a1", next())].into();
         let number = |text: &str| -> f64 {
             // a name with a sign, and decimal degrees before or behind it
             let mut total = 0.0;
@@ -177,14 +187,7 @@ impl Draw {
                 drift.insert(format!("D_{term}{gyro}"), next());
             }
         }
-        Case {
-            positions,
-            carry: self.carry,
-            rates,
-            psi,
-            drift,
-            names: names.iter().map(|(n, x)| ((*n).into(), *x)).collect(),
-        }
+        Case { positions, carry: self.carry, rates, psi, drift, names: names.clone() }
     }
 }
 
@@ -422,12 +425,197 @@ fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &
     }
 }
 
+/// A scheme of the given attitudes.
+fn fixed(angles: &[&str], asked: &'static [&'static str]) -> Draw {
+    let of = |a: &&str| -> [String; 3] {
+        let parts: Vec<String> = a.split(',').map(String::from).collect();
+        parts.try_into().expect("three angles")
+    };
+    Draw {
+        angles: angles.iter().map(of).collect(),
+        turns: vec![None; angles.len()],
+        carry: Carry::Platform,
+        latitude: None,
+        azimuth: false,
+        terms: "F,I,O,S",
+        asked,
+        values: (0..64).map(|i| 0.2 + f64::from(i * 37 % 64) / 80.0).collect(),
+    }
+}
+
+/// Combinations that are asked for may have roots, decimals, sines and cosines in them, with and without the engine.
+fn asked(mut worker: Option<&mut Worker>) {
+    for (angles, asked) in [
+        (
+            &["0,0,0", "180,0,0"] as &[&str],
+            &[
+                "sqrt(2)*D_FX + D_SX/3",
+                "0.123456789*D_FX - sqrt(12)*wU^2/wN*psi_x",
+                "(D_IY-D_FY)*wN*(1+sqrt(6))^2",
+            ] as &'static [&'static str],
+        ),
+        (
+            &["20,0,0", "180,0,0"],
+            &["D_FX + sin(20 deg)/(1+cos(20 deg))*D_OX", "cos(110 deg)*(D_FX+D_SX) - 2.5*psi_x*wU"],
+        ),
+        (
+            &["alpha,0,0", "alpha,0,180"],
+            &["cos(alpha)*D_FX + sin(alpha)*cos(alpha)*D_OX", "D_SX/sin(alpha)^2"],
+        ),
+    ] {
+        let draw = fixed(angles, asked);
+        let mut seen = Seen::default();
+        for frame in [Frame::N, Frame::Platform] {
+            let generic = angles[0].contains("alpha");
+            if generic && worker.is_none() {
+                continue;
+            }
+            check(&draw, frame, worker.as_deref_mut(), &mut seen);
+            let a = analyze(&draw.scheme(), Options { frame, ..Options::default() }, None).expect("analysed");
+            let verdicts: Vec<_> = a.combinations.iter().filter(|c| c.requested).map(|c| c.degree).collect();
+            assert!(verdicts.len() == asked.len() && verdicts.iter().all(Option::is_some), "{verdicts:?}");
+        }
+    }
+}
+
+/// What a coefficient cannot be is refused with what it can be.
+#[test]
+fn coefficients_that_are_not_known_are_refused() {
+    for (text, expected) in [
+        ("sqrt(5)*D_FX", "expected the root of 2, 3 or 6, or of one of these times a square"),
+        ("exp(1)*D_FX", "expected sin or cos of an angle, or a square root"),
+        ("sin(33 deg)*D_FX", "expected an angle that the scheme has, found `33 deg`"),
+        ("sin(alpha)*D_FX", "`alpha` is not known here"),
+        ("(wN+wU)*D_FX", "expected coefficients that are numbers times powers of wN and wU"),
+        ("D_FX*D_FY", "expected a linear combination of unknowns"),
+    ] {
+        let scheme = Scheme { combinations: vec![text.into()], ..fixed(&["0,0,0", "20,0,0"], &[]).scheme() };
+        let e = analyze(&scheme, Options::default(), None).expect_err("refused").to_string();
+        assert!(e.contains(expected), "{text}: {e}");
+    }
+}
+
+/// Every reported combination can be read: whatever the angles, none of its coefficients is a decimal.
+#[test]
+fn combinations_can_be_read() {
+    for kind in [Angles::Decimals, Angles::Constants, Angles::Roots] {
+        for draw in cases(kind, 3, 12, &[]) {
+            let a = analyze(&draw.scheme(), Options { solutions: false, ..Options::default() }, None)
+                .expect("analysed");
+            for c in &a.combinations {
+                assert!(
+                    !c.expression.contains('.') && !c.expression.contains("combination"),
+                    "{} of {draw:?}",
+                    c.expression
+                );
+            }
+            // they and the unknowns of each degree span what is observable
+            for (k, rank) in a.rank_profile.iter().enumerate() {
+                let within = |degree: Option<usize>| degree.is_some_and(|d| d <= k);
+                let unknowns = a.quantities.iter().filter(|q| within(q.degree)).count();
+                let combinations = a.combinations.iter().filter(|c| !c.requested && within(c.degree)).count();
+                assert!(unknowns + combinations >= *rank, "{k} {draw:?}");
+            }
+        }
+    }
+}
+
+/// The rank of the derivatives of Z up to an order as functionals of the unknowns, by elimination with full pivoting.
+fn numeric_rank(case: &Case, order: usize) -> usize {
+    let mut silent = case.clone();
+    silent.psi.fill([0.0; 3]);
+    silent.drift.values_mut().for_each(|d| *d = 0.0);
+    let psi = ["psi_x", "psi_y", "psi_z"].map(String::from);
+    let unknowns: Vec<String> = psi.into_iter().chain(case.drift.keys().cloned()).collect();
+    let column = |name: &String| -> Vec<f64> {
+        let mut moved = silent.clone();
+        assert!(moved.change(name, 1.0));
+        let stations = (0..case.positions.len()).map(|i| moved.station(i, 0.0));
+        stations.flat_map(|s| s.z_n[..=order].concat()).collect()
+    };
+    let mut columns: Vec<Vec<f64>> = unknowns.iter().map(column).collect();
+    let mut rank = 0;
+    loop {
+        let entries = columns
+            .iter()
+            .enumerate()
+            .flat_map(|(c, v)| v.iter().enumerate().map(move |(r, x)| (x.abs(), c, r)));
+        let Some((largest, c, r)) = entries.max_by(|a, b| a.0.total_cmp(&b.0)) else { return rank };
+        if largest < 1e-8 {
+            return rank;
+        }
+        rank += 1;
+        let pivot = columns.swap_remove(c);
+        for other in &mut columns {
+            let factor = other[r] / pivot[r];
+            other.iter_mut().zip(&pivot).for_each(|(x, p)| *x -= factor * p);
+        }
+    }
+}
+
+/// Degenerate angles: at each of the points that are given ranks are what is said, and not beside it.
+#[cfg(feature = "symbolica")]
+fn degenerate_angles(worker: &mut Worker) {
+    let mut several = 0;
+    for angles in [
+        &["alpha,0,0", "alpha,0,180"] as &[&str],
+        &["alpha,alpha,0", "0,alpha,alpha", "alpha,0,alpha"],
+        &["alpha,0,0", "a1,0,0", "0,0,alpha"],
+        &["alpha,0,a1", "0,alpha,0", "a1,0,0"],
+    ] {
+        let draw = fixed(angles, &[]);
+        let options = Options { solutions: false, formulas: true, ..Options::default() };
+        let a = analyze(&draw.scheme(), options, Some(&mut *worker)).expect("analysed");
+        let loci = a.degenerate_loci.expect("loci");
+        assert!(loci.len() > 1, "{:?}", a.notes);
+        for l in &loci {
+            assert!(l.condition.len() < 250 && !l.points_deg.is_empty(), "{l:?}");
+            several += usize::from(!l.complete);
+            for point in &l.points_deg {
+                let profile_at = |offset: f64| -> Vec<usize> {
+                    let names = point.iter().map(|(n, deg)| (n.clone(), deg.to_radians() + offset));
+                    let mut values: HashMap<String, f64> =
+                        [("alpha".to_string(), 0.77), ("a1".into(), -1.31)].into();
+                    values.extend(names);
+                    let case = draw.case_at(&values);
+                    (0..a.rank_profile.len()).map(|k| numeric_rank(&case, k)).collect()
+                };
+                let mut expected = l.rank_profile.clone();
+                expected.resize(a.rank_profile.len(), *expected.last().expect("a rank"));
+                assert_eq!(profile_at(0.0), expected, "{l:?}");
+                if l.complete {
+                    assert_eq!(profile_at(0.02), a.rank_profile, "{l:?}");
+                }
+            }
+            if l.complete {
+                let (name, values) = l.condition.split_once(" = ").expect("a list");
+                let printed: Vec<f64> = values
+                    .trim_end_matches(" deg")
+                    .split(", ")
+                    .map(|x| x.parse().expect("degrees"))
+                    .collect();
+                assert_eq!(printed.len(), l.points_deg.len());
+                for (x, point) in printed.iter().zip(&l.points_deg) {
+                    assert!((x - point[name]).abs() < 1e-3);
+                }
+            }
+        }
+    }
+    assert!(several > 2);
+}
+
 /// Draws `n` cases, the same ones every time.
 fn cases(kind: Angles, most: usize, n: usize, turning: &'static [i32]) -> Vec<Draw> {
     let config =
         Config { rng_seed: RngSeed::Fixed(12), rng_algorithm: RngAlgorithm::ChaCha, ..Config::default() };
     let mut runner = TestRunner::new(config);
     (0..n).map(|_| draws(kind, most, turning).new_tree(&mut runner).expect("drawn").current()).collect()
+}
+
+/// Combinations that are asked for, without the engine.
+#[test]
+fn combinations_asked_for() {
+    asked(None);
 }
 
 /// Without the engine: numbers recovered from the fields, and decimals.
@@ -469,17 +657,22 @@ fn formulas_of_the_engine_give_the_truth() {
     let mut seen = Seen::default();
     for (kind, most, n, turning) in [
         (Angles::Cardinal, 3, 4, &[] as &[i32]),
-        (Angles::Roots, 3, 6, &[]),
-        (Angles::Constants, 2, 12, &[]),
-        (Angles::Names, 2, 12, &[]),
-        (Angles::TwoNames, 1, 4, &[]),
+        (Angles::Roots, 3, 4, &[]),
+        (Angles::Constants, 2, 8, &[]),
+        (Angles::Names, 2, 10, &[]),
+        (Angles::TwoNames, 1, 2, &[]),
         (Angles::Cardinal, 2, 6, &[360, -360]),
-        (Angles::Names, 1, 2, &[360]),
     ] {
         for (i, draw) in cases(kind, most, n, turning).iter().enumerate() {
             check(draw, [Frame::N, Frame::Platform][i % 2], Some(&mut worker), &mut seen);
         }
     }
+    let turning = Draw { turns: vec![Some(("X_p", 360))], ..fixed(&["alpha,0,0"], &[]) };
+    for frame in [Frame::N, Frame::Platform] {
+        check(&turning, frame, Some(&mut worker), &mut seen);
+    }
+    asked(Some(&mut worker));
+    degenerate_angles(&mut worker);
     assert!(
         seen.exact > 100
             && seen.symbolic > 50

@@ -3,9 +3,9 @@
 use crate::accuracy::{Accuracy, AccuracyError};
 use crate::analysis::requested::requested_combinations;
 use crate::analysis::{AnalysisError, Status, few_enough, verdict};
-use crate::degree::coefficient::{Coefficient, Number};
+use crate::degree::coefficient::Coefficient;
 use crate::degree::ensemble::judge;
-use crate::degree::verdict::{combinations, expression, null_space, partners};
+use crate::degree::verdict::{combinations, null_space, partners};
 use crate::model::Platform;
 use crate::solution::solver::{Frame, Solver, Sparse};
 
@@ -117,8 +117,10 @@ impl Prediction {
                 }
             })
             .collect();
+        let combined = combinations(platform, &verdicts, &mut solver);
         let numbers = |terms: &Sparse| -> Option<Combination> {
-            terms.iter().map(|(c, k)| Some((*c, number(k, rates)?))).collect()
+            let rate = |k: &Coefficient| rates[0].powi(k.rates[0]) * rates[1].powi(k.rates[1]);
+            terms.iter().map(|(c, k)| Some((*c, solver.number(k)? * rate(k)))).collect()
         };
         let of_functional =
             |row: &[u64], degree| accuracy.as_ref().and_then(|a| a.of_functional(row, degree));
@@ -136,14 +138,13 @@ impl Prediction {
                 expression: r.text,
             })
         });
-        let combinations = combinations(platform, &verdicts, &mut solver)
+        let combinations = combined
             .into_iter()
             .filter_map(|c| {
-                let functional = c.functional.as_ref()?;
                 let order_at_end = at_end(&c.vector, Some(c.degree));
                 Some(PredictedCombination {
-                    expression: expression(platform, &c.support, Some(&functional.terms)),
-                    terms: numbers(&functional.terms)?,
+                    terms: numbers(&c.functional.as_ref()?.terms)?,
+                    expression: c.name,
                     status: Status::Observable,
                     degree: Some(c.degree),
                     accuracy_order: of_functional(&c.vector, Some(c.degree)),
@@ -176,14 +177,4 @@ impl Prediction {
     pub fn whole_null_space(&self) -> Option<&[Combination]> {
         (self.null_space.len() + self.rank == self.unknowns.len()).then_some(&self.null_space)
     }
-}
-
-/// The value of a coefficient; `None` for one that is only known as a formula.
-fn number(k: &Coefficient, [w_n, w_u]: [f64; 2]) -> Option<f64> {
-    let factor = match &k.number {
-        Number::Radical(r) => r.to_f64(),
-        Number::Decimal(x) => *x,
-        Number::Text { .. } => return None,
-    };
-    Some(factor * w_n.powi(k.rates[0]) * w_u.powi(k.rates[1]))
 }

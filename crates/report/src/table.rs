@@ -127,7 +127,7 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
         paragraph(&mut out, &silent.join(", "), layout);
     }
     if let Some(loci) = &a.degenerate_loci {
-        heading(&mut out, "Degenerate angles (deg)", layout);
+        heading(&mut out, "Degenerate angles", layout);
         for l in loci {
             paragraph(&mut out, &words::locus(l), layout);
         }

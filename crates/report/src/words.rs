@@ -168,6 +168,13 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
             s.label, s.position
         ));
     }
+    let local = |c: &obsdeg_core::analysis::CombinationReport| !c.requested && c.expression.contains("^n@");
+    if let Some(c) = a.combinations.iter().find(|c| local(c)) {
+        let at = c.expression.rsplit_once('@').map_or("", |(_, at)| at);
+        out.push(format!(
+            "eps_x^n@{at} is the drift along North at {at}, psi^n and y (Up), z (East) likewise; --formulas writes them in the unknowns"
+        ));
+    }
     if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {
         out.push(
             "solutions take psi as it is carried from station to station: what the dwells change in it is not in them".into(),

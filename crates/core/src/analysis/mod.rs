@@ -13,7 +13,7 @@ use crate::accuracy::Accuracy;
 use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::{EnsembleError, Verdicts, degrees, judge};
 use crate::degree::staircase::Degrees;
-use crate::degree::verdict::{Combination, NullVector, combinations, expression, null_space, partners};
+use crate::degree::verdict::{Combination, NullVector, combinations, null_space, partners};
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::Platform;
 use crate::model::ring::Float;
@@ -92,7 +92,7 @@ pub fn analyze(
     printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
     let quantities = quantities(&platform, &verdicts, &null, &mut printer)?;
     let mut combinations: Vec<CombinationReport> =
-        basis.into_iter().map(|c| basis_report(&platform, c, &mut printer)).collect();
+        basis.into_iter().map(|c| basis_report(c, &mut printer)).collect();
     combinations.extend(requested.into_iter().map(|r| requested_report(r, &mut printer)));
     let found = loci(&platform, &verdicts, &mut printer.solver, options.seed);
     let found = printer.noted(found).unwrap_or_default();
@@ -228,15 +228,15 @@ fn quantities(
     Ok(out)
 }
 
-fn basis_report(platform: &Platform, c: Combination, printer: &mut Printer<'_>) -> CombinationReport {
-    let expression = expression(platform, &c.support, c.functional.as_ref().map(|f| &f.terms));
-    let solution = c.functional.and_then(|f| printer.solution(&f, c.degree, &expression));
+fn basis_report(c: Combination, printer: &mut Printer<'_>) -> CombinationReport {
+    let Combination { name: expression, vector, functional, degree } = c;
+    let solution = functional.and_then(|f| printer.solution(&f, degree, &expression));
     CombinationReport {
         expression,
         requested: false,
         status: Status::Observable,
-        degree: Some(c.degree),
-        accuracy_order: printer.accuracy_order(&c.vector, Some(c.degree)),
+        degree: Some(degree),
+        accuracy_order: printer.accuracy_order(&vector, Some(degree)),
         solution,
     }
 }

@@ -1,11 +1,13 @@
 //! From the staircase to named combinations, null vectors and partners.
 
-use obsdeg_exact::Echelon;
+use obsdeg_exact::{Echelon, Radical};
 
-use super::coefficient::{Coefficient, linear_combination, readable};
+use super::coefficient::{Coefficient, Form, Number, READABLE, linear_combination};
 use super::ensemble::Verdicts;
 use super::sparse::{extend_by_short_vectors, support};
 use crate::model::Platform;
+use crate::model::platform::LOCAL_NAMES;
+use crate::solution::print::{StationLabel, stations};
 use crate::solution::problem::Problem;
 use crate::solution::solver::{Functional, Solver, Sparse};
 use crate::solution::support::short_support;
@@ -13,11 +15,11 @@ use crate::solution::support::short_support;
 /// A named observable combination.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Combination {
+    /// What it is, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`.
+    pub name: String,
     /// Its coefficients in the first field of the verdicts (up to a factor).
     pub vector: Vec<u64>,
-    /// The columns that occur.
-    pub support: Vec<usize>,
-    /// Its coefficients (one for the leading unknown), if they could be computed.
+    /// Its coefficients, that of the leading unknown first, if they could be computed.
     pub functional: Option<Functional>,
     /// The smallest k with the combination in `V_k`.
     pub degree: usize,
@@ -34,19 +36,27 @@ pub struct NullVector {
     pub components: Option<Sparse>,
 }
 
-/// `D_FZ - wN*psi_y`; the unknowns alone when the coefficients are missing.
-pub fn expression(platform: &Platform, support: &[usize], terms: Option<&Sparse>) -> String {
+/// `D_FZ - wN*psi_y`, if nothing in it is longer than [`READABLE`] or a decimal.
+fn readable_sum(platform: &Platform, terms: &Sparse) -> Option<String> {
+    let readable =
+        |c: &Coefficient| c.form() != Form::Decimal && c.without_rates().to_string().len() <= READABLE;
     let names = platform.names();
-    match terms {
-        Some(f) => {
-            let printed = readable(f.iter().map(|(_, k)| k.clone()).collect());
-            linear_combination(f.iter().zip(&printed).map(|((c, _), k)| (k, names[*c].as_str())))
-        }
-        None => {
-            let list: Vec<&str> = support.iter().map(|&c| names[c].as_str()).collect();
-            format!("a combination of {}", list.join(", "))
-        }
-    }
+    terms
+        .iter()
+        .all(|(_, c)| readable(c))
+        .then(|| linear_combination(terms.iter().map(|(c, k)| (k, names[*c].as_str()))))
+}
+
+/// A row of the tables by the names of a position: `eps_z^n@p2 - wN*psi_y^n@p2`.
+fn local_name(solver: &Solver<'_>, labels: &[StationLabel], row: usize) -> String {
+    let tables = &solver.tables;
+    let at = &labels[tables.station(row)].label;
+    let terms = tables.observables[row % tables.observables.len()].row.iter().map(|&(i, sign, rates)| {
+        let number = Number::Radical(Radical::rational(sign, 1));
+        (Coefficient { number, rates }, format!("{}@{at}", LOCAL_NAMES[i]))
+    });
+    let terms: Vec<(Coefficient, String)> = terms.collect();
+    linear_combination(terms.iter().map(|(c, name)| (c, name.as_str())))
 }
 
 /// The leading column of a support: the first constant (a coefficient, not psi), else the first.
@@ -55,23 +65,28 @@ fn lead(platform: &Platform, support: &[usize]) -> usize {
     support.iter().find(constant).copied().unwrap_or(support[0])
 }
 
-/// The sparse basis of the staircase beyond single unknowns: for every degree k, combinations that
-/// together with the unknowns of degree up to k and the combinations before span `V_k`.
+/// A basis of the staircase beyond single unknowns: for every degree k, combinations that together with the unknowns of degree up
+/// to k and the combinations before span `V_k`. Sparse combinations of unknowns with coefficients that a person can read come first;
+/// what these leave is spanned by `psi^n` and `eps^n` at single positions.
 pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<'_>) -> Vec<Combination> {
     let field = verdicts.values[0].roots().field;
     let n = platform.names().len();
     let mut chosen: Vec<(Vec<u64>, usize)> = Vec::new();
-    for (k, basis) in verdicts.stairs.iter().enumerate() {
-        let single = |c: usize| verdicts.degrees.degree[c].is_some_and(|d| d <= k);
+    let singles = |k: usize| -> Echelon {
         let mut span = Echelon::new(field, n);
-        for c in (0..n).filter(|&c| single(c)) {
+        for c in (0..n).filter(|&c| verdicts.degrees.degree[c].is_some_and(|d| d <= k)) {
             let unit: Vec<u64> = (0..n).map(|j| if j == c { field.one() } else { 0 }).collect();
             span.insert(&unit);
         }
+        span
+    };
+    for (k, basis) in verdicts.stairs.iter().enumerate() {
+        let mut span = singles(k);
         for (v, _) in &chosen {
             span.insert(v);
         }
         // basis rows whose pivot is no single unknown vanish at all single unknowns
+        let single = |c: usize| verdicts.degrees.degree[c].is_some_and(|d| d <= k);
         let rows: Vec<Vec<u64>> = basis
             .pivots()
             .enumerate()
@@ -82,16 +97,35 @@ pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solve
             chosen.extend(extend_by_short_vectors(&rows, &mut span).into_iter().map(|v| (v, k)));
         }
     }
-    chosen
-        .into_iter()
-        .map(|(v, degree)| {
-            let mut support = support(&v);
-            let lead = lead(platform, &support);
-            support.sort_by_key(|c| *c != lead);
-            let functional = combination_coefficients(platform, solver, &support, &v, degree);
-            Combination { vector: v, support, functional, degree }
-        })
-        .collect()
+    let sum = |(vector, degree): (Vec<u64>, usize)| {
+        let mut support = support(&vector);
+        let lead = lead(platform, &support);
+        support.sort_by_key(|c| *c != lead);
+        let functional = combination_coefficients(platform, solver, &support, &vector, degree)?;
+        let name = readable_sum(platform, &functional.terms)?;
+        Some(Combination { name, vector, functional: Some(functional), degree })
+    };
+    let mut out: Vec<Combination> = chosen.into_iter().filter_map(sum).collect();
+    let labels = stations(platform.scheme());
+    for (k, basis) in verdicts.stairs.iter().enumerate() {
+        let mut span = singles(k);
+        for c in out.iter().filter(|c| c.degree <= k) {
+            span.insert(&c.vector);
+        }
+        for row in solver.tables.rows_up_to(k) {
+            if span.rank() == basis.rank() {
+                break;
+            }
+            let vector = solver.tables.first().rows[row].clone();
+            if span.insert(&vector) {
+                let functional = solver.functional_of_row(row);
+                let name = local_name(solver, &labels, row);
+                out.push(Combination { name, vector, functional, degree: k });
+            }
+        }
+    }
+    out.sort_by_key(|c| c.degree);
+    out
 }
 
 /// The coefficients of a combination found as `vector`, scaled to one at the first of `support`.

@@ -140,8 +140,12 @@ pub enum Names {
 pub trait Environment {
     /// The value of a name.
     fn name(&self, name: &str) -> Option<u64>;
-    /// The cosine and sine of a named angle.
+    /// The cosine and sine of a named angle, or of one such as `20 deg`.
     fn cos_sin(&self, angle: &str) -> Option<(u64, u64)>;
+    /// The square root of an integer.
+    fn sqrt(&self, _: i32) -> Option<u64> {
+        None
+    }
     /// All known names, for hints.
     fn known(&self) -> Vec<String>;
 }
@@ -175,7 +179,8 @@ impl Expression {
     }
 }
 
-/// The value of `expression` in a field; functions are the sine and cosine of named angles, exponents integers.
+/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots of integers, exponents
+/// integers.
 ///
 /// # Errors
 /// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for other functions and
@@ -213,14 +218,29 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
             Node::Name(_) if arguments[i] => 0,
             Node::Name(name) => env.name(name).ok_or_else(|| unknown(name))?,
             Node::Call { function, argument } => {
-                let Some(angle) = expression.name_at(*argument) else {
-                    return Err(syntax(*argument, "the name of an angle"));
+                let angle = || {
+                    let Some(angle) = expression.name_at(*argument) else {
+                        return Err(syntax(*argument, "the name of an angle, or one such as `20 deg`"));
+                    };
+                    env.cos_sin(angle).ok_or_else(|| match angle.ends_with(" deg") {
+                        true => ExpressionError::Syntax {
+                            expected: "an angle that the scheme has",
+                            found: format!("`{angle}`"),
+                            span: expression.spans[*argument].clone(),
+                        },
+                        false => unknown(angle),
+                    })
                 };
-                let (c, s) = env.cos_sin(angle).ok_or_else(|| unknown(angle))?;
                 match function {
-                    Function::Cos => c,
-                    Function::Sin => s,
-                    _ => return Err(syntax(i, "sin or cos of an angle")),
+                    Function::Cos => angle()?.0,
+                    Function::Sin => angle()?.1,
+                    Function::Sqrt => {
+                        let root = expression.integer_at(*argument).and_then(|n| env.sqrt(n));
+                        root.ok_or_else(|| {
+                            syntax(i, "the root of 2, 3 or 6, or of one of these times a square")
+                        })?
+                    }
+                    _ => return Err(syntax(i, "sin or cos of an angle, or a square root")),
                 }
             }
             Node::Negate(a) => f.neg(values[*a]),
@@ -380,8 +400,18 @@ mod tests {
         assert_eq!(wrong("D_FZ"), "`D_FZ` is not known here; did you mean `D_FX`?");
         assert_eq!(wrong("1/(x-3)"), "division by zero");
         assert_eq!(wrong("nothing_like_it"), "`nothing_like_it` is not known here");
-        assert_eq!(wrong("sin(2)"), "expected the name of an angle, found something else");
-        assert_eq!(wrong("tan(alpha)"), "expected sin or cos of an angle, found something else");
+        let angle = "expected the name of an angle, or one such as `20 deg`, found something else";
+        assert_eq!(wrong("sin(2)"), angle);
+        assert_eq!(wrong("sin(2.5 deg)"), "expected an angle that the scheme has, found `2.5 deg`");
+        assert_eq!(wrong("2 deg"), "`2 deg` is not known here");
+        assert_eq!(
+            wrong("tan(alpha)"),
+            "expected sin or cos of an angle, or a square root, found something else"
+        );
+        assert_eq!(
+            wrong("sqrt(5)"),
+            "expected the root of 2, 3 or 6, or of one of these times a square, found something else"
+        );
         assert_eq!(wrong("x^x"), "expected an integer exponent, found something else");
     }
 

@@ -108,7 +108,21 @@ fn operand(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
     skip_blanks(input);
     let start = input.current_token_start();
     match peek(input) {
-        Some(c) if c.is_ascii_digit() || c == '.' => number(input),
+        Some(c) if c.is_ascii_digit() || c == '.' => {
+            let literal: &str = input.input.as_ref();
+            let value = number(input)?;
+            let rest: &str = input.input.as_ref();
+            let behind = rest.strip_prefix(" deg").filter(|_| names == Names::Platform);
+            if behind.is_none_or(|b| b.starts_with(|c: char| c.is_alphanumeric() || c == '_')) {
+                return Ok(value);
+            }
+            // `20 deg` names an angle
+            let name = literal[..literal.len() - rest.len() + " deg".len()].to_string();
+            input.next_slice(" deg".len());
+            input.state.nodes.pop();
+            input.state.spans.pop();
+            Ok(push(input, Node::Name(name), start))
+        }
         Some(c) if c.is_alphabetic() || c == '_' => {
             let rest: &str = input.input.as_ref();
             let more = |c: char| c.is_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);

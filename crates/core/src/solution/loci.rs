@@ -1,13 +1,18 @@
 //! Degenerate loci: conditions on generic angles under which a verdict changes.
 
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
 use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 use obsdeg_symbolic::{Job, Request};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::half_tangent::{coefficients, roots_deg};
 use super::local::rows_at;
 use super::solver::Solver;
 use crate::analysis::{Difference, verdict};
+use crate::degree::coefficient::decimal;
 use crate::degree::ensemble::{Verdicts, staircase};
 use crate::degree::staircase::Degrees;
 use crate::model::Platform;
@@ -19,8 +24,13 @@ use crate::model::scheme::Station;
 /// A condition and what it does.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Locus {
-    /// The condition, one irreducible factor, such as `alpha = 0` or a polynomial in half tangents.
+    /// Where: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that vanishes; one that is too long to
+    /// be read is described.
     pub condition: String,
+    /// Points of it, in degrees by angle: all of them when `complete`, examples otherwise.
+    pub points_deg: Vec<BTreeMap<String, f64>>,
+    /// Whether the condition is on a single angle, and all its values are given.
+    pub complete: bool,
     /// The rank profile at a general point of the locus.
     pub rank_profile: Vec<usize>,
     /// The unknowns whose verdict changes there.
@@ -44,6 +54,12 @@ enum Condition {
     /// A polynomial in half tangents vanishes.
     Factor(String),
 }
+
+/// Longest condition that is printed as it is.
+const LONGEST: usize = 120;
+/// Values of the other angles at which examples are sought, in degrees.
+const EXAMPLES_DEG: [[f64; 3]; 4] =
+    [[70.0, 40.0, 25.0], [10.0, 110.0, 200.0], [150.0, 250.0, 75.0], [300.0, 5.0, 160.0]];
 
 /// Random points tried per factor: a polynomial has a root in a random field with probability near
 /// 1 - 1/e.
@@ -92,8 +108,9 @@ pub fn loci(
         }
     }
     let mut rng = platform.scheme().random(seed, "degenerate angles");
-    let mut out: Vec<Locus> = Vec::new();
+    let mut found: Vec<(Place, Locus)> = Vec::new();
     for condition in conditions {
+        let Some(place) = Place::of(&condition, &names)? else { continue };
         let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else { continue };
         let changes: Vec<Difference> = platform
             .names()
@@ -109,9 +126,37 @@ pub fn loci(
         if changes.is_empty() && there.rank_profile == verdicts.degrees.rank_profile {
             continue;
         }
-        out.push(Locus { condition: describe(&condition), rank_profile: there.rank_profile, changes });
+        let rank_profile = there.rank_profile;
+        // values of one angle that do the same are one condition
+        let same = |l: &&mut (Place, Locus)| {
+            let same_angle = l.0.angle.is_some() && l.0.angle == place.angle;
+            same_angle && l.1.rank_profile == rank_profile && l.1.changes == changes
+        };
+        match found.iter_mut().find(same) {
+            Some((other, _)) => other.points_deg.extend(place.points_deg),
+            None => {
+                let blank = Locus {
+                    condition: String::new(),
+                    points_deg: vec![],
+                    complete: false,
+                    rank_profile,
+                    changes,
+                };
+                found.push((place, blank));
+            }
+        }
     }
-    Ok(Found { loci: Some(out), incomplete })
+    let finished = |(mut place, locus): (Place, Locus)| {
+        let angle = place.angle.clone();
+        place.points_deg.sort_by(|a, b| angle.as_ref().map_or(Ordering::Equal, |n| a[n].total_cmp(&b[n])));
+        Locus {
+            condition: place.condition(),
+            complete: angle.is_some(),
+            points_deg: place.points_deg,
+            ..locus
+        }
+    };
+    Ok(Found { loci: Some(found.into_iter().map(finished).collect()), incomplete })
 }
 
 /// One request per candidate matrix, over `t_name = tan(name/2)`.
@@ -178,8 +223,7 @@ fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
     }
 }
 
-/// The degrees at a random point of the condition, agreed on by two fields; `None` when it has no
-/// real points.
+/// The degrees at a random point of the condition, agreed on by two fields; `None` when none was found.
 fn degrees_on(
     platform: &Platform,
     condition: &Condition,
@@ -190,9 +234,6 @@ fn degrees_on(
         Condition::HalfTurn(_) => None,
         Condition::Factor(text) => Some(parse(text).map_err(|e| format!("factor `{text}`: {e}"))?),
     };
-    if parsed.as_ref().is_some_and(|e| !has_real_zero(e, names)) {
-        return Ok(None);
-    }
     let mut found: Vec<Degrees> = Vec::new();
     for _ in 0..TRIES {
         let mut values = RandomValues::draw(platform.scheme(), rng).map_err(|e| e.to_string())?;
@@ -268,21 +309,141 @@ fn degree_in(e: &Expression, name: &str) -> usize {
     degrees.last().copied().unwrap_or(0)
 }
 
+/// Where a condition lies.
+#[derive(Debug, Clone, PartialEq)]
+struct Place {
+    /// The one angle that it is on.
+    angle: Option<String>,
+    /// All values of this angle, or examples.
+    points_deg: Vec<BTreeMap<String, f64>>,
+    /// The condition in words, unless its values say it.
+    words: Option<String>,
+}
+
+impl Place {
+    /// `None` when it has no real point.
+    fn of(condition: &Condition, names: &[String]) -> Result<Option<Self>, String> {
+        let text = match condition {
+            Condition::HalfTurn(name) => {
+                let points_deg = vec![BTreeMap::from([(name.clone(), 180.0)])];
+                return Ok(Some(Self { angle: Some(name.clone()), points_deg, words: None }));
+            }
+            Condition::Factor(text) => text,
+        };
+        let e = parse(text).map_err(|e| format!("factor `{text}`: {e}"))?;
+        let in_it: Vec<&String> = names.iter().filter(|n| degree_in(&e, &format!("t_{n}")) > 0).collect();
+        let roots = |name: &str, others: &dyn Fn(&str) -> f64| -> Vec<f64> {
+            coefficients(&e, &format!("t_{name}"), others).and_then(|c| roots_deg(&c)).unwrap_or_default()
+        };
+        if let [name] = in_it[..] {
+            let points = roots(name, &|_| f64::NAN).into_iter().map(|x| BTreeMap::from([(name.clone(), x)]));
+            let points_deg: Vec<_> = points.collect();
+            let found = !points_deg.is_empty();
+            return Ok(found.then(|| Self { angle: Some(name.clone()), points_deg, words: None }));
+        }
+        // examples: the others at some values, solved for each angle in turn
+        for degrees in EXAMPLES_DEG {
+            for main in &in_it {
+                let value = |n: &str| {
+                    let place = in_it.iter().position(|m| m.as_str() == n).unwrap_or(0);
+                    degrees[place % degrees.len()]
+                };
+                let at = |t: &str| (value(t.strip_prefix("t_").unwrap_or(t)).to_radians() / 2.0).tan();
+                let points = roots(main, &at).into_iter().map(|x| {
+                    let of = |n: &&String| ((*n).clone(), if n == main { x } else { value(n) });
+                    in_it.iter().map(of).collect()
+                });
+                let points_deg: Vec<BTreeMap<String, f64>> = points.collect();
+                if !points_deg.is_empty() {
+                    return Ok(Some(Self {
+                        angle: None,
+                        points_deg,
+                        words: Some(in_words(&e, text, &in_it)),
+                    }));
+                }
+            }
+        }
+        // it may still have points that are isolated, such as a sum of squares
+        let words = has_real_zero(&e, names).then(|| in_words(&e, text, &in_it));
+        Ok(words.map(|words| Self { angle: None, points_deg: vec![], words: Some(words) }))
+    }
+
+    /// `alpha = 0, 180 deg`, or the words with an example.
+    fn condition(&self) -> String {
+        let list = |name: &str| {
+            let values: Vec<String> = self.points_deg.iter().map(|p| decimal(p[name])).collect();
+            format!("{name} = {} deg", values.join(", "))
+        };
+        if let Some(name) = &self.angle {
+            return list(name);
+        }
+        let words = self.words.clone().unwrap_or_default();
+        let Some(point) =
+            self.points_deg.first().filter(|_| words.contains("tan") || words.contains("polynomial"))
+        else {
+            return words;
+        };
+        let values: Vec<String> = point.iter().map(|(n, x)| format!("{n} = {}", decimal(*x))).collect();
+        format!("{words}, for instance at {} deg", values.join(", "))
+    }
+}
+
+/// A polynomial in half tangents that vanishes: a relation of two angles where it is one.
+fn in_words(e: &Expression, text: &str, in_it: &[&String]) -> String {
+    let name = |text: &str| -> Option<String> {
+        let name = text.strip_prefix("t_")?;
+        name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_').then(|| name.to_string())
+    };
+    let pair = |text: &str, operator: char| {
+        let (a, b) = text.split_once(operator)?;
+        Some((name(a)?, name(b)?))
+    };
+    if let Some((a, b)) = pair(text, '-') {
+        return format!("{a} = {b}");
+    }
+    if let Some((a, b)) = pair(text, '+') {
+        return format!("{a} = -{b}");
+    }
+    for (start, sign) in [("-1+", '+'), ("1+", '-')] {
+        if let Some((a, b)) = text.strip_prefix(start).and_then(|t| pair(t, '*')) {
+            return format!("{a} {sign} {b} = 180 deg");
+        }
+    }
+    let mut shown = String::new();
+    let mut rest = text;
+    while let Some(start) = rest.find("t_") {
+        let name_end = rest[start + 2..]
+            .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+            .map_or(rest.len(), |e| start + 2 + e);
+        shown.push_str(&rest[..start]);
+        shown.push_str(&format!("tan({}/2)", &rest[start + 2..name_end]));
+        rest = &rest[name_end..];
+    }
+    shown.push_str(rest);
+    if shown.len() > LONGEST {
+        let degrees: Vec<String> =
+            in_it.iter().map(|n| format!("{} in tan({n}/2)", degree_in(e, &format!("t_{n}")))).collect();
+        let terms = 1 + text.char_indices().filter(|(i, c)| *i > 0 && matches!(c, '+' | '-')).count();
+        return format!("a polynomial of {terms} terms vanishes, of degree {}", degrees.join(", "));
+    }
+    format!("{shown} = 0")
+}
+
 /// Whether the polynomial takes both signs, or zero, on a grid of half tangents.
 fn has_real_zero(e: &Expression, names: &[String]) -> bool {
-    let steps: usize = if names.len() == 1 { 2001 } else { 61 };
+    const STEPS: usize = 61;
     let tangent = |i: usize| {
-        let half = std::f64::consts::FRAC_PI_2 * (2.0 * (i as f64 + 0.5) / steps as f64 - 1.0);
-        if 2 * i + 1 == steps { 0.0 } else { half.tan() }
+        let half = std::f64::consts::FRAC_PI_2 * (2.0 * (i as f64 + 0.5) / STEPS as f64 - 1.0);
+        if 2 * i + 1 == STEPS { 0.0 } else { half.tan() }
     };
     let (mut positive, mut negative) = (false, false);
-    for i in 0..steps {
-        for j in 0..if names.len() == 1 { 1 } else { steps } {
+    for i in 0..STEPS {
+        for j in 0..STEPS {
             let at = |n: &str| match names.iter().position(|m| n.strip_prefix("t_") == Some(m)) {
                 Some(0) => tangent(i),
                 Some(1) => tangent(j),
                 // further names run along with the first two, at incommensurate steps
-                Some(k) => tangent((i * (2 * k + 1) + j * (k + 1)) % steps),
+                Some(k) => tangent((i * (2 * k + 1) + j * (k + 1)) % STEPS),
                 None => f64::NAN,
             };
             let v = evaluate_f64(e, &at);
@@ -296,53 +457,40 @@ fn has_real_zero(e: &Expression, names: &[String]) -> bool {
     positive && negative
 }
 
-fn describe(condition: &Condition) -> String {
-    let text = match condition {
-        Condition::HalfTurn(name) => return format!("{name} = 180"),
-        Condition::Factor(text) => text,
-    };
-    let name = |text: &str| -> Option<String> {
-        let name = text.strip_prefix("t_")?;
-        name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_').then(|| name.to_string())
-    };
-    for (sign, degrees) in [("", 0), ("-1+", 90), ("1+", -90)] {
-        if let Some(name) = text.strip_prefix(sign).and_then(name) {
-            return format!("{name} = {degrees}");
-        }
-    }
-    for (operator, sign) in [('-', ""), ('+', "-")] {
-        if let Some((a, b)) = text.split_once(operator)
-            && let (Some(a), Some(b)) = (name(a), name(b))
-        {
-            return format!("{a} = {sign}{b}");
-        }
-    }
-    let mut shown = String::new();
-    let mut rest = text.as_str();
-    while let Some(start) = rest.find("t_") {
-        let name_end = rest[start + 2..]
-            .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
-            .map_or(rest.len(), |e| start + 2 + e);
-        shown.push_str(&rest[..start]);
-        shown.push_str(&format!("tan({}/2)", &rest[start + 2..name_end]));
-        rest = &rest[name_end..];
-    }
-    format!("{shown}{rest} = 0")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn conditions_in_words() {
-        let factor = |t: &str| describe(&Condition::Factor(t.into()));
-        assert_eq!(factor("t_alpha"), "alpha = 0");
-        assert_eq!(factor("-1+t_beta"), "beta = 90");
-        assert_eq!(factor("1+t_beta"), "beta = -90");
-        assert_eq!(factor("t_a-t_b"), "a = b");
-        assert_eq!(factor("t_a+t_b"), "a = -b");
-        assert_eq!(factor("-1+2*t_a*t_b+t_a^2"), "-1+2*tan(a/2)*tan(b/2)+tan(a/2)^2 = 0");
+        let names = ["a".to_string(), "b".into()];
+        let factor =
+            |t: &str| Place::of(&Condition::Factor(t.into()), &names).expect("read").map(|p| p.condition());
+        let says = |t: &str, words: &str| assert_eq!(factor(t).as_deref(), Some(words));
+        says("t_a", "a = 0 deg");
+        says("-1+t_b^2", "b = 90, 270 deg");
+        says("-1+2*t_b^2", "b = 70.5288, 289.471 deg");
+        says("t_a-t_b", "a = b");
+        says("t_a+t_b", "a = -b");
+        says("-1+t_a*t_b", "a + b = 180 deg");
+        says("1+t_a*t_b", "a - b = 180 deg");
+        says(
+            "-1+2*t_a*t_b+t_a^2",
+            "-1+2*tan(a/2)*tan(b/2)+tan(a/2)^2 = 0, for instance at a = 70, b = 46.1356 deg",
+        );
+        // what nobody could read is described
+        let long: String = (0..40).map(|k| format!("+{}*t_a^{}*t_b^3", k + 2, k % 7)).collect();
+        let words = factor(&format!("-1{long}")).expect("it has points");
+        assert!(
+            words.len() < 160
+                && words.starts_with(
+                    "a polynomial of 41 terms vanishes, of degree 6 in tan(a/2), 3 in tan(b/2), for"
+                ),
+            "{words}"
+        );
+        // no real point
+        assert_eq!(factor("1+t_a^2"), None);
+        assert_eq!(factor("1+t_a^2*t_b^2"), None);
     }
 
     #[test]

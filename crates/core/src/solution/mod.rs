@@ -2,6 +2,7 @@
 
 pub mod ask;
 pub mod formulas;
+mod half_tangent;
 pub mod local;
 pub mod loci;
 pub mod print;

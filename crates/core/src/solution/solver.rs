@@ -243,14 +243,7 @@ impl<'a> Solver<'a> {
     fn holds_in_floats(&self, terms: &[Term], functional: &Functional) -> Option<bool> {
         let (w_n, w_u, turning) = OTHER_RATES;
         let point = float_point(self.platform, &self.tables, (w_n, w_u));
-        let number = |c: &Coefficient| -> Option<f64> {
-            let number = match &c.number {
-                Number::Radical(r) => r.to_f64(),
-                Number::Decimal(x) => *x,
-                Number::Text { raw, .. } => self.symbols.float(raw)?,
-            };
-            Some(number * w_n.powi(c.rates[0]) * w_u.powi(c.rates[1]))
-        };
+        let number = |c: &Coefficient| Some(self.number(c)? * w_n.powi(c.rates[0]) * w_u.powi(c.rates[1]));
         let coefficient = |t: &Term| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
         let coefficients: Vec<f64> = terms.iter().map(coefficient).collect::<Option<_>>()?;
         let mut rest =
@@ -268,6 +261,41 @@ impl<'a> Solver<'a> {
     pub fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
         let (coefficients, images) = self.coefficients(problem)?;
         Some(Functional { terms: support.iter().copied().zip(coefficients).collect(), images })
+    }
+
+    /// The functional that is a row of a local observable.
+    pub fn functional_of_row(&self, row: usize) -> Option<Functional> {
+        let first = self.tables.first();
+        let names = self.platform.names();
+        let mut columns: Vec<usize> = (0..names.len()).filter(|&c| first.rows[row][c] != 0).collect();
+        // a coefficient leads
+        columns.sort_by_key(|&c| names[c].starts_with("psi"));
+        let images: Vec<Vec<u64>> =
+            self.all_tables().map(|(_, t)| columns.iter().map(|&c| t.rows[row][c]).collect()).collect();
+        let split = self.split_rates(&images)?;
+        let mut text = None;
+        let terms = columns.into_iter().zip(split).map(|(c, (rates, numbers))| {
+            let number = self.recover(&numbers).map_or_else(
+                || {
+                    let rows = text.get_or_insert_with(|| {
+                        rows_at(self.platform, &self.text_point, &self.tables.observables)
+                    });
+                    self.text_number(rows[row][c].clone())
+                },
+                Number::Radical,
+            );
+            (c, Coefficient { number, rates })
+        });
+        Some(Functional { terms: terms.collect(), images })
+    }
+
+    /// The value of a coefficient without rates; `None` for one in generic angles.
+    pub fn number(&self, c: &Coefficient) -> Option<f64> {
+        match &c.number {
+            Number::Radical(r) => Some(r.to_f64()),
+            Number::Decimal(x) => Some(*x),
+            Number::Text { raw, .. } => self.symbols.float(raw),
+        }
     }
 
     /// All nine tables with the index of their field.
@@ -365,14 +393,13 @@ impl<'a> Solver<'a> {
         let targets: Vec<Vec<u64>> = functional.images.iter().map(scatter).collect();
         let first = self.tables.first();
         let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-        let support = short_support(
-            first.sample.roots.field,
-            &first.rows,
-            &self.tables.rows_up_to(degree),
-            &targets[0],
-            cost,
-        )
-        .ok_or("the rows of its order do not span it")?;
+        let allowed = self.tables.rows_up_to(degree);
+        // what is a row is solved by it
+        let support = match allowed.iter().find(|&&j| first.rows[j] == targets[0]) {
+            Some(&j) => vec![j],
+            None => short_support(first.sample.roots.field, &first.rows, &allowed, &targets[0], cost)
+                .ok_or("the rows of its order do not span it")?,
+        };
         let columns = self.platform.names().len();
         let solve = |problem: &Problem| -> Option<Vec<(Rates, Vec<u64>)>> {
             let tables = self.all_tables().zip(&targets);
@@ -580,11 +607,7 @@ impl<'a> Solver<'a> {
         let (point, rows) = self.floats.as_ref()?;
         let mut target = vec![0.0; self.platform.names().len()];
         for (column, c) in &functional.terms {
-            target[*column] = match &c.number {
-                Number::Radical(r) => r.to_f64(),
-                Number::Decimal(x) => *x,
-                Number::Text { raw, .. } => self.symbols.float(raw)?,
-            };
+            target[*column] = self.number(c)?;
         }
         let x = problem.solve_in_floats(rows, &target)?;
         Some(self.term_numbers(point, plan, &x).into_iter().map(|v| Number::Decimal(tidy(v))).collect())

@@ -28,9 +28,11 @@ impl Symbols {
     /// The symbols of `platform`: one base per generic name, and one per constant angle that is no
     /// multiple of 15 degrees, up to sign, complement and supplement.
     pub fn of(platform: &Platform) -> Self {
+        // combinations that are asked for may have roots of their own
+        let radicals = platform.scheme().combinations.iter().any(|c| c.contains('('));
         let positions = platform.scheme().positions.iter().enumerate();
         let turning = positions.filter(|(_, p)| p.rotation.is_some()).map(|(i, _)| i).collect();
-        let mut out = Self { turning, ..Self::default() };
+        let mut out = Self { turning, radicals, ..Self::default() };
         for angle in platform.scheme().stations().iter().flat_map(Station::angles) {
             if let Some((name, _)) = angle.generic() {
                 out.add(Base::Name(name.into()));
@@ -92,7 +94,16 @@ impl Symbols {
         Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), attitudes }
     }
 
-    fn cos_sin(&self, angle: &Angle) -> (String, String) {
+    /// Whether the sine and cosine of an angle are among the symbols.
+    pub fn has(&self, angle: &Angle) -> bool {
+        let base = octant(angle).0;
+        let name = angle.generic().map(|(name, _)| name);
+        angle.turn().is_multiple_of_deg(15) && name.is_none_or(|n| self.bases.contains(&Base::Name(n.into())))
+            || name.is_none() && self.bases.contains(&Base::Constant(base))
+    }
+
+    /// The cosine and sine of an angle as text.
+    pub fn cos_sin(&self, angle: &Angle) -> (String, String) {
         let constant = self.constant_cos_sin(angle);
         match angle.generic() {
             None => constant,

@@ -161,7 +161,7 @@ impl Reader<'_> {
             }
         }
         for text in combinations {
-            requested::check(text.get_ref(), platform.names())
+            requested::check(text.get_ref(), &platform)
                 .map_err(|e| self.at(self.within(text, e.span()), format!("combination: {e}")))?;
         }
         Ok(platform.into_scheme())
