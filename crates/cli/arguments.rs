@@ -42,7 +42,8 @@ pub(crate) struct SchemeArguments {
     #[arg(long)]
     measured_azimuth: bool,
 
-    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"
+    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"; coefficients may have wN, wU, sqrt(2), sqrt(3), and
+    /// sines and cosines of the scheme's angles ("sin(20 deg)", "cos(alpha)")
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     combination: Vec<String>,
 }

@@ -239,6 +239,14 @@ impl Case {
         }
     }
 
+    /// The same with all unknowns zero.
+    pub(crate) fn silent(&self) -> Self {
+        let mut silent = self.clone();
+        silent.psi.fill([0.0; 3]);
+        silent.drift.values_mut().for_each(|d| *d = 0.0);
+        silent
+    }
+
     /// The same with an unknown changed; false for one that there is not.
     pub(crate) fn change(&mut self, name: &str, by: f64) -> bool {
         if let Some(d) = self.drift.get_mut(name) {

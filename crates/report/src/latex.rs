@@ -136,7 +136,10 @@ pub(crate) fn analysis(a: &Analysis) -> String {
         lines.push(escape(&format!("under the other carry {}: {}", words::carry(c), words::differences(c))));
     }
     lines.extend(
-        a.degenerate_loci.iter().flatten().map(|l| escape(&format!("degenerate: {}", words::locus(l)))),
+        a.degenerate_loci
+            .iter()
+            .flat_map(|l| l.iter().map(words::locus).chain([words::loci(l)]))
+            .map(|l| escape(&format!("degenerate: {l}"))),
     );
     lines.extend(words::assumptions(a).iter().map(|s| escape(&format!("assumed: {s}"))));
     lines.push(escape(&words::certainty(a)));

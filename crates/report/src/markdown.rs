@@ -98,7 +98,11 @@ pub(crate) fn analysis(a: &Analysis) -> String {
     section("Not excited", words::not_excited(a).iter().map(|n| code(n)).collect());
     section(
         "Degenerate angles",
-        a.degenerate_loci.iter().flatten().map(|l| escape(&words::locus(l))).collect(),
+        a.degenerate_loci
+            .iter()
+            .flat_map(|l| l.iter().map(words::locus).chain([words::loci(l)]))
+            .map(|l| escape(&l))
+            .collect(),
     );
     let formula = |f: &obsdeg_core::solution::formulas::Formula| {
         let at = f.position.as_ref().map(|p| format!(" @{p}")).unwrap_or_default();

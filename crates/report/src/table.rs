@@ -131,9 +131,7 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
         for l in loci {
             paragraph(&mut out, &words::locus(l), layout);
         }
-        if loci.is_empty() {
-            paragraph(&mut out, "none of codimension one", layout);
-        }
+        paragraph(&mut out, &words::loci(loci), layout);
     }
     if let Some(formulas) = &a.formulas {
         heading(&mut out, "Z in n, and psi, eps in n at each position", layout);

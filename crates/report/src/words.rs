@@ -264,7 +264,19 @@ pub(crate) fn null_vector(v: &[obsdeg_core::analysis::Component]) -> String {
     v.iter().map(part).collect::<Vec<_>>().join(", ")
 }
 
-/// A locus as `alpha = 0: rank profile 2 4 5; D_FX degree 1 -> not observable`.
+/// What the list of degenerate angles holds.
+pub(crate) fn loci(loci: &[obsdeg_core::solution::loci::Locus]) -> String {
+    let held = match loci.is_empty() {
+        true => "none was found: a determinant would vanish there, and",
+        false => "a determinant vanishes there, and",
+    };
+    format!(
+        "({held} at a random point of each, in two prime fields, ranks or verdicts differ from those above; what needs two equations at \
+         once is not sought; degrees that are not whole are rounded)"
+    )
+}
+
+/// A locus as `alpha = 0 deg: rank profile 2 4 5; D_FX degree 1 -> not observable`.
 pub(crate) fn locus(l: &obsdeg_core::solution::loci::Locus) -> String {
     let changes: Vec<String> = l.changes.iter().map(difference).collect();
     let changes = if changes.is_empty() { String::new() } else { format!("; {}", changes.join("; ")) };

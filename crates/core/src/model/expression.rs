@@ -235,9 +235,12 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
                     Function::Cos => angle()?.0,
                     Function::Sin => angle()?.1,
                     Function::Sqrt => {
-                        let root = expression.integer_at(*argument).and_then(|n| env.sqrt(n));
-                        root.ok_or_else(|| {
-                            syntax(i, "the root of 2, 3 or 6, or of one of these times a square")
+                        let n = expression.integer_at(*argument);
+                        n.and_then(|n| env.sqrt(n)).ok_or_else(|| ExpressionError::Syntax {
+                            expected: "the root of 2, 3 or 6, or of one of these times a square",
+                            found: n
+                                .map_or_else(|| "that of something else".into(), |n| format!("that of {n}")),
+                            span: expression.spans[i].clone(),
                         })?
                     }
                     _ => return Err(syntax(i, "sin or cos of an angle, or a square root")),
@@ -410,7 +413,7 @@ mod tests {
         );
         assert_eq!(
             wrong("sqrt(5)"),
-            "expected the root of 2, 3 or 6, or of one of these times a square, found something else"
+            "expected the root of 2, 3 or 6, or of one of these times a square, found that of 5"
         );
         assert_eq!(wrong("x^x"), "expected an integer exponent, found something else");
     }

@@ -8,15 +8,14 @@ use obsdeg_symbolic::{Job, Request};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::half_tangent::{coefficients, roots_deg};
+use super::half_tangent::{Roots, coefficients, roots_deg};
 use super::local::rows_at;
 use super::solver::Solver;
 use crate::analysis::{Difference, verdict};
-use crate::degree::coefficient::decimal;
 use crate::degree::ensemble::{Verdicts, staircase};
 use crate::degree::staircase::Degrees;
 use crate::model::Platform;
-use crate::model::expression::{Environment, Expression, Node, evaluate, evaluate_f64, parse};
+use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
 use crate::model::platform::{Point, RandomValues};
 use crate::model::ring::{Ring, Text};
 use crate::model::scheme::Station;
@@ -29,7 +28,7 @@ pub struct Locus {
     pub condition: String,
     /// Points of it, in degrees by angle: all of them when `complete`, examples otherwise.
     pub points_deg: Vec<BTreeMap<String, f64>>,
-    /// Whether the condition is on a single angle, and all its values are given.
+    /// Whether the condition is on a single angle, and these are certainly all its values.
     pub complete: bool,
     /// The rank profile at a general point of the locus.
     pub rank_profile: Vec<usize>,
@@ -57,9 +56,8 @@ enum Condition {
 
 /// Longest condition that is printed as it is.
 const LONGEST: usize = 120;
-/// Values of the other angles at which examples are sought, in degrees.
-const EXAMPLES_DEG: [[f64; 3]; 4] =
-    [[70.0, 40.0, 25.0], [10.0, 110.0, 200.0], [150.0, 250.0, 75.0], [300.0, 5.0, 160.0]];
+/// How many values of the other angles are tried for an example.
+const EXAMPLES: usize = 48;
 
 /// Random points tried per factor: a polynomial has a root in a random field with probability near
 /// 1 - 1/e.
@@ -109,9 +107,17 @@ pub fn loci(
     }
     let mut rng = platform.scheme().random(seed, "degenerate angles");
     let mut found: Vec<(Place, Locus)> = Vec::new();
+    let mut undecided = 0;
     for condition in conditions {
-        let Some(place) = Place::of(&condition, &names)? else { continue };
-        let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else { continue };
+        let place = match Place::of(&condition, &names) {
+            Where::Nowhere => continue,
+            Where::At(place) => Some(place),
+            Where::Unknown => None,
+        };
+        let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else {
+            undecided += 1;
+            continue;
+        };
         let changes: Vec<Difference> = platform
             .names()
             .iter()
@@ -126,10 +132,14 @@ pub fn loci(
         if changes.is_empty() && there.rank_profile == verdicts.degrees.rank_profile {
             continue;
         }
+        let Some(place) = place else {
+            undecided += 1;
+            continue;
+        };
         let rank_profile = there.rank_profile;
         // values of one angle that do the same are one condition
         let same = |l: &&mut (Place, Locus)| {
-            let same_angle = l.0.angle.is_some() && l.0.angle == place.angle;
+            let same_angle = l.0.angle.is_some() && l.0.angle == place.angle && l.0.words == place.words;
             same_angle && l.1.rank_profile == rank_profile && l.1.changes == changes
         };
         match found.iter_mut().find(same) {
@@ -151,11 +161,19 @@ pub fn loci(
         place.points_deg.sort_by(|a, b| angle.as_ref().map_or(Ordering::Equal, |n| a[n].total_cmp(&b[n])));
         Locus {
             condition: place.condition(),
-            complete: angle.is_some(),
+            complete: angle.is_some() && place.words.is_none(),
             points_deg: place.points_deg,
             ..locus
         }
     };
+    if undecided > 0 {
+        let few = format!(
+            "the list of degenerate angles may lack some: of {undecided} {} it is not known whether angles meet {} or what changes there",
+            if undecided == 1 { "condition" } else { "conditions" },
+            if undecided == 1 { "it" } else { "them" },
+        );
+        incomplete = Some(incomplete.map_or(few.clone(), |e| format!("{e}; {few}")));
+    }
     Ok(Found { loci: Some(found.into_iter().map(finished).collect()), incomplete })
 }
 
@@ -314,78 +332,112 @@ fn degree_in(e: &Expression, name: &str) -> usize {
 struct Place {
     /// The one angle that it is on.
     angle: Option<String>,
-    /// All values of this angle, or examples.
+    /// Values of this angle, all of them if there are no words, or examples.
     points_deg: Vec<BTreeMap<String, f64>>,
     /// The condition in words, unless its values say it.
     words: Option<String>,
 }
 
+/// What is known about the real points of a condition.
+#[derive(Debug, Clone, PartialEq)]
+enum Where {
+    /// It has none, or only such as need two conditions at once.
+    Nowhere,
+    At(Place),
+    /// None was found, which does not say that there is none.
+    Unknown,
+}
+
+/// A whole number as such, others with four decimals.
+fn degrees(x: f64) -> String {
+    if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") }
+}
+
 impl Place {
-    /// `None` when it has no real point.
-    fn of(condition: &Condition, names: &[String]) -> Result<Option<Self>, String> {
+    fn of(condition: &Condition, names: &[String]) -> Where {
         let text = match condition {
             Condition::HalfTurn(name) => {
                 let points_deg = vec![BTreeMap::from([(name.clone(), 180.0)])];
-                return Ok(Some(Self { angle: Some(name.clone()), points_deg, words: None }));
+                return Where::At(Self { angle: Some(name.clone()), points_deg, words: None });
             }
             Condition::Factor(text) => text,
         };
-        let e = parse(text).map_err(|e| format!("factor `{text}`: {e}"))?;
+        let Ok(e) = parse(text) else { return Where::Unknown };
         let in_it: Vec<&String> = names.iter().filter(|n| degree_in(&e, &format!("t_{n}")) > 0).collect();
-        let roots = |name: &str, others: &dyn Fn(&str) -> f64| -> Vec<f64> {
-            coefficients(&e, &format!("t_{name}"), others).and_then(|c| roots_deg(&c)).unwrap_or_default()
+        let roots = |name: &str, others: &dyn Fn(&str) -> f64| -> Roots {
+            let found = coefficients(&e, &format!("t_{name}"), others).and_then(|c| roots_deg(&c));
+            found.unwrap_or(Roots { deg: Vec::new(), all: false })
         };
         if let [name] = in_it[..] {
-            let points = roots(name, &|_| f64::NAN).into_iter().map(|x| BTreeMap::from([(name.clone(), x)]));
-            let points_deg: Vec<_> = points.collect();
-            let found = !points_deg.is_empty();
-            return Ok(found.then(|| Self { angle: Some(name.clone()), points_deg, words: None }));
+            let Roots { deg, all } = roots(name, &|_| f64::NAN);
+            if deg.is_empty() {
+                return if all { Where::Nowhere } else { Where::Unknown };
+            }
+            let points_deg = deg.into_iter().map(|x| BTreeMap::from([(name.clone(), x)])).collect();
+            let words = (!all).then(|| in_words(&e, text, &in_it));
+            return Where::At(Self { angle: Some(name.clone()), points_deg, words });
+        }
+        // a factor that is never negative vanishes on no surface
+        if never_negative(&e) {
+            return Where::Nowhere;
         }
         // examples: the others at some values, solved for each angle in turn
-        for degrees in EXAMPLES_DEG {
+        for i in 0..EXAMPLES {
+            let value = |n: &str| {
+                let place = in_it.iter().position(|m| m.as_str() == n).unwrap_or(0);
+                ((70 + 330 * place + i * (53 + 44 * place)) % 360) as f64
+            };
+            // values at which something else may happen
+            if in_it.iter().any(|n| value(n) % 45.0 == 0.0) {
+                continue;
+            }
             for main in &in_it {
-                let value = |n: &str| {
-                    let place = in_it.iter().position(|m| m.as_str() == n).unwrap_or(0);
-                    degrees[place % degrees.len()]
-                };
                 let at = |t: &str| (value(t.strip_prefix("t_").unwrap_or(t)).to_radians() / 2.0).tan();
-                let points = roots(main, &at).into_iter().map(|x| {
+                let points = roots(main, &at).deg.into_iter().map(|x| {
                     let of = |n: &&String| ((*n).clone(), if n == main { x } else { value(n) });
                     in_it.iter().map(of).collect()
                 });
                 let points_deg: Vec<BTreeMap<String, f64>> = points.collect();
                 if !points_deg.is_empty() {
-                    return Ok(Some(Self {
-                        angle: None,
-                        points_deg,
-                        words: Some(in_words(&e, text, &in_it)),
-                    }));
+                    let words = Some(in_words(&e, text, &in_it));
+                    return Where::At(Self { angle: None, points_deg, words });
                 }
             }
         }
-        // it may still have points that are isolated, such as a sum of squares
-        let words = has_real_zero(&e, names).then(|| in_words(&e, text, &in_it));
-        Ok(words.map(|words| Self { angle: None, points_deg: vec![], words: Some(words) }))
+        Where::Unknown
     }
 
     /// `alpha = 0, 180 deg`, or the words with an example.
     fn condition(&self) -> String {
         let list = |name: &str| {
-            let values: Vec<String> = self.points_deg.iter().map(|p| decimal(p[name])).collect();
+            let values: Vec<String> = self.points_deg.iter().map(|p| degrees(p[name])).collect();
             format!("{name} = {} deg", values.join(", "))
         };
-        if let Some(name) = &self.angle {
-            return list(name);
+        match (&self.words, &self.angle, self.points_deg.first()) {
+            (None, Some(name), _) => list(name),
+            (Some(words), Some(name), _) => format!("{words}, for instance at {}", list(name)),
+            (Some(words), None, Some(point)) if words.contains("tan(") => {
+                let values: Vec<String> =
+                    point.iter().map(|(n, x)| format!("{n} = {}", degrees(*x))).collect();
+                format!("{words}, for instance at {} deg", values.join(", "))
+            }
+            (words, ..) => words.clone().unwrap_or_default(),
         }
-        let words = self.words.clone().unwrap_or_default();
-        let Some(point) =
-            self.points_deg.first().filter(|_| words.contains("tan") || words.contains("polynomial"))
-        else {
-            return words;
-        };
-        let values: Vec<String> = point.iter().map(|(n, x)| format!("{n} = {}", decimal(*x))).collect();
-        format!("{words}, for instance at {} deg", values.join(", "))
     }
+}
+
+/// Whether a polynomial is a sum of products of squares, as far as its text shows.
+fn never_negative(e: &Expression) -> bool {
+    let mut out: Vec<bool> = Vec::with_capacity(e.nodes.len());
+    for node in &e.nodes {
+        out.push(match node {
+            Node::Number { mantissa, .. } => *mantissa >= 0,
+            Node::Name(_) | Node::Call { .. } | Node::Negate(_) | Node::Subtract(..) => false,
+            Node::Add(a, b) | Node::Multiply(a, b) | Node::Divide(a, b) => out[*a] && out[*b],
+            Node::Power(a, k) => out[*a] || e.integer_at(*k).is_some_and(|k| k % 2 == 0),
+        });
+    }
+    out.last().copied().unwrap_or(false)
 }
 
 /// A polynomial in half tangents that vanishes: a relation of two angles where it is one.
@@ -421,40 +473,13 @@ fn in_words(e: &Expression, text: &str, in_it: &[&String]) -> String {
     }
     shown.push_str(rest);
     if shown.len() > LONGEST {
-        let degrees: Vec<String> =
-            in_it.iter().map(|n| format!("{} in tan({n}/2)", degree_in(e, &format!("t_{n}")))).collect();
+        let of_names = |f: &dyn Fn(&&String) -> String| in_it.iter().map(f).collect::<Vec<_>>().join(", ");
+        let tangents = of_names(&|n| format!("tan({n}/2)"));
+        let degrees = of_names(&|n| degree_in(e, &format!("t_{n}")).to_string());
         let terms = 1 + text.char_indices().filter(|(i, c)| *i > 0 && matches!(c, '+' | '-')).count();
-        return format!("a polynomial of {terms} terms vanishes, of degree {}", degrees.join(", "));
+        return format!("a polynomial of {terms} terms in {tangents}, of degree {degrees}, vanishes");
     }
     format!("{shown} = 0")
-}
-
-/// Whether the polynomial takes both signs, or zero, on a grid of half tangents.
-fn has_real_zero(e: &Expression, names: &[String]) -> bool {
-    const STEPS: usize = 61;
-    let tangent = |i: usize| {
-        let half = std::f64::consts::FRAC_PI_2 * (2.0 * (i as f64 + 0.5) / STEPS as f64 - 1.0);
-        if 2 * i + 1 == STEPS { 0.0 } else { half.tan() }
-    };
-    let (mut positive, mut negative) = (false, false);
-    for i in 0..STEPS {
-        for j in 0..STEPS {
-            let at = |n: &str| match names.iter().position(|m| n.strip_prefix("t_") == Some(m)) {
-                Some(0) => tangent(i),
-                Some(1) => tangent(j),
-                // further names run along with the first two, at incommensurate steps
-                Some(k) => tangent((i * (2 * k + 1) + j * (k + 1)) % STEPS),
-                None => f64::NAN,
-            };
-            let v = evaluate_f64(e, &at);
-            if v == 0.0 {
-                return true;
-            }
-            positive |= v > 0.0;
-            negative |= v < 0.0;
-        }
-    }
-    positive && negative
 }
 
 #[cfg(test)]
@@ -464,39 +489,37 @@ mod tests {
     #[test]
     fn conditions_in_words() {
         let names = ["a".to_string(), "b".into()];
-        let factor =
-            |t: &str| Place::of(&Condition::Factor(t.into()), &names).expect("read").map(|p| p.condition());
+        let place = |t: &str| Place::of(&Condition::Factor(t.into()), &names);
+        let factor = |t: &str| match place(t) {
+            Where::At(p) => Some(p.condition()),
+            _ => None,
+        };
         let says = |t: &str, words: &str| assert_eq!(factor(t).as_deref(), Some(words));
         says("t_a", "a = 0 deg");
         says("-1+t_b^2", "b = 90, 270 deg");
-        says("-1+2*t_b^2", "b = 70.5288, 289.471 deg");
+        says("-1+2*t_b^2", "b = 70.5288, 289.4712 deg");
         says("t_a-t_b", "a = b");
         says("t_a+t_b", "a = -b");
         says("-1+t_a*t_b", "a + b = 180 deg");
         says("1+t_a*t_b", "a - b = 180 deg");
+        // tan(b/2) = (1 - tan(35 deg)^2) / (2 tan(35 deg)) = 1/tan(70 deg): b = 40 deg
         says(
             "-1+2*t_a*t_b+t_a^2",
-            "-1+2*tan(a/2)*tan(b/2)+tan(a/2)^2 = 0, for instance at a = 70, b = 46.1356 deg",
+            "-1+2*tan(a/2)*tan(b/2)+tan(a/2)^2 = 0, for instance at a = 70, b = 40 deg",
         );
         // what nobody could read is described
         let long: String = (0..40).map(|k| format!("+{}*t_a^{}*t_b^3", k + 2, k % 7)).collect();
         let words = factor(&format!("-1{long}")).expect("it has points");
-        assert!(
-            words.len() < 160
-                && words.starts_with(
-                    "a polynomial of 41 terms vanishes, of degree 6 in tan(a/2), 3 in tan(b/2), for"
-                ),
-            "{words}"
-        );
-        // no real point
-        assert_eq!(factor("1+t_a^2"), None);
-        assert_eq!(factor("1+t_a^2*t_b^2"), None);
-    }
-
-    #[test]
-    fn real_zeros() {
-        let real = |t: &str| has_real_zero(&parse(t).expect("parses"), &["a".into(), "b".into()]);
-        assert!(real("t_a-t_b") && real("t_a^2-2") && real("t_a^2+t_b^2"));
-        assert!(!real("t_a^2+1") && !real("1+t_a^2*t_b^2"));
+        let described =
+            "a polynomial of 41 terms in tan(a/2), tan(b/2), of degree 6, 3, vanishes, for instance at a = ";
+        assert!(words.len() < 160 && words.starts_with(described), "{words}");
+        // no real point; points that need two conditions; not all of them known
+        for t in ["1+t_a^2", "1+t_a^2*t_b^2", "t_a^2+2*t_b^2", "3+t_a^2*(1+t_b^2)"] {
+            assert_eq!(place(t), Where::Nowhere, "{t}");
+        }
+        assert_eq!(place("3-2*t_a+t_a^2-2*t_b+t_b^2"), Where::Unknown);
+        let hidden = factor("(t_a-1)*(t_b-t_b+3*t_a-1)^2*(t_a^200-1)*t_a");
+        assert_eq!(hidden, None, "beyond the limit");
+        says("(t_a-1)*(3*t_a-1)^2", "(tan(a/2)-1)*(3*tan(a/2)-1)^2 = 0, for instance at a = 90 deg");
     }
 }
