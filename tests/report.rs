@@ -449,3 +449,17 @@ fn the_pdf_holds_every_table() {
     assert!(missing.is_empty(), "{missing:?}");
     assert!(texts(&page, "table").len() > 20);
 }
+
+/// Schemes of which no dwell determines a coefficient have no curve of sigma against time.
+#[test]
+fn schemes_that_determine_nothing_have_no_front() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("one.toml");
+    std::fs::write(&file, "terms = [\"F\", \"I\", \"O\", \"S\"]\n[[position]]\nangles_deg = [0, 0, 0]\n")
+        .expect("written");
+    let file = file.display().to_string();
+    let (_, text) = report(folder.path(), "r.html", &[&file, &file]);
+    assert!(!text.contains("Pareto front"), "nothing to draw");
+    let (_, text) = report(folder.path(), "s.html", &[PAPER, PAPER]);
+    assert!(text.contains("Pareto front"));
+}

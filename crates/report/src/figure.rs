@@ -108,10 +108,14 @@ impl Figure {
                 _ => LegendPosition::OutsideRightTop,
             })
             .with_legend_box(false);
-        if self.log_y {
+        // an axis without anything above zero has no logarithm
+        let anything = |of: fn(&(f64, f64)) -> f64| {
+            self.lines.iter().flat_map(|l| &l.points).any(|p| of(p) > 0.0 && of(p).is_finite())
+        };
+        if self.log_y && anything(|p| p.1) {
             layout = layout.with_log_y().with_y_tick_format(TickFormat::Sci);
         }
-        if self.log {
+        if self.log && anything(|p| p.0) && anything(|p| p.1) {
             layout = layout.with_log_scale().with_y_tick_format(TickFormat::Sci);
         }
         if let Some((low, high)) = self.x_range {

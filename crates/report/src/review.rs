@@ -28,7 +28,7 @@ pub(crate) fn document(r: &DesignReview) -> Document {
     if r.schemes.len() > 1 {
         blocks.push(section(1, "Comparison of the schemes"));
         blocks.extend(compare::document(&r.comparison).blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
-        blocks.push(pictures::time_against_sigma(&r.schemes, "comparison_front"));
+        blocks.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
     }
     for (i, m) in r.models.iter().enumerate() {
         if !alone {
@@ -371,7 +371,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
         });
     }
     if !alternatives.front.is_empty() {
-        blocks.push(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
+        blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
     }
 }
 

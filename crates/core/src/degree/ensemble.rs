@@ -116,7 +116,7 @@ pub struct Table {
     /// Field and embedding.
     pub sample: Sample,
     /// One row per station and local observable, station by station; then, if the scheme rotates, one per station of
-    /// [`motion_rows`](crate::solution::turning::motion_rows).
+    /// [`motion_rows`].
     pub rows: Vec<Vec<u64>>,
 }
 
@@ -189,7 +189,7 @@ impl Tables {
         row / self.observables.len()
     }
 
-    /// The row of [`motion_rows`](crate::solution::turning::motion_rows) of a station.
+    /// The row of [`motion_rows`] of a station.
     pub fn motion_row(&self, station: usize) -> usize {
         self.observable_rows + station
     }

@@ -34,7 +34,7 @@ pub(super) struct Way {
 pub struct Stop {
     /// The candidate.
     pub candidate: usize,
-    /// A half turn to it goes the other way round than [`Slew::to`] says.
+    /// A half turn to it goes the other way round than `Slew::to` says.
     pub reversed: bool,
 }
 

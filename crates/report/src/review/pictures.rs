@@ -184,8 +184,9 @@ fn logarithmic_window(lines: &[Line]) -> Option<(f64, f64)> {
     (high > 0.0).then_some((low / 1.5, high * 1.5))
 }
 
-/// Total time against the largest sigma: schemes at other dwells, and the front of what was found.
-pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Block {
+/// Total time against the largest sigma: schemes at other dwells, and the front of what was found; nothing where no dwell determines
+/// anything.
+pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option<Block> {
     let mut lines = Vec::new();
     for (i, s) in schemes.iter().enumerate() {
         let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
@@ -213,7 +214,7 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Block 
     let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
                    dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most, for the same \
                    coefficients";
-    curves(name, caption, figure)
+    (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
 /// Errors of the estimate with the band of three sigma, a picture each.
