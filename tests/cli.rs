@@ -360,9 +360,22 @@ fn the_paper_is_audited() {
         (find("(20)"), find("(21)"), find("conclusion 2")),
         ("agree".into(), "disagree".into(), "agree".into())
     );
-    for format in ["table", "markdown", "latex"] {
-        assert!(stdout(&run(&["paper", "--format", format])).contains("eps"));
+    // what is not covered is listed in every format, as often as in JSON
+    let lines = a["lines"].as_array().expect("a list");
+    let open = lines.iter().filter(|l| l["finding"] == "not_covered").count();
+    assert!(open > 0);
+    for format in ["table", "markdown", "latex", "csv"] {
+        let text = stdout(&run(&["paper", "--format", format]));
+        let title = usize::from(["table", "markdown"].contains(&format));
+        assert_eq!(text.matches("not covered").count(), open + title, "{format}: {text}");
+        assert!(text.contains("eps"));
     }
+    let counted = |finding: &str| lines.iter().filter(|l| l["finding"] == finding).count();
+    let [agree, conditional, disagree] = ["agree", "conditional", "disagree"].map(counted);
+    let title = stdout(&run(&["paper", "--format", "markdown"]));
+    let expected =
+        format!("{agree} agree, {conditional} with a condition, {disagree} disagree, {open} not covered");
+    assert!(title.lines().next().is_some_and(|t| t.contains(&expected)), "{title}");
 }
 
 #[test]

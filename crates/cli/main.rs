@@ -65,7 +65,7 @@ enum Command {
     Design(design::Arguments),
     /// Write the design review of schemes and models: HTML, PDF, Markdown or LaTeX
     Report(report::Arguments),
-    /// Recompute every equation and claim of the paper and say where it is wrong
+    /// Recompute the equations and claims of the paper: what agrees, what does not, and what is not covered
     Paper(paper::Arguments),
     /// Print the completion script of a shell
     Completions(completions::Arguments),

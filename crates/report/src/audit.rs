@@ -8,6 +8,8 @@ use crate::{Layout, ReportError, csv_text, latex, markdown};
 fn word(f: Finding) -> String {
     match f {
         Finding::Agree => "agree",
+        Finding::Conditional => "with a condition",
+        Finding::NotCovered => "not covered",
         Finding::Disagree => "disagree",
     }
     .into()
@@ -20,12 +22,9 @@ fn rows(a: &Audit) -> Vec<[String; 4]> {
 }
 
 fn title(a: &Audit) -> String {
-    let slips = a.lines.iter().filter(|l| l.finding == Finding::Disagree).count();
-    format!(
-        "The paper against the algebra: {} lines, {slips} disagree (recomputed at random points, seed {})",
-        a.lines.len(),
-        a.seed
-    )
+    let all = [Finding::Agree, Finding::Conditional, Finding::Disagree, Finding::NotCovered];
+    let counts = all.map(|f| format!("{} {}", a.lines.iter().filter(|l| l.finding == f).count(), word(f)));
+    format!("The paper against the algebra: {} (recomputed with seed {})", counts.join(", "), a.seed)
 }
 
 pub(crate) fn table(a: &Audit, layout: Layout) -> String {

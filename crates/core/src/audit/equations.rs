@@ -1,23 +1,45 @@
-//! The numbered equations, as printed, compared with the model at random points of two prime fields.
+//! The numbered equations from (6) on, as printed, compared with the model at random points of random prime fields.
 
 use obsdeg_exact::{Field, RootField, SplitMix64};
 
-use super::{Line, finding};
+use super::{Finding, Line, finding, line};
 use crate::analysis::AnalysisError;
 use crate::degree::ensemble::EnsembleError;
-use crate::model::expression::{Environment, evaluate, parse};
+use crate::model::attitude::Matrix3;
+use crate::model::expression::{Environment, ExpressionError, evaluate, parse};
 use crate::model::platform::{LOCAL, Platform, RandomValues, local_dynamics, local_output};
 use crate::model::scheme::{Scheme, parse_attitude};
 
-/// Random points per prime field at which an identity is tested.
-const POINTS: usize = 3;
+/// Random points at which an identity is tested, each in a random prime field of its own.
+const POINTS: usize = 6;
 
 /// One point: angles, rates, psi and the twelve coefficients at random, and what the model makes of
 /// them.
-struct At {
-    field: Field,
-    angles: [(u64, u64); 3],
+pub(super) struct At {
+    pub(super) field: Field,
+    /// `C_c^n`.
+    pub(super) attitude: Matrix3<u64>,
+    /// Cosine and sine of alpha, beta, gamma.
+    pub(super) angles: [(u64, u64); 3],
     names: Vec<(String, u64)>,
+}
+
+impl At {
+    /// The value of a formula.
+    pub(super) fn value(&self, text: &str) -> Result<u64, AnalysisError> {
+        let wrap = |e: ExpressionError| AnalysisError::Combination {
+            text: text.into(),
+            reason: e.to_string(),
+            span: e.span(),
+        };
+        evaluate(&parse(text).map_err(wrap)?, &self.field, self).map_err(wrap)
+    }
+
+    /// The values of three formulas.
+    pub(super) fn vector(&self, texts: [&str; 3]) -> Result<[u64; 3], AnalysisError> {
+        let [x, y, z] = texts.map(|t| self.value(t));
+        Ok([x?, y?, z?])
+    }
 }
 
 impl Environment for At {
@@ -34,8 +56,9 @@ impl Environment for At {
 
 /// The model at a random point of a random field, under names for the formulas of the paper:
 /// `psi_x psi_y psi_z` and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in
-/// c, `Z1 Z3` with `p`, `pp` for derivatives, and `Zcx..` for Z in c.
-fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
+/// c, `Z1 Z3` with `p`, `pp` for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n; `t q h` are random numbers, `rx ry rz`
+/// a random rate.
+pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
     let angles = parse_attitude(attitude)
         .unwrap_or_else(|_| std::array::from_fn(|_| crate::model::Angle::from_degrees(0)));
     let platform = Platform::new(Scheme::of_angles([angles]))?;
@@ -48,8 +71,9 @@ fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
     let (w_n, w_u) = (sample.point.w_n, sample.point.w_u);
     put("wN", w_n);
     put("wU", w_u);
-    put("t", f.from_u64(rng.next_u64()));
-    put("q", f.from_u64(rng.next_u64()));
+    for name in ["t", "q", "h", "rx", "ry", "rz"] {
+        put(name, f.from_u64(rng.next_u64()));
+    }
     let c = &sample.point.attitudes[0];
     let g: [u64; 3] = std::array::from_fn(|j| f.neg(c[1][j]));
     for (name, value) in ["gx", "gy", "gz"].into_iter().zip(g) {
@@ -75,14 +99,17 @@ fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
             row = std::array::from_fn(|j| f.dot(0, (0..LOCAL).map(|i| (row[i], dynamics[i][j]))));
         }
     }
-    // psi_y' of the model
-    put("pyp", f.dot(0, dynamics[1].iter().copied().zip(local)));
+    // psi' of the model
+    for (name, row) in ["pxp", "pyp", "pzp"].into_iter().zip(&dynamics) {
+        put(name, f.dot(0, row.iter().copied().zip(local)));
+    }
     let z_n = [local[2], 0, f.neg(local[0])];
     for (name, value) in ["Zcx", "Zcy", "Zcz"].into_iter().zip(to_c(z_n)) {
         put(name, value);
     }
     Ok(At {
         field: f,
+        attitude: *c,
         angles: platform.scheme().positions[0]
             .angles
             .each_ref()
@@ -91,33 +118,37 @@ fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
     })
 }
 
-/// Whether `left = right` at random points of two fields, at the attitude given (`alpha,beta,gamma`
-/// for a random one).
-fn identity(attitude: &str, pairs: &[(&str, &str)], seed: u64) -> Result<bool, AnalysisError> {
+/// Whether something holds at random points of random fields, at the attitude given (`alpha,beta,gamma` for a random one).
+pub(super) fn everywhere(
+    attitude: &str,
+    seed: u64,
+    mut holds: impl FnMut(&At) -> Result<bool, AnalysisError>,
+) -> Result<bool, AnalysisError> {
     let mut rng = SplitMix64::new(seed);
-    for _ in 0..2 * POINTS {
-        let point = at(attitude, &mut rng)?;
-        for (left, right) in pairs {
-            let value = |text: &str| {
-                let wrap = |e: crate::model::expression::ExpressionError| AnalysisError::Combination {
-                    text: text.into(),
-                    reason: e.to_string(),
-                    span: e.span(),
-                };
-                evaluate(&parse(text).map_err(wrap)?, &point.field, &point).map_err(wrap)
-            };
-            if value(left)? != value(right)? {
-                return Ok(false);
-            }
+    for _ in 0..POINTS {
+        if !holds(&at(attitude, &mut rng)?)? {
+            return Ok(false);
         }
     }
     Ok(true)
 }
 
-const ANY: &str = "alpha,beta,gamma";
+/// Whether every `left = right`.
+fn identity(attitude: &str, pairs: &[(&str, &str)], seed: u64) -> Result<bool, AnalysisError> {
+    everywhere(attitude, seed, |point| {
+        for (left, right) in pairs {
+            if point.value(left)? != point.value(right)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    })
+}
+
+pub(super) const ANY: &str = "alpha,beta,gamma";
 
 // (20)
-const G: [(&str, &str); 3] = [
+pub(super) const G: [(&str, &str); 3] = [
     ("gx", "sin(gamma)*cos(alpha) - sin(alpha)*sin(beta)*cos(gamma)"),
     ("gy", "-cos(alpha)*cos(gamma) - sin(alpha)*sin(beta)*sin(gamma)"),
     ("gz", "-sin(alpha)*cos(beta)"),
@@ -156,7 +187,7 @@ const EPS_N_Y: &str = "D_FX*(cos(gamma)*sin(alpha)*sin(beta) - cos(alpha)*sin(ga
     + 2*(D_IX - D_IY)*sin(alpha)*sin(beta)*sin(gamma)*cos(alpha)*cos(gamma)";
 
 // (24)
-const PSI_C: [(&str, &str); 3] = [
+pub(super) const PSI_C: [(&str, &str); 3] = [
     (
         "psi_x",
         "px*cos(beta)*cos(gamma) + py*(sin(alpha)*sin(beta)*cos(gamma) - cos(alpha)*sin(gamma)) \
@@ -170,37 +201,21 @@ const PSI_C: [(&str, &str); 3] = [
     ("psi_z", "-px*sin(beta) + py*sin(alpha)*cos(beta) + pz*cos(alpha)*cos(beta)"),
 ];
 
+/// What a test of an identity has shown.
+pub(super) fn plain(ok: bool) -> String {
+    if ok {
+        format!("an identity: holds at {POINTS} random points, each in a prime field of its own")
+    } else {
+        "not an identity".into()
+    }
+}
+
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     let mut out = Vec::new();
-    let mut line = |place: &str, claim: &str, holds: bool, reason: String| {
-        let (place, claim) = (place.to_string(), claim.to_string());
-        out.push(Line { place, claim, finding: finding(holds), reason });
+    let mut add = |place: &str, claim: &str, holds: bool, reason: String| {
+        out.push(line(place, claim, finding(holds), reason));
     };
     let holds = |attitude: &str, pairs: &[(&str, &str)]| identity(attitude, pairs, seed);
-    let plain = |ok: bool| {
-        if ok { "identity at random points of two prime fields" } else { "not an identity" }.to_string()
-    };
-
-    // (4): the sign of the specific force that (21)-(28) use
-    let with = |sign: &str| -> Vec<(String, String)> {
-        let right = format!("D_FX {sign} (D_IX*gx + D_SX*gy - D_OX*gz)");
-        vec![("cx".to_string(), right)]
-    };
-    let test = |pairs: Vec<(String, String)>| {
-        let refs: Vec<(&str, &str)> = pairs.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
-        identity(ANY, &refs, seed)
-    };
-    let (minus, plus) = (test(with("-"))?, test(with("+"))?);
-    line(
-        "(4)",
-        "the g-sensitive terms multiply -g^c",
-        minus,
-        format!(
-            "with -g^c the drift of (22), (27), (28) does {}come out; with +g^c it does{}",
-            if minus { "" } else { "not " },
-            if plus { "" } else { " not either" }
-        ),
-    );
 
     let cross = [
         ("Zcx", "-(gy*psi_z - gz*psi_y)"),
@@ -208,14 +223,19 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         ("Zcz", "-(gx*psi_y - gy*psi_x)"),
     ];
     let ok = holds(ANY, &cross)?;
-    line("(6)", "Z = -[g^c x] psi", ok, plain(ok));
+    add("(6)", "Z = -[g^c x] psi", ok, plain(ok));
     let ok = holds(ANY, &[("Z1", "pz"), ("Z3", "-px")])?;
-    line("(9)", "Z^n = (psi_z, 0, -psi_x)", ok, plain(ok));
+    add("(9)", "Z^n = (psi_z, 0, -psi_x)", ok, plain(ok));
     let ok = holds(ANY, &[("Z1p", "wU*px - wN*py + ez"), ("Z3p", "wU*pz - ex")])?;
-    line("(10)", "Z' in n", ok, plain(ok));
+    add("(10)", "Z'^n = (wU psi_x - wN psi_y + eps_z, 0, wU psi_z - eps_x)", ok, plain(ok));
     let ok =
         holds(ANY, &[("Z1pp", "-(wN^2 + wU^2)*pz + wU*ex - wN*ey"), ("Z3pp", "wU^2*px - wU*wN*py + wU*ez")])?;
-    line("(12)", "Z'' in n", ok, plain(ok));
+    add(
+        "(12)",
+        "Z''^n = (-(wN^2 + wU^2) psi_z + wU eps_x - wN eps_y, 0, wU^2 psi_x - wU wN psi_y + wU eps_z)",
+        ok,
+        plain(ok),
+    );
     for (place, claim, left, right) in [
         ("(13)", "psi_x = -Z3", "px", "-Z3"),
         ("(14)", "psi_z = Z1", "pz", "Z1"),
@@ -230,10 +250,10 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         ("(18)", "(wN psi_y - eps_z) wU = wU^2 psi_x - Z3''", "(wN*py - ez)*wU", "wU^2*px - Z3pp"),
     ] {
         let ok = holds(ANY, &[(left, right)])?;
-        line(place, claim, ok, plain(ok));
+        add(place, claim, ok, plain(ok));
     }
     let ok = holds(ANY, &G)?;
-    line("(20)", "g^c in the Euler angles of (19)", ok, plain(ok));
+    add("(20)", "g^c in the Euler angles of (19)", ok, plain(ok));
 
     let (printed_x, corrected_x) = (EPS_C_X.replace("%s", "+"), EPS_C_X.replace("%s", "-"));
     let printed = holds(ANY, &[("cx", &printed_x), ("cy", EPS_C_Y), ("cz", EPS_C_Z)])?;
@@ -243,10 +263,10 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         plain(printed),
         if corrected { "an identity" } else { "still none" }
     );
-    line("(21)", "eps^c in the Euler angles", printed, reason);
+    add("(21)", "eps^c in the Euler angles", printed, reason);
 
     let ok = holds(ANY, &[("ex", EPS_N_X)])?;
-    line("(22)", "eps_x^n in the Euler angles", ok, plain(ok));
+    add("(22)", "eps_x^n in the Euler angles", ok, plain(ok));
 
     let eps_n_y = |f: &str, c: &str| EPS_N_Y.replace("%f", f).replace("%c", c);
     let as_printed = eps_n_y("D_FZ", "sin(beta)");
@@ -266,26 +286,28 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         if d { "an identity" } else { "still none" },
         if b || c { "an identity" } else { "none" }
     );
-    line("(23)", "eps_y^n in the Euler angles", a, reason);
+    add("(23)", "eps_y^n in the Euler angles", a, reason);
 
     let ok = holds(ANY, &PSI_C)?;
-    line("(24)", "psi^c in psi^n", ok, plain(ok));
+    add("(24)", "psi^c in psi^n", ok, plain(ok));
     let ok = holds(ANY, &[("pyp", "wN*pz + ey")])?;
-    line("(25)", "psi_y' = wN psi_z + eps_y", ok, plain(ok));
+    add("(25)", "psi_y' = wN psi_z + eps_y", ok, plain(ok));
     // (26) at time t: psi_y(t) = psi_y(0) + psi_y' t (+ q t^2 when psi_y' is not constant)
     let left = "ez - wN*(py - pyp*t)";
     let curved = "ez - wN*(py - pyp*t - q*t^2)";
     let right = "Z1p + pyp*t*wN - wU*px";
     let (constant, varying) = (holds(ANY, &[(left, right)])?, holds(ANY, &[(curved, right)])?);
-    let reason = format!(
-        "{} while psi_y' is constant; {} when psi_y' changes with time",
-        plain(constant),
-        if varying { "also" } else { "not" }
-    );
-    line("(26)", "eps_z - wN psi_y(0) = Z1' + psi_y' t wN - wU psi_x", constant, reason);
     let ok = holds("0,0,0", &[("ex", "D_FX - D_SX"), ("ey", "D_FY - D_IY"), ("ez", "D_FZ - D_SZ")])?;
-    line("(27)", "eps^n at p1 = (0,0,0)", ok, plain(ok));
+    add("(27)", "eps^n at p1 = (0,0,0)", ok, plain(ok));
     let ok = holds("180,0,0", &[("ex", "D_FX + D_SX"), ("ey", "-(D_FY + D_IY)"), ("ez", "-(D_FZ + D_SZ)")])?;
-    line("(28)", "eps^n at p2 = (180,0,0)", ok, plain(ok));
+    add("(28)", "eps^n at p2 = (180,0,0)", ok, plain(ok));
+    let (finding, reason) = match (constant, varying) {
+        (true, false) => (
+            Finding::Conditional,
+            format!("while psi_y' is constant {}; when it changes with time it is none", plain(true)),
+        ),
+        _ => (finding(constant), plain(constant)),
+    };
+    out.push(line("(26)", "eps_z - wN psi_y(0) = Z1' + psi_y' t wN - wU psi_x", finding, reason));
     Ok(out)
 }
