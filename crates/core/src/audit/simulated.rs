@@ -28,7 +28,7 @@ fn scheme(carry: Carry) -> Scheme {
     Scheme { carry, ..positions(&PAPER) }
 }
 
-/// The filter without noise in truth and samples, and without surprise at it.
+/// A run of the filter; of [`Mean::of`] the one without noise in truth and samples.
 struct Mean {
     plan: Plan,
     record: Record,
@@ -299,4 +299,65 @@ fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
             prior("D_IX")
         ),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The run without noise is the mean of runs with it: their average lies within four of its standard deviations, and the average of
+    /// another carry does not.
+    #[test]
+    fn the_error_without_noise_is_the_mean() {
+        const RUNS: u64 = 40;
+        let mean = Mean::of(Carry::Platform, 1).expect("a run");
+        let other = Mean::of(Carry::Inertial, 1).expect("a run");
+        let conditions = conditions();
+        let plan = Plan::new(&scheme(Carry::Platform), &conditions).expect("a plan");
+        let start = Start::new(&plan, &conditions).expect("a start");
+        let prediction =
+            Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], 1).expect("predicted");
+        let runs: Vec<Mean> = (0..RUNS)
+            .map(|seed| {
+                let record = run(&plan, &conditions, &start, &prediction, seed).expect("a run");
+                Mean { plan: plan.clone(), record }
+            })
+            .collect();
+        for sample in [10, 100, 101, 150, 200] {
+            for name in ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_IY", "D_SX", "D_SZ"] {
+                let errors: Vec<f64> = runs.iter().map(|r| r.error(name, sample)).collect();
+                let average = errors.iter().sum::<f64>() / RUNS as f64;
+                let square = errors.iter().map(|e| (e - average).powi(2)).sum::<f64>() / (RUNS - 1) as f64;
+                let band = 4.0 * (square / RUNS as f64).sqrt();
+                let found = mean.error(name, sample);
+                assert!((average - found).abs() < band, "{name} {sample}: {average} {found} {band}");
+                if name == "D_FZ" && sample == 200 {
+                    assert!((average - other.error(name, sample)).abs() > band);
+                }
+            }
+        }
+    }
+
+    /// When an estimate has settled, looked at sample by sample.
+    #[test]
+    fn settled_means_from_then_on() {
+        for carry in [Carry::Platform, Carry::Inertial] {
+            let mean = Mean::of(carry, 1).expect("a run");
+            let traces = &mean.record.traces;
+            for (i, name) in traces.names.iter().enumerate() {
+                let truth = traces.series[i].truth[0] / traces.scales[i];
+                for segment in [0, 1] {
+                    let within =
+                        |k: usize| mean.error(name, k).abs().max(mean.sigma(name, k)) <= truth.abs() / 100.0;
+                    let own: Vec<usize> =
+                        (0..traces.time.len()).filter(|k| traces.position[*k] == segment).collect();
+                    let since = own.iter().find(|k| own.iter().all(|l| l < *k || within(*l)));
+                    let expected = since.map(|k| traces.time[*k] - 1000.0 * segment as f64);
+                    assert_eq!(mean.settled(name, segment), expected, "{carry}: {name} {segment}");
+                }
+            }
+            // and by hand: noise of Z of one sample is 0.6 % of psi(0), a first-order coefficient is not told in segment 1
+            assert_eq!((mean.settled("psi_x", 0), mean.settled("D_FX", 0)), (Some(10.0), None));
+        }
+    }
 }
