@@ -214,13 +214,18 @@ mod tests {
             ("section 2.2", "at least two", "suffice under platform carry, not under inertial, reset carry"),
             ("conclusion 2", "", "1 1 1 at 5 under platform, 1 1 1 at 6 under platform"),
             ("conclusion 2", "", "2 2 2 at 6 under inertial"),
+            ("conclusion 2", "", "at a pole it is in no derivative"),
             // 15.0411 cos(28.2 deg) 0.1 pi/180 and 15.0411 0.1 pi/180
             (
                 "section 3.3",
                 "D_FZ quickly",
                 "-wN psi_y(0) is -0.02314 deg/h, with the whole earth rate -0.02625",
             ),
-            ("section 3.3", "D_FY and D_IY", "degrees of D_FY, D_IY: degree 2, degree 2"),
+            (
+                "section 3.3",
+                "D_FY and D_IY",
+                "degree 1, not observable, degree 1, degree 1, degree 2, degree 2",
+            ),
         ] {
             let found = reason(place, claim);
             assert!(found.contains(numbers), "{place}: {found}");
