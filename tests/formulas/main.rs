@@ -454,7 +454,7 @@ fn asked(mut worker: Option<&mut Worker>) {
         ),
         (
             &["20,0,0", "180,0,0"],
-            &["D_FX + sin(20 deg)/(1+cos(20 deg))*D_OX", "cos(110 deg)*(D_FX+D_SX) - 2.5*psi_x*wU"],
+            &["D_FX - sin(-20 deg)/(1+cos(-20 deg))*D_OX", "cos(110 deg)*(D_FX+D_SX) - 2.5*psi_x*wU"],
         ),
         (
             &["alpha,0,0", "alpha,0,180"],

@@ -239,10 +239,10 @@ fn text_of(expression: &Expression, names: &Names<'_>, unknown: &str) -> String 
             Node::Name(name) if name == "wN" || name == "wU" || name == unknown => Text.one(),
             Node::Name(_) => Text.zero(),
             Node::Call { function, argument } => {
-                let angle = match &expression.nodes[*argument] {
-                    Node::Name(name) => names.cos_sin(name),
-                    _ => None,
-                };
+                let angle = expression.angle_at(*argument).and_then(|(name, minus)| {
+                    let (c, s) = names.cos_sin(name)?;
+                    Some((c, if minus { Text.neg(&s) } else { s }))
+                });
                 match (function, angle, integer(*argument).and_then(square_root)) {
                     (Function::Cos, Some((c, _)), _) => c,
                     (Function::Sin, Some((_, s)), _) => s,

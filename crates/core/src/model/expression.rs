@@ -161,10 +161,11 @@ impl Expression {
         self.spans.last().cloned().unwrap_or(0..0)
     }
 
-    /// The name that an operation is.
-    fn name_at(&self, i: usize) -> Option<&str> {
+    /// The name that an operation is, and whether it has a minus.
+    pub fn angle_at(&self, i: usize) -> Option<(&str, bool)> {
         match &self.nodes[i] {
-            Node::Name(name) => Some(name),
+            Node::Name(name) => Some((name, false)),
+            Node::Negate(a) => self.angle_at(*a).map(|(name, minus)| (name, !minus)),
             _ => None,
         }
     }
@@ -194,9 +195,11 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
     let mut values: Vec<u64> = Vec::with_capacity(expression.nodes.len());
     // what only names an angle, or is an exponent, needs no value
     let mut arguments = vec![false; expression.nodes.len()];
-    for node in &expression.nodes {
-        if let Node::Call { argument, .. } = node {
-            arguments[*argument] = true;
+    for (i, node) in expression.nodes.iter().enumerate().rev() {
+        match node {
+            Node::Call { argument, .. } => arguments[*argument] = true,
+            Node::Negate(a) => arguments[*a] |= arguments[i],
+            _ => (),
         }
     }
     for (i, node) in expression.nodes.iter().enumerate() {
@@ -216,20 +219,30 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
                 f.mul(from_i128(f, *mantissa), if *decimals < 0 { ten } else { f.inv(ten) })
             }
             Node::Name(_) if arguments[i] => 0,
+            Node::Name(name) if name.ends_with(" deg") => {
+                return Err(ExpressionError::Syntax {
+                    expected: "angles in sin or cos only",
+                    found: format!("`{name}`"),
+                    span: span(),
+                });
+            }
             Node::Name(name) => env.name(name).ok_or_else(|| unknown(name))?,
             Node::Call { function, argument } => {
                 let angle = || {
-                    let Some(angle) = expression.name_at(*argument) else {
+                    let Some((angle, minus)) = expression.angle_at(*argument) else {
                         return Err(syntax(*argument, "the name of an angle, or one such as `20 deg`"));
                     };
-                    env.cos_sin(angle).ok_or_else(|| match angle.ends_with(" deg") {
-                        true => ExpressionError::Syntax {
-                            expected: "an angle that the scheme has",
-                            found: format!("`{angle}`"),
-                            span: expression.spans[*argument].clone(),
-                        },
-                        false => unknown(angle),
-                    })
+                    let known = env.cos_sin(angle);
+                    let (c, s) =
+                        known.ok_or_else(|| match angle.ends_with(" deg") || env.name(angle).is_some() {
+                            true => ExpressionError::Syntax {
+                                expected: "an angle that the scheme has",
+                                found: format!("`{angle}`"),
+                                span: expression.spans[*argument].clone(),
+                            },
+                            false => unknown(angle),
+                        })?;
+                    Ok((c, if minus { f.neg(s) } else { s }))
                 };
                 match function {
                     Function::Cos => angle()?.0,
@@ -406,7 +419,8 @@ mod tests {
         let angle = "expected the name of an angle, or one such as `20 deg`, found something else";
         assert_eq!(wrong("sin(2)"), angle);
         assert_eq!(wrong("sin(2.5 deg)"), "expected an angle that the scheme has, found `2.5 deg`");
-        assert_eq!(wrong("2 deg"), "`2 deg` is not known here");
+        assert_eq!(wrong("2 deg"), "expected angles in sin or cos only, found `2 deg`");
+        assert_eq!(wrong("sin(x)"), "expected an angle that the scheme has, found `x`");
         assert_eq!(
             wrong("tan(alpha)"),
             "expected sin or cos of an angle, or a square root, found something else"
