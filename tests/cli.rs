@@ -253,7 +253,7 @@ fn a_file_of_the_other_kind_is_named() {
 /// Ranges of numbers are those of the help.
 #[test]
 fn the_help_states_the_ranges() {
-    use obsdeg_core::simulation::ranges;
+    use obsdeg_core::model::ranges;
     let help = stdout(&run(&["simulate", "--help"])).split_whitespace().collect::<Vec<_>>().join(" ");
     for range in [
         ranges::DWELL_S,

@@ -1,9 +1,10 @@
 //! Laws that hold for every scheme, on random ones.
 
-use obsdeg_core::analysis::{AnalysisError, Options, Status, analyze};
+use obsdeg_core::analysis::{AnalysisError, Options, analyze};
 use obsdeg_core::degree::ensemble::{judge, staircase};
 use obsdeg_core::degree::rows::DerivativeRows;
 use obsdeg_core::degree::staircase::{Degrees, climb};
+use obsdeg_core::degree::status::Status;
 use obsdeg_core::model::platform::{Platform, RandomValues};
 use obsdeg_core::model::scheme::Scheme;
 use obsdeg_core::model::{Angle, Carry};

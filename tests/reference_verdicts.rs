@@ -1,6 +1,7 @@
 //! The reference verdicts: rank profiles and degrees that were derived independently of this program.
 
-use obsdeg_core::analysis::{Analysis, Options, Status, analyze};
+use obsdeg_core::analysis::{Analysis, Options, analyze};
+use obsdeg_core::degree::status::Status;
 use obsdeg_core::model::attitude::{cardinal, cardinal_names};
 use obsdeg_core::model::scheme::{Scheme, parse_attitude};
 use obsdeg_core::model::{Carry, Unknowns};

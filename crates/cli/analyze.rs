@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::{AnalysisError, Options, analyze};
+use obsdeg_core::solution::requested::CombinationError;
 use obsdeg_core::solution::solver::Frame;
 use obsdeg_core::system::analyze_system;
 
@@ -100,7 +101,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     drop(spinner);
     rest(worker.as_mut());
     let analysis = analysed.map_err(|e| match e {
-        AnalysisError::Combination { text, reason, span } => {
+        AnalysisError::Combination(CombinationError { text, reason, span }) => {
             Failure::at(&format!("combination: {reason}"), "--combination", &text, span)
         }
         AnalysisError::Scheme(e) => Failure::input(e.to_string()),

@@ -2,9 +2,9 @@
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::model::Scheme;
+use obsdeg_core::model::ranges::{self, Range};
+use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth};
 use obsdeg_core::simulation::Conditions;
-use obsdeg_core::simulation::conditions::{Assignment, DriftNoise, Propagation, Settings, Truth};
-use obsdeg_core::simulation::ranges::{self, Range};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TruthArgument {

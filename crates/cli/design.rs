@@ -8,10 +8,10 @@ use clap::{Args, ValueEnum};
 use obsdeg_core::design::answer::Found;
 use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design, scheme_found};
 use obsdeg_core::model::angle::parse_decimal;
+use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_core::simulation::Conditions;
-use obsdeg_core::simulation::ranges::SLEW_RATE_DEG_S;
 use obsdeg_report::{File, Format, Layout, ReportError, design_figures, visible};
 
 use crate::arguments::{FolderArguments, read_scheme};

@@ -7,6 +7,7 @@ use clap::Args;
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::prediction::PredictionError;
 use obsdeg_core::simulation::{SimulationError, Traces, simulate};
+use obsdeg_core::solution::requested::CombinationError;
 use obsdeg_core::system::simulate_system;
 use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
 
@@ -101,11 +102,9 @@ fn files(json: Result<String, ReportError>, traces: &Traces) -> Result<Vec<File>
 /// What is wrong with the input, or with the program.
 pub(crate) fn failure(e: SimulationError) -> Failure {
     match e {
-        SimulationError::Prediction(PredictionError::Analysis(AnalysisError::Combination {
-            text,
-            reason,
-            span,
-        })) => Failure::at(&format!("combination: {reason}"), "--combination", &text, span),
+        SimulationError::Prediction(PredictionError::Analysis(AnalysisError::Combination(
+            CombinationError { text, reason, span },
+        ))) => Failure::at(&format!("combination: {reason}"), "--combination", &text, span),
         SimulationError::Filter(e) if e.is_numeric() => Failure::input(format!(
             "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
         )),

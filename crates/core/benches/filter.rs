@@ -3,8 +3,9 @@
 use divan::{Bencher, black_box};
 use obsdeg_core::crosscheck::monte_carlo::{Experiment, Prepared};
 use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_core::simulation::conditions::{Conditions, Truth};
+use obsdeg_core::simulation::conditions::Conditions;
 use obsdeg_core::simulation::plan::Plan;
 use obsdeg_core::simulation::record::Start;
 use obsdeg_ekf::Form;

@@ -1,12 +1,13 @@
 //! What the exact engine says of a scheme, as numbers that a filter can be held against.
 
 use crate::accuracy::{Accuracy, AccuracyError};
-use crate::analysis::requested::requested_combinations;
-use crate::analysis::{AnalysisError, Status, few_enough, verdict};
+use crate::analysis::{AnalysisError, few_enough};
 use crate::degree::coefficient::Coefficient;
 use crate::degree::ensemble::judge;
-use crate::degree::verdict::{combinations, null_space, partners};
+use crate::degree::status::{Status, Verdict};
 use crate::model::Platform;
+use crate::solution::combinations::{combinations, null_space, partners};
+use crate::solution::requested::requested_combinations;
 use crate::solution::solver::{Frame, Solver, Sparse};
 
 /// A linear combination of unknowns: `(unknown, coefficient)` in SI units.
@@ -87,7 +88,7 @@ impl Prediction {
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
         few_enough(platform).map_err(AnalysisError::from)?;
         let verdicts = judge(platform, seed).map_err(AnalysisError::from)?;
-        let requested = requested_combinations(platform, &verdicts, seed)?;
+        let requested = requested_combinations(platform, &verdicts, seed).map_err(AnalysisError::from)?;
         let accuracy = match Accuracy::new(platform, &verdicts, seed) {
             Err(AccuracyError::Rotation) => None,
             other => Some(other?),
@@ -103,7 +104,7 @@ impl Prediction {
             .into_iter()
             .enumerate()
             .map(|(c, partners)| {
-                let v = verdict(&verdicts.degrees, c);
+                let v = Verdict::of(&verdicts.degrees, c);
                 let accuracy_order = accuracy.as_ref().and_then(|a| a.order[c]);
                 let order_at_end = accuracy.as_ref().and_then(|a| a.order_at_end[c]);
                 PredictedUnknown {

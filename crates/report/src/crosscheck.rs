@@ -152,10 +152,7 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
                 .into(),
         );
     }
-    if !c.passed
-        && !c.validity.holds
-        && c.conditions.truth == obsdeg_core::simulation::conditions::Truth::Exact
-    {
+    if !c.passed && !c.validity.holds && c.conditions.truth == obsdeg_core::model::settings::Truth::Exact {
         lead.push(format!(
             "the truth is exact and the drifts are too large for the linear model: |psi| reaches {} deg, so (6) leaves out {} times the noise of Z",
             number(c.validity.largest_psi_deg),

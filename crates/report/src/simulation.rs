@@ -1,7 +1,7 @@
 //! One run of the filter.
 
+use obsdeg_core::model::settings::{Propagation, Truth};
 use obsdeg_core::simulation::answer::{ConditionsReport, Estimate, Simulation, TimelineReport, Validity};
-use obsdeg_core::simulation::conditions::{Propagation, Truth};
 
 use crate::document::{Block, Document, number, optional};
 use crate::words;

@@ -1,7 +1,7 @@
 //! Any system.
 
-use obsdeg_core::analysis::Status;
 use obsdeg_core::crosscheck::answer::Check;
+use obsdeg_core::degree::status::Status;
 use obsdeg_core::simulation::answer::Outcome;
 use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination, SystemQuantity};
 use obsdeg_core::system::evidence::{SystemEvidence, SystemQuantityEvidence};

@@ -1,7 +1,8 @@
 //! The table for the terminal.
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
-use obsdeg_core::analysis::{Analysis, Status};
+use obsdeg_core::analysis::Analysis;
+use obsdeg_core::degree::status::Status;
 
 use crate::{Layout, visible, words};
 

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::analysis::{Analysis, CarryReport, Difference, Quantity, Solution, Status, Verdict};
+use obsdeg_core::analysis::{Analysis, CarryReport, Quantity, Solution};
 use obsdeg_core::degree::coefficient::Form;
+use obsdeg_core::degree::status::{Difference, Status, Verdict};
+use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_core::requirements::{Miss, Requirements};
-use obsdeg_core::simulation::answer::{MeasurementReport, Turn};
+use obsdeg_core::simulation::answer::MeasurementReport;
 use obsdeg_core::simulation::consistency::{Consistency, Doubt};
 use obsdeg_core::solution::solver::{Frame, Verification};
 

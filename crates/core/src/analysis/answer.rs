@@ -4,34 +4,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::degree::coefficient::Form;
+use crate::degree::status::{Difference, Status};
 use crate::model::Carry;
 use crate::model::geometry::Geometry;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
 use crate::solution::solver::{Frame, Solved, Verification};
-
-/// Whether an unknown can be solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// It is in the span of the derivative rows.
-    Observable,
-    /// It moves Z, but only together with its partners.
-    Inseparable,
-    /// It does not move Z at all.
-    NotExcited,
-}
-
-impl std::fmt::Display for Status {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Observable => "observable",
-            Self::Inseparable => "inseparable",
-            Self::NotExcited => "not excited",
-        })
-    }
-}
 
 /// The answer for one scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -204,26 +183,6 @@ pub struct CarryReport {
     pub unknowns: usize,
     /// The unknowns of both carries whose verdict differs.
     pub differs: Vec<Difference>,
-}
-
-/// A verdict that depends on the carry.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Difference {
-    /// The unknown.
-    pub name: String,
-    /// Under the carry of the scheme.
-    pub here: Verdict,
-    /// Under the other one.
-    pub there: Verdict,
-}
-
-/// Status and degree.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct Verdict {
-    /// Whether it can be solved.
-    pub status: Status,
-    /// The observable degree.
-    pub degree: Option<usize>,
 }
 
 /// How certain the verdicts are.

@@ -1,9 +1,6 @@
 //! The main job: everything that is said about one scheme, as plain data.
 
 mod answer;
-pub(crate) mod requested;
-
-use std::ops::Range;
 
 use obsdeg_symbolic::{Worker, WorkerError};
 
@@ -12,17 +9,18 @@ pub use answer::*;
 use crate::accuracy::Accuracy;
 use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::{EnsembleError, Verdicts, degrees, judge};
-use crate::degree::staircase::Degrees;
-use crate::degree::verdict::{Combination, NullVector, combinations, null_space, partners};
+use crate::degree::status::{Difference, Status, Verdict};
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::Platform;
 use crate::model::ring::Float;
+use crate::model::scheme::MAX_UNKNOWNS;
 use crate::model::{Angle, Carry, Scheme, SchemeError, Unknowns};
+use crate::solution::combinations::{Combination, NullVector, combinations, null_space, partners};
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
 use crate::solution::print::{StationLabel, stations, terms, text};
+use crate::solution::requested::{CombinationError, Requested, requested_combinations};
 use crate::solution::solver::{Frame, Functional, Solver};
-use requested::{Requested, requested_combinations};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.analysis/1";
@@ -56,15 +54,8 @@ pub enum AnalysisError {
     #[error(transparent)]
     Verdict(#[from] EnsembleError),
     /// A combination is no linear combination of the unknowns.
-    #[error("combination `{text}`: {reason}")]
-    Combination {
-        /// As written.
-        text: String,
-        /// What is wrong.
-        reason: String,
-        /// Where in the text.
-        span: Range<usize>,
-    },
+    #[error(transparent)]
+    Combination(#[from] CombinationError),
 }
 
 /// Analyses `scheme`. The worker, if given, is started only when formulas are wanted.
@@ -135,9 +126,6 @@ pub fn analyze(
     })
 }
 
-/// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.
-pub const MAX_UNKNOWNS: usize = 1000;
-
 /// Refuses more unknowns than an analysis takes, before anything grows.
 pub(crate) fn few_enough(platform: &Platform) -> Result<(), SchemeError> {
     let found = platform.names().len();
@@ -205,7 +193,7 @@ fn quantities(
 
     let mut out = Vec::new();
     for (c, name) in platform.names().iter().enumerate() {
-        let Verdict { status, degree } = verdict(&verdicts.degrees, c);
+        let Verdict { status, degree } = Verdict::of(&verdicts.degrees, c);
         let unit = printer.solver.functional(vec![(c, Coefficient::one())]);
         let solution = degree.and_then(|k| printer.solution(unit.as_ref()?, k, name));
         let elsewhere = Elsewhere {
@@ -291,16 +279,6 @@ fn engine_note(built: bool, solver: &mut Solver<'_>) -> Option<String> {
     ))
 }
 
-pub(crate) fn verdict(degrees: &Degrees, column: usize) -> Verdict {
-    let degree = degrees.degree[column];
-    let status = match degree {
-        Some(_) => Status::Observable,
-        None if degrees.excited[column] => Status::Inseparable,
-        None => Status::NotExcited,
-    };
-    Verdict { status, degree }
-}
-
 fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, AnalysisError> {
     Ok(degrees(&Platform::new(scheme.clone())?, seed)?.degree)
 }
@@ -356,7 +334,7 @@ fn carry_reports(
         let there = degrees(&other, seed)?;
         let differs = platform.names().iter().enumerate().filter_map(|(c, name)| {
             let d = other.names().iter().position(|n| n == name)?;
-            let (here, there) = (verdict(&verdicts.degrees, c), verdict(&there, d));
+            let (here, there) = (Verdict::of(&verdicts.degrees, c), Verdict::of(&there, d));
             (here != there).then(|| Difference { name: name.clone(), here, there })
         });
         out.push(CarryReport {

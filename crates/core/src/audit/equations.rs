@@ -9,6 +9,7 @@ use crate::model::attitude::Matrix3;
 use crate::model::expression::{Environment, ExpressionError, evaluate, parse};
 use crate::model::platform::{LOCAL, Platform, RandomValues, local_dynamics, local_output};
 use crate::model::scheme::{Scheme, parse_attitude};
+use crate::solution::requested::CombinationError;
 
 /// Random points at which an identity is tested, each in a random prime field of its own.
 const POINTS: usize = 6;
@@ -27,12 +28,12 @@ pub(super) struct At {
 impl At {
     /// The value of a formula.
     pub(super) fn value(&self, text: &str) -> Result<u64, AnalysisError> {
-        let wrap = |e: ExpressionError| AnalysisError::Combination {
+        let wrap = |e: ExpressionError| CombinationError {
             text: text.into(),
             reason: e.to_string(),
             span: e.span(),
         };
-        evaluate(&parse(text).map_err(wrap)?, &self.field, self).map_err(wrap)
+        Ok(evaluate(&parse(text).map_err(wrap)?, &self.field, self).map_err(wrap)?)
     }
 
     /// The values of three formulas.

@@ -5,10 +5,11 @@
 
 use super::claims::{Judged, PAPER, positions, segment_1, show};
 use super::{AuditError, Finding, Line, finding, line};
+use crate::model::settings::{DriftNoise, Propagation, Truth};
+use crate::model::slew::W_IE;
 use crate::model::{Carry, Scheme};
 use crate::prediction::Prediction;
-use crate::simulation::conditions::{Conditions, DriftNoise, Propagation, Truth};
-use crate::simulation::plan::W_IE;
+use crate::simulation::conditions::Conditions;
 use crate::simulation::record::{Record, Series, Start, run};
 use crate::simulation::{Plan, SimulationError, simulate};
 

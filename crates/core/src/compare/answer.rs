@@ -3,10 +3,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::analysis::Status;
+use crate::degree::status::Status;
 use crate::model::Carry;
+use crate::model::slew::Turn;
 use crate::requirements::{Claim, Miss, Requirements};
-use crate::simulation::answer::{MeasurementReport, Turn};
+use crate::simulation::answer::MeasurementReport;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.comparison/1";

@@ -8,16 +8,17 @@ use rayon::prelude::*;
 
 pub use answer::Comparison;
 
-use crate::analysis::Status;
+use crate::degree::status::Status;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
+use crate::model::settings::DriftNoise;
+use crate::model::slew;
 use crate::model::{Carry, Platform, Position, Scheme};
 use crate::prediction::Prediction;
 use crate::requirements::Requirements;
 use crate::simulation::answer::MeasurementReport;
-use crate::simulation::attitude_path;
 use crate::simulation::batch::{batch, diffuse_prior};
-use crate::simulation::conditions::{Conditions, DriftNoise, resolve, shown_unit, si_per_shown};
+use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::plan::MAX_UNKNOWNS;
 use crate::simulation::{Plan, SimulationError};
 use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
@@ -216,7 +217,7 @@ fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
         let Some(turn) = &position.rotation else {
             return squares(&plan.attitudes[i]).iter().map(|x| x.sqrt()).collect();
         };
-        let arc = attitude_path::Slew::about(&plan.attitudes[i], turn, 1.0);
+        let arc = slew::Slew::about(&plan.attitudes[i], turn, 1.0);
         let mut mean = vec![0.0; platform.coefficients()];
         for (t, weight) in quadrature(arc.rate.iter().map(|x| x * x).sum::<f64>().sqrt()) {
             for (m, x) in mean.iter_mut().zip(squares(&arc.at(t))) {

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::analysis::Status;
+use crate::degree::status::Status;
 use crate::model::Carry;
 use crate::simulation::answer::{ConditionsReport, TimelineReport, Validity};
 

@@ -2,10 +2,11 @@
 
 use obsdeg_ekf::SquareRootInformation;
 
+use crate::model::settings::DriftNoise;
 use crate::model::{Dwell, Scheme, SchemeError};
 use crate::simulation::SimulationError;
 use crate::simulation::batch::{batch, diffuse_prior};
-use crate::simulation::conditions::{Conditions, DriftNoise};
+use crate::simulation::conditions::Conditions;
 use crate::simulation::plan::Plan;
 
 /// The dwells at which the slope is measured, in s: so short that the highest order outweighs the lower ones, long against

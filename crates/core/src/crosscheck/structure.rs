@@ -8,9 +8,10 @@ use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 use super::answer::{Check, Correlation, Count, NullEvidence, QuantityEvidence, SlopeCurve};
 use super::slopes::{self, slopes};
 use crate::model::Scheme;
+use crate::model::settings::DriftNoise;
 use crate::prediction::{Combination, Prediction};
 use crate::simulation::batch::{batch, diffuse_prior};
-use crate::simulation::conditions::{DriftNoise, shown_unit, si_per_shown};
+use crate::simulation::conditions::{shown_unit, si_per_shown};
 use crate::simulation::record::Start;
 use crate::simulation::{Conditions, Plan, SimulationError};
 

@@ -1,16 +1,13 @@
 //! Two random fields in four embeddings each: what verdicts agree in and coefficients are recovered from.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
-use obsdeg_exact::radical::embeddings;
-use obsdeg_exact::{Echelon, PrimeError, RootField};
+use obsdeg_exact::{Echelon, PrimeError};
 
 use super::platform_rows::PlatformRows;
 use super::reset::reset_degrees;
 use super::staircase::{Degrees, climb};
 use crate::model::platform::{RandomValues, Sample};
 use crate::model::{Carry, Platform, Unknowns};
-use crate::solution::local::{LocalObservable, RateZeros, local_observables, rows_at};
-use crate::solution::turning::motion_rows;
 
 /// How many pairs of fields are drawn before a disagreement is an error.
 const ATTEMPTS: usize = 4;
@@ -107,101 +104,6 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
         row_degree: orders + if generic { 18 } else { 0 },
         // |entry| <= 6, denominators 2^9, 15 entries of norm at most sqrt(15) together, w/ margin
         row_bits: 16.0,
-    }
-}
-
-/// The rows of the local observables of every position, in one field and embedding.
-#[derive(Debug, Clone)]
-pub struct Table {
-    /// Field and embedding.
-    pub sample: Sample,
-    /// One row per station and local observable, station by station; then, if the scheme rotates, one per station of
-    /// [`motion_rows`].
-    pub rows: Vec<Vec<u64>>,
-}
-
-impl Table {
-    /// The values of `(wN, wU)`.
-    pub fn rates(&self) -> [u64; 2] {
-        [self.sample.point.w_n, self.sample.point.w_u]
-    }
-}
-
-/// The observable rows of a scheme in two fields, four embeddings each, with random rates: a formula in
-/// `wN` and `wU` that holds there holds at every latitude with the same zeros.
-#[derive(Debug, Clone)]
-pub struct Tables {
-    /// The observables of one position.
-    pub observables: Vec<LocalObservable>,
-    /// How many rows are those of local observables.
-    pub observable_rows: usize,
-    /// Zeros of the rates.
-    pub zeros: RateZeros,
-    /// `tables[field][embedding]`.
-    pub tables: [[Table; 4]; 2],
-    /// The first field and embedding at other rates.
-    pub other_rates: Table,
-}
-
-impl Tables {
-    /// The tables of `platform` in the fields of `verdicts`.
-    pub fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Self {
-        let scheme = platform.scheme();
-        let zeros = RateZeros::of(platform);
-        let observables = local_observables(zeros, scheme.measured_azimuth);
-        let mut rng = scheme.random(seed, "other rates");
-        let mut rates = |roots: &RootField| {
-            let p = roots.field.modulus();
-            let mut draw = |zero: bool| if zero { 0 } else { 1 + rng.below(p - 1) };
-            [draw(zeros.w_n), draw(zeros.w_u)]
-        };
-        let table = |values: &RandomValues, a: u64, [w_n, w_u]: [u64; 2]| {
-            let mut sample = values.sample(scheme, a);
-            (sample.point.w_n, sample.point.w_u) = (w_n, w_u);
-            let mut rows = rows_at(platform, &sample.point, &observables);
-            rows.extend(motion_rows(platform, &sample.point));
-            Table { sample, rows }
-        };
-        // the rates of the verdicts, so that vectors of the stairs are vectors of the first table
-        let tables = [0, 1].map(|i| {
-            let values = &verdicts.values[i];
-            let point = values.sample(scheme, 1).point;
-            embeddings(values.roots().order).map(|a| table(values, a, [point.w_n, point.w_u]))
-        });
-        let first = &verdicts.values[0];
-        let other_rates = table(first, 1, rates(first.roots()));
-        let observable_rows = scheme.stations().len() * observables.len();
-        Self { observables, observable_rows, zeros, tables, other_rates }
-    }
-
-    /// The two fields.
-    pub fn fields(&self) -> [RootField; 2] {
-        [self.tables[0][0].sample.roots, self.tables[1][0].sample.roots]
-    }
-
-    /// The derivative order of a row.
-    pub fn order(&self, row: usize) -> usize {
-        self.observables[row % self.observables.len()].order
-    }
-
-    /// The station of a row.
-    pub fn station(&self, row: usize) -> usize {
-        row / self.observables.len()
-    }
-
-    /// The row of [`motion_rows`] of a station.
-    pub fn motion_row(&self, station: usize) -> usize {
-        self.observable_rows + station
-    }
-
-    /// The rows of local observables of order up to `degree`.
-    pub fn rows_up_to(&self, degree: usize) -> Vec<usize> {
-        (0..self.observable_rows).filter(|&j| self.order(j) <= degree).collect()
-    }
-
-    /// The first field and embedding.
-    pub fn first(&self) -> &Table {
-        &self.tables[0][0]
     }
 }
 

@@ -7,4 +7,4 @@ mod reset;
 pub mod rows;
 pub mod sparse;
 pub mod staircase;
-pub mod verdict;
+pub mod status;

@@ -8,10 +8,11 @@ use super::ways::{Stop, Way};
 use crate::model::attitude::{Euler, Matrix3, c_n};
 use crate::model::platform::{LOCAL, local_dynamics, local_output};
 use crate::model::ring::Float;
+use crate::model::slew::W_IE;
 use crate::model::{Carry, Gimbals, Platform, Scheme};
 use crate::simulation::SimulationError;
 use crate::simulation::conditions::{Conditions, latitude_of, si_per_shown};
-use crate::simulation::plan::{Plan, W_IE, steps};
+use crate::simulation::plan::{Plan, steps};
 
 /// Most unknowns of a search: psi and the coefficients of ten terms.
 pub const MAX: usize = 33;

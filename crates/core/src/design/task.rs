@@ -14,9 +14,10 @@ use super::{Design, DesignError, EXHAUSTIVE, Kind, Options, refine};
 use crate::accuracy::Accuracy;
 use crate::degree::ensemble::judge;
 use crate::model::attitude::Euler;
+use crate::model::settings::concerns;
 use crate::model::{Platform, Scheme, Unknowns};
 use crate::requirements::{Claim, Miss, Requirements};
-use crate::simulation::conditions::{Conditions, concerns, latitude_of, resolve};
+use crate::simulation::conditions::{Conditions, latitude_of, resolve};
 
 /// Most sets whose keys are held.
 const MOST_SETS: u64 = 5_000_000;

@@ -7,8 +7,8 @@ use super::information::Evaluator;
 use crate::model::SlewTo;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
-use crate::simulation::answer::Turn;
-use crate::simulation::attitude_path::Slew;
+use crate::model::slew::Slew;
+use crate::model::slew::Turn;
 
 /// Most candidates when it takes time to turn from one to another.
 pub const MAX_TURNING: usize = 256;

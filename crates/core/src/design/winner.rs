@@ -3,8 +3,9 @@
 use super::DesignError;
 use super::answer::Found;
 use crate::model::scheme::parse_attitude;
+use crate::model::settings::Settings;
 use crate::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo};
-use crate::simulation::conditions::{Conditions, Settings, latitude_of};
+use crate::simulation::conditions::{Conditions, latitude_of};
 
 /// Half a turn in degrees.
 const HALF: i32 = 180;

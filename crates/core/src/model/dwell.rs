@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::angle::{format_decimal, parse_decimal};
-use crate::simulation::ranges::DWELL_S;
+use crate::model::ranges::DWELL_S;
 
 /// The time spent at a position, an exact decimal of seconds.
 ///

@@ -6,7 +6,7 @@ use super::angle::{format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, c_n};
 use super::ring::Float;
 use super::scheme::Position;
-use crate::simulation::attitude_path::Slew;
+use crate::model::slew::Slew;
 
 /// A turn in 1e-9 degrees.
 const TURN: i64 = 360_000_000_000;

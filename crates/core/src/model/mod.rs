@@ -3,6 +3,7 @@
 pub mod angle;
 pub mod attitude;
 mod canonical;
+pub(crate) mod combination;
 pub mod dwell;
 pub mod expression;
 pub(crate) mod file_error;
@@ -10,10 +11,14 @@ pub mod geometry;
 pub mod gimbals;
 mod parser;
 pub mod platform;
+pub mod ranges;
 pub mod ring;
 pub mod rotation;
 pub mod scheme;
 pub mod scheme_file;
+pub mod settings;
+pub mod slew;
+pub mod symbols;
 
 pub use angle::{Angle, AngleError};
 pub use dwell::Dwell;

@@ -14,8 +14,9 @@ use super::geometry::{Geometry, Unknowns};
 use super::gimbals::Gimbals;
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
-use crate::simulation::conditions::{self, Settings};
-use crate::simulation::ranges::{self, RangeError};
+use crate::model::ranges::{self, RangeError};
+use crate::model::settings;
+use crate::model::settings::Settings;
 
 /// What is carried from one position to the next (the paper does not say).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -284,6 +285,9 @@ pub struct Scheme {
     pub gimbals: Gimbals,
 }
 
+/// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.
+pub const MAX_UNKNOWNS: usize = 1000;
+
 /// Why a scheme cannot be analysed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SchemeError {
@@ -299,7 +303,7 @@ pub enum SchemeError {
     /// More unknowns than an analysis takes.
     #[error(
         "{found} unknowns; expected at most {} (under reset carry every position has three of its own)",
-        crate::analysis::MAX_UNKNOWNS
+        MAX_UNKNOWNS
     )]
     TooManyUnknowns {
         /// Their number.
@@ -515,7 +519,7 @@ impl Scheme {
     fn validate_numbers(&self) -> Result<(), SchemeError> {
         let lists = self.simulation.lists().map(|(key, list, _)| (format!("simulation.{key}"), list));
         for (key, list) in lists.into_iter().chain([("requirements".into(), &self.requirements)]) {
-            if let Some(name) = list.keys().find(|name| !conditions::may_be_unknown(name)) {
+            if let Some(name) = list.keys().find(|name| !settings::may_be_unknown(name)) {
                 return Err(SchemeError::UnknownName { key: format!("{key}.{name}"), name: excerpt(name) });
             }
         }
@@ -598,5 +602,26 @@ impl Scheme {
             }
         }
         names
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A scheme that no file was read for is checked as well.
+    #[test]
+    fn names_of_requirements_and_settings_are_known() {
+        let zero = || std::array::from_fn(|_| Angle::from_degrees(0));
+        let scheme = Scheme::of_angles([zero()]);
+        assert_eq!(scheme.validate(), Ok(()));
+        let known = |name: &str| [(name.to_string(), 0.1)].into();
+        let wrong = Scheme { requirements: known("D_QX"), ..scheme.clone() };
+        let error = SchemeError::UnknownName { key: "requirements.D_QX".into(), name: "D_QX".into() };
+        assert_eq!(wrong.validate(), Err(error));
+        let simulation = Settings { priors: known("psi_w"), ..Settings::default() };
+        let wrong = Scheme { simulation, ..scheme.clone() };
+        assert_eq!(wrong.validate().map_err(|e| e.key()), Err(Some("simulation.priors.psi_w".into())));
+        assert_eq!(Scheme { requirements: known("D_F"), ..scheme }.validate(), Ok(()));
     }
 }

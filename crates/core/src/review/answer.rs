@@ -4,7 +4,7 @@ use crate::analysis::Analysis;
 use crate::compare::Comparison;
 use crate::crosscheck::CrossCheck;
 use crate::design::answer::{Found, Minimum};
-use crate::simulation::answer::Turn;
+use crate::model::slew::Turn;
 use crate::simulation::{Simulation, Traces};
 use crate::system::{SystemAnalysis, SystemEvidence, SystemRun};
 

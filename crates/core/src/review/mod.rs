@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 pub use answer::{DesignReview, ModelReview, SchemeReview};
 
-use crate::analysis::{self, AnalysisError, Status, analyze};
+use crate::analysis::{self, AnalysisError, analyze};
 use crate::compare::{Entry, comparable, compare, predicted};
 use crate::crosscheck::{self, crosscheck};
+use crate::degree::status::Status;
 use crate::design::{self, Candidates, DesignError, Kind, design};
 use crate::model::{Dwell, Scheme};
 use crate::simulation::plan::Kind as Part;

@@ -3,9 +3,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::conditions::{Conditions, Propagation, Truth, latitude_of};
+use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
-use crate::analysis::Status;
+use crate::degree::status::Status;
+use crate::model::settings::{Propagation, Truth};
+use crate::model::slew::Turn;
 use crate::model::{Carry, Scheme};
 use crate::requirements::{Miss, Requirements, meets};
 
@@ -115,22 +117,6 @@ pub struct TimelineReport {
     pub end_s: f64,
     /// How a slew turns; null at a position.
     pub turn: Option<Turn>,
-}
-
-/// A turn about a fixed axis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Turn {
-    /// The axis: a unit vector (North, Up, East).
-    pub about: [f64; 3],
-    /// The angle in degrees, right-handed about the axis, above 0.
-    pub angle_deg: f64,
-}
-
-impl Turn {
-    /// Whether the opposite turn ends at the same attitude.
-    pub fn is_half(&self) -> bool {
-        self.angle_deg == 180.0
-    }
 }
 
 /// The estimate of one unknown or combination at the end of the run.

@@ -1,12 +1,10 @@
 //! A torquing scheme run through the filter: one run against one truth, and what it says.
 
 pub mod answer;
-pub(crate) mod attitude_path;
 pub mod batch;
 pub mod conditions;
 pub mod consistency;
 pub mod plan;
-pub mod ranges;
 pub mod record;
 pub mod truth;
 
@@ -17,12 +15,13 @@ pub use conditions::Conditions;
 pub use plan::Plan;
 pub use record::{Record, Start, Traces, run};
 
-use crate::analysis::Status;
+use crate::degree::status::Status;
+use crate::model::settings::DriftNoise;
 use crate::model::{Carry, Scheme, SchemeError};
 use crate::prediction::{Prediction, PredictionError};
 use crate::requirements::{Claim, Requirements, meets};
 use answer::{ConditionsReport, Estimate, Outcome, SCHEMA, TimelineReport};
-use conditions::{DriftNoise, resolve, shown_unit, si_per_shown};
+use conditions::{resolve, shown_unit, si_per_shown};
 use consistency::{Consistency, Outcomes};
 use plan::Kind;
 
@@ -99,7 +98,7 @@ pub enum SimulationError {
     },
     /// A condition beyond its range.
     #[error(transparent)]
-    Range(#[from] ranges::RangeError),
+    Range(#[from] crate::model::ranges::RangeError),
     /// A value for something that the scheme does not have.
     #[error("{what} for `{found}`: no such unknown; {known}")]
     UnknownName {

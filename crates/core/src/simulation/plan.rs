@@ -5,17 +5,17 @@ use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
 
 use super::SimulationError;
-use super::answer::Turn;
-use super::attitude_path::{Slew, times, transpose};
-use super::conditions::{Conditions, Propagation, latitude_of};
+use super::conditions::{Conditions, latitude_of};
 use crate::model::attitude::Matrix3;
 use crate::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
 use crate::model::ring::Float;
 use crate::model::scheme::Station;
+use crate::model::settings::Propagation;
+use crate::model::slew::Turn;
+use crate::model::slew::W_IE;
+use crate::model::slew::{Slew, times, transpose};
 use crate::model::{Carry, Platform, Scheme, Unknowns};
 
-/// The earth rate in rad/s.
-pub const W_IE: f64 = 7.292115e-5;
 /// Most unknowns of a run: the covariance is a full matrix.
 pub const MAX_UNKNOWNS: usize = 300;
 /// Most steps of a run.

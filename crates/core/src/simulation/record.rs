@@ -5,9 +5,11 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form};
 
 use super::SimulationError;
-use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, Truth, resolve, shown_unit, si_per_shown};
+use super::conditions::{Conditions, resolve, shown_unit, si_per_shown};
+use super::conditions::{ESTIMATE, PRIOR, TRUE_VALUE};
 use super::plan::Plan;
 use super::truth::{Noise, TruthModel, check_drifts};
+use crate::model::settings::Truth;
 use crate::prediction::Prediction;
 
 /// Where a run starts, in SI units (shape n each).

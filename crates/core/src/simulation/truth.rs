@@ -6,12 +6,14 @@ use rand_pcg::Pcg64;
 use obsdeg_exact::SplitMix64;
 
 use super::SimulationError;
-use super::attitude_path::{apply, cross, rotation, rotation_vector, times, transpose};
-use super::conditions::{Conditions, Truth};
-use super::plan::{G_N, MAX_INTEGRATION, Plan, W_IE, integration_steps};
+use super::conditions::Conditions;
+use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
 use crate::model::Carry;
 use crate::model::attitude::Matrix3;
 use crate::model::ring::Float;
+use crate::model::settings::Truth;
+use crate::model::slew::W_IE;
+use crate::model::slew::{apply, cross, rotation, rotation_vector, times, transpose};
 
 /// The stream of random numbers of one run.
 #[derive(Debug, Clone)]

@@ -6,11 +6,11 @@ use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protoc
 use super::local::ZTerm;
 use super::problem::{Outputs, Problem};
 use super::solver::{Contribution, Functional, Key, Solver, Used};
-use super::symbols::Symbols;
 use super::turning::drift_derivative;
 use crate::degree::coefficient::{Number, Rates};
 use crate::model::platform::{LOCAL, local_dynamics, local_output};
 use crate::model::ring::{Ring, Text};
+use crate::model::symbols::Symbols;
 
 impl Solver<'_> {
     pub(super) fn request(&self, system: System, check: Option<Check>) -> Request {

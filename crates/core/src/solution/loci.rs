@@ -11,9 +11,9 @@ use serde::Serialize;
 use super::half_tangent::{Roots, coefficients, roots_deg};
 use super::local::rows_at;
 use super::solver::Solver;
-use crate::analysis::{Difference, verdict};
 use crate::degree::ensemble::{Verdicts, staircase};
 use crate::degree::staircase::Degrees;
+use crate::degree::status::{Difference, Verdict};
 use crate::model::Platform;
 use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
 use crate::model::platform::{Point, RandomValues};
@@ -124,8 +124,8 @@ pub fn loci(
             .enumerate()
             .map(|(c, name)| Difference {
                 name: name.clone(),
-                here: verdict(&verdicts.degrees, c),
-                there: verdict(&there, c),
+                here: Verdict::of(&verdicts.degrees, c),
+                there: Verdict::of(&there, c),
             })
             .filter(|d| d.here != d.there)
             .collect();

@@ -11,16 +11,17 @@ use serde::Serialize;
 use super::problem::{Motion, Problem};
 use super::substitution::{Substitution, binomial};
 use super::support::short_support;
-use super::symbols::Symbols;
 use super::turning::{attitude_derivative, motion_rows};
 use crate::degree::coefficient::{
     Coefficient, Form, Image, Number, READABLE, Rates, power, rates_between, readable, recover_radical,
 };
-use crate::degree::ensemble::{Table, Tables, Verdicts};
+use crate::degree::ensemble::Verdicts;
 use crate::model::platform::{Platform, Point};
 use crate::model::ring::{Float, Ring, Text};
 use crate::model::rotation::Axis;
+use crate::model::symbols::Symbols;
 use crate::solution::local::rows_at;
+use crate::solution::tables::{Table, Tables};
 
 /// Most angles with symbols of their own for which formulas are attempted.
 const MAX_SYMBOLIC_ANGLES: usize = 4;

@@ -7,8 +7,8 @@ use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, Start, SystemModel};
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
-use crate::analysis::Status;
 use crate::degree::sparse::{extend_by_short_vectors, support};
+use crate::degree::status::Status;
 use obsdeg_exact::Echelon;
 use obsdeg_symbolic::Worker;
 
@@ -156,11 +156,7 @@ pub(super) fn answer(
             Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
         };
         let degree = judged.degrees.degree[c];
-        let status = match degree {
-            Some(_) => Status::Observable,
-            None if judged.degrees.excited[c] => Status::Inseparable,
-            None => Status::NotExcited,
-        };
+        let status = Status::of(degree, judged.degrees.excited[c]);
         SystemQuantity {
             name: u.name.clone(),
             kind: kind.into(),

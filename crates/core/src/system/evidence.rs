@@ -14,8 +14,8 @@ use super::numeric::{FilterState, Numeric};
 use super::rows::Unknown;
 use super::run::{RunError, Setup};
 use super::symmetry::{PolynomialDirection, Symmetry, symmetries};
-use crate::analysis::Status;
 use crate::crosscheck::answer::{Check, Count};
+use crate::degree::status::Status;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system-evidence/1";
@@ -199,11 +199,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         .enumerate()
         .map(|(c, u)| {
             let degree = judged.degrees.degree[c];
-            let status = match degree {
-                Some(_) => Status::Observable,
-                None if judged.degrees.excited[c] => Status::Inseparable,
-                None => Status::NotExcited,
-            };
+            let status = Status::of(degree, judged.degrees.excited[c]);
             let predicted = degree.map_or(0.0, |k| -(k as f64 + 0.5));
             let measured = slopes[c].filter(|_| degree.is_some());
             let factor = inflated[c];

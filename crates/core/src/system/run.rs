@@ -11,7 +11,7 @@ use super::judge::judge_compiled;
 use super::model::{Compiled, ModelError, Start, SystemModel};
 use super::numeric::{FilterState, Numeric};
 use super::symmetry::Symmetries;
-use crate::analysis::Status;
+use crate::degree::status::Status;
 use crate::simulation::Traces;
 use crate::simulation::answer::Outcome;
 use crate::simulation::consistency::{Consistency, Outcomes};

@@ -1,6 +1,6 @@
 //! The part of a model in a review.
 
-use obsdeg_core::analysis::Status as Exact;
+use obsdeg_core::degree::status::Status as Exact;
 use obsdeg_core::review::ModelReview;
 use obsdeg_core::simulation::answer::Outcome;
 

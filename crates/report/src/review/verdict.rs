@@ -1,7 +1,7 @@
 //! The verdict on a scheme in words, led by what limits it, and its status at a glance.
 
-use obsdeg_core::analysis::Status as Exact;
 use obsdeg_core::compare::answer::{Quantity, Review};
+use obsdeg_core::degree::status::Status as Exact;
 use obsdeg_core::review::SchemeReview;
 use obsdeg_core::simulation::answer::Outcome;
 

@@ -7,9 +7,9 @@ use serde::Deserialize;
 use serde_spanned::Spanned;
 
 use crate::model::geometry::{Geometry, Term};
+use crate::model::ranges;
 use crate::model::scheme::Carry;
-use crate::simulation::conditions::{DriftNoise, Propagation, Truth};
-use crate::simulation::ranges;
+use crate::model::settings::{DriftNoise, Propagation, Truth};
 
 /// A number as it is written.
 pub(super) type Literal = Option<Spanned<toml::Value>>;

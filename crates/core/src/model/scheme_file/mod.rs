@@ -17,8 +17,9 @@ use super::file_error::explain;
 use super::geometry::Unknowns;
 use super::platform::Platform;
 use super::scheme::{Latitude, Scheme};
-use crate::analysis::requested;
-use crate::simulation::conditions::{self, Settings};
+use crate::model::combination;
+use crate::model::settings;
+use crate::model::settings::Settings;
 use layout::{GimbalEntry, Numbers, SimulationEntry};
 
 /// Longest scheme file, in bytes: a thousand positions with all their keys.
@@ -79,7 +80,7 @@ impl Reader<'_> {
     fn numbers(&mut self, key: &str, list: &Numbers) -> std::collections::BTreeMap<String, f64> {
         let kept = list.iter().map(|(name, x)| {
             // a name that is wrong is drawn at the name, a number at the number
-            let place = if conditions::may_be_unknown(name.get_ref()) { x.span() } else { name.span() };
+            let place = if settings::may_be_unknown(name.get_ref()) { x.span() } else { name.span() };
             self.places.insert(format!("{key}.{}", name.get_ref()), place);
             (name.get_ref().clone(), *x.get_ref())
         });
@@ -151,17 +152,16 @@ impl Reader<'_> {
         let lists = scheme.simulation.lists().map(|(key, list, _)| (format!("simulation.{key}"), list));
         for (key, list) in lists.into_iter().chain([("requirements".into(), &scheme.requirements)]) {
             let strange = list.keys().find(|name| {
-                !conditions::is_family(name)
-                    && !platform.names().iter().any(|n| conditions::concerns(name, n))
+                !settings::is_family(name) && !platform.names().iter().any(|n| settings::concerns(name, n))
             });
             if let Some(name) = strange {
-                let message = format!("`{name}`: no such unknown; {}", conditions::known(&platform, name));
+                let message = format!("`{name}`: no such unknown; {}", settings::known(&platform, name));
                 let span = self.places.get(&format!("{key}.{name}")).cloned();
                 return Err(SchemeFileError { message, span });
             }
         }
         for text in combinations {
-            requested::check(text.get_ref(), &platform)
+            combination::check(text.get_ref(), &platform)
                 .map_err(|e| self.at(self.within(text, e.span()), format!("combination: {e}")))?;
         }
         Ok(platform.into_scheme())

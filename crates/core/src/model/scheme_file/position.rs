@@ -7,9 +7,9 @@ use super::{Reader, SchemeFileError};
 use crate::model::angle::{Angle, MAX_DEGREES, parse_decimal};
 use crate::model::attitude::Euler;
 use crate::model::dwell::Dwell;
+use crate::model::ranges::DWELL_S;
 use crate::model::rotation::{AxisError, MIN_ROTATION, Rotation, SlewAxis, SlewTo, whole_angle};
 use crate::model::scheme::{Position, parse_attitude};
-use crate::simulation::ranges::DWELL_S;
 
 impl Reader<'_> {
     pub(super) fn position(

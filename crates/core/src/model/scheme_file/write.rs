@@ -5,8 +5,8 @@ use std::fmt::Write;
 
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
+use crate::model::settings::{Propagation, Settings, Truth};
 use crate::model::{Geometry, SlewAxis, Unknowns};
-use crate::simulation::conditions::{Propagation, Settings, Truth};
 
 /// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
 pub fn write(scheme: &Scheme) -> String {
@@ -164,8 +164,8 @@ fn position(out: &mut String, p: &Position) {
 mod tests {
     use super::*;
     use crate::model::scheme_file::read;
+    use crate::model::settings::DriftNoise;
     use crate::model::{Carry, Dwell, Gimbals, Rotation, SlewTo, Term};
-    use crate::simulation::conditions::DriftNoise;
     use proptest::prelude::*;
 
     fn numbers(range: std::ops::Range<i32>) -> impl Strategy<Value = BTreeMap<String, f64>> {

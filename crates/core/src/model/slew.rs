@@ -1,10 +1,30 @@
 //! The computed attitude over time: constant at a position, turning about an eigenaxis during a slew.
 
-use super::answer::Turn;
-use super::plan::W_IE;
-use crate::model::attitude::Matrix3;
-use crate::model::ring::Float;
-use crate::model::rotation::{Axis, Rotation, SlewAxis, SlewTo};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::attitude::Matrix3;
+use super::ring::Float;
+use super::rotation::{Axis, Rotation, SlewAxis, SlewTo};
+
+/// The earth rate in rad/s.
+pub const W_IE: f64 = 7.292115e-5;
+
+/// A turn about a fixed axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Turn {
+    /// The axis: a unit vector (North, Up, East).
+    pub about: [f64; 3],
+    /// The angle in degrees, right-handed about the axis, above 0.
+    pub angle_deg: f64,
+}
+
+impl Turn {
+    /// Whether the opposite turn ends at the same attitude.
+    pub fn is_half(&self) -> bool {
+        self.angle_deg == 180.0
+    }
+}
 
 /// `a b` in floating point.
 pub(crate) fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {

@@ -2,9 +2,9 @@
 
 use obsdeg_exact::{Echelon, Radical};
 
-use super::coefficient::{Coefficient, Form, Number, READABLE, linear_combination};
-use super::ensemble::Verdicts;
-use super::sparse::{extend_by_short_vectors, support};
+use crate::degree::coefficient::{Coefficient, Form, Number, READABLE, linear_combination};
+use crate::degree::ensemble::Verdicts;
+use crate::degree::sparse::{extend_by_short_vectors, support};
 use crate::model::Platform;
 use crate::model::platform::LOCAL_NAMES;
 use crate::solution::print::{StationLabel, stations};

@@ -1,137 +1,29 @@
-//! Combinations that a scheme asks for: read, checked to be linear, judged.
+//! Combinations that a scheme asks for, judged, with their exact coefficients.
 
-use obsdeg_exact::radical::{Ratio, embeddings};
-use obsdeg_exact::{Field, Radical, SplitMix64};
+use std::ops::Range;
 
-use super::{AnalysisError, Status, Verdict};
+use obsdeg_exact::SplitMix64;
+use obsdeg_exact::radical::embeddings;
+
+use super::solver::Sparse;
 use crate::degree::coefficient::{Coefficient, Image, Number, rates_between, recover_radical};
 use crate::degree::ensemble::Verdicts;
-use crate::model::expression::{Environment, Expression, ExpressionError, Function, Node, evaluate, parse};
-use crate::model::platform::{RandomValues, Sample};
+use crate::degree::status::{Status, Verdict};
+use crate::model::Platform;
+use crate::model::combination::{At, Names, row_of, square_root};
+use crate::model::expression::{Expression, ExpressionError, Function, Node, parse};
 use crate::model::ring::{Ring, Text};
-use crate::model::{Angle, Platform};
-use crate::solution::solver::Sparse;
-use crate::solution::symbols::Symbols;
 
-/// What the names of a combination stand for.
-struct Names<'a> {
-    unknowns: &'a [String],
-    generic: Vec<String>,
-    symbols: Symbols,
-}
-
-impl<'a> Names<'a> {
-    fn of(platform: &'a Platform) -> Self {
-        let generic = platform.scheme().generic_names();
-        Self { unknowns: platform.names(), generic, symbols: Symbols::of(platform) }
-    }
-
-    /// The cosine and sine of an angle of the scheme as text.
-    fn cos_sin(&self, angle: &str) -> Option<(String, String)> {
-        let angle: Angle = angle.strip_suffix(" deg").unwrap_or(angle).parse().ok()?;
-        self.symbols.has(&angle).then(|| self.symbols.cos_sin(&angle))
-    }
-}
-
-/// `n = s^2 m` with m one of 1, 2, 3, 6: s and the place of `sqrt m` in a radical.
-fn square_root(n: i32) -> Option<(i64, usize)> {
-    let n = i64::from(n);
-    [1, 2, 3, 6].into_iter().enumerate().find_map(|(i, m)| {
-        let square = (n > 0 && n % m == 0).then_some(n / m)?;
-        let s = square.isqrt();
-        (s * s == square).then_some((s, i))
-    })
-}
-
-struct Unit<'a> {
-    names: &'a Names<'a>,
-    values: &'a RandomValues,
-    sample: &'a Sample,
-    /// The value of each unknown.
-    unknowns: &'a [u64],
-    rates: [u64; 2],
-}
-
-impl Environment for Unit<'_> {
-    fn name(&self, name: &str) -> Option<u64> {
-        match name {
-            "wN" => Some(self.rates[0]),
-            "wU" => Some(self.rates[1]),
-            _ => self.names.unknowns.iter().position(|n| n == name).map(|c| self.unknowns[c]),
-        }
-    }
-    fn cos_sin(&self, angle: &str) -> Option<(u64, u64)> {
-        let (c, s) = self.names.cos_sin(angle)?;
-        let value = |text: &str| self.names.symbols.value(text, self.values, self.sample);
-        Some((value(&c)?, value(&s)?))
-    }
-    fn sqrt(&self, n: i32) -> Option<u64> {
-        let (s, place) = square_root(n)?;
-        let mut coefficients = [Ratio { num: 0, den: 1 }; 4];
-        coefficients[place] = Ratio { num: s, den: 1 };
-        Some(Radical { coefficients }.image(&self.sample.roots))
-    }
-    fn known(&self) -> Vec<String> {
-        let rates = ["wN".to_string(), "wU".into()];
-        self.names.unknowns.iter().chain(&self.names.generic).cloned().chain(rates).collect()
-    }
-}
-
-/// One point at which a combination is looked at.
-struct At<'a> {
-    values: &'a RandomValues,
-    sample: &'a Sample,
-    rates: [u64; 2],
-}
-
-impl At<'_> {
-    fn field(&self) -> &Field {
-        &self.sample.roots.field
-    }
-}
-
-/// The coefficients of a linear expression at one point, or why it is not linear: then it is not the sum of its parts at random values.
-fn row_of(
-    expression: &Expression,
-    names: &Names<'_>,
-    point: &At<'_>,
-    rng: &mut SplitMix64,
-) -> Result<Vec<u64>, ExpressionError> {
-    let (f, n) = (point.field(), names.unknowns.len());
-    let at = |unknowns: &[u64]| {
-        let At { values, sample, rates } = *point;
-        evaluate(expression, f, &Unit { names, values, sample, unknowns, rates })
-    };
-    let zero = vec![0; n];
-    let unit = |c: usize| -> Vec<u64> { (0..n).map(|j| if j == c { f.one() } else { 0 }).collect() };
-    // what it does not name has no part in it
-    let named = |c: usize| {
-        expression.nodes.iter().any(|n| matches!(n, Node::Name(name) if *name == names.unknowns[c]))
-    };
-    let row: Vec<u64> =
-        (0..n).map(|c| if named(c) { at(&unit(c)) } else { Ok(0) }).collect::<Result<_, _>>()?;
-    let probe: Vec<u64> = (0..n).map(|_| rng.below(f.modulus())).collect();
-    let linear = at(&zero)? == 0 && at(&probe)? == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
-    if !linear {
-        return Err(ExpressionError::Syntax {
-            expected: "a linear combination of unknowns such as D_IX - D_IY",
-            found: "something that is not linear in them".into(),
-            span: expression.span(),
-        });
-    }
-    Ok(row)
-}
-
-/// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are known.
-pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionError> {
-    let parsed = parse(text)?;
-    let mut rng = SplitMix64::of(1, "combination", &[text]);
-    // every validated scheme has a field
-    let Ok(values) = RandomValues::draw(platform.scheme(), &mut rng) else { return Ok(()) };
-    let sample = values.sample(platform.scheme(), 1);
-    let rates = [0; 2].map(|_| 1 + rng.below(sample.roots.field.modulus() - 1));
-    row_of(&parsed, &Names::of(platform), &At { values: &values, sample: &sample, rates }, &mut rng)
-        .map(|_| ())
+/// A combination that is asked for is no linear combination of the unknowns.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("combination `{text}`: {reason}")]
+pub struct CombinationError {
+    /// As written.
+    pub text: String,
+    /// What is wrong.
+    pub reason: String,
+    /// Where in the text.
+    pub span: Range<usize>,
 }
 
 /// A combination that was asked for.
@@ -151,7 +43,7 @@ pub(crate) fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
     seed: u64,
-) -> Result<Vec<Requested>, AnalysisError> {
+) -> Result<Vec<Requested>, CombinationError> {
     let scheme = platform.scheme();
     let mut rng = scheme.random(seed, "combinations asked for");
     let names = Names::of(platform);
@@ -159,7 +51,7 @@ pub(crate) fn requested_combinations(
         .combinations
         .iter()
         .map(|text| {
-            let wrap = |e: ExpressionError| AnalysisError::Combination {
+            let wrap = |e: ExpressionError| CombinationError {
                 text: text.clone(),
                 reason: e.to_string(),
                 span: e.span(),
@@ -171,11 +63,7 @@ pub(crate) fn requested_combinations(
             let row = row_of(&parsed, &names, &At { values, sample, rates }, &mut rng).map_err(wrap)?;
             let degree = verdicts.stairs.iter().position(|v| v.contains(&row));
             let moved = (0..row.len()).any(|c| row[c] != 0 && verdicts.degrees.excited[c]);
-            let status = match degree {
-                Some(_) => Status::Observable,
-                None if moved => Status::Inseparable,
-                None => Status::NotExcited,
-            };
+            let status = Status::of(degree, moved);
             let terms = terms_of(&parsed, platform, &names, verdicts, &mut rng).map_err(wrap)?;
             Ok(Requested { text: text.clone(), row, terms, verdict: Verdict { status, degree } })
         })

@@ -1,0 +1,67 @@
+//! What a degree says of an unknown, and how verdicts differ.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::staircase::Degrees;
+
+/// Whether an unknown can be solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// It is in the span of the derivative rows.
+    Observable,
+    /// It moves Z, but only together with its partners.
+    Inseparable,
+    /// It does not move Z at all.
+    NotExcited,
+}
+
+impl Status {
+    /// The status of what has this degree, if any, and moves Z or does not.
+    pub fn of(degree: Option<usize>, excited: bool) -> Self {
+        match degree {
+            Some(_) => Self::Observable,
+            None if excited => Self::Inseparable,
+            None => Self::NotExcited,
+        }
+    }
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Observable => "observable",
+            Self::Inseparable => "inseparable",
+            Self::NotExcited => "not excited",
+        })
+    }
+}
+
+/// Status and degree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Verdict {
+    /// Whether it can be solved.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+}
+
+impl Verdict {
+    /// The verdict on a column.
+    pub fn of(degrees: &Degrees, column: usize) -> Self {
+        let degree = degrees.degree[column];
+        Self { status: Status::of(degree, degrees.excited[column]), degree }
+    }
+}
+
+/// A verdict that depends on the carry.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Difference {
+    /// The unknown.
+    pub name: String,
+    /// Under the carry of the scheme.
+    pub here: Verdict,
+    /// Under the other one.
+    pub there: Verdict,
+}

@@ -1,0 +1,130 @@
+//! Linear combinations of unknowns as text: read, and checked to be linear.
+
+use obsdeg_exact::radical::Ratio;
+use obsdeg_exact::{Field, Radical, SplitMix64};
+
+use super::expression::{Environment, Expression, ExpressionError, Node, evaluate, parse};
+use super::platform::{RandomValues, Sample};
+use super::symbols::Symbols;
+use super::{Angle, Platform};
+
+/// What the names of a combination stand for.
+pub(crate) struct Names<'a> {
+    pub(crate) unknowns: &'a [String],
+    generic: Vec<String>,
+    pub(crate) symbols: Symbols,
+}
+
+impl<'a> Names<'a> {
+    pub(crate) fn of(platform: &'a Platform) -> Self {
+        let generic = platform.scheme().generic_names();
+        Self { unknowns: platform.names(), generic, symbols: Symbols::of(platform) }
+    }
+
+    /// The cosine and sine of an angle of the scheme as text.
+    pub(crate) fn cos_sin(&self, angle: &str) -> Option<(String, String)> {
+        let angle: Angle = angle.strip_suffix(" deg").unwrap_or(angle).parse().ok()?;
+        self.symbols.has(&angle).then(|| self.symbols.cos_sin(&angle))
+    }
+}
+
+/// `n = s^2 m` with m one of 1, 2, 3, 6: s and the place of `sqrt m` in a radical.
+pub(crate) fn square_root(n: i32) -> Option<(i64, usize)> {
+    let n = i64::from(n);
+    [1, 2, 3, 6].into_iter().enumerate().find_map(|(i, m)| {
+        let square = (n > 0 && n % m == 0).then_some(n / m)?;
+        let s = square.isqrt();
+        (s * s == square).then_some((s, i))
+    })
+}
+
+struct Unit<'a> {
+    names: &'a Names<'a>,
+    values: &'a RandomValues,
+    sample: &'a Sample,
+    /// The value of each unknown.
+    unknowns: &'a [u64],
+    rates: [u64; 2],
+}
+
+impl Environment for Unit<'_> {
+    fn name(&self, name: &str) -> Option<u64> {
+        match name {
+            "wN" => Some(self.rates[0]),
+            "wU" => Some(self.rates[1]),
+            _ => self.names.unknowns.iter().position(|n| n == name).map(|c| self.unknowns[c]),
+        }
+    }
+    fn cos_sin(&self, angle: &str) -> Option<(u64, u64)> {
+        let (c, s) = self.names.cos_sin(angle)?;
+        let value = |text: &str| self.names.symbols.value(text, self.values, self.sample);
+        Some((value(&c)?, value(&s)?))
+    }
+    fn sqrt(&self, n: i32) -> Option<u64> {
+        let (s, place) = square_root(n)?;
+        let mut coefficients = [Ratio { num: 0, den: 1 }; 4];
+        coefficients[place] = Ratio { num: s, den: 1 };
+        Some(Radical { coefficients }.image(&self.sample.roots))
+    }
+    fn known(&self) -> Vec<String> {
+        let rates = ["wN".to_string(), "wU".into()];
+        self.names.unknowns.iter().chain(&self.names.generic).cloned().chain(rates).collect()
+    }
+}
+
+/// One point at which a combination is looked at.
+pub(crate) struct At<'a> {
+    pub(crate) values: &'a RandomValues,
+    pub(crate) sample: &'a Sample,
+    pub(crate) rates: [u64; 2],
+}
+
+impl At<'_> {
+    fn field(&self) -> &Field {
+        &self.sample.roots.field
+    }
+}
+
+/// The coefficients of a linear expression at one point, or why it is not linear: then it is not the sum of its parts at random values.
+pub(crate) fn row_of(
+    expression: &Expression,
+    names: &Names<'_>,
+    point: &At<'_>,
+    rng: &mut SplitMix64,
+) -> Result<Vec<u64>, ExpressionError> {
+    let (f, n) = (point.field(), names.unknowns.len());
+    let at = |unknowns: &[u64]| {
+        let At { values, sample, rates } = *point;
+        evaluate(expression, f, &Unit { names, values, sample, unknowns, rates })
+    };
+    let zero = vec![0; n];
+    let unit = |c: usize| -> Vec<u64> { (0..n).map(|j| if j == c { f.one() } else { 0 }).collect() };
+    // what it does not name has no part in it
+    let named = |c: usize| {
+        expression.nodes.iter().any(|n| matches!(n, Node::Name(name) if *name == names.unknowns[c]))
+    };
+    let row: Vec<u64> =
+        (0..n).map(|c| if named(c) { at(&unit(c)) } else { Ok(0) }).collect::<Result<_, _>>()?;
+    let probe: Vec<u64> = (0..n).map(|_| rng.below(f.modulus())).collect();
+    let linear = at(&zero)? == 0 && at(&probe)? == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
+    if !linear {
+        return Err(ExpressionError::Syntax {
+            expected: "a linear combination of unknowns such as D_IX - D_IY",
+            found: "something that is not linear in them".into(),
+            span: expression.span(),
+        });
+    }
+    Ok(row)
+}
+
+/// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are known.
+pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionError> {
+    let parsed = parse(text)?;
+    let mut rng = SplitMix64::of(1, "combination", &[text]);
+    // every validated scheme has a field
+    let Ok(values) = RandomValues::draw(platform.scheme(), &mut rng) else { return Ok(()) };
+    let sample = values.sample(platform.scheme(), 1);
+    let rates = [0; 2].map(|_| 1 + rng.below(sample.roots.field.modulus() - 1));
+    row_of(&parsed, &Names::of(platform), &At { values: &values, sample: &sample, rates }, &mut rng)
+        .map(|_| ())
+}
