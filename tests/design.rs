@@ -313,6 +313,9 @@ fn an_answer_says_what_it_rests_on() {
         "24 sequences are as good, itself and its images counted",
         "half turns are tried in both directions",
         "NUE (-N) NDW (-N) NUE",
+        "Best schemes (sigma: information of all samples, no prior, no drift noise; psi at the start)",
+        "by prediction (no prior, no drift noise, psi at the start) every requirement (the program's own: none is stated) is met, 3 of 3",
+        "to be checked with prior and drift noise, psi at the end: `obsdeg simulate`",
     ] {
         assert!(table.contains(said), "{said}: {table}");
     }
@@ -325,6 +328,9 @@ fn an_answer_says_what_it_rests_on() {
     });
     assert_eq!(search["conditions"], conditions);
     assert!(search["drift_noise"].is_null() && search["prior"].is_null());
+    assert_eq!(json["found"][0]["requirements"]["basis"], "predicted");
+    // what is missed by prediction needs no other check
+    assert!(!run(&["--requirement", "D=1e-9"]).contains("to be checked"));
     assert_eq!(search["ties"], serde_json::json!({ "sequences": 24, "within": 1e-6 }));
     let turns =
         serde_json::json!([{ "to": 2, "about": [-1.0, 0.0, 0.0] }, { "to": 3, "about": [-1.0, 0.0, 0.0] }]);

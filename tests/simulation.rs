@@ -431,6 +431,26 @@ fn obsdeg(arguments: &[&str]) -> Output {
 
 const P1P2: [&str; 5] = ["simulate", "--angles", "0,0,0", "--angles", "180,0,0"];
 
+/// A worst margin says whose it is where some that are missed have none.
+#[test]
+fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {
+    let attitudes = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110"];
+    let angles = attitudes.map(|a| format!("--angles={a}"));
+    let of = |more: &[&str]| {
+        let mut arguments: Vec<&str> = vec!["simulate", "--carry", "inertial", "--requirement", "D_I=0.005"];
+        arguments.extend(angles.iter().map(String::as_str));
+        arguments.extend(more);
+        String::from_utf8_lossy(&obsdeg(&arguments).stdout).replace("\n      ", " ")
+    };
+    // the prior of psi_x and psi_y is all that they have: no margin, though they miss by more
+    let text = of(&["--prior", "psi=0.02"]);
+    let said = "in the run (with prior and drift noise, psi at the end) requirements are NOT met, 6 of 15 missed: psi_z, D_IX, D_IY, D_IZ; \
+                psi_x, psi_y (resting on the prior); worst margin of the others 0.0";
+    assert!(text.contains(said), "{text}");
+    let text = of(&["--prior", "psi=10"]);
+    assert!(text.contains("missed: psi_x, psi_y, psi_z, D_IX, D_IY, D_IZ; worst margin 0.0"), "{text}");
+}
+
 #[test]
 fn the_papers_run_word_by_word() {
     let output = obsdeg(&P1P2);

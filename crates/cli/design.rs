@@ -120,7 +120,7 @@ struct WantedArguments {
     criterion: CriterionArgument,
 
     /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
-    /// coefficients
+    /// coefficients; by prediction: no prior, no drift noise, psi at the start (`simulate` the winner for the rest)
     #[arg(long)]
     meet: bool,
 

@@ -70,9 +70,21 @@ pub struct Margin {
     pub margin: f64,
 }
 
+/// Under what sigmas are held against requirements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// The information of all samples: no prior, no drift noise, psi at the start (under reset carry at the start of each position).
+    Predicted,
+    /// The filter at the end of a run: with prior and drift noise, psi at the end.
+    Run,
+}
+
 /// What became of all requirements.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Requirements {
+    /// Under what this is decided.
+    pub basis: Basis,
     /// Unknowns with a requirement.
     pub stated: usize,
     /// How many of them meet it.
@@ -87,8 +99,8 @@ pub struct Requirements {
 
 impl Requirements {
     /// Decides about `claims`, in their order.
-    pub fn of<'a>(claims: impl IntoIterator<Item = Claim<'a>>, by_default: bool) -> Self {
-        let mut out = Self { by_default, ..Self::default() };
+    pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = Claim<'a>>, by_default: bool) -> Self {
+        let mut out = Self { basis, stated: 0, met: 0, worst: None, missed: Vec::new(), by_default };
         for claim in claims {
             let Some(required) = claim.required else { continue };
             out.stated += 1;
@@ -109,6 +121,11 @@ impl Requirements {
     pub fn all_met(&self) -> bool {
         self.missed.is_empty()
     }
+
+    /// Whether the worst margin leaves out some that are missed: their sigma does not count.
+    pub fn leaves_out(&self) -> bool {
+        self.missed.iter().any(|m| m.why != Miss::TooLarge)
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +139,7 @@ mod tests {
     #[test]
     fn what_is_met_and_what_is_missed() {
         let judged = Requirements::of(
+            Basis::Run,
             [
                 claim("just", Some(0.1), Ok(0.1)),
                 claim("above", Some(0.1), Ok(0.1000001)),
@@ -143,9 +161,11 @@ mod tests {
             ("infinite", Miss::NoNumber),
         ];
         assert_eq!(missed, expected);
+        assert!(judged.leaves_out());
         assert_eq!(judged.worst.map(|w| w.name).as_deref(), Some("above"));
+        assert!(!Requirements::of(Basis::Run, [claim("above", Some(0.1), Ok(0.2))], false).leaves_out());
         // nothing asked for, nothing missed
-        let none = Requirements::of([claim("free", None, Ok(1.0))], true);
+        let none = Requirements::of(Basis::Predicted, [claim("free", None, Ok(1.0))], true);
         assert_eq!((none.stated, none.met, none.worst.is_none(), none.all_met()), (0, 0, true, true));
     }
 }

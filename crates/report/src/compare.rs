@@ -17,7 +17,8 @@ fn list(items: &[String]) -> String {
 
 /// `met; 2.231 (D_IX)`.
 fn requirements(r: &Requirements) -> String {
-    let worst = words::worst_margin(r).map_or_else(String::new, |w| format!("; {w}"));
+    let worst =
+        words::worst_margin(r).map_or_else(String::new, |w| format!(";{} {w}", words::whose_margin(r)));
     match (r.stated, r.all_met()) {
         (0, _) => "none".into(),
         (_, true) => format!("met{worst}"),
@@ -41,7 +42,7 @@ fn overview(schemes: &[Review]) -> Block {
         ]
     };
     Block::Table {
-        heading: "Side by side".into(),
+        heading: format!("Side by side ({})", words::PREDICTED),
         header: vec![
             "scheme",
             "carry",

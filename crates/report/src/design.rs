@@ -41,6 +41,15 @@ fn margin(r: &Requirements) -> String {
     none.or_else(|| words::worst_margin(r)).unwrap_or_else(|| "-".into())
 }
 
+/// What became of the requirements, and what a prediction leaves to be checked.
+fn requirements(r: &Requirements) -> Vec<String> {
+    let check = r.all_met() && r.stated > 0;
+    let check = check.then(|| {
+        "to be checked with prior and drift noise, psi at the end: `obsdeg simulate` of the winner.toml that -o writes".into()
+    });
+    std::iter::once(words::requirements(r)).chain(check).collect()
+}
+
 fn table(heading: &str, found: &[Found]) -> Block {
     let row = |(i, f): (usize, &Found)| {
         vec![
@@ -197,10 +206,11 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
 pub(crate) fn document(d: &Design) -> Document {
     let mut blocks = Vec::new();
     if let Some(s) = &d.search {
-        blocks.push(table(
-            "Best schemes (sigma: information of all samples, no prior, no drift noise)",
-            &d.found,
-        ));
+        blocks.push(table(&format!("Best schemes ({})", words::PREDICTED), &d.found));
+        blocks.extend(d.found.first().map(|f| Block::List {
+            heading: "Requirements of the first".into(),
+            lines: requirements(&f.requirements),
+        }));
         blocks.push(Block::List { heading: "How".into(), lines: how(d, s) });
         blocks.push(table(
             "Front of total time against the criterion (other dwells by exchange, not proven)",

@@ -52,6 +52,8 @@ pub(crate) enum Grade {
     Good,
     /// It limits what the rest is worth.
     Limited,
+    /// What was asked for is not there.
+    Missed,
     /// Nobody knows: not computed, not taken.
     Open,
 }
@@ -61,6 +63,7 @@ impl Grade {
         match self {
             Self::Good => "ok",
             Self::Limited => "LIMITED",
+            Self::Missed => "NOT MET",
             Self::Open => "open",
         }
     }

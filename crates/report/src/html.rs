@@ -74,6 +74,7 @@ fn block(i: usize, part: &Part<'_>) -> Json {
                 let grade = match f.grade {
                     Grade::Good => "good",
                     Grade::Limited => "limited",
+                    Grade::Missed => "missed",
                     Grade::Open => "open",
                 };
                 json!({ "what": f.what, "grade": grade, "mark": f.grade.mark(), "text": f.text })

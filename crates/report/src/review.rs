@@ -45,7 +45,7 @@ pub(crate) fn document(r: &DesignReview) -> Document {
              accuracy order"
                 .into(),
             format!(
-                "verdicts are exact ranks in prime fields; predicted {}; the filter's runs have both prior and drift noise",
+                "verdicts are exact ranks in prime fields; predicted {}; the filter's runs have both prior and drift noise, psi at the end",
                 words::PREDICTED
             ),
         ],

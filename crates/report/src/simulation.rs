@@ -165,7 +165,7 @@ pub(crate) fn document(s: &Simulation) -> Document {
     if !s.combinations.is_empty() {
         blocks.push(table("Combinations (psi: of the end)", &s.combinations));
     }
-    blocks.push(list("Requirements (sigma of the filter at the end)", requirements_met(s)));
+    blocks.push(list("Requirements (sigma of the filter at the end of the run)", requirements_met(s)));
     blocks.push(list("Consistency", words::consistency(&s.consistency)));
     blocks.push(list("Validity of the small-angle model", validity(&s.validity)));
     let mut assumed = conditions(&s.conditions, &s.timeline);

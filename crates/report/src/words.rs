@@ -7,7 +7,7 @@ use obsdeg_core::degree::coefficient::Form;
 use obsdeg_core::degree::status::{Difference, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
-use obsdeg_core::requirements::{Miss, Requirements};
+use obsdeg_core::requirements::{Basis, Miss, Requirements};
 use obsdeg_core::simulation::answer::MeasurementReport;
 use obsdeg_core::simulation::consistency::{Consistency, Doubt};
 use obsdeg_core::solution::solver::{Frame, Verification};
@@ -321,26 +321,33 @@ pub(crate) fn worst_margin(r: &Requirements) -> Option<String> {
     r.worst.as_ref().map(|w| format!("{} ({})", number(w.margin), w.name))
 }
 
-/// What became of the requirements.
+/// Whose margin is the worst: ` of the others` where some that are missed have none.
+pub(crate) fn whose_margin(r: &Requirements) -> &'static str {
+    if r.leaves_out() { " of the others" } else { "" }
+}
+
+/// Under what requirements are decided.
+pub(crate) fn basis(b: Basis) -> &'static str {
+    match b {
+        Basis::Predicted => "by prediction (no prior, no drift noise, psi at the start)",
+        Basis::Run => "in the run (with prior and drift noise, psi at the end)",
+    }
+}
+
+/// What became of the requirements, and under what.
 pub(crate) fn requirements(r: &Requirements) -> String {
     if r.stated == 0 {
         return "no requirement is stated".into();
     }
     let whose = if r.by_default { " (the program's own: none is stated)" } else { "" };
-    let worst = |of: &str| worst_margin(r).map_or_else(String::new, |w| format!("{of} {w}"));
+    let basis = basis(r.basis);
+    let worst =
+        worst_margin(r).map_or_else(String::new, |w| format!("; worst margin{} {w}", whose_margin(r)));
     if r.all_met() {
-        return format!(
-            "every requirement{whose} is met, {} of {}{}",
-            r.met,
-            r.stated,
-            worst("; worst margin")
-        );
+        return format!("{basis} every requirement{whose} is met, {} of {}{worst}", r.met, r.stated);
     }
-    // what has no margin may be all that misses
-    let met = r.worst.as_ref().is_some_and(|w| w.margin >= 1.0);
-    let worst = worst(if met { "; worst margin of the others" } else { "; worst margin" });
     format!(
-        "requirements{whose} are NOT met, {} of {} missed: {}{worst}",
+        "{basis} requirements{whose} are NOT met, {} of {} missed: {}{worst}",
         r.missed.len(),
         r.stated,
         missed(r)

@@ -15,7 +15,7 @@ use crate::model::settings::DriftNoise;
 use crate::model::slew;
 use crate::model::{Carry, Platform, Position, Scheme};
 use crate::prediction::Prediction;
-use crate::requirements::Requirements;
+use crate::requirements::{Basis, Requirements};
 use crate::simulation::answer::MeasurementReport;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
@@ -148,8 +148,11 @@ fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
     conditions.concern(judged.platform())?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
     let quantities = quantities(&judged, conditions, &drop_one)?;
-    let requirements =
-        Requirements::of(quantities.iter().map(Quantity::claim), conditions.requires_by_default());
+    let requirements = Requirements::of(
+        Basis::Predicted,
+        quantities.iter().map(Quantity::claim),
+        conditions.requires_by_default(),
+    );
     let slews = judged.plan.slews();
     Ok(Review {
         name: name.clone(),

@@ -16,7 +16,7 @@ use crate::degree::ensemble::judge;
 use crate::model::attitude::Euler;
 use crate::model::settings::concerns;
 use crate::model::{Platform, Scheme, Unknowns};
-use crate::requirements::{Claim, Miss, Requirements};
+use crate::requirements::{Basis, Claim, Miss, Requirements};
 use crate::simulation::conditions::{Conditions, latitude_of, resolve};
 
 /// Most sets whose keys are held.
@@ -294,7 +294,7 @@ impl<'a> Task<'a> {
             required: limit(*required),
             sigma: if determined(first + c) { Ok(*sigma) } else { Err(Miss::NotObservable) },
         });
-        let requirements = Requirements::of(psi.chain(coefficients), self.by_default);
+        let requirements = Requirements::of(Basis::Predicted, psi.chain(coefficients), self.by_default);
         if self.options.meet && !requirements.all_met() {
             return Ok(None);
         }
@@ -390,9 +390,9 @@ impl<'a> Task<'a> {
         out.extend(c.slew_s.map(|s| format!("slews of at most {s} s")));
         if c.sigmas.is_some() {
             out.push(match self.options.required.is_empty() {
-                true => "every requirement met, on psi too".into(),
+                true => "every requirement met as predicted, on psi (at the start) too".into(),
                 false => {
-                    "the requirements on what must be observable met; those on psi and the rest do not count"
+                    "the requirements on what must be observable met as predicted; those on psi and the rest do not count"
                         .into()
                 }
             });

@@ -19,7 +19,7 @@ use crate::degree::status::Status;
 use crate::model::settings::DriftNoise;
 use crate::model::{Carry, Scheme, SchemeError};
 use crate::prediction::{Prediction, PredictionError};
-use crate::requirements::{Claim, Requirements, meets};
+use crate::requirements::{Basis, Claim, Requirements, meets};
 use answer::{ConditionsReport, Estimate, Outcome, SCHEMA, TimelineReport};
 use conditions::{resolve, shown_unit, si_per_shown};
 use consistency::{Consistency, Outcomes};
@@ -188,6 +188,7 @@ fn summary(
         conditions: conditions_report(scheme, plan, conditions),
         timeline: timeline_report(plan),
         requirements: Requirements::of(
+            Basis::Run,
             quantities.iter().map(|q| Claim {
                 name: &q.name,
                 required: q.required_sigma,

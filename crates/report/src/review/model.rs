@@ -75,7 +75,9 @@ fn limits(m: &ModelReview) -> Vec<String> {
     }
     match evidence(m) {
         (Grade::Good, _) => {}
-        (Grade::Limited, what) => out.push(format!("the information of a run and the exact verdicts {what}")),
+        (Grade::Limited | Grade::Missed, what) => {
+            out.push(format!("the information of a run and the exact verdicts {what}"))
+        }
         (Grade::Open, _) => out.push("no evidence by a run is taken".into()),
     }
     let prior = by_prior(m);

@@ -9,6 +9,12 @@ use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};
 use crate::words;
 
+/// A sentence with its first letter large.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
+}
+
 /// What the unknowns besides psi are.
 fn kind(coefficients: &[&Quantity]) -> &'static str {
     match coefficients.first() {
@@ -69,7 +75,7 @@ fn limits(s: &SchemeReview) -> Vec<String> {
     }
     match evidence(s) {
         (Grade::Good, _) => {}
-        (Grade::Limited, what) => out.push(format!("filter and exact verdicts {what}")),
+        (Grade::Limited | Grade::Missed, what) => out.push(format!("filter and exact verdicts {what}")),
         (Grade::Open, what) => out.push(format!("evidence by a filter is {what}")),
     }
     let prior = by_prior(s);
@@ -90,7 +96,18 @@ fn limits(s: &SchemeReview) -> Vec<String> {
     out
 }
 
-/// The verdict: what limits it, what is determined, and how well.
+/// Requirements by prediction and in the run, what is missed first.
+fn requirements(s: &SchemeReview, review: &Review) -> (Grade, String) {
+    let mut both = [&review.requirements, &s.simulation.requirements];
+    if both.iter().all(|r| r.stated == 0) {
+        return (Grade::Open, words::requirements(both[0]));
+    }
+    both.sort_by_key(|r| r.all_met());
+    let grade = if both.iter().all(|r| r.all_met()) { Grade::Good } else { Grade::Missed };
+    (grade, both.map(words::requirements).join("; "))
+}
+
+/// The verdict: what is missed, what limits it, what is determined, and how well.
 pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> String {
     let a = &s.analysis;
     let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
@@ -138,10 +155,12 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
         _ => "",
     };
     let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
-    let requirements = words::requirements(&review.requirements);
-    format!(
-        "{lead}{first}. {accuracy}; by predicted sigma, without prior and drift noise, {requirements}{filter}."
-    )
+    let (grade, requirements) = requirements(s, review);
+    let (missed, others) = match grade {
+        Grade::Missed => (format!("{}. ", capital(&requirements)), String::new()),
+        _ => (String::new(), format!("; {requirements}")),
+    };
+    format!("{missed}{lead}{first}. {accuracy}{others}{filter}.")
 }
 
 /// The box of a scheme.
@@ -162,6 +181,7 @@ pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
     let consistency = &s.simulation.consistency;
     let prior = by_prior(s);
     let (checks, agreement) = evidence(s);
+    let (required, requirements) = requirements(s, review);
     let row = |what, grade, text| Finding { what, grade, text };
     Status {
         title: s.name.clone(),
@@ -171,14 +191,7 @@ pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
                 grade(every),
                 format!("{} {}, {} of psi{dwell}", counted(false), kind(&coefficients), counted(true)),
             ),
-            row(
-                "Requirements",
-                match review.requirements.stated {
-                    0 => Grade::Open,
-                    _ => grade(review.requirements.all_met()),
-                },
-                words::requirements(&review.requirements),
-            ),
+            row("Requirements", required, requirements),
             row(
                 "Small-angle model",
                 grade(s.simulation.validity.holds),
