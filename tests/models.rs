@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use obsdeg_core::analysis::{Options, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::attitude::cardinal;
+use obsdeg_core::system::evidence::SystemEvidence;
 use obsdeg_core::system::numeric::Numeric;
 use obsdeg_core::system::rows::Unknown;
 use obsdeg_core::system::{Judgement, crosscheck_system, json, judge, model_file, simulate_system};
@@ -367,6 +368,36 @@ fn the_information_confirms_the_verdicts() {
     let still = text.expect("readable").replace("1 + 0.5*sin(0.3*t)", "0").replace("0.2*cos(0.17*t)", "0");
     let refuted = crosscheck_system(&model_file::read(&still).expect("a model"), 1).expect("evidence");
     assert!(!refuted.passed && (refuted.defect.predicted, refuted.defect.measured) == (1, 2), "{refuted:?}");
+}
+
+/// With jumps no slope is measured: what the other evidence says is not said of the degrees.
+#[test]
+fn what_is_not_measured_is_no_agreement() {
+    let orders = |e: &SystemEvidence| (e.orders.measured, e.orders.of);
+    let e = crosscheck_system(&example("two-position-alignment"), 1).expect("evidence");
+    assert_eq!((e.passed, orders(&e)), (true, (0, 10)));
+    assert!(e.quantities.iter().all(|q| q.slope.pass.is_none() && q.inflation.pass == Some(true)));
+    // three states in closed form: degrees 0, 1, 2
+    let chain = "name='c'\n[states]\nx='y'\ny='z'\nz='0'\n[outputs]\no='x'\n[simulation]\nduration=1\nstep=0.1\n\
+                 noise={o=0.01}\nvalues={x=1, y=1, z=1}";
+    let e = crosscheck_system(&model_file::read(chain).expect("a model"), 1).expect("evidence");
+    assert!(e.passed && orders(&e) == (3, 3) && e.checks == 7, "{e:?}");
+    assert!(e.quantities.iter().all(|q| q.slope.pass == Some(true)));
+}
+
+/// A pendulum that starts at rest: its slopes go up and down with the horizon until rounding hides them. Two horizons that agree by chance
+/// refute nothing.
+#[test]
+fn slopes_that_do_not_settle_are_not_measured() {
+    for (theta, input) in [("0.5", "sin(t)"), ("1", "0.5*cos(3*t)")] {
+        let text = format!(
+            "name='pendulum'\nparameters=['k', 'c', 'b', 's', 'o']\nknown_inputs={{u='generic'}}\n[states]\ntheta='omega'\n\
+             omega='-k*sin(theta) - c*omega + b*u'\n[outputs]\ny='s*cos(theta) + o'\n[simulation]\nduration=10\nstep=0.01\n\
+             noise={{y=1e-3}}\ninputs={{u='{input}'}}\nvalues={{theta={theta}, omega=0, k=20, c=0.3, b=1, s=1.2, o=0.1}}"
+        );
+        let e = crosscheck_system(&model_file::read(&text).expect("a model"), 1).expect("evidence");
+        assert!(e.passed && (e.orders.measured, e.orders.of) == (0, 7), "{e:?}");
+    }
 }
 
 /// The filter of a model: consistent where everything is observable; where a direction is not, a filter that is linearised anew takes

@@ -1,5 +1,7 @@
 //! The reference verdicts: rank profiles and degrees that were derived independently of this program.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use obsdeg_core::analysis::{Analysis, Options, analyze};
 use obsdeg_core::degree::status::Status;
 use obsdeg_core::model::attitude::{cardinal, cardinal_names};
@@ -77,6 +79,51 @@ fn single_position_at_pole_and_equator_and_with_azimuth() {
     assert_eq!(drift(Some("28.2"), false).rank, 5);
     let azimuth = drift(None, true);
     assert_eq!((azimuth.rank, degree(&azimuth, "eps_y^n")), (6, Some(1)));
+}
+
+/// Whom an unknown is not told from depends on the directions that Z does not see, on no choice of them. At -90, 0, 0 (D_FY, psi_z) and
+/// (D_OY, psi_z) cannot be seen, so D_FY = 1, D_OY = -+1 cannot either.
+#[test]
+fn whom_an_unknown_is_not_told_from() {
+    let partners = |s: &Scheme| -> BTreeMap<String, BTreeSet<String>> {
+        let list = judged(s).quantities;
+        list.into_iter().map(|q| (q.name, q.partners.into_iter().collect())).collect()
+    };
+    let set = |names: &[&str]| names.iter().map(ToString::to_string).collect::<BTreeSet<String>>();
+    let mut single = scheme(&["-90,0,0"], Carry::Platform);
+    let found = partners(&single);
+    assert!(found["D_FY"].is_superset(&set(&["D_OY", "psi_z"])), "{found:?}");
+    assert!(found["D_OY"].is_superset(&set(&["D_FY", "psi_z"])), "{found:?}");
+    single.measured_azimuth = true;
+    assert!(partners(&single)["D_FY"].contains("D_OY"));
+    // the pole, and schemes of all kinds: mutual, and whoever shares a printed direction is named
+    let cardinals = ["0,0,0", "180,0,0", "0,-90,90", "90,180,-90", "0,90,0"];
+    let mut schemes: Vec<Scheme> = Carry::ALL
+        .iter()
+        .flat_map(|&carry| {
+            (1..=5).flat_map(move |n| [scheme(&cardinals[..n], carry), scheme(&S6[..n], carry)])
+        })
+        .collect();
+    for s in schemes.clone() {
+        schemes.push(Scheme { latitude: "90".parse().ok(), ..s });
+    }
+    for s in &schemes {
+        let found = partners(s);
+        for (name, others) in &found {
+            assert!(
+                !others.contains(name) && others.iter().all(|o| found[o].contains(name)),
+                "{name}: {found:?}"
+            );
+        }
+        for direction in judged(s).null_space {
+            let all: BTreeSet<String> = direction.iter().map(|c| c.name.clone()).collect();
+            for name in &all {
+                let mut with_itself = found[name].clone();
+                with_itself.insert(name.clone());
+                assert!(with_itself.is_superset(&all), "{name}: {found:?}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::degree::coefficient::Coefficient;
 use crate::degree::ensemble::judge;
 use crate::degree::status::{Status, Verdict};
 use crate::model::Platform;
-use crate::solution::combinations::{combinations, null_space, partners};
+use crate::solution::combinations::{combinations, null_space};
 use crate::solution::requested::requested_combinations;
 use crate::solution::solver::{Frame, Solver, Sparse};
 
@@ -28,8 +28,6 @@ pub struct PredictedUnknown {
     pub order_at_end: Option<usize>,
     /// Whether samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves it.
     pub determined_at_end: bool,
-    /// Unknowns that it cannot be told from.
-    pub partners: Vec<usize>,
 }
 
 /// An observable combination, or one that was asked for.
@@ -96,14 +94,11 @@ impl Prediction {
         let mut solver = Solver::new(platform, &verdicts, seed, Frame::N, None);
         let null = null_space(platform, &verdicts, &mut solver);
         let n = platform.names().len();
-        let partners = partners(n, &null);
         let determined = |order: Option<usize>, degree: Option<usize>| {
             if accuracy.is_some() { order.is_some() } else { degree.is_some() }
         };
-        let unknowns: Vec<PredictedUnknown> = partners
-            .into_iter()
-            .enumerate()
-            .map(|(c, partners)| {
+        let unknowns: Vec<PredictedUnknown> = (0..n)
+            .map(|c| {
                 let v = Verdict::of(&verdicts.degrees, c);
                 let accuracy_order = accuracy.as_ref().and_then(|a| a.order[c]);
                 let order_at_end = accuracy.as_ref().and_then(|a| a.order_at_end[c]);
@@ -114,7 +109,6 @@ impl Prediction {
                     determined: determined(accuracy_order, v.degree),
                     order_at_end,
                     determined_at_end: determined(order_at_end, v.degree),
-                    partners,
                 }
             })
             .collect();

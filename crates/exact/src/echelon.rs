@@ -212,6 +212,26 @@ impl Echelon {
             })
             .collect()
     }
+
+    /// Per column: the others that occur with it in some null vector of minimal support (a circuit of the matroid of the columns), in
+    /// column order. They are its connected component of that matroid, whose parts are those of the graph that joins a pivot to the
+    /// free columns where its row is not zero: whatever the pivots are, the parts are the same.
+    pub fn companions(&self) -> Vec<Vec<usize>> {
+        let mut part: Vec<usize> = (0..self.columns).collect();
+        for (i, pivot) in self.pivots().enumerate() {
+            let mut touched = vec![false; self.columns];
+            for (&p, _) in part.iter().zip(self.row(i)).filter(|(_, a)| **a != 0) {
+                touched[p] = true;
+            }
+            let name = part[pivot];
+            for p in part.iter_mut().filter(|p| touched[**p]) {
+                *p = name;
+            }
+        }
+        (0..self.columns)
+            .map(|c| (0..self.columns).filter(|&d| d != c && part[d] == part[c]).collect())
+            .collect()
+    }
 }
 
 /// The columns, out of `n`, in which some row is not zero.
@@ -330,6 +350,30 @@ mod tests {
         rank
     }
 
+    /// Per column the others of all circuits through it: sets of columns that are dependent while every smaller one is not.
+    fn companions_by_subsets(rows: &[Vec<i64>]) -> Vec<Vec<usize>> {
+        let n = rows[0].len();
+        let columns = |set: usize| (0..n).filter(move |c| set >> c & 1 == 1);
+        let dependent = |set: usize| {
+            let picked: Vec<Vec<i64>> = rows.iter().map(|r| columns(set).map(|c| r[c]).collect()).collect();
+            rank_rational(&picked) < columns(set).count()
+        };
+        let circuit = |set: &usize| dependent(*set) && columns(*set).all(|c| !dependent(*set & !(1 << c)));
+        let circuits: Vec<usize> = (1..1usize << n).filter(circuit).collect();
+        let together = |c: usize, d: usize| circuits.iter().any(|s| s >> c & 1 == 1 && s >> d & 1 == 1);
+        (0..n).map(|c| (0..n).filter(|&d| d != c && together(c, d)).collect()).collect()
+    }
+
+    /// Null vectors (0,1,1,0), (0,0,1,1): their difference holds columns 1 and 3 without 2.
+    #[test]
+    fn companions_are_more_than_a_basis_shows() {
+        let mut v = Echelon::new(field(), 4);
+        v.insert(&[0, 1, -1, 1].map(|a| field().from_i64(a)));
+        assert_eq!(v.companions(), [vec![], vec![2, 3], vec![1, 3], vec![1, 2]]);
+        let none: [Vec<usize>; 2] = [vec![], vec![]];
+        assert_eq!(Echelon::new(field(), 2).companions(), none);
+    }
+
     #[test]
     fn cleared_it_is_the_zero_space() {
         let f = field();
@@ -394,6 +438,7 @@ mod tests {
             }
             let rank = rank_rational(&rows);
             prop_assert_eq!(v.rank(), rank);
+            prop_assert_eq!(v.companions(), companions_by_subsets(&rows));
             let null = v.null_space();
             prop_assert_eq!(null.len(), n - rank);
             for u in &null {

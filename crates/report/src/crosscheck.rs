@@ -7,8 +7,14 @@ use crate::document::{Block, Document, number, optional};
 use crate::simulation::{conditions, validity, warning};
 use crate::words::{self, band};
 
-fn mark(pass: bool) -> String {
-    if pass { "pass" } else { "FAIL" }.into()
+/// What was not measured is neither.
+fn mark(pass: impl Into<Option<bool>>) -> String {
+    match pass.into() {
+        Some(true) => "pass",
+        Some(false) => "FAIL",
+        None => "-",
+    }
+    .into()
 }
 
 fn measured(c: &Check) -> String {
@@ -145,6 +151,7 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
     let verdict =
         if c.passed { "filter and exact verdicts agree" } else { "filter and exact verdicts DISAGREE" };
     let mut lead: Vec<String> = warning(&c.conditions).into_iter().collect();
+    lead.push(format!("{} of {} accuracy orders measured", c.orders.measured, c.orders.of));
     if c.timeline.iter().any(|t| t.slew) {
         lead.push(
             "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \

@@ -72,11 +72,19 @@ pub(crate) fn rank(a: &Analysis) -> String {
     )
 }
 
+/// `not told from D_FZ, D_OY`; a long list is cut, and says so (JSON and CSV hold all of it).
+pub(crate) fn not_told_from(partners: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let more = partners.len().saturating_sub(SHOWN);
+    let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("not told from {}{tail}", partners[..partners.len() - more].join(", "))
+}
+
 /// What stands beside the verdict on an unknown: its solution, its partners, or why there is neither.
 pub(crate) fn explanation(q: &Quantity) -> String {
     let mut out = match (&q.solution, q.status) {
         (Some(s), _) => s.text.clone(),
-        (None, Status::Inseparable) => format!("not told from {}", q.partners.join(", ")),
+        (None, Status::Inseparable) => not_told_from(&q.partners),
         _ => String::new(),
     };
     if let Some(e) = &q.elsewhere {

@@ -109,7 +109,7 @@ pub struct Quantity {
     /// The accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null when no dwell
     /// makes it observable.
     pub accuracy_order: Option<usize>,
-    /// Unknowns that it cannot be told from.
+    /// Unknowns that it cannot be told from: those that share with it a direction that Z does not see and that holds no shorter one.
     pub partners: Vec<String>,
     /// How it is solved.
     pub solution: Option<Solution>,

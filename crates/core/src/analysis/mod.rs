@@ -9,13 +9,14 @@ pub use answer::*;
 use crate::accuracy::Accuracy;
 use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::{EnsembleError, Verdicts, degrees, judge};
+use crate::degree::staircase::partners;
 use crate::degree::status::{Difference, Status, Verdict};
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::Platform;
 use crate::model::ring::Float;
 use crate::model::scheme::MAX_UNKNOWNS;
 use crate::model::{Angle, Carry, Scheme, SchemeError, Unknowns};
-use crate::solution::combinations::{Combination, NullVector, combinations, null_space, partners};
+use crate::solution::combinations::{Combination, NullVector, combinations, null_space};
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
 use crate::solution::print::{StationLabel, stations, terms, text};
@@ -81,7 +82,7 @@ pub fn analyze(
         Printer { solver, options, stations: stations(scheme), accuracy: None, notes: Vec::new() };
     let accuracy = Accuracy::new(&platform, &verdicts, options.seed);
     printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
-    let quantities = quantities(&platform, &verdicts, &null, &mut printer)?;
+    let quantities = quantities(&platform, &verdicts, &mut printer)?;
     let mut combinations: Vec<CombinationReport> =
         basis.into_iter().map(|c| basis_report(c, &mut printer)).collect();
     combinations.extend(requested.into_iter().map(|r| requested_report(r, &mut printer)));
@@ -179,7 +180,6 @@ impl Printer<'_> {
 fn quantities(
     platform: &Platform,
     verdicts: &Verdicts,
-    null: &[NullVector],
     printer: &mut Printer<'_>,
 ) -> Result<Vec<Quantity>, AnalysisError> {
     let (scheme, seed) = (platform.scheme(), printer.options.seed);
@@ -189,7 +189,7 @@ fn quantities(
     let defect = verdicts.degrees.rank() < platform.names().len();
     let generic = generic_angles(scheme).filter(|_| defect);
     let other_angles = generic.map(|s| degrees_of(&s, seed)).transpose()?;
-    let partners = partners(platform.names().len(), null);
+    let partners = partners(platform.names().len(), &verdicts.stairs);
 
     let mut out = Vec::new();
     for (c, name) in platform.names().iter().enumerate() {

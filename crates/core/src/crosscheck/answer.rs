@@ -29,6 +29,8 @@ pub struct CrossCheck {
     pub passed: bool,
     /// What disagrees, in words.
     pub disagreements: Vec<String>,
+    /// How many accuracy orders were measured.
+    pub orders: Measured,
     /// Evidence a and b per unknown and combination.
     pub quantities: Vec<QuantityEvidence>,
     /// Directions that Z does not see.
@@ -62,8 +64,37 @@ pub struct Check {
     pub predicted: f64,
     /// What the filter shows; null when it could not be measured.
     pub measured: Option<f64>,
-    /// Whether they agree.
-    pub pass: bool,
+    /// Whether they agree; null when nothing was measured, which is neither.
+    pub pass: Option<bool>,
+}
+
+impl Check {
+    /// What was measured is held against the prediction by `agrees`; what was not is left open.
+    pub(crate) fn new(predicted: f64, measured: Option<f64>, agrees: impl Fn(f64) -> bool) -> Self {
+        Self { predicted, measured, pass: measured.map(agrees) }
+    }
+
+    /// Whether something was measured that disagrees.
+    pub fn fails(&self) -> bool {
+        self.pass == Some(false)
+    }
+}
+
+/// How many of the orders that the verdicts say were measured by a slope.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Measured {
+    /// Slopes that were measured.
+    pub measured: usize,
+    /// Unknowns and combinations that have an order.
+    pub of: usize,
+}
+
+impl Measured {
+    /// Counts over slopes, each with whether the verdict says an order.
+    pub(crate) fn count<'a>(slopes: impl Iterator<Item = (&'a Check, bool)>) -> Self {
+        let said: Vec<&Check> = slopes.filter(|(_, said)| *said).map(|(slope, _)| slope).collect();
+        Self { measured: said.iter().filter(|c| c.measured.is_some()).count(), of: said.len() }
+    }
 }
 
 /// Evidence on one unknown or combination.
@@ -77,6 +108,8 @@ pub struct QuantityEvidence {
     pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
+    /// Whether the filter has it: one that was made wrong may lack an unknown, and nothing is measured then.
+    pub modelled: bool,
     /// a: log-log slope of sigma (psi: of the start) against the dwell; 0, or more, when nothing is learnt.
     pub slope: Check,
     /// b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100.

@@ -24,7 +24,7 @@ use crate::simulation::conditions::resolve;
 use crate::simulation::plan::Kind;
 use crate::simulation::record::{Start, run};
 use crate::simulation::{Conditions, Plan, SimulationError, conditions_report, timeline_report, validity};
-use answer::{Control, Difference, MonteCarlo, QuantityEvidence, Ranking, SCHEMA};
+use answer::{Check, Control, Difference, Measured, MonteCarlo, QuantityEvidence, Ranking, SCHEMA};
 use monte_carlo::{Experiment, Prepared};
 use structure::{last_covariance, still, structure};
 
@@ -157,6 +157,7 @@ pub fn crosscheck(
         disagreements: Vec::new(),
         ranking: ranking(&structure.quantities),
         slopes: structure.slopes,
+        orders: Measured::count(structure.quantities.iter().map(|q| (&q.slope, q.accuracy_order.is_some()))),
         quantities: structure.quantities,
         null_space: structure.null_space,
         defect: structure.defect,
@@ -271,26 +272,24 @@ fn controls(
 /// Everything that failed, in words.
 fn disagreements(c: &CrossCheck) -> Vec<String> {
     let mut out = Vec::new();
-    let shown = |x: Option<f64>| x.map_or_else(|| "not measurable".into(), |x| format!("{x:.3}"));
+    let failed = |c: &Check| c.measured.filter(|_| c.fails());
     for q in &c.quantities {
-        if !q.slope.pass {
-            out.push(format!(
-                "{}: slope {} instead of {:.1}",
-                q.name,
-                shown(q.slope.measured),
-                q.slope.predicted
-            ));
+        if !q.modelled {
+            out.push(format!("{}: the filter has no such unknown", q.name));
         }
-        if !q.inflation.pass {
-            let (found, expected) = (shown(q.inflation.measured), q.inflation.predicted);
-            out.push(format!("{}: prior inflation {found} instead of {expected:.0}", q.name));
+        if let Some(found) = failed(&q.slope) {
+            out.push(format!("{}: slope {found:.3} instead of {:.1}", q.name, q.slope.predicted));
+        }
+        if let Some(found) = failed(&q.inflation) {
+            let expected = q.inflation.predicted;
+            out.push(format!("{}: prior inflation {found:.3} instead of {expected:.0}", q.name));
         }
     }
     for v in &c.null_space {
-        if !v.seen.pass {
+        if v.seen.fails() {
             out.push(format!("{}: the filter sees this direction", v.direction));
         }
-        if v.correlation.is_some_and(|k| !k.pass) {
+        if v.correlation.is_some_and(|k| k.fails()) {
             out.push(format!("{}: correlation is not +-1", v.direction));
         }
     }

@@ -34,12 +34,11 @@ pub(super) struct Structure {
 impl Structure {
     /// The number of checks that fail, and of all checks.
     pub(super) fn failures(&self) -> (usize, usize) {
-        let checks = self.quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
-        let null = self
-            .null_space
-            .iter()
-            .flat_map(|v| std::iter::once(v.seen.pass).chain(v.correlation.iter().map(|c| c.pass)));
-        let all: Vec<bool> = checks.chain(null).chain([self.defect.pass]).collect();
+        let missing = self.quantities.iter().filter(|q| !q.modelled).map(|_| false);
+        let measured = self.quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
+        let null = self.null_space.iter().flat_map(|v| [v.seen.pass, v.correlation.and_then(|c| c.pass)]);
+        let all: Vec<bool> =
+            measured.chain(null).flatten().chain(missing).chain([self.defect.pass]).collect();
         (all.iter().filter(|pass| !**pass).count(), all.len())
     }
 }
@@ -157,23 +156,20 @@ fn quantities(
             let predicted = accuracy_order.map_or(0.0, |d| -(d as f64 + 0.5));
             // the slope is that of the start, the inflation that of the end
             let (expected, tolerance) = if at_end { (1.0, INFLATION_TOLERANCE) } else { (10.0, 1.0) };
-            let near = |x: Option<f64>, y: f64, tolerance: f64| x.is_some_and(|x| (x - y).abs() <= tolerance);
-            let slope_agrees = match accuracy_order {
-                Some(_) => near(slope, predicted, SLOPE_TOLERANCE),
+            let near = |x: f64, y: f64, tolerance: f64| (x - y).abs() <= tolerance;
+            let slope_agrees = |x: f64| match accuracy_order {
+                Some(_) => near(x, predicted, SLOPE_TOLERANCE),
                 // nothing is learnt: sigma stays, or grows as drift that nobody sees turns psi
-                None => slope.is_some_and(|x| x >= -SLOPE_TOLERANCE),
+                None => x >= -SLOPE_TOLERANCE,
             };
             QuantityEvidence {
                 name: name.clone(),
                 status,
                 degree,
                 accuracy_order,
-                slope: Check { predicted, measured: slope, pass: slope_agrees },
-                inflation: Check {
-                    predicted: expected,
-                    measured: ratio,
-                    pass: near(ratio, expected, tolerance),
-                },
+                modelled: functional.is_some(),
+                slope: Check::new(predicted, slope, slope_agrees),
+                inflation: Check::new(expected, ratio, |x| near(x, expected, tolerance)),
             }
         })
         .collect()
@@ -219,11 +215,11 @@ fn null_evidence(
             let signed = pairs.map(|(a, b)| correlation[(a.0, b.0)] * (a.1 * b.1).signum());
             // NaN stays
             let smallest = signed.fold(1.0, |a: f64, b| if b >= a { a } else { b });
-            Check { predicted: 1.0, measured: Some(smallest), pass: smallest > 0.999 }
+            Check::new(1.0, Some(smallest), |x| x > 0.999)
         });
         evidence.push(NullEvidence {
             direction: parts.join(", "),
-            seen: Check { predicted: 0.0, measured: seen, pass: seen.is_some_and(|s| s <= UNSEEN) },
+            seen: Check::new(0.0, seen, |s| s <= UNSEEN),
             correlation,
         });
     }

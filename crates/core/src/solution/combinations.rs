@@ -1,4 +1,4 @@
-//! From the staircase to named combinations, null vectors and partners.
+//! From the staircase to named combinations and null vectors.
 
 use obsdeg_exact::{Echelon, Radical};
 
@@ -174,21 +174,4 @@ fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Sparse>
     let (values, _) = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
     let rest = support[1..].iter().copied().zip(values);
     Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())
-}
-
-/// For every unknown: the others that share a null vector with it.
-pub fn partners(n: usize, null_space: &[NullVector]) -> Vec<Vec<usize>> {
-    (0..n)
-        .map(|c| {
-            let mut out: Vec<usize> = null_space
-                .iter()
-                .filter(|v| v.support.contains(&c))
-                .flat_map(|v| v.support.iter().copied())
-                .filter(|&d| d != c)
-                .collect();
-            out.sort_unstable();
-            out.dedup();
-            out
-        })
-        .collect()
 }

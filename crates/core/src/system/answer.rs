@@ -7,9 +7,8 @@ use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, Start, SystemModel};
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
-use crate::degree::sparse::{extend_by_short_vectors, support};
+use crate::degree::staircase::partners;
 use crate::degree::status::Status;
-use obsdeg_exact::Echelon;
 use obsdeg_symbolic::Worker;
 
 /// Name and version of the JSON layout.
@@ -81,7 +80,7 @@ pub struct SystemQuantity {
     pub status: Status,
     /// The smallest order of derivatives that solves it.
     pub degree: Option<usize>,
-    /// Unknowns that move with it while no output changes.
+    /// Unknowns that it cannot be told from: those that share with it a direction that changes no output and that holds no shorter one.
     pub partners: Vec<String>,
     /// What it is in outputs, inputs, their derivatives and unknowns of no higher degree, where it enters linearly; verified in both
     /// fields.
@@ -141,7 +140,7 @@ pub(super) fn answer(
     symmetries: &Symmetries,
     seed: u64,
 ) -> SystemAnalysis {
-    let partners = partners(judged);
+    let partners = partners(judged.layout.unknowns.len(), &judged.stairs);
     // known constants are counted on behind the unknowns
     let name = |c: usize| match judged.layout.unknowns.get(c) {
         Some(u) => u.name.clone(),
@@ -217,26 +216,6 @@ pub(super) fn answer(
 
 fn named(list: &[Vec<usize>], name: &dyn Fn(usize) -> String) -> Vec<Vec<String>> {
     list.iter().map(|columns| columns.iter().map(|&c| name(c)).collect()).collect()
-}
-
-/// For every unknown the others that share a short null vector with it.
-fn partners(judged: &Judgement) -> Vec<Vec<usize>> {
-    let n = judged.layout.unknowns.len();
-    let Some(last) = judged.stairs.last() else { return vec![Vec::new(); n] };
-    let mut span = Echelon::new(judged.fields[0], n);
-    let short = extend_by_short_vectors(&last.null_space(), &mut span);
-    let mut out = vec![Vec::new(); n];
-    for v in short {
-        let support = support(&v);
-        for &c in &support {
-            out[c].extend(support.iter().copied().filter(|&d| d != c));
-        }
-    }
-    for list in &mut out {
-        list.sort_unstable();
-        list.dedup();
-    }
-    out
 }
 
 /// `c`, or a name like it that the model does not use.

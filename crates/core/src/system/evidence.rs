@@ -14,7 +14,7 @@ use super::numeric::{FilterState, Numeric};
 use super::rows::Unknown;
 use super::run::{RunError, Setup};
 use super::symmetry::{PolynomialDirection, Symmetry, symmetries};
-use crate::crosscheck::answer::{Check, Count};
+use crate::crosscheck::answer::{Check, Count, Measured};
 use crate::degree::status::Status;
 
 /// Name and version of the JSON layout.
@@ -34,6 +34,9 @@ const SEEN: f64 = 1e-9;
 const UNSEEN: f64 = 1e-12;
 /// How far a measured slope may be from the predicted one, and from the slope at the next horizon.
 const TOLERANCE: f64 = 0.1;
+/// How many slopes in a row must settle, and how much rounding changes them.
+const SETTLED: usize = 4;
+const JITTER: f64 = 0.005;
 /// The factor of an observable unknown is below, that of another above.
 const OBSERVABLE_FACTOR: f64 = 1.5;
 const UNOBSERVABLE_FACTOR: f64 = 5.0;
@@ -55,7 +58,9 @@ pub struct SystemEvidence {
     pub defect: Count,
     /// Checks that failed.
     pub failures: usize,
-    /// Checks that were made.
+    /// How many degrees were measured.
+    pub orders: Measured,
+    /// Checks that were made: what could not be measured is none.
     pub checks: usize,
     /// Whether none failed.
     pub passed: bool,
@@ -76,7 +81,7 @@ pub struct SystemQuantityEvidence {
     pub status: Status,
     /// The degree.
     pub degree: Option<usize>,
-    /// Log-log slope of sigma against the horizon: -(degree + 1/2); measured null where it has no plateau above rounding.
+    /// Log-log slope of sigma against the horizon: -(degree + 1/2); measured null where it does not settle above rounding.
     pub slope: Check,
     /// Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 where not observable.
     pub inflation: Check,
@@ -193,7 +198,6 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     } else {
         vec![None; columns.len()]
     };
-    let near = |x: Option<f64>, y: f64| x.is_none_or(|x| (x - y).abs() <= TOLERANCE);
     let quantities: Vec<SystemQuantityEvidence> = unknowns
         .iter()
         .enumerate()
@@ -203,18 +207,14 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
             let predicted = degree.map_or(0.0, |k| -(k as f64 + 0.5));
             let measured = slopes[c].filter(|_| degree.is_some());
             let factor = inflated[c];
-            let pass =
-                if degree.is_some() { factor < OBSERVABLE_FACTOR } else { factor > UNOBSERVABLE_FACTOR };
+            let kept =
+                |x: f64| if degree.is_some() { x < OBSERVABLE_FACTOR } else { x > UNOBSERVABLE_FACTOR };
             SystemQuantityEvidence {
                 name: u.name.clone(),
                 status,
                 degree,
-                slope: Check { predicted, measured, pass: near(measured, predicted) },
-                inflation: Check {
-                    predicted: if degree.is_some() { 1.0 } else { 10.0 },
-                    measured: Some(factor),
-                    pass,
-                },
+                slope: Check::new(predicted, measured, |x| (x - predicted).abs() <= TOLERANCE),
+                inflation: Check::new(if degree.is_some() { 1.0 } else { 10.0 }, Some(factor), kept),
             }
         })
         .collect();
@@ -237,17 +237,14 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
             }
             let seen = (&m * &v).norm() / (v.norm() * largest);
             // the derivatives are integrated by Runge-Kutta: what a symmetry leaves alone, its error does not
-            let pass = seen <= 1e-6;
-            SymmetryEvidence {
-                words: report.words.clone(),
-                seen: Check { predicted: 0.0, measured: Some(seen), pass },
-            }
+            SymmetryEvidence { words: report.words.clone(), seen: Check::new(0.0, Some(seen), |x| x <= 1e-6) }
         })
         .collect();
     let checks: Vec<bool> = quantities
         .iter()
-        .flat_map(|q| q.slope.measured.map(|_| q.slope.pass).into_iter().chain([q.inflation.pass]))
+        .flat_map(|q| [q.slope.pass, q.inflation.pass])
         .chain(symmetries.iter().map(|s| s.seen.pass))
+        .flatten()
         .chain([defect.pass])
         .collect();
     let failures = checks.iter().filter(|pass| !**pass).count();
@@ -255,6 +252,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         name: model.name.clone(),
+        orders: Measured::count(quantities.iter().map(|q| (&q.slope, q.degree.is_some()))),
         quantities,
         symmetries,
         defect,
@@ -309,7 +307,18 @@ fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Resul
     Ok(large.iter().zip(&small).map(|(l, s)| l / s).collect())
 }
 
-/// The slope of every unknown at the shortest horizon at which rounding is out of sight, where it agrees with that of the next.
+/// What slopes at shorter and shorter horizons settle at: the last one, if the last of them change little and less and less. Two that agree
+/// are no sign of it: slopes that go up and down meet.
+fn settled(slopes: &[f64]) -> Option<f64> {
+    let last = slopes.last_chunk::<SETTLED>()?;
+    let changes: Vec<f64> = last.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let less = changes.windows(2).all(|w| w[1] <= w[0].max(JITTER));
+    let little =
+        changes.iter().all(|x| *x <= TOLERANCE) && changes.last().is_some_and(|x| *x <= TOLERANCE / 4.0);
+    (less && little).then_some(last[SETTLED - 1])
+}
+
+/// The slope of every unknown at the shortest horizon at which rounding is out of sight, where those before it settle there.
 fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
     let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
     for j in 0..HORIZONS {
@@ -327,10 +336,28 @@ fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Optio
         (s1[c] / s2[c]).ln() / (t1 / t2).ln() - 0.5
     };
     Ok((0..columns.len())
-        .map(|c| {
-            let last = seen.len().checked_sub(2)?;
-            let (here, before) = (slope(c, last), slope(c, last.checked_sub(1)?));
-            ((here - before).abs() <= TOLERANCE / 4.0).then_some(here)
-        })
+        .map(|c| settled(&(0..seen.len().saturating_sub(1)).map(|k| slope(c, k)).collect::<Vec<_>>()))
         .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::settled;
+
+    #[test]
+    fn what_settles() {
+        assert_eq!(settled(&[-4.0, -4.351, -4.403, -4.436, -4.458]), Some(-4.458));
+        assert_eq!(settled(&[-0.5; 4]), Some(-0.5));
+        // too few; two that meet by chance; a drift at a steady pace; growing changes; rounding
+        for open in [
+            &[-0.5; 3][..],
+            &[-7.2, -1.6, -1.25, -1.27],
+            &[-1.3, -1.32, -1.34, -1.9],
+            &[-2.0, -2.08, -2.16, -2.24],
+            &[-2.5, -2.501, -2.51, -2.53],
+            &[-2.5, -2.5, -2.5, f64::NAN],
+        ] {
+            assert_eq!(settled(open), None, "{open:?}");
+        }
+    }
 }
