@@ -174,6 +174,81 @@ fn excitation_of_an_arc() {
     }
 }
 
+/// Observability and requirements are two questions: what can go for one cannot for the other.
+#[test]
+fn positions_that_can_go() {
+    let six = scheme(&S6, Carry::Inertial);
+    let of = |d: f64| {
+        let require = |name: &str, value| Assignment { name: name.into(), value };
+        let requirements = vec![require("D", d), require("psi", 1.0)];
+        let conditions = Conditions { requirements, ..Conditions::default() };
+        let entry = Entry { name: "it".into(), scheme: six.clone(), conditions };
+        compare(&[entry], 1).expect("compared").schemes.remove(0)
+    };
+    // by the worst sigma without each, which drop-one knows
+    let all = of(1e3);
+    let mut without: Vec<f64> =
+        all.drop_one.iter().filter_map(|d| Some(d.worst.as_ref()?.sigma_dph)).collect();
+    without.sort_by(f64::total_cmp);
+    let between = (without[2] + without[3]) / 2.0;
+    let r = of(between);
+    assert!(r.requirements.all_met() && r.drop_one.iter().all(|d| d.lost.is_empty()));
+    for d in &r.drop_one {
+        let sigma = d.worst.as_ref().expect("observable").sigma_dph;
+        assert_eq!(
+            (d.requirements.stated, d.requirements.all_met()),
+            (15, sigma <= between),
+            "{}",
+            d.position
+        );
+    }
+    assert_eq!(r.drop_one.iter().filter(|d| d.requirements.all_met()).count(), 3);
+    assert!(all.drop_one.iter().all(|d| d.requirements.all_met()));
+    let text = obsdeg(&["examples/six-positions/scheme.toml", "--requirement", "D=1e-6"]);
+    let row = text.lines().find(|l| l.starts_with(" six-positions")).expect("a row");
+    assert!(
+        text.contains("observable without") && row.contains(" any one ") && row.ends_with("   -"),
+        "{row}"
+    );
+}
+
+/// A table says what it compares: other carries without the slews, and schemes that have different tasks.
+#[test]
+fn what_is_not_alike_is_said() {
+    let twelve = "examples/twelve-positions/scheme.toml";
+    let text = obsdeg(&[twelve]);
+    assert!(
+        text.contains(" platform carry, no slews ") && text.contains(" reset carry, no slews "),
+        "{text}"
+    );
+    assert!(text.contains("no slews: slews need inertial carry") && !text.contains("not like with like"));
+    let (five, six) = ("examples/five-positions/scheme.toml", "examples/six-positions/scheme.toml");
+    let text = obsdeg(&[five, six]);
+    assert!(text.contains(" inertial carry ") && !text.contains("slews:"), "{text}");
+    assert!(!text.contains("not like with like"), "{text}");
+    let text = obsdeg(&[twelve, five]);
+    assert!(
+        text.contains("not like with like: the schemes differ in carry, latitude, requirements\n"),
+        "{text}"
+    );
+    let text = obsdeg(&[twelve, five, "--carry", "inertial", "--latitude", "48", "--requirement", "D=1"]);
+    assert!(!text.contains("not like with like"), "{text}");
+    let json: serde_json::Value =
+        serde_json::from_str(&obsdeg(&[twelve, five, "--latitude", "48", "--format", "json"])).expect("JSON");
+    assert_eq!(json["differ"], serde_json::json!(["carry", "requirements"]));
+    assert_eq!(json["schemes"][0]["sensitivity"][9]["condition"], "platform carry, no slews");
+}
+
+fn obsdeg(arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .arg("compare")
+        .args(arguments)
+        .output()
+        .expect("it runs");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
 /// What the sigmas rest on is in the answer and in the table; what the dwell takes away has no sigma.
 #[test]
 fn conditions_and_dwell() {

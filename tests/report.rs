@@ -107,7 +107,7 @@ fn assert_status(page: &Html, verdict: &str) {
     let limited = !(consistent && valid && !prior && good("Filter and exact verdicts"));
     assert!(!limited || verdict.contains("Limited: "), "{verdict}");
     // what is missed anywhere on the page leads, and is never a green ok
-    let missed = whole.contains("NOT met");
+    let missed = whole.contains(" are NOT met, ");
     let leads =
         ["By prediction (no prior, ", "In the run (with prior "].iter().any(|l| verdict.starts_with(l));
     assert_eq!((of("Requirements").is_some_and(|r| r[1] == "missed"), leads), (missed, missed), "{verdict}");
@@ -283,7 +283,25 @@ fn a_verdict_leads_with_what_limits_it() {
         .map(|r| [r[0].clone(), r[9].clone()])
         .collect();
     assert!(excited.iter().all(|[_, at]| at != "-"), "{excited:?}");
-    // at a pole the dwell takes away what derivatives see
+    // at a pole the dwell gives what no derivative sees
+    let (page, verdict) = page_of("dwell.html", &[five, "--latitude", "90"]);
+    let said = "The scheme determines 0 of the 12 gyro coefficients by derivatives, and 12 of them with dwell, during which psi moves. \
+                The largest predicted sigma of those is ";
+    assert!(
+        verdict.contains(said) && !verdict.contains("None of them") && !verdict.contains("cannot tell"),
+        "{verdict}"
+    );
+    let expected =
+        "LIMITED by derivatives 0 of 12 gyro coefficients, 3 of 3 of psi; with dwell 12 of 12 and 3 of 3";
+    assert_eq!(row(&page, "Observable"), ["limited", expected]);
+    let unseen =
+        texts(&page, "li").into_iter().filter(|l| l.starts_with("no derivative of Z changes when ")).count();
+    assert_eq!(unseen, 2, "the rank by derivatives is 13 of 15");
+    assert!(texts(&page, "li").iter().any(|l| {
+        l.starts_with("with dwell, during which psi moves, these are determined nonetheless: D_FX, ")
+    }));
+    assert!(texts(&page, "th").contains(&"rank with dwell".to_string()));
+    // or takes away what derivatives see
     let pole = file(
         "pole.toml",
         "latitude_deg = 90\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\n\

@@ -1,7 +1,7 @@
 //! Schemes side by side.
 
 use obsdeg_core::compare::Comparison;
-use obsdeg_core::compare::answer::{Quantity, Review, Worst};
+use obsdeg_core::compare::answer::{DropOne, Quantity, Review, Worst};
 use obsdeg_core::requirements::Requirements;
 
 use crate::document::{Block, Document, number, optional};
@@ -15,8 +15,13 @@ fn list(items: &[String]) -> String {
     if items.is_empty() { "-".into() } else { items.join(" ") }
 }
 
+/// `15 of 15`; how it is counted where accuracy orders are not computed.
+pub(crate) fn rank([rank, unknowns]: [usize; 2], with_dwell: bool) -> String {
+    format!("{rank} of {unknowns}{}", if with_dwell { "" } else { " by derivatives" })
+}
+
 /// `met; 2.231 (D_IX)`.
-fn requirements(r: &Requirements) -> String {
+pub(crate) fn requirements(r: &Requirements) -> String {
     let worst =
         words::worst_margin(r).map_or_else(String::new, |w| format!(";{} {w}", words::whose_margin(r)));
     match (r.stated, r.all_met()) {
@@ -29,16 +34,20 @@ fn requirements(r: &Requirements) -> String {
 /// One row per scheme.
 fn overview(schemes: &[Review]) -> Block {
     let row = |r: &Review| {
-        let carried = r.drop_one.iter().filter(|d| d.lost.is_empty() && d.worst.is_some());
+        let without = |keeps: fn(&&DropOne) -> bool| {
+            let kept: Vec<String> = r.drop_one.iter().filter(keeps).map(|d| d.position.clone()).collect();
+            if kept.len() > 1 && kept.len() == r.positions.len() { "any one".into() } else { list(&kept) }
+        };
         vec![
             r.name.clone(),
             r.carry.to_string(),
             r.positions.len().to_string(),
             number(r.total_s),
-            format!("{} of {}", r.rank[0], r.rank[1]),
+            rank(r.rank, r.has_accuracy_orders),
             worst(r.worst.as_ref()),
             requirements(&r.requirements),
-            list(&carried.map(|d| d.position.clone()).collect::<Vec<_>>()),
+            without(|d| d.lost.is_empty()),
+            without(|d| d.requirements.stated > 0 && d.requirements.all_met()),
         ]
     };
     Block::Table {
@@ -48,12 +57,13 @@ fn overview(schemes: &[Review]) -> Block {
             "carry",
             "positions",
             "total [s]",
-            "rank",
+            "rank with dwell",
             "worst sigma(D)",
             "requirements; worst margin",
-            "redundant",
+            "observable without",
+            "met without",
         ],
-        numbers: vec![false, false, true, true, true, false, false, false],
+        numbers: vec![false, false, true, true, true, false, false, false, false],
         rows: schemes.iter().map(row).collect(),
     }
 }
@@ -123,14 +133,26 @@ fn excitation(q: &Quantity) -> String {
 pub(crate) fn document(c: &Comparison) -> Document {
     let mut blocks = vec![overview(&c.schemes), by_unknown(&c.schemes)];
     let drop_rows = c.schemes.iter().flat_map(|r| {
-        r.drop_one
-            .iter()
-            .map(|d| vec![r.name.clone(), d.position.clone(), list(&d.lost), worst(d.worst.as_ref())])
+        r.drop_one.iter().map(|d| {
+            vec![
+                r.name.clone(),
+                d.position.clone(),
+                list(&d.lost),
+                worst(d.worst.as_ref()),
+                requirements(&d.requirements),
+            ]
+        })
     });
     blocks.push(Block::Table {
         heading: "Without one position".into(),
-        header: vec!["scheme", "without", "not observable any more", "worst sigma(D)"],
-        numbers: vec![false; 4],
+        header: vec![
+            "scheme",
+            "without",
+            "not observable any more",
+            "worst sigma(D)",
+            "requirements; worst margin",
+        ],
+        numbers: vec![false; 5],
         rows: drop_rows.collect(),
     });
     let conditions = c.schemes.first().map_or(&[][..], |r| &r.sensitivity);
@@ -147,7 +169,7 @@ pub(crate) fn document(c: &Comparison) -> Document {
                 rows.push(vec![
                     name.clone(),
                     r.name.clone(),
-                    format!("{} of {}", s.rank[0], s.rank[1]),
+                    rank(s.rank, r.has_accuracy_orders),
                     worst(s.worst.as_ref()),
                 ]);
             }
@@ -155,7 +177,7 @@ pub(crate) fn document(c: &Comparison) -> Document {
     }
     blocks.push(Block::Table {
         heading: "Sensitivity of the worst sigma(D)".into(),
-        header: vec!["condition", "scheme", "rank", "worst sigma(D)"],
+        header: vec!["condition", "scheme", "rank with dwell", "worst sigma(D)"],
         numbers: vec![false, false, true, false],
         rows,
     });
@@ -179,15 +201,25 @@ pub(crate) fn document(c: &Comparison) -> Document {
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
             .into(),
-        "redundant: without it every unknown stays observable; only by: positions without which it does not"
+        "observable without, met without: positions that can go, one at a time, so that what is observable stays so, and so \
+         that every requirement is met; only by: positions without which the unknown is not observable"
             .into(),
         format!("seed {}", c.seed),
     ]);
+    if c.schemes.iter().any(|r| !r.slews.is_empty()) {
+        lines.push(
+            "no slews: slews need inertial carry, so other carries are taken with repositioning at once"
+                .into(),
+        );
+    }
     blocks.push(Block::List { heading: "Assumed".into(), lines });
     let n = c.schemes.len();
     Document {
         title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
-        lead: Vec::new(),
+        lead: (!c.differ.is_empty())
+            .then(|| format!("not like with like: the schemes differ in {}", c.differ.join(", ")))
+            .into_iter()
+            .collect(),
         blocks,
     }
 }

@@ -75,7 +75,7 @@ fn table(heading: &str, found: &[Found]) -> Block {
             "criterion",
             "worst sigma [deg/h, /g]",
             "worst margin",
-            "rank",
+            "rank by derivatives",
         ],
         numbers: vec![true, false, true, true, true, true, false, false, true],
         rows: found.iter().enumerate().map(row).collect(),

@@ -127,7 +127,10 @@ pub(crate) fn analysis(a: &Analysis) -> String {
             let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| expression(k));
             format!("${} = {value}$", symbol(&c.name))
         };
-        lines.push(format!("not seen by $Z$: {}", v.iter().map(part).collect::<Vec<_>>().join(", ")));
+        lines.push(format!(
+            "not seen by derivatives of $Z$: {}",
+            v.iter().map(part).collect::<Vec<_>>().join(", ")
+        ));
     }
     for f in a.formulas.iter().flatten() {
         lines.push(format!("${} = {}$", left(&f.left, f.position.as_deref()), expression(&f.right)));

@@ -91,10 +91,7 @@ pub(crate) fn analysis(a: &Analysis) -> String {
         }
     };
     section(words::ACCURACY, words::accuracy(a).iter().map(|s| escape(s)).collect());
-    section(
-        "Directions that Z does not see",
-        a.null_space.iter().map(|v| code(&words::null_vector(v))).collect(),
-    );
+    section(words::UNSEEN, a.null_space.iter().map(|v| code(&words::null_vector(v))).collect());
     section("Not excited", words::not_excited(a).iter().map(|n| code(n)).collect());
     section(
         "Degenerate angles",

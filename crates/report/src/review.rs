@@ -27,7 +27,9 @@ pub(crate) fn document(r: &DesignReview) -> Document {
     }
     if r.schemes.len() > 1 {
         blocks.push(section(1, "Comparison of the schemes"));
-        blocks.extend(compare::document(&r.comparison).blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
+        let comparison = compare::document(&r.comparison);
+        blocks.extend(comparison.lead.into_iter().map(Block::Text));
+        blocks.extend(comparison.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
         blocks.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
     }
     for (i, m) in r.models.iter().enumerate() {
@@ -170,8 +172,8 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             })
             .collect();
         lines.push(match v.len() {
-            1 => format!("{names} can take any value"),
-            _ => format!("no output changes when these change together: {}", parts.join(", ")),
+            1 => format!("no derivative of Z changes with {names}"),
+            _ => format!("no derivative of Z changes when these change together: {}", parts.join(", ")),
         });
         let component = |c: &obsdeg_core::analysis::Component| {
             let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| latex::expression(k));
@@ -185,11 +187,21 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
         lines.push(format!("no position excites {}: each can take any value", silent.join(", ")));
     }
     if lines.is_empty() {
-        lines.push("nothing: every unknown is observable".into());
+        lines.push("nothing: every unknown is observable by derivatives".into());
+    }
+    let seen: Vec<&str> = (a.quantities.iter())
+        .filter(|q| q.degree.is_none() && q.accuracy_order.is_some())
+        .map(|q| q.name.as_str())
+        .collect();
+    if !seen.is_empty() {
+        lines.push(format!(
+            "with dwell, during which psi moves, these are determined nonetheless: {}",
+            seen.join(", ")
+        ));
     }
     blocks.push(list("", lines));
     if !formulas.is_empty() {
-        blocks.push(Block::Formulas { heading: "Directions that Z does not see".into(), lines: formulas });
+        blocks.push(Block::Formulas { heading: words::UNSEEN.into(), lines: formulas });
     }
     let combination = |c: &obsdeg_core::analysis::CombinationReport| {
         let asked = if c.requested { ", asked for" } else { "" };
@@ -303,14 +315,14 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &
     let row = |c: &obsdeg_core::compare::answer::Sensitivity| {
         vec![
             c.condition.clone(),
-            format!("{} of {}", c.rank[0], c.rank[1]),
+            compare::rank(c.rank, review.has_accuracy_orders),
             compare::worst(c.worst.as_ref()),
             compare::worst(c.worst_determined.as_ref()),
         ]
     };
     blocks.push(Block::Table {
         heading: "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where one is not observable)".into(),
-        header: vec!["condition", "rank", "of all", "of those determined"],
+        header: vec!["condition", "rank with dwell", "of all", "of those determined"],
         numbers: vec![false, true, false, false],
         rows: review.sensitivity.iter().map(row).collect(),
     });
@@ -360,13 +372,23 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
     blocks.push(list("", lines));
     let row = |d: &obsdeg_core::compare::answer::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
-        vec![d.position.clone(), lost, compare::worst(d.worst.as_ref())]
+        vec![
+            d.position.clone(),
+            lost,
+            compare::worst(d.worst.as_ref()),
+            compare::requirements(&d.requirements),
+        ]
     };
     if !review.drop_one.is_empty() {
         blocks.push(Block::Table {
             heading: "Without one position".into(),
-            header: vec!["without", "not observable any more", "worst sigma(D) [deg/h, /g]"],
-            numbers: vec![false; 3],
+            header: vec![
+                "without",
+                "not observable any more",
+                "worst sigma(D) [deg/h, /g]",
+                "requirements; worst margin",
+            ],
+            numbers: vec![false; 4],
             rows: review.drop_one.iter().map(row).collect(),
         });
     }

@@ -117,7 +117,7 @@ pub(crate) fn analysis(a: &Analysis, layout: Layout) -> String {
         }
     }
     if !a.null_space.is_empty() {
-        heading(&mut out, "Directions that Z does not see (a change along one leaves Z as it is)", layout);
+        heading(&mut out, &format!("{} (a change along one leaves them as they are)", words::UNSEEN), layout);
         for v in &a.null_space {
             paragraph(&mut out, &words::null_vector(v), layout);
         }

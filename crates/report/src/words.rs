@@ -60,11 +60,11 @@ pub(crate) fn headline(a: &Analysis) -> String {
     format!("{n} position{}, {} carry, {latitude}{azimuth}", if n == 1 { "" } else { "s" }, a.carry)
 }
 
-/// `rank 8 of 15; rank profile 2 6 8 for derivatives of order 0, 1, 2`.
+/// `rank 8 of 15 by derivatives; rank profile 2 6 8 with derivatives up to order 0, 1, 2`.
 pub(crate) fn rank(a: &Analysis) -> String {
     let orders: Vec<String> = (0..a.rank_profile.len()).map(|k| k.to_string()).collect();
     format!(
-        "rank {} of {}; rank profile {} with derivatives up to order {}",
+        "rank {} of {} by derivatives; rank profile {} with derivatives up to order {}",
         a.rank,
         a.unknowns.len(),
         list(&a.rank_profile),
@@ -225,6 +225,9 @@ pub(crate) fn accuracy(a: &Analysis) -> Vec<String> {
     };
     groups.into_iter().map(sentence).collect()
 }
+
+/// Title of the null space.
+pub(crate) const UNSEEN: &str = "Directions that derivatives of Z do not see";
 
 /// Title of the section on accuracy orders.
 pub(crate) const ACCURACY: &str =

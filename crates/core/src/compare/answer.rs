@@ -21,6 +21,8 @@ pub struct Comparison {
     pub version: String,
     /// The schemes in the order given.
     pub schemes: Vec<Review>,
+    /// What differs between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step.
+    pub differ: Vec<String>,
     /// Seed of all random choices.
     pub seed: u64,
 }
@@ -40,7 +42,7 @@ pub struct Review {
     pub slews: Vec<Slew>,
     /// Total time with slews, in s.
     pub total_s: f64,
-    /// The rank and the number of unknowns.
+    /// The rank with dwell (by derivatives where accuracy orders are not computed), and the number of unknowns.
     pub rank: [usize; 2],
     /// Per unknown.
     pub quantities: Vec<Quantity>,
@@ -118,14 +120,17 @@ pub struct DropOne {
     pub lost: Vec<String>,
     /// The worst sigma without it.
     pub worst: Option<Worst>,
+    /// What becomes of the requirements without it.
+    pub requirements: Requirements,
 }
 
 /// The worst sigma under another condition.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Sensitivity {
-    /// The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`.
+    /// The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` where the scheme has slews, which only
+    /// inertial carry knows.
     pub condition: String,
-    /// The rank and the number of unknowns there.
+    /// The rank with dwell and the number of unknowns there.
     pub rank: [usize; 2],
     /// The worst sigma there.
     pub worst: Option<Worst>,

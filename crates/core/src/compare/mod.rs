@@ -3,6 +3,8 @@
 
 pub mod answer;
 
+use std::collections::BTreeMap;
+
 use obsdeg_ekf::SquareRootInformation;
 use rayon::prelude::*;
 
@@ -57,12 +59,36 @@ pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, Simu
         comparable(&e.scheme).map_err(|error| (e.name.clone(), error))?;
     }
     let schemes = entries.iter().map(|e| review(e, seed).map_err(|error| (e.name.clone(), error)));
+    let schemes = schemes.collect::<Result<Vec<_>, _>>()?;
     Ok(Comparison {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
-        schemes: schemes.collect::<Result<_, _>>()?,
+        differ: differ(&schemes),
+        schemes,
         seed,
     })
+}
+
+/// What differs between schemes besides positions, dwells and slews.
+fn differ(schemes: &[Review]) -> Vec<String> {
+    let Some((first, others)) = schemes.split_first() else { return Vec::new() };
+    // psi of every position counts as psi
+    let required = |r: &Review| -> BTreeMap<String, Option<f64>> {
+        let family = |name: &str| name.split('@').next().unwrap_or_default().to_string();
+        r.quantities.iter().map(|q| (family(&q.name), q.requirement)).collect()
+    };
+    let here = required(first);
+    let other = |differs: &dyn Fn(&Review) -> bool| others.iter().any(differs);
+    let noise = |r: &Review| (r.conditions.accelerometer_noise_g, r.conditions.azimuth_noise_deg);
+    let found = [
+        ("carry", other(&|r| r.carry != first.carry)),
+        ("latitude", other(&|r| r.conditions.latitude_deg != first.conditions.latitude_deg)),
+        ("unknowns", other(&|r| !required(r).keys().eq(here.keys()))),
+        ("requirements", other(&|r| required(r).iter().any(|(n, x)| here.get(n).is_some_and(|y| x != y)))),
+        ("noise", other(&|r| noise(r) != noise(first))),
+        ("step", other(&|r| r.conditions.step_s != first.conditions.step_s)),
+    ];
+    found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
 }
 
 /// Every unknown with its standard deviation in deg, deg/h, deg/h/g by the information of all samples, without prior and drift noise;
@@ -148,12 +174,9 @@ fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
     conditions.concern(judged.platform())?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
     let quantities = quantities(&judged, conditions, &drop_one)?;
-    let requirements = Requirements::of(
-        Basis::Predicted,
-        quantities.iter().map(Quantity::claim),
-        conditions.requires_by_default(),
-    );
+    let requirements = required(&quantities, conditions);
     let slews = judged.plan.slews();
+    let has_slews = judged.plan.slews().next().is_some();
     Ok(Review {
         name: name.clone(),
         carry: scheme.carry,
@@ -168,8 +191,17 @@ fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
         quantities,
         worst: judged.worst(),
         drop_one,
-        sensitivity: sensitivity(scheme, conditions, &judged.determined(), seed)?,
+        sensitivity: sensitivity(scheme, conditions, &judged.determined(), has_slews, seed)?,
     })
+}
+
+/// The requirements of `conditions` against predicted sigmas.
+fn required(quantities: &[Quantity], conditions: &Conditions) -> Requirements {
+    Requirements::of(
+        Basis::Predicted,
+        quantities.iter().map(Quantity::claim),
+        conditions.requires_by_default(),
+    )
 }
 
 fn quantities(
@@ -269,7 +301,9 @@ fn drop_one(
             // under reset carry every position has a psi of its own
             let names = names.filter(|n| !n.contains('@'));
             let lost = names.filter(|n| observable(whole, n) && !observable(&judged, n)).cloned().collect();
-            Ok(DropOne { position, lost, worst: judged.worst() })
+            let still = conditions.within(judged.platform());
+            let requirements = required(&quantities(&judged, &still, &[])?, conditions);
+            Ok(DropOne { position, lost, worst: judged.worst(), requirements })
         })
         .collect()
 }
@@ -279,6 +313,7 @@ fn sensitivity(
     scheme: &Scheme,
     conditions: &Conditions,
     determined: &[String],
+    slews: bool,
     seed: u64,
 ) -> Result<Vec<Sensitivity>, SimulationError> {
     let mut others: Vec<(String, Scheme, Conditions)> = Vec::new();
@@ -290,10 +325,11 @@ fn sensitivity(
         let other = scheme.with_dwells(conditions.dwell_s, factor)?;
         others.push((format!("dwell x {factor}"), other, conditions.clone()));
     }
+    let without = if slews { ", no slews" } else { "" };
     for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
         // slews carry psi^n: without them another carry can be asked for
         let still = Conditions { slews: false, ..conditions.clone() };
-        others.push((format!("{carry} carry"), Scheme { carry, ..scheme.clone() }, still));
+        others.push((format!("{carry} carry{without}"), Scheme { carry, ..scheme.clone() }, still));
     }
     let judged = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
         let judged = Judged::new(&scheme, &conditions, seed)?;

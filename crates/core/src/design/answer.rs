@@ -141,7 +141,7 @@ pub struct Found {
     pub worst_degree: usize,
     /// Its largest accuracy order of a required coefficient.
     pub worst_accuracy_order: Option<usize>,
-    /// Its exact rank and the number of unknowns.
+    /// Its exact rank by derivatives, and the number of unknowns.
     pub rank: [usize; 2],
 }
 

@@ -112,10 +112,16 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
     let a = &s.analysis;
     let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
     let seen: Vec<&&Quantity> = of(Exact::Observable).collect();
+    let with_dwell: Vec<&&Quantity> = coefficients.iter().filter(|q| q.sigma.is_some()).collect();
     let (all, what) = (coefficients.len(), kind(coefficients));
-    let mut first = match (seen.len(), all) {
-        (n, all) if n == all => format!("The scheme determines every one of the {all} {what}"),
-        (n, all) => format!("The scheme determines {n} of the {all} {what}"),
+    let same = seen.iter().map(|q| &q.name).eq(with_dwell.iter().map(|q| &q.name));
+    let mut first = match (seen.len(), same) {
+        (n, true) if n == all => format!("The scheme determines every one of the {all} {what}"),
+        (n, true) => format!("The scheme determines {n} of the {all} {what}"),
+        (n, false) => format!(
+            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with dwell, during which psi moves",
+            with_dwell.len()
+        ),
     };
     if let Some(worst) = seen.iter().filter_map(|q| q.degree).max() {
         let degrees = seen.iter().map(|q| (q.name.as_str(), q.degree));
@@ -126,7 +132,8 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
         let partners = verdict.map_or_else(String::new, |v| v.partners.join(", "));
         format!("{} from {partners}", q.name)
     };
-    let lost: Vec<String> = of(Exact::Inseparable).map(|q| partners(&q)).collect();
+    let lost: Vec<String> =
+        of(Exact::Inseparable).filter(|q| q.sigma.is_none()).map(|q| partners(&q)).collect();
     let lost = lost.join("; ");
     let silent = joined(of(Exact::NotExcited).map(|q| q.name.as_str()));
     if !lost.is_empty() {
@@ -135,7 +142,7 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
     if !silent.is_empty() {
         first.push_str(&format!("; it does not excite {silent}"));
     }
-    let worst = seen.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
+    let worst = with_dwell.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
     let accuracy = worst.map_or_else(
         || "None of them has a finite predicted sigma".to_string(),
         |(q, sigma)| {
@@ -166,16 +173,26 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
 /// The box of a scheme.
 pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
     let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
-    let counted = |psi: bool| {
-        let seen = of(psi).filter(|q| q.status == Exact::Observable).count();
-        format!("{seen} of {}", of(psi).count())
+    let count = |psi: bool, seen: fn(&&Quantity) -> bool| {
+        format!("{} of {}", of(psi).filter(seen).count(), of(psi).count())
     };
     let coefficients: Vec<&Quantity> = of(false).collect();
     let lost = lost_with_dwell(s);
     let every = review.quantities.iter().all(|q| q.status == Exact::Observable) && lost.is_empty();
+    let observable = {
+        let what = kind(&coefficients);
+        let [by, with]: [fn(&&Quantity) -> bool; 2] =
+            [|q| q.status == Exact::Observable, |q| q.sigma.is_some()];
+        let text = format!("{} {what}, {} of psi", count(false, by), count(true, by));
+        if review.quantities.iter().all(|q| by(&q) == with(&q)) {
+            text
+        } else {
+            format!("by derivatives {text}; with dwell {} and {}", count(false, with), count(true, with))
+        }
+    };
     let dwell = match lost.is_empty() {
         true => String::new(),
-        false => format!("; with dwell not determined: {}", words::names(lost)),
+        false => format!(", without {}", words::names(lost)),
     };
     let grade = |good: bool| if good { Grade::Good } else { Grade::Limited };
     let consistency = &s.simulation.consistency;
@@ -186,11 +203,7 @@ pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
     Status {
         title: s.name.clone(),
         rows: vec![
-            row(
-                "Observable",
-                grade(every),
-                format!("{} {}, {} of psi{dwell}", counted(false), kind(&coefficients), counted(true)),
-            ),
+            row("Observable", grade(every), format!("{observable}{dwell}")),
             row("Requirements", required, requirements),
             row(
                 "Small-angle model",
