@@ -185,11 +185,86 @@ fn bad_input_is_refused_by_name() {
     refused(&[&P1P2[..], &["--format", "xml"]].concat(), &["`xml` is not a format"]);
     refused(&[&P1P2[..], &["--combination", "D_FZ - D_IW"]].concat(), &["`D_IW`", "did you mean", "^^^^"]);
     refused(&[&P1P2[..], &["--combination", "D_FX*D_FY"]].concat(), &["not linear"]);
+    for other in ["psi_y/D_FX", "1/D_FX", "D_FX + 1", "D_FX/(1 + psi_y)"] {
+        refused(&[&P1P2[..], &["--combination", other]].concat(), &["not linear"]);
+    }
+    refused(&[&P1P2[..], &["--combination", "D_FX/(wN - wN)"]].concat(), &["division by zero"]);
+    for zero in ["0*D_FX", "D_FX - D_FX", "(sin(180 deg))*psi_y", "0"] {
+        refused(&[&P1P2[..], &["--combination", zero]].concat(), &["always zero"]);
+        refused(&["simulate", "--angles", "180,0,0", "--combination", zero], &["always zero"]);
+    }
+    refused(&[&P1P2[..], &["--combination", "abs(D_FX)"]].concat(), &["known function", "found `abs`"]);
     refused(&[&P1P2[..], &["--combination", "D_FX +"]].concat(), &["end of the expression"]);
     refused(&["analyze", "--scheme", "no/such/file.toml"], &["no/such/file.toml"]);
     refused(&["analyze"], &["--scheme"]);
     refused(&["analyze", "--angles", "0,0,0", "--scheme", "x.toml"], &["cannot be used with"]);
     refused(&["frobnicate"], &["unrecognized subcommand"]);
+}
+
+/// A file without its option is told which; what is no file, or where no option takes one, is not.
+#[test]
+fn a_file_without_its_option() {
+    for command in ["analyze", "simulate", "crosscheck"] {
+        refused(&[command, "mine.toml"], &["'mine.toml'", "--scheme mine.toml", "--model mine.toml"]);
+        refused(&[command, "--seed", "3", "m.json"], &["--model m.json"]);
+    }
+    for arguments in [["analyze", "mine"], ["design", "mine.toml"], ["analyze", "--mine.toml"]] {
+        let message = stderr(&run(&arguments));
+        assert!(message.contains("mine") && !message.contains("--scheme mine"), "{message}");
+    }
+}
+
+/// The slips of a first scheme file and of a first model are told by name.
+#[test]
+fn slips_of_a_first_file() {
+    let (folder, _) = scratch();
+    let file = folder.path().join("s.toml").display().to_string();
+    let one = "[[position]]\nangles_deg = [0, 0, 0]\n";
+    let top = "belongs at the top of the file";
+    for (text, expected) in [
+        (format!("latitude_deg = 48,5\n{one}"), "expected a decimal point, as in 48.5"),
+        (one.replace(',', ""), "`0 0 0` has no commas"),
+        (format!("latitude = 48\n{one}"), "did you mean `latitude_deg`?"),
+        (format!("Latitude = 48\n{one}"), "did you mean `latitude_deg`?"),
+        (one.replace("_deg", ""), "did you mean `angles_deg`?"),
+        (format!("{one}[simulation]\nslew_rate = 1\n"), "did you mean `slew_rate_deg_s`?"),
+        (format!("{one}latitude_deg = 48\n"), top),
+        (format!("{one}latitude = 48\n"), top),
+        (format!("{one}[requirements]\nD = 1\n[simulation]\ncarry = 'reset'\n"), top),
+        (format!("dwell_s = 5\n{one}"), "`dwell_s` belongs in [simulation] or in [[position]]"),
+        (format!("{one}[requirements]\nd_fx = 1\n"), "did you mean `D_FX`?"),
+        (format!("{one}[simulation.priors]\nPsi = 1\n"), "did you mean `psi`?"),
+    ] {
+        std::fs::write(&file, &text).expect("written");
+        refused(&["analyze", "--scheme", &file], &[expected, "s.toml:", "^"]);
+    }
+    let model =
+        |equation: &str| format!("parameters = ['a']\n[states]\nx = \"{equation}\"\n[outputs]\ny = 'x'\n");
+    for (text, expected) in [
+        // a name is missed last: it hides nothing
+        (model("-a*x"), "the key `name` is missing"),
+        (model("-a*x +"), "the equation of x: expected"),
+        (model("-a*y"), "`y` is"),
+        (format!("name = 'n'\n{}", model("-abs(x)")), "found `abs`"),
+        (format!("name = 'n'\n{}[simulation]\nstep = 0,5\n", model("-x")), "as in 0.5"),
+        (format!("name = 'n'\nduration = 5\n{}", model("-x")), "`duration` belongs in [simulation]"),
+    ] {
+        std::fs::write(&file, &text).expect("written");
+        refused(&["analyze", "--model", &file], &[expected, "s.toml:", "^"]);
+    }
+}
+
+/// No random drift needs no unit.
+#[test]
+fn no_drift_noise() {
+    let run =
+        |noise: &str| json(&["simulate", "--angles", "0,0,0", "--drift-noise", noise, "--format", "json"]);
+    assert_eq!(run("0"), run("0 deg/h"));
+    assert_ne!(run("0"), run("0.01 deg/h"));
+    refused(
+        &["simulate", "--angles", "0,0,0", "--drift-noise", "0.01"],
+        &["expected 0, or a number with a unit"],
+    );
 }
 
 /// The whole file is checked by every command that reads it.

@@ -25,6 +25,7 @@ mod simulate;
 
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use failure::{Failure, say};
@@ -89,10 +90,31 @@ fn command() -> clap::Command {
     })
 }
 
+/// Which options of the command take a file that was given without one.
+fn file_hint(e: &clap::Error) -> Option<String> {
+    let Some(ContextValue::String(found)) = e.get(ContextKind::InvalidArg) else { return None };
+    let file = std::path::Path::new(found).extension().is_some_and(|x| x == "toml" || x == "json");
+    if e.kind() != ErrorKind::UnknownArgument || found.starts_with('-') || !file {
+        return None;
+    }
+    let command = command();
+    let asked = std::env::args().skip(1).find_map(|a| command.find_subcommand(a).cloned())?;
+    let takes = |id: &str| asked.get_arguments().any(|a| a.get_id() == id);
+    let options: Vec<String> = ["scheme", "model"]
+        .into_iter()
+        .filter(|id| takes(id))
+        .map(|id| format!("a {id} file goes with --{id}, as in --{id} {found}"))
+        .collect();
+    (!options.is_empty()).then(|| options.join("; "))
+}
+
 /// The arguments; what is wrong with them is said, and nothing of theirs but text.
 fn arguments() -> Result<Cli, ExitCode> {
     let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
-    parsed.map_err(|e| {
+    parsed.map_err(|mut e| {
+        if let Some(hint) = file_hint(&e) {
+            e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint.into()]));
+        }
         let message = e.render().to_string();
         if !e.use_stderr() || message.lines().all(|line| visible(line) == line) {
             // in colour, where there is any; nobody listens if that fails

@@ -350,7 +350,8 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
 
 /// The directions that Z is said not to see move no derivative of it.
 fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
-    let lines: Vec<&str> = latex.lines().filter_map(|l| l.strip_prefix("\\item not seen by $Z$: ")).collect();
+    let lines: Vec<&str> =
+        latex.lines().filter_map(|l| l.strip_prefix("\\item not seen by derivatives of $Z$: ")).collect();
     let vectors = json["null_space"].as_array().expect("a list");
     assert_eq!(lines.len(), vectors.len());
     if draw.terms == "drift" {

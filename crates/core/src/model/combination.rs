@@ -103,18 +103,37 @@ pub(crate) fn row_of(
     let named = |c: usize| {
         expression.nodes.iter().any(|n| matches!(n, Node::Name(name) if *name == names.unknowns[c]))
     };
-    let row: Vec<u64> =
-        (0..n).map(|c| if named(c) { at(&unit(c)) } else { Ok(0) }).collect::<Result<_, _>>()?;
+    let not_linear = || ExpressionError::Syntax {
+        expected: "a linear combination of unknowns such as D_IX - D_IY",
+        found: "something that is not linear in them".into(),
+        span: expression.span(),
+    };
     let probe: Vec<u64> = (0..n).map(|_| rng.below(f.modulus())).collect();
-    let linear = at(&zero)? == 0 && at(&probe)? == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
-    if !linear {
-        return Err(ExpressionError::Syntax {
-            expected: "a linear combination of unknowns such as D_IX - D_IY",
-            found: "something that is not linear in them".into(),
-            span: expression.span(),
-        });
+    let there = at(&probe)?;
+    // what can be divided by there, but not where unknowns are zero, has unknowns in it
+    let divided = |e: ExpressionError| match e {
+        ExpressionError::DivisionByZero { .. } => not_linear(),
+        other => other,
+    };
+    let row: Vec<u64> = (0..n)
+        .map(|c| if named(c) { at(&unit(c)) } else { Ok(0) })
+        .collect::<Result<_, _>>()
+        .map_err(divided)?;
+    let linear =
+        at(&zero).map_err(divided)? == 0 && there == f.dot(0, row.iter().copied().zip(probe.iter().copied()));
+    if linear { Ok(row) } else { Err(not_linear()) }
+}
+
+/// Refuses a combination that is zero, whatever the unknowns and the rates are: `row` is its row at rates that were drawn.
+pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), ExpressionError> {
+    if row.iter().any(|x| *x != 0) {
+        return Ok(());
     }
-    Ok(row)
+    Err(ExpressionError::Syntax {
+        expected: "a combination in which some unknown counts",
+        found: "one that is always zero".into(),
+        span: expression.span(),
+    })
 }
 
 /// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are known.
@@ -125,6 +144,7 @@ pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionErr
     let Ok(values) = RandomValues::draw(platform.scheme(), &mut rng) else { return Ok(()) };
     let sample = values.sample(platform.scheme(), 1);
     let rates = [0; 2].map(|_| 1 + rng.below(sample.roots.field.modulus() - 1));
-    row_of(&parsed, &Names::of(platform), &At { values: &values, sample: &sample, rates }, &mut rng)
-        .map(|_| ())
+    let row =
+        row_of(&parsed, &Names::of(platform), &At { values: &values, sample: &sample, rates }, &mut rng)?;
+    not_zero(&parsed, &row)
 }

@@ -320,7 +320,7 @@ pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     values.last().copied().unwrap_or(f64::NAN)
 }
 
-/// The known name with the least edit distance, if it is close.
+/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends: `latitude`, `latitude_deg`.
 pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
     let distance = |a: &str, b: &str| {
         let b: Vec<char> = b.chars().collect();
@@ -339,9 +339,16 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
     known
         .iter()
         .map(|k| (distance(name, k), k))
+        .map(|(d, k)| (d > 0 && !goes_on(name, k), d, k))
         .min()
-        .filter(|(d, _)| *d <= 1.max(name.chars().count() * 2 / 5))
-        .map(|(_, k)| k.clone())
+        .filter(|(far, d, _)| !far || *d <= 1.max(name.chars().count() * 2 / 5))
+        .map(|(_, _, k)| k.clone())
+}
+
+/// Whether `longer` is `name` with more behind it, as `latitude_deg` is for `Latitude`.
+pub(crate) fn goes_on(name: &str, longer: &str) -> bool {
+    let start = longer.get(..name.len()).filter(|_| name.len() > 2);
+    start.is_some_and(|s| s.eq_ignore_ascii_case(name)) && longer[name.len()..].starts_with('_')
 }
 
 #[cfg(test)]
@@ -403,6 +410,8 @@ mod tests {
     #[case("1e999", "expected an exponent of at most 400, found `1e999`", 0..5)]
     #[case("§", "expected a number, a name or `(`, found `§`", 0..2)]
     #[case("1.2.3", "expected a number of at most 36 digits, found `1.2.3`", 0..5)]
+    #[case("2*abs(x)", "expected a known function (sin, cos, sqrt) or an operator before `(`, found `abs`", 2..5)]
+    #[case("(x)(x)", "expected an operator or the end of the expression, found `(`", 3..4)]
     fn syntax_errors(#[case] text: &str, #[case] message: &str, #[case] span: Range<usize>) {
         let e = parse(text).expect_err("wrong");
         assert_eq!((e.to_string().as_str(), e.span()), (message, span));
@@ -430,6 +439,26 @@ mod tests {
             "expected the root of 2, 3 or 6, or of one of these times a square, found that of 5"
         );
         assert_eq!(wrong("x^x"), "expected an integer exponent, found something else");
+    }
+
+    #[test]
+    fn names_that_are_near() {
+        let known =
+            ["name", "attitude", "latitude_deg", "slew_rate_deg_s", "D_FX", "psi_x", "psi"].map(String::from);
+        for (name, found) in [
+            ("latitude", "latitude_deg"),
+            ("Latitude", "latitude_deg"),
+            ("lattitude_deg", "latitude_deg"),
+            ("slew_rate", "slew_rate_deg_s"),
+            ("d_fx", "D_FX"),
+            ("Psi", "psi"),
+            ("atitude", "attitude"),
+        ] {
+            assert_eq!(nearest(name, &known).as_deref(), Some(found), "{name}");
+        }
+        for strange in ["lat", "la", "ä", "latitude_deg_and_more", "carry"] {
+            assert_eq!(nearest(strange, &known), None, "{strange}");
+        }
     }
 
     #[test]

@@ -2,15 +2,22 @@
 
 use std::ops::Range;
 
-use super::expression::nearest;
+use schemars::{JsonSchema, schema_for};
+
+use super::expression::{goes_on, nearest};
 
 /// Longest part of a file that is repeated in a message.
 const SHOWN: usize = 40;
 
-/// What is wrong with a TOML file, and where.
-pub(crate) fn explain(text: &str, e: &toml::de::Error) -> (String, Option<Range<usize>>) {
+/// What is wrong with a TOML file of the layout `T`, and where.
+pub(crate) fn explain<T: JsonSchema>(text: &str, e: &toml::de::Error) -> (String, Option<Range<usize>>) {
     let span = e.span().filter(|s| text.get(s.clone()).is_some());
     let message = e.message().trim();
+    if let Some(found) =
+        span.clone().and_then(|s| decimal_comma(text, s.clone()).or_else(|| without_commas(text, s)))
+    {
+        return (found.0, Some(found.1));
+    }
     if let Some((word, place)) = span.clone().and_then(|s| unquoted(text, s)) {
         return (
             format!("`{word}` has no quotes; expected a text such as \"{word}\", or a number"),
@@ -30,8 +37,81 @@ pub(crate) fn explain(text: &str, e: &toml::de::Error) -> (String, Option<Range<
                 span,
             )
         }
-        _ => (words(message), span),
+        _ => (misplaced::<T>(message).unwrap_or_else(|| words(message)), span),
     }
+}
+
+/// A key that is known in another table of the layout.
+fn misplaced<T: JsonSchema>(message: &str) -> Option<String> {
+    let (found, rest) = quoted(message.strip_prefix("unknown field ")?)?;
+    let here = names(rest);
+    let elsewhere = other_tables(schema_for!(T).as_value(), &here);
+    let keys: Vec<String> = elsewhere.iter().map(|(key, _)| key.clone()).collect();
+    let surely = |keys: &[String]| keys.iter().find(|k| *k == found || goes_on(found, k)).cloned();
+    let key = match (surely(&here), surely(&keys)) {
+        (None, Some(key)) => key,
+        _ => nearest(found, &keys).filter(|_| nearest(found, &here).is_none())?,
+    };
+    let places: Vec<&str> = elsewhere.iter().filter(|(k, _)| *k == key).map(|(_, p)| p.as_str()).collect();
+    let (found, places) = (shortened(found), places.join(" or "));
+    Some(format!("unknown key `{found}` here; `{key}` belongs {places} (expected {})", here.join(", ")))
+}
+
+/// The keys of the tables of a layout and where these are, but for the table with the keys `here`.
+fn other_tables(schema: &serde_json::Value, here: &[String]) -> Vec<(String, String)> {
+    let keys = |table: &serde_json::Value| -> Vec<String> {
+        table["properties"].as_object().map(|p| p.keys().cloned().collect()).unwrap_or_default()
+    };
+    let table = |entry: &serde_json::Value| {
+        let name = entry["$ref"].as_str()?.strip_prefix("#/$defs/")?;
+        Some(&schema["$defs"][name])
+    };
+    let top = (keys(schema), "at the top of the file, before the first table".to_string());
+    let parts = schema["properties"].as_object().into_iter().flatten().filter_map(|(name, entry)| {
+        let one = table(entry).map(|t| (keys(t), format!("in [{name}]")));
+        one.or_else(|| table(&entry["items"]).map(|t| (keys(t), format!("in [[{name}]]"))))
+    });
+    std::iter::once(top)
+        .chain(parts)
+        .filter(|(keys, _)| !keys.iter().all(|k| here.contains(k)))
+        .flat_map(|(keys, place)| keys.into_iter().map(move |k| (k, place.clone())))
+        .collect()
+}
+
+/// `48,5` where one number is expected.
+fn decimal_comma(text: &str, span: Range<usize>) -> Option<(String, Range<usize>)> {
+    let number = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '_');
+    let before = text[..span.start].trim_end_matches(number);
+    let fraction = text[span.start..].strip_prefix(',')?;
+    let digits = fraction.len() - fraction.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let end = span.start + 1 + digits;
+    let whole = &text[before.len()..span.start];
+    let alone = text[end..]
+        .split('\n')
+        .next()
+        .is_some_and(|rest| matches!(rest.trim().chars().next(), None | Some('#')));
+    let found = before.trim_end().ends_with('=') && !whole.is_empty() && digits > 0 && alone;
+    found.then(|| {
+        let point = format!("{whole}.{}", &fraction[..digits]);
+        (
+            format!("`{whole},{}` has a comma; expected a decimal point, as in {point}", &fraction[..digits]),
+            before.len()..end,
+        )
+    })
+}
+
+/// `0 0 0` in a list.
+fn without_commas(text: &str, span: Range<usize>) -> Option<(String, Range<usize>)> {
+    let list = text[..span.start].trim_end().ends_with(['[', ',']);
+    let words: Vec<&str> = text[span.clone()].split_whitespace().collect();
+    let numbers = words.len() > 1 && words.iter().all(|w| w.parse::<f64>().is_ok());
+    (list && numbers).then(|| {
+        let found = shortened(&text[span.clone()]);
+        (
+            format!("`{found}` has no commas; expected commas between the values of a list, as in [0, 0, 0]"),
+            span,
+        )
+    })
 }
 
 /// A complaint of a reader about keys and kinds.
@@ -153,7 +233,14 @@ mod tests {
     use super::*;
     use serde::Deserialize;
 
-    #[derive(Debug, Deserialize)]
+    #[derive(Debug, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "what is read does not matter here")]
+    struct Inner {
+        depth_m: f64,
+    }
+
+    #[derive(Debug, Deserialize, JsonSchema)]
     #[serde(deny_unknown_fields)]
     #[allow(dead_code, reason = "what is read does not matter here")]
     struct File {
@@ -166,13 +253,15 @@ mod tests {
         table: BTreeMap<String, usize>,
         #[serde(default)]
         choice: Option<crate::model::Carry>,
+        #[serde(default)]
+        inner: Vec<Inner>,
     }
 
     #[test]
     fn complaints_are_in_words_and_know_their_place() {
         let said = |text: &str| {
             let e = toml::from_str::<File>(text).expect_err("wrong");
-            let (message, span) = explain(text, &e);
+            let (message, span) = explain::<File>(text, &e);
             (message, span.map(|s| text[s].to_string()))
         };
         let at = |text: &str, message: &str, place: &str| {
@@ -202,13 +291,27 @@ mod tests {
             "`inertal` is no choice here; did you mean `inertial`? (expected platform, inertial, reset)",
             "'inertal'",
         );
-        let keys = "carry, step, list, table, choice";
+        let keys = "carry, step, list, table, choice, inner";
         at(
             "carry = 'a'\nstp = 1",
             &format!("unknown key `stp`; did you mean `step`? (expected {keys})"),
             "stp",
         );
         at("carry = 'a'\nfoo = 1", &format!("unknown key `foo` (expected {keys})"), "foo");
+        let misplaced = |found: &str, key: &str, place: &str, keys: &str| {
+            format!("unknown key `{found}` here; `{key}` belongs {place} (expected {keys})")
+        };
+        let top = "at the top of the file, before the first table";
+        at("[[inner]]\nstep = 1", &misplaced("step", "step", top, "depth_m"), "step");
+        at("[[inner]]\nStp = 1", &misplaced("Stp", "step", top, "depth_m"), "Stp");
+        at("depth = 1", &misplaced("depth", "depth_m", "in [[inner]]", keys), "depth");
+        at("step = 48,5", "`48,5` has a comma; expected a decimal point, as in 48.5", "48,5");
+        at("step = -1,25 # m\n", "`-1,25` has a comma; expected a decimal point, as in -1.25", "-1,25");
+        let commas = |found: &str| {
+            format!("`{found}` has no commas; expected commas between the values of a list, as in [0, 0, 0]")
+        };
+        at("list = [0 0 0]", &commas("0 0 0"), "0 0 0");
+        at("list = [0, -9 1.5]", &commas("-9 1.5"), "-9 1.5");
         assert_eq!(said("step = 1").0, "the key `carry` is missing; expected it in this table");
         at("carry = 'a'\ncarry = 'b'", "duplicate key", "carry");
         at("carry = 'a'\nstep = nan x", &quotes("nan x"), "nan x");

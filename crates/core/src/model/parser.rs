@@ -104,6 +104,16 @@ fn number(input: &mut Input<'_>) -> Parsed<usize> {
     }
 }
 
+/// What could stand before a bracket instead of a name.
+const fn functions(names: Names) -> &'static str {
+    match names {
+        Names::Platform => "a known function (sin, cos, sqrt) or an operator before `(`",
+        Names::Plain => {
+            "a known function (sin, cos, tan, asin, acos, atan, exp, log, sqrt) or an operator before `(`"
+        }
+    }
+}
+
 fn operand(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
     skip_blanks(input);
     let start = input.current_token_start();
@@ -133,7 +143,10 @@ fn operand(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
             let name = rest[..length].to_string();
             input.next_slice(length);
             let Some(function) = Function::named(&name) else {
-                return Ok(push(input, Node::Name(name), start));
+                return match peek(input) {
+                    Some('(') => Err(ErrMode::Cut(Wrong { at: start, expected: functions(names) })),
+                    _ => Ok(push(input, Node::Name(name), start)),
+                };
             };
             if symbol(input, "(").is_none() {
                 return wrong(input, "`(`");

@@ -345,9 +345,7 @@ pub enum SchemeError {
     #[error(transparent)]
     Range(#[from] RangeError),
     /// A number for something that no gyro model has.
-    #[error(
-        "`{name}`: no such unknown; expected an unknown such as D_FX or psi_x, or a family such as D_F, D or psi"
-    )]
+    #[error("`{name}`: no such unknown; {}", settings::meant(name))]
     UnknownName {
         /// The key in a scheme file.
         key: String,

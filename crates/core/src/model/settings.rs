@@ -81,10 +81,14 @@ impl FromStr for DriftNoise {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{text}` is no random drift; expected a number with a unit, as in \"0.01 deg/h\" (bias of one step) or \"0.001 deg/sqrt(h)\""
+                "`{text}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of one step) or \"0.001 deg/sqrt(h)\""
             )
         };
         let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
+        // none needs no unit
+        if compact.contains('0') && matches!(compact.trim_matches('0'), "" | ".") {
+            return Ok(Self::OneStep(0.0));
+        }
         let split = compact.find("deg").ok_or_else(wrong)?;
         let value: f64 = compact[..split].parse().map_err(|_| wrong())?;
         let noise = match &compact[split..] {
@@ -237,6 +241,23 @@ pub(crate) fn is_family(name: &str) -> bool {
 /// Families that stand for several unknowns.
 const FAMILIES: [&str; 7] = ["psi", "eps", "D", "D_F", "D_I", "D_O", "D_S"];
 
+/// What could have been meant by `name`, of all that some scheme has.
+pub(crate) fn meant(name: &str) -> String {
+    let axes = |stem: &str, letters: [char; 3]| letters.map(|l| format!("{stem}{l}"));
+    let of_terms = super::Term::ALL.iter().flat_map(|t| {
+        let family = format!("D_{}", t.letters());
+        axes(&family, ['X', 'Y', 'Z']).into_iter().chain([family])
+    });
+    let angles = ["psi_", "eps_"].into_iter().flat_map(|stem| axes(stem, ['x', 'y', 'z']));
+    let families = ["psi", "eps", "D"].map(String::from);
+    let all: Vec<String> = families.into_iter().chain(angles).chain(of_terms).collect();
+    let expected = "expected an unknown such as D_FX or psi_x, or a family such as D_F, D or psi";
+    match nearest(name, &all) {
+        Some(near) => format!("did you mean `{near}`? ({expected})"),
+        None => expected.into(),
+    }
+}
+
 /// What could have been meant by `name`: the nearest, or all there is (the first of very many).
 pub(crate) fn known(platform: &Platform, name: &str) -> String {
     let families = FAMILIES.iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
@@ -274,7 +295,10 @@ mod tests {
     fn units_of_the_random_drift() {
         assert_eq!("0.01 deg/h".parse(), Ok(DriftNoise::OneStep(0.01)));
         assert_eq!("0.001deg/sqrt(h)".parse(), Ok(DriftNoise::RandomWalk(0.001)));
-        for wrong in ["0.01", "-1 deg/h", "nan deg/h", "1 rad/s", "deg/h"] {
+        for none in ["0", " 0.0 ", "0 deg/h", "00."] {
+            assert_eq!(none.parse(), Ok(DriftNoise::OneStep(0.0)), "{none}");
+        }
+        for wrong in ["", ".", "00.1", "0 h", "0.01", "-1 deg/h", "nan deg/h", "1 rad/s", "deg/h"] {
             assert!(wrong.parse::<DriftNoise>().is_err(), "{wrong}");
         }
         // a random walk of N deg/sqrt(h) turns by N after an hour, whatever the step

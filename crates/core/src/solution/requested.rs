@@ -10,7 +10,7 @@ use crate::degree::coefficient::{Coefficient, Image, Number, rates_between, reco
 use crate::degree::ensemble::Verdicts;
 use crate::degree::status::{Status, Verdict};
 use crate::model::Platform;
-use crate::model::combination::{At, Names, row_of, square_root};
+use crate::model::combination::{At, Names, not_zero, row_of, square_root};
 use crate::model::expression::{Expression, ExpressionError, Function, Node, parse};
 use crate::model::ring::{Ring, Text};
 
@@ -85,6 +85,7 @@ fn terms_of(
     let mut rates = || [1 + rng.below(f.modulus() - 1), 1 + rng.below(f.modulus() - 1)];
     let [one, other] = [rates(), rates()];
     let first = row_of(parsed, names, &At { values, sample, rates: one }, rng)?;
+    not_zero(parsed, &first)?;
     let second = row_of(parsed, names, &At { values, sample, rates: other }, rng)?;
     let unsupported = || ExpressionError::Syntax {
         expected: "coefficients that are numbers times powers of wN and wU, such as 2*wN, wU/wN or sqrt(2)/2",

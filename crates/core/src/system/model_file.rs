@@ -21,7 +21,8 @@ use crate::model::file_error::explain;
 #[serde(deny_unknown_fields)]
 pub struct ModelFile {
     /// Name of the system.
-    name: String,
+    #[schemars(required)]
+    name: Option<String>,
     /// What it is and where it comes from.
     #[serde(default)]
     description: String,
@@ -216,12 +217,12 @@ pub fn is_model(text: &str) -> bool {
 /// [`ModelError`] with the byte range of the offender where it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     let file: ModelFile = toml::from_str(text).map_err(|e| {
-        let (message, span) = explain(text, &e);
+        let (message, span) = explain::<ModelFile>(text, &e);
         ModelError { what: "the model file".into(), message, span }
     })?;
     let r = Reader { text };
     let mut model = SystemModel {
-        name: file.name,
+        name: file.name.clone().unwrap_or_default(),
         description: file.description,
         experiments: 1,
         ..SystemModel::default()
@@ -362,10 +363,16 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         model.combinations.push(r.formula(what, &Value::String(c.get_ref().clone()), c.span())?);
     }
     nominal(&r, &file.simulation, &mut model)?;
-    match model.check() {
-        Err(e) => Err(ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e }),
-        Ok(()) => Ok(model),
+    let placed =
+        |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
+    model.check().map_err(placed)?;
+    // it stands in no equation: what is wrong with these is said first
+    if file.name.is_none() {
+        model.compile().map_err(placed)?;
+        let message = "the key `name` is missing; expected it at the top of the file".into();
+        return Err(r.at(0..text.chars().next().map_or(0, char::len_utf8), "the model file".into(), message));
     }
+    Ok(model)
 }
 
 /// Numbers for a simulation: names that are known, numbers that can be.

@@ -83,7 +83,7 @@ pub(super) struct SimulationEntry {
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::AZIMUTH_NOISE_DEG.low, "maximum" = ranges::AZIMUTH_NOISE_DEG.high))]
     pub(super) azimuth_noise_deg: Option<Spanned<f64>>,
     /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
-    #[schemars(with = "Option<String>", extend("pattern" = "deg */ *(h|sqrt\\(h\\))"))]
+    #[schemars(with = "Option<String>", extend("pattern" = "deg */ *(h|sqrt\\(h\\))|^ *0+[.]?0* *$"))]
     pub(super) drift_noise: Option<Spanned<DriftNoise>>,
     /// exponential (default) or rk4.
     pub(super) propagation: Option<Propagation>,

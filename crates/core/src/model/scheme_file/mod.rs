@@ -186,7 +186,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         return Err(whole(format!("{} bytes; expected a scheme file of at most {MAX_FILE}", text.len())));
     }
     let file: SchemeFile = toml::from_str(text).map_err(|e| {
-        let (message, span) = explain(text, &e);
+        let (message, span) = explain::<SchemeFile>(text, &e);
         SchemeFileError { message, span }
     })?;
     let mut r = Reader { text, places: HashMap::new() };
