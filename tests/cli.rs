@@ -560,3 +560,83 @@ fn models_from_files() {
     assert_eq!((&e["schema"], &e["passed"]), (&"obsdeg.system-evidence/1".into(), &true.into()));
     refused(&["analyze"], &["--angles", "--scheme"]);
 }
+
+/// What is said of one unknown counts before what is said of its family, in whatever order; what concerns no unknown is refused.
+#[test]
+fn options_by_name_and_by_family() {
+    const FIVE: &str = "examples/five-positions/scheme.toml";
+    let single = ["--requirement", "D_FX=1e-6"];
+    let family = ["--requirement", "D=10", "--requirement", "psi=10"];
+    for command in [&["simulate", "--scheme", FIVE][..], &["compare", FIVE]] {
+        let of = |order: [&[&str]; 2]| json(&[command, order[0], order[1], &["--format", "json"]].concat());
+        let (one, other) = (of([&single, &family]), of([&family, &single]));
+        assert_eq!(one, other);
+        let requirements =
+            if command[0] == "simulate" { &one["requirements"] } else { &one["schemes"][0]["requirements"] };
+        assert_eq!(requirements["met"], 14, "{requirements}");
+        assert_eq!(requirements["missed"][0]["name"], "D_FX");
+    }
+    for (option, given) in
+        [("--requirement", "D_II=1"), ("--requirement", "D_IIX=1"), ("--requirement", "eps=1")]
+            .into_iter()
+            .chain([("--value", "D_IIX=3"), ("--prior", "D_SS=3"), ("--estimate", "psi_x@2=1")])
+    {
+        let output = run(&["simulate", "--scheme", FIVE, option, given]);
+        assert_eq!(output.status.code(), Some(2), "{option} {given}");
+        assert!(
+            stderr(&output).contains(&format!("`{option} {given}`: no unknown here is")),
+            "{}",
+            stderr(&output)
+        );
+    }
+    let refused = run(&["design", "--positions", "5", "--meet", "--requirement", "D_II=1e-9"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("s.toml").display().to_string();
+    let scheme = "[requirements]\nD_II = 1e-9\n[[position]]\nangles_deg = [0, 0, 0]\n";
+    std::fs::write(&path, scheme).expect("written");
+    let output = run(&["analyze", "--scheme", &path]);
+    assert!(stderr(&output).contains("`D_II`: no such unknown"), "{}", stderr(&output));
+    std::fs::write(&path, format!("terms = [\"F\", \"II\"]\n{scheme}")).expect("written");
+    assert!(run(&["analyze", "--scheme", &path, "--solutions", "off"]).status.success());
+}
+
+/// Under reset carry every position has a psi of its own: each is held against the one psi of the other carries.
+#[test]
+fn psi_under_the_other_carries() {
+    let two =
+        ["analyze", "--angles", "0,0,20", "--angles", "20,0,0", "--solutions", "off", "--format", "json"];
+    let differing = |arguments: &[&str], carry: &str| -> Vec<String> {
+        let a = json(arguments);
+        let reports = a["carries"].as_array().expect("a list").clone();
+        let report = reports.iter().find(|r| r["carry"] == carry).expect("the carry").clone();
+        let names = report["differs"].as_array().expect("a list").iter();
+        names.map(|d| d["name"].as_str().expect("a name").to_string()).collect()
+    };
+    let inseparable = ["psi_x@1", "psi_y@1", "psi_y@2", "psi_z@2"];
+    assert_eq!(differing(&two, "reset"), inseparable);
+    // and the other way round; what reset says by itself
+    let reset = [&two[..], &["--carry", "reset"]].concat();
+    assert_eq!(differing(&reset, "platform"), inseparable);
+    let own = json(&reset);
+    let quantities = own["quantities"].as_array().expect("a list");
+    let unseen =
+        quantities.iter().filter(|q| q["status"] == "inseparable").filter_map(|q| q["name"].as_str());
+    let mut unseen: Vec<&str> = unseen.filter(|n| n.starts_with("psi")).collect();
+    unseen.sort_unstable();
+    assert_eq!(unseen, inseparable);
+}
+
+/// The exact verdict is one of repositioning at once: a file whose slews take time is told so.
+#[test]
+fn slews_of_a_file_are_not_part_of_the_verdict() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("s.toml").display().to_string();
+    let scheme = "carry = \"inertial\"\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
+    for (rate, said) in [("", false), ("[simulation]\nslew_rate_deg_s = 0.5\n", true)] {
+        std::fs::write(&path, scheme.replacen("[[position]]", &format!("{rate}[[position]]"), 1))
+            .expect("written");
+        let a = json(&["analyze", "--scheme", &path, "--solutions", "off", "--format", "json"]);
+        assert_eq!(a["notes"].to_string().contains("of repositioning at once"), said);
+    }
+}

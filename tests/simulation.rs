@@ -1,5 +1,6 @@
 //! The filter against a simulated truth: the paper's run, other carries, exact truth, slews.
 
+use std::collections::BTreeMap;
 use std::process::{Command, Output};
 
 use nalgebra::{DMatrix, DVector};
@@ -576,5 +577,46 @@ fn formats() {
             output.status.success() && text.contains("FX") && text.contains("reached"),
             "{format}: {text}"
         );
+    }
+}
+
+/// With slews of finite duration the exact verdict, of repositioning at once, does not say what samples determine: psi moves by drifts of
+/// its own meanwhile. The sigmas are from an independent computation without priors (information with the slews integrated).
+#[test]
+fn with_slews_the_samples_decide() {
+    let outcome = |arguments: &[&str]| {
+        let output = obsdeg(&[&["simulate", "--format", "json", "--carry", "inertial"], arguments].concat());
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let of = |q: &serde_json::Value| {
+            let text = |key: &str| q[key].as_str().expect("a text").to_string();
+            (text("name"), (q["degree"].as_u64(), text("verdict"), q["sigma"].as_f64().expect("a number")))
+        };
+        json["quantities"].as_array().expect("a list").iter().map(of).collect::<BTreeMap<_, _>>()
+    };
+    let two = ["--angles", "NUE", "--angles", "NDW", "--latitude", "28.2"];
+    // at once D_FZ is observable; with slews only its prior bounds it: tenfold priors, tenfold sigma
+    let at_once = outcome(&two);
+    assert_eq!((at_once["D_FZ"].0, at_once["D_FZ"].1.as_str()), (Some(1), "reached"));
+    for prior in ["D=10", "D=1000"] {
+        let slow = outcome(&[&two[..], &["--slew-rate", "0.5", "--prior", prior]].concat());
+        assert_eq!((slow["D_FZ"].0, slow["D_FZ"].1.as_str()), (Some(1), "prior_only"), "{prior}");
+        assert_eq!(slow["D_FX"].1, "reached");
+    }
+    let three = ["--angles", "EDN", "--angles", "UNW", "--angles", "SUW", "--latitude", "28.2"];
+    let conditions =
+        ["--slew-rate", "0.5", "--prior", "D=1000", "--prior", "psi=1000", "--drift-noise", "0 deg/h"];
+    let slow = outcome(&[&three[..], &conditions].concat());
+    for (name, sigma) in [
+        ("D_FX", 0.1914),
+        ("D_FZ", 0.02478),
+        ("D_IX", 0.1346),
+        ("D_OZ", 0.02516),
+        ("D_SX", 0.1914),
+        ("D_SZ", 0.02477),
+    ] {
+        let (degree, verdict, found) = &slow[name];
+        assert_eq!(*degree, None, "{name}");
+        assert!(["reached", "converging"].contains(&verdict.as_str()), "{name}: {verdict}");
+        assert!((found / sigma - 1.0).abs() < 0.02, "{name}: {found} instead of {sigma}");
     }
 }

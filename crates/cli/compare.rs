@@ -59,6 +59,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         let conditions = a.measurement.conditions(&scheme);
         entries.push(Entry { name: output::name(path), scheme, conditions });
     }
+    a.measurement.concern(entries.iter().map(|e| &e.scheme))?;
     let spinner = Spinner::start("judging schemes", a.output.quiet);
     let compared = compare(&entries, a.seed);
     drop(spinner);

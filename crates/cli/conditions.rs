@@ -1,10 +1,13 @@
 //! The conditions of a run, shared by the commands that simulate.
 
 use clap::{Args, ValueEnum};
-use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges::{self, Range};
-use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth};
+use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth, concerns, known};
+use obsdeg_core::model::{Platform, Scheme};
 use obsdeg_core::simulation::Conditions;
+use obsdeg_core::simulation::conditions::general_first;
+
+use crate::failure::Failure;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TruthArgument {
@@ -103,7 +106,40 @@ pub(crate) struct ConditionArguments {
     drift_scale: Option<f64>,
 }
 
+/// Refuses an assignment that concerns an unknown of none of the schemes: nothing would hear of it.
+fn concern_some<'a>(
+    option: &str,
+    given: &[Assignment],
+    schemes: impl Iterator<Item = &'a Scheme> + Clone,
+) -> Result<(), Failure> {
+    for a in given {
+        let mut hint = None;
+        for scheme in schemes.clone() {
+            let platform = Platform::new(scheme.clone()).map_err(|e| Failure::input(e.to_string()))?;
+            if platform.names().iter().any(|name| concerns(&a.name, name)) {
+                hint = None;
+                break;
+            }
+            hint.get_or_insert_with(|| known(&platform, &a.name));
+        }
+        if let Some(hint) = hint {
+            let message =
+                format!("`{option} {}={}`: no unknown here is `{}`; {hint}", a.name, a.value, a.name);
+            return Err(Failure::input(message));
+        }
+    }
+    Ok(())
+}
+
 impl MeasurementArguments {
+    /// Checks that every assignment concerns an unknown of some scheme.
+    pub(crate) fn concern<'a>(
+        &self,
+        schemes: impl Iterator<Item = &'a Scheme> + Clone,
+    ) -> Result<(), Failure> {
+        concern_some("--requirement", &self.requirement, schemes)
+    }
+
     /// The paper's conditions, with what the scheme and the options say.
     pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::of(scheme);
@@ -114,12 +150,26 @@ impl MeasurementArguments {
             azimuth_noise_deg: self.azimuth_noise,
             ..Settings::default()
         });
-        out.requirements.extend(self.requirement.iter().cloned());
+        out.requirements.extend(general_first(self.requirement.clone()));
         out
     }
 }
 
 impl ConditionArguments {
+    /// Checks that every assignment concerns an unknown of some scheme.
+    pub(crate) fn concern<'a>(
+        &self,
+        schemes: impl Iterator<Item = &'a Scheme> + Clone,
+    ) -> Result<(), Failure> {
+        self.measurement.concern(schemes.clone())?;
+        for (option, given) in
+            [("--value", &self.value), ("--prior", &self.prior), ("--estimate", &self.estimate)]
+        {
+            concern_some(option, given, schemes.clone())?;
+        }
+        Ok(())
+    }
+
     /// The paper's run, with what the scheme and the options say.
     pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = self.measurement.conditions(scheme);
@@ -137,9 +187,9 @@ impl ConditionArguments {
             drift_scale: self.drift_scale,
             ..Settings::default()
         });
-        out.values.extend(self.value.iter().cloned());
-        out.priors.extend(self.prior.iter().cloned());
-        out.estimates.extend(self.estimate.iter().cloned());
+        out.values.extend(general_first(self.value.clone()));
+        out.priors.extend(general_first(self.prior.clone()));
+        out.estimates.extend(general_first(self.estimate.clone()));
         out
     }
 }

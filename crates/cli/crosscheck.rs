@@ -74,6 +74,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         return system(a, path);
     }
     let scheme = a.scheme.scheme()?;
+    a.conditions.concern(std::iter::once(&scheme))?;
     let conditions = a.conditions.conditions(&scheme);
     let dropped = a.filter_drop.as_ref().map(|name| position(&scheme, name)).transpose()?;
     let filter = FilterChange { carry: a.filter_carry, latitude: a.filter_latitude, dropped };

@@ -159,6 +159,10 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     for limit in &a.wanted.gimbal {
         base.gimbals.limit(limit).map_err(|e| Failure::input(format!("--gimbal: {e}")))?;
     }
+    // any position has the unknowns that count
+    let any = std::array::from_fn(|_| obsdeg_core::model::Angle::from_degrees(0));
+    let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
+    a.measurement.concern(std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
     let options = Options {
@@ -251,8 +255,11 @@ fn scheme_file(
     let positions = best.positions.iter().enumerate().map(|(i, name)| format!("p{} {name}", i + 1));
     let positions = positions.collect::<Vec<_>>().join(", ");
     let scheme = scheme_found(best, base, conditions)?;
+    let all = found.required.len() + 3 >= best.rank[1];
+    let what = if all { "all coefficients".into() } else { found.required.join(", ") };
     Ok(format!(
-        "# {proven}: worst sigma(D) {:.4} deg/h (per g) in {:.0} s, no prior, no drift noise, seed {}\n# {}\n{}",
+        "# {proven} of {} candidates: largest sigma of {what} {:.3e} deg/h (per g) in {:.0} s, no prior, no drift noise, seed {}\n# {}\n{}",
+        found.candidates.len(),
         best.worst_sigma_dph,
         best.total_s,
         found.seed,

@@ -109,6 +109,9 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         let name = if scheme.name.is_empty() { output::name(path) } else { scheme.name.clone() };
         entries.push(Entry { name, scheme, conditions });
     }
+    if !entries.is_empty() {
+        a.conditions.concern(entries.iter().map(|e| &e.scheme))?;
+    }
     let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
     let mut worker = a.engine.worker(a.quiet)?;
     let bar = Bar::start(1000, "", a.quiet);

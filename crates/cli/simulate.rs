@@ -58,6 +58,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         return system(a, path);
     }
     let scheme = a.scheme.scheme()?;
+    a.conditions.concern(std::iter::once(&scheme))?;
     let conditions = a.conditions.conditions(&scheme);
     let (summary, record) = simulate(&scheme, &conditions, a.seed).map_err(failure)?;
     let text = obsdeg_report::simulation(&summary, a.output.format, output::terminal())

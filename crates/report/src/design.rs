@@ -117,9 +117,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     }
     if s.lost > 0 {
         out.push(format!(
-            "{} of them are observable by the exact verdict (of repositioning at once), but their samples do not determine what is required \
-             in double precision: they count as worse than all others",
-            s.lost
+            "{} of them are observable by the exact verdict (of repositioning at once), but their samples{} do not determine what is required, as \
+             far as double precision tells: they count as worse than all others",
+            s.lost,
+            if s.conditions.slew_rate_deg_s.is_some() { " with the slews" } else { "" }
         ));
     }
     out.extend(s.ties.map(|t| match t.sequences {
@@ -138,6 +139,11 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         .into(),
     );
     if s.conditions.slew_rate_deg_s.is_some() {
+        out.push(
+            "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at once; only what is observable so is \
+             listed, and its samples determine it with the slews; what slews alone would determine is not sought"
+                .into(),
+        );
         out.push(
             "half turns are tried in both directions, which are different schemes: the axis about which they are right-handed stands \
              before the position"

@@ -158,8 +158,13 @@ pub(crate) fn document(s: &Simulation) -> Document {
     };
     let list = |heading: &str, lines: Vec<String>| Block::List { heading: heading.into(), lines };
     let end = s.timeline.last().map_or(0.0, |t| t.end_s);
+    let degree = if s.timeline.iter().any(|t| t.slew) {
+        "exact verdict of repositioning at once, - not observable; verdict: with the slews"
+    } else {
+        "exact verdict, - not observable"
+    };
     let mut blocks = vec![table(
-        "Estimates at the end (degree: exact verdict, - not observable; at: when sigma met the requirement)",
+        &format!("Estimates at the end (degree: {degree}; at: when sigma met the requirement)"),
         &s.quantities,
     )];
     if !s.combinations.is_empty() {

@@ -16,7 +16,7 @@ const READABLE: usize = 240;
 
 fn explanation(q: &SystemQuantity) -> String {
     match (q.status, q.degree) {
-        (Status::Observable, Some(0)) => "read off an output, or a function of outputs".into(),
+        (Status::Observable, Some(0)) => "from the outputs themselves; local: finitely many solutions".into(),
         (Status::Observable, _) if q.solution.is_some() => "one solution: see below".into(),
         (Status::Observable, _) => "local: finitely many solutions".into(),
         (Status::Inseparable, _) => words::not_told_from(&q.partners),

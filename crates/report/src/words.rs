@@ -413,7 +413,12 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
     let azimuth = m.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
     let slews = m.slew_rate_deg_s.map_or_else(
         || "repositioning at once unless a position says otherwise".into(),
-        |r| format!("slews at {r} deg/s unless a position says otherwise, Z not used meanwhile"),
+        |r| {
+            format!(
+                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, accuracy orders and ranks: of \
+                 repositioning at once; what has a sigma: with the slews, in floating point)"
+            )
+        },
     );
     vec![
         PREDICTED.into(),

@@ -91,6 +91,13 @@ pub fn analyze(
     printer.notes.extend(found.incomplete);
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
+    if scheme.slews() {
+        printer.notes.push(
+            "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at once, and with slews of \
+             finite duration they need not hold"
+                .into(),
+        );
+    }
     if options.solutions {
         let note = engine_note(built, &mut printer.solver);
         printer.notes.extend(note);
@@ -332,10 +339,16 @@ fn carry_reports(
     for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
         let other = Platform::new(Scheme { carry, ..scheme.clone() })?;
         let there = degrees(&other, seed)?;
-        let differs = platform.names().iter().enumerate().filter_map(|(c, name)| {
-            let d = other.names().iter().position(|n| n == name)?;
+        // under reset carry every position has a psi of its own: each is held against the psi of the other carry
+        let reset = [scheme.carry, carry].contains(&Carry::Reset);
+        let one = |name: &str| name.split('@').next().unwrap_or(name).to_string();
+        let pairs = (0..platform.names().len()).flat_map(|c| (0..other.names().len()).map(move |d| (c, d)));
+        let differs = pairs.filter_map(|(c, d)| {
+            let (name, of) = (&platform.names()[c], &other.names()[d]);
+            let same = name == of || reset && one(name) == one(of);
             let (here, there) = (Verdict::of(&verdicts.degrees, c), Verdict::of(&there, d));
-            (here != there).then(|| Difference { name: name.clone(), here, there })
+            let longer = if name.len() < of.len() { of } else { name };
+            (same && here != there).then(|| Difference { name: longer.clone(), here, there })
         });
         out.push(CarryReport {
             carry,

@@ -22,7 +22,7 @@ use crate::simulation::answer::MeasurementReport;
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::plan::MAX_UNKNOWNS;
-use crate::simulation::{Plan, SimulationError};
+use crate::simulation::{Plan, SimulationError, predict};
 use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
 
 /// Latitudes of the sweep, in degrees.
@@ -119,7 +119,7 @@ impl Judged {
         let conditions = conditions.within(&Platform::new(scheme.clone())?);
         let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions };
         let plan = Plan::new(scheme, &still)?;
-        let prediction = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
+        let prediction = predict(&plan, seed)?;
         let prior = SquareRootInformation::prior(&diffuse_prior(&plan)?)?;
         let sigmas = batch(&plan, prior)?.information.sigmas()?;
         let units = plan.platform.units().iter();

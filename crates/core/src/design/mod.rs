@@ -294,7 +294,11 @@ pub fn design(
         let (positions, wanted) = (k, task.wanted());
         return Err(match (best.complete, exhaustive) {
             (false, _) => DesignError::Interrupted,
-            (true, Some(_)) => DesignError::Impossible { positions, wanted, why: examined(best.lost) },
+            (true, Some(_)) => DesignError::Impossible {
+                positions,
+                wanted,
+                why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
+            },
             (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
         });
     };
@@ -327,11 +331,13 @@ pub fn design(
 }
 
 /// Why an exhaustive search found nothing.
-fn examined(lost: u64) -> String {
+fn examined(lost: u64, slews: bool) -> String {
+    let with = if slews { " with the slews" } else { "" };
     match lost {
         0 => "every sequence was examined".into(),
         _ => format!(
-            "every sequence was examined; the samples of {lost} with observable positions do not determine what is required in double precision"
+            "every sequence was examined; the samples of {lost} with observable positions do not determine it{with}, as far as double precision \
+             tells"
         ),
     }
 }

@@ -43,6 +43,8 @@ pub(super) struct Task<'a> {
     by_default: bool,
     pub(super) rows: Rows,
     pub(super) symmetry: Symmetry,
+    /// Whether repositioning takes time.
+    slews: bool,
 }
 
 impl<'a> Task<'a> {
@@ -163,6 +165,7 @@ impl<'a> Task<'a> {
             by_default,
             rows,
             symmetry,
+            slews: conditions.slew_rate_deg_s.is_some(),
         })
     }
 
@@ -380,7 +383,8 @@ impl<'a> Task<'a> {
         let what = if every { "every coefficient".into() } else { names.join(", ") };
         let limits = self.constraints_in_words();
         let limits = if limits.is_empty() { String::new() } else { format!(" with {}", limits.join(", ")) };
-        format!("makes {what} observable{limits}")
+        let slews = if self.slews { " by repositioning at once as well as with its slews" } else { "" };
+        format!("makes {what} observable{slews}{limits}")
     }
 
     pub(super) fn constraints_in_words(&self) -> Vec<String> {

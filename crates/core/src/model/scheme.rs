@@ -547,6 +547,12 @@ impl Scheme {
         Ok(other)
     }
 
+    /// Whether it says that turning to a position takes time.
+    pub fn slews(&self) -> bool {
+        let own = |p: &Position| p.slew.as_ref().is_some_and(|s| s.rate_deg_s.is_some());
+        self.simulation.slew_rate_deg_s.is_some() || self.positions.iter().any(own)
+    }
+
     /// The scheme without a position; the one behind it is reached from another attitude then, the shortest way.
     pub fn without_position(&self, index: usize) -> Self {
         let mut rest = self.clone();

@@ -211,7 +211,7 @@ impl Settings {
 }
 
 /// Whether an assignment to `pattern` concerns the unknown `name`.
-pub(crate) fn concerns(pattern: &str, name: &str) -> bool {
+pub fn concerns(pattern: &str, name: &str) -> bool {
     let base = name.split('@').next().unwrap_or(name);
     let base = base.strip_suffix("^n").unwrap_or(base);
     let family = base.strip_prefix("D_").zip(pattern.strip_prefix("D_"));
@@ -259,7 +259,7 @@ pub(crate) fn meant(name: &str) -> String {
 }
 
 /// What could have been meant by `name`: the nearest, or all there is (the first of very many).
-pub(crate) fn known(platform: &Platform, name: &str) -> String {
+pub fn known(platform: &Platform, name: &str) -> String {
     let families = FAMILIES.iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
     let names: Vec<String> =
         platform.names().iter().cloned().chain(families.map(ToString::to_string)).collect();

@@ -180,10 +180,10 @@ impl Outcome {
     ) -> Self {
         if !(error_over_sigma.is_finite() && sigma.is_finite()) {
             Self::NoNumber
-        } else if error_over_sigma.abs() > CREDIBLE {
-            Self::Inconsistent
         } else if !determined {
             Self::PriorOnly
+        } else if error_over_sigma.abs() > CREDIBLE {
+            Self::Inconsistent
         } else if sigma > 0.9 * prior {
             Self::RestsOnPrior
         } else if required.is_some_and(|r| meets(sigma, r)) {

@@ -64,6 +64,11 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
 /// [`EkfError`] when a number is not finite.
 pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     let information = batch(plan, SquareRootInformation::none(plan.unknowns()))?.information;
+    Ok(wider(plan, &information, WIDER_PSI, WIDER_DRIFT))
+}
+
+/// Standard deviations so many times wider than what `information` says of the best known psi and drift, all others known.
+pub(crate) fn wider(plan: &Plan, information: &SquareRootInformation, psi: f64, drift: f64) -> Vec<f64> {
     let units = plan.platform.units();
     let sigma = |psi: bool, wider: f64| {
         let own = information.root().column_iter().zip(units).filter(|(_, u)| (**u == "rad") == psi);
@@ -71,6 +76,6 @@ pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
         // nothing is measured of any: any prior will do
         if largest > 0.0 { wider / largest } else { wider }
     };
-    let (psi, drift) = (sigma(true, WIDER_PSI), sigma(false, WIDER_DRIFT));
-    Ok(units.iter().map(|u| if *u == "rad" { psi } else { drift }).collect())
+    let (psi, drift) = (sigma(true, psi), sigma(false, drift));
+    units.iter().map(|u| if *u == "rad" { psi } else { drift }).collect()
 }

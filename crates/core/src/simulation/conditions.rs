@@ -78,11 +78,14 @@ impl Default for Conditions {
     }
 }
 
-/// Families before single unknowns.
-fn by_family(given: &BTreeMap<String, f64>) -> Vec<Assignment> {
-    let mut given: Vec<Assignment> = given.iter().map(|(n, v)| assign(n, *v)).collect();
+/// Families before single unknowns, so that these are what they say in whatever order they are given; of equal names the last counts.
+pub fn general_first(mut given: Vec<Assignment>) -> Vec<Assignment> {
     given.sort_by_key(|a| a.name.len());
     given
+}
+
+fn by_family(given: &BTreeMap<String, f64>) -> Vec<Assignment> {
+    general_first(given.iter().map(|(n, v)| assign(n, *v)).collect())
 }
 
 impl Conditions {

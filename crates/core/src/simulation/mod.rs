@@ -6,6 +6,7 @@ pub mod conditions;
 pub mod consistency;
 pub mod plan;
 pub mod record;
+mod seen;
 pub mod truth;
 
 use obsdeg_ekf::EkfError;
@@ -14,6 +15,7 @@ pub use answer::{Simulation, Validity};
 pub use conditions::Conditions;
 pub use plan::Plan;
 pub use record::{Record, Start, Traces, run};
+pub use seen::predict;
 
 use crate::degree::status::Status;
 use crate::model::settings::DriftNoise;
@@ -142,8 +144,7 @@ pub fn simulate(
 ) -> Result<(Simulation, Record), SimulationError> {
     let plan = Plan::new(scheme, conditions)?;
     let start = Start::new(&plan, conditions)?;
-    let rates = [plan.point.w_n, plan.point.w_u];
-    let prediction = Prediction::new(&plan.platform, rates, seed)?;
+    let prediction = predict(&plan, seed)?;
     let record = run(&plan, conditions, &start, &prediction, seed)?;
     let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
     Ok((summary, record))

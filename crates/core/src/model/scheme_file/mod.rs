@@ -151,9 +151,8 @@ impl Reader<'_> {
         let scheme = platform.scheme();
         let lists = scheme.simulation.lists().map(|(key, list, _)| (format!("simulation.{key}"), list));
         for (key, list) in lists.into_iter().chain([("requirements".into(), &scheme.requirements)]) {
-            let strange = list.keys().find(|name| {
-                !settings::is_family(name) && !platform.names().iter().any(|n| settings::concerns(name, n))
-            });
+            let concerned = |name: &String| platform.names().iter().any(|n| settings::concerns(name, n));
+            let strange = list.keys().find(|name| !concerned(name));
             if let Some(name) = strange {
                 let message = format!("`{name}`: no such unknown; {}", settings::known(&platform, name));
                 let span = self.places.get(&format!("{key}.{name}")).cloned();
@@ -370,7 +369,9 @@ alpha_deg = [-180, 180.5]
             drawn(&format!("[{list}]\n\"psi_x@2\" = 0.1"), "0.1", "no such unknown");
             drawn(&format!("[{list}]\neps_x = 0.1"), "0.1", "no such unknown");
             drawn(&format!("[{list}]\nD_FX = inf"), "inf", "; expected ");
-            assert!(read(&format!("{ONE}[{list}]\nD_SS = 0.1\npsi_z = 0.1")).is_ok(), "{list}");
+            drawn(&format!("[{list}]\nD_SS = 0.1"), "0.1", "no such unknown");
+            let second = format!("terms = [\"F\", \"SS\"]\n{ONE}[{list}]\nD_SS = 0.1\npsi_z = 0.1");
+            assert!(read(&second).is_ok(), "{list}");
         }
         drawn("[simulation.values]\nD = -1e7", "-1e7", "-1e6 to 1e6");
         drawn("[simulation]\ndrift_noise = \"1e200 deg/h\"", "\"1e200 deg/h\"", "1e-12 to 1e6 deg/h");
