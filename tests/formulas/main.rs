@@ -26,8 +26,10 @@ use value::Value;
 
 /// Exact coefficients, relative to the sum of the magnitudes that are added up.
 const EXACT: f64 = 1e-9;
-/// Coefficients that are printed with six digits: 5e-6 each, and those of a combination on the left as well.
+/// Coefficients that are printed with six digits and decimals: 5e-6 each, and those of a combination on the left as well.
 const SIX_DIGITS: f64 = 1.1e-5;
+/// Whatever cancels: absolute, for unknowns of about one.
+const SIX_PLACES: f64 = 1e-4;
 
 /// How the angles of a scheme are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -344,6 +346,8 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
         assert_eq!(solution["turning"].as_bool(), Some(list.iter().any(turning)), "{}", c.about);
         seen.turning += usize::from(printed.contains("w@"));
         c.equal("text", c.text(printed), expected, tolerance);
+        let off = (c.text(printed).value - expected.value).abs();
+        assert!(off < SIX_PLACES, "terms that cancel are rounded to decimals: off by {off}\n{}", c.about);
         c.equal("LaTeX", c.latex(&latex[latex.len() - 1]), expected, tolerance);
     }
 }

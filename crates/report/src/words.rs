@@ -258,7 +258,7 @@ pub(crate) fn certainty(a: &Analysis) -> String {
     }
     let decimals = solutions.iter().filter(|s| s.form == Form::Decimal).count();
     if decimals > 0 {
-        out.push_str(&format!("; {decimals} with coefficients as decimals, rounded to six digits"));
+        out.push_str(&format!("; {decimals} with coefficients as decimals, rounded to six places"));
     }
     out
 }

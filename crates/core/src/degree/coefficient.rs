@@ -41,7 +41,7 @@ pub enum Form {
     Exact,
     /// Sines and cosines of angles.
     Symbolic,
-    /// Decimals, rounded to six digits.
+    /// Decimals, rounded to six places (small ones to six digits).
     Decimal,
 }
 
@@ -236,12 +236,13 @@ fn has_sum(text: &str) -> bool {
     false
 }
 
-/// Six significant digits, without trailing zeros.
+/// Six decimals, and six significant digits of what is small, without trailing zeros: terms of a solution that nearly cancel are as
+/// certain as others.
 pub fn decimal(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
     }
-    let digits = (5 - x.abs().log10().floor() as i32).clamp(0, 17) as usize;
+    let digits = (5 - x.abs().log10().floor() as i32).clamp(6, 17) as usize;
     let text = format!("{x:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
@@ -430,10 +431,12 @@ mod tests {
     }
 
     #[test]
-    fn six_digits() {
+    fn six_decimals() {
         assert_eq!(decimal(0.123_456_789), "0.123457");
         assert_eq!(decimal(1234567.0), "1234567");
         assert_eq!(decimal(-1.5), "-1.5");
+        // terms of 1249.85 and -670.001 that nearly cancel
+        assert_eq!(decimal(1249.850_123_4), "1249.850123");
         assert_eq!(["0", "0.001", "100000", "99999.9"], [0.0, 0.001, 1e5, 99_999.9].map(decimal)[..]);
     }
 }
