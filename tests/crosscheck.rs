@@ -12,6 +12,7 @@ use obsdeg_core::simulation::batch::batch;
 use obsdeg_core::simulation::conditions::Conditions;
 use obsdeg_core::simulation::plan::Plan;
 use obsdeg_ekf::SquareRootInformation;
+use obsdeg_report::{Format, Layout};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
@@ -158,6 +159,26 @@ fn exact_truth_fails_at_the_papers_drifts_and_passes_at_a_thousandth() {
     let c = check(&paper(Carry::Platform), &exact, FilterChange::default());
     let nis = c.monte_carlo.statistics.iter().find(|s| s.name == "NIS").expect("NIS");
     assert!(!c.passed && nis.measured > 100.0 && !c.validity.holds);
+    // what fails is the model of the runs, not a verdict
+    assert!(
+        c.verdicts_agree
+            && c.quantities.iter().all(|q| q.slope.pass != Some(false) && q.inflation.pass != Some(false))
+    );
+    let title = |c: &CrossCheck| {
+        let text = obsdeg_report::crosscheck(c, Format::Table, Layout::default()).expect("text");
+        text.lines().next().unwrap_or_default().to_string()
+    };
+    assert_eq!(
+        title(&c),
+        "Cross-check: filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter (platform carry)"
+    );
+    let wrong = FilterChange { carry: Some(Carry::Inertial), ..FilterChange::default() };
+    let c = check(&paper(Carry::Platform), &Conditions::default(), wrong);
+    assert!(
+        !c.verdicts_agree && title(&c).contains("filter and exact verdicts DISAGREE"),
+        "{:?}",
+        c.disagreements
+    );
     let small = Conditions { drift_scale: 1e-3, ..exact };
     let c = check(&paper(Carry::Inertial), &small, FilterChange::default());
     assert!(c.passed && c.validity.holds, "{:?}", c.disagreements);

@@ -138,7 +138,11 @@ fn every_example_has_a_report() {
             .into_iter()
             .find(|p| p.contains("The scheme determines") || p.contains("locally"))
             .unwrap_or_else(|| panic!("{}: no verdict", input.display()));
-        assert!(!verdict.contains("DISAGREE"), "{}: {verdict}", input.display());
+        assert!(
+            !verdict.contains("DISAGREE") && !verdict.contains("do NOT fit"),
+            "{}: {verdict}",
+            input.display()
+        );
         assert_status(&page, &verdict);
         assert!(texts(&page, ".formulas code").is_empty(), "{}: a formula without MathML", input.display());
     }
@@ -241,6 +245,17 @@ fn a_verdict_leads_with_what_limits_it() {
     let also = "by prediction (no prior, no drift noise, psi at the start) every requirement is met, 15 of 15; worst margin ";
     let [grade, text] = row(&page, "Requirements");
     assert!(grade == "missed" && text.contains(&said[1..]) && text.contains(also), "{grade} {text}");
+    // which positions suffice, in the order of the scheme, and for what
+    let few =
+        texts(&page, "li").into_iter().find(|l| l.contains(" of the 12 positions (")).expect("the fewest");
+    let names = few.split(['(', ')']).nth(1).expect("names");
+    let order: Vec<u32> = names.split(", ").map(|n| n[1..].parse().expect("p1, p2, ...")).collect();
+    assert!(order.len() == 5 && order.is_sorted(), "{few}");
+    assert!(
+        few.contains(") suffice to observe D_FX, ")
+            && few.ends_with("meet the requirements is another question"),
+        "{few}"
+    );
     // small drifts, requirements that are met: nothing limits, and only then the filter confirms
     let file = |name: &str, text: &str| -> String {
         let path = folder.path().join(name);
@@ -259,12 +274,23 @@ fn a_verdict_leads_with_what_limits_it() {
     assert!(statuses(&page)[0].iter().all(|r| r[1] == "good"), "{:?}", statuses(&page));
     // a truth that the linear filter cannot follow
     let (page, verdict) = page_of("exact.html", &[PAPER, "--truth", "exact"]);
-    for limit in ["does NOT hold", "is NOT consistent with its truth (mean NIS", "DISAGREE in "] {
+    for limit in [
+        "does NOT hold",
+        "is NOT consistent with its truth (mean NIS",
+        "the Monte Carlo runs do NOT fit the filter (4 checks)",
+    ] {
         let lead = verdict.split(". The scheme").next().unwrap_or_default();
         let lead = lead.split_once(". Limited: ").map_or("", |(_, lead)| lead);
         assert!(lead.contains(limit), "{limit}: {verdict}");
     }
-    assert!(row(&page, "Filter and exact verdicts")[1].starts_with("LIMITED DISAGREE"));
+    assert!(
+        row(&page, "Filter and exact verdicts")[1]
+            .starts_with("LIMITED agree, but the Monte Carlo runs do NOT fit ")
+    );
+    assert!(
+        !verdict.contains("DISAGREE") && !texts(&page, "main").concat().contains("DISAGREE"),
+        "{verdict}"
+    );
     // what is not taken is said first, too; and a rotating segment excites all along its arc
     let turning = file(
         "turning.toml",
@@ -341,13 +367,40 @@ fn text_from_files_is_text_in_every_format() {
     let (file, text) = report(folder.path(), "review.md", &[&scheme]);
     assert!(!text.contains("<script>") && text.contains("\\<script\\>"), "markup in Markdown");
     assert!(text.contains("#### Status: ") && text.contains("| Small-angle model | LIMITED |"));
-    assert!(file.with_file_name("figures").join("s1_staircase.svg").is_file());
+    let first =
+        std::fs::read(file.with_file_name("review_figures").join("s1_staircase.svg")).expect("a picture");
+    // a second report beside it has pictures of its own, and both have all that they show
+    let (_, other) = report(folder.path(), "b.md", &["examples/simulated-run/scheme.toml"]);
+    let shown = |text: &str| -> Vec<String> {
+        let pictures = text.split("](").skip(1).filter_map(|t| t.split(')').next());
+        pictures.filter(|p| p.ends_with(".svg")).map(str::to_string).collect()
+    };
+    // times as people read them
+    let starts: Vec<&str> = (other.split(" from ").skip(1).filter_map(|t| t.split_once(" s").map(|t| t.0)))
+        .filter(|t| t.parse::<f64>().is_ok())
+        .collect();
+    assert!(starts.len() > 5, "{starts:?}");
+    assert!(
+        starts.iter().all(|t| t.split_once('.').is_none_or(|(_, digits)| digits.len() == 1)),
+        "{starts:?}"
+    );
+    for (text, own) in [(&text, "review_figures/"), (&other, "b_figures/")] {
+        let pictures = shown(text);
+        assert!(
+            pictures.len() > 10
+                && pictures.iter().all(|p| p.starts_with(own) && folder.path().join(p).is_file())
+        );
+    }
+    assert!(
+        first == std::fs::read(folder.path().join("review_figures/s1_staircase.svg")).expect("still there")
+    );
+    assert!(first != std::fs::read(folder.path().join("b_figures/s1_staircase.svg")).expect("its own"));
     let other = tempfile::tempdir().expect("a folder");
     let (file, text) = report(other.path(), "review.tex", &[&scheme]);
     assert_eq!(text.matches("\\end{document}").count(), 1);
     assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & LIMITED & "));
     assert!(text.contains("\\$a\\_b\\textasciicircum{}c\\$ \\#let \\textbackslash{}end\\{document\\}"));
-    assert!(file.with_file_name("figures").join("s1_staircase.png").is_file());
+    assert!(file.with_file_name("review_figures").join("s1_staircase.png").is_file());
 }
 
 #[test]

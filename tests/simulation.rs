@@ -432,6 +432,28 @@ fn obsdeg(arguments: &[&str]) -> Output {
 
 const P1P2: [&str; 5] = ["simulate", "--angles", "0,0,0", "--angles", "180,0,0"];
 
+/// What is known from the prior only says on whose: of the paper's case D_FZ - wN psi_y is seen, neither of them alone.
+#[test]
+fn what_rests_on_a_prior_says_on_whose() {
+    let s = run(Carry::Platform, &Conditions::default());
+    assert_eq!(
+        (of(&s, "D_FZ").prior_of.as_slice(), of(&s, "psi_y").prior_of.as_slice()),
+        (&["psi_y".to_string()][..], &["D_FZ".to_string()][..])
+    );
+    // its sigma is that of psi_y's prior times wN, not its own prior
+    let w_n = W_N_DPH * 28.2f64.to_radians().cos();
+    assert!((of(&s, "D_FZ").sigma / (w_n * 0.1f64.to_radians()) - 1.0).abs() < 0.05, "{:?}", of(&s, "D_FZ"));
+    for q in &s.quantities {
+        assert!(q.prior_of.is_empty() || q.verdict == Outcome::PriorOnly, "{q:?}");
+        for other in &q.prior_of {
+            assert!(of(&s, other).prior_of.contains(&q.name), "mutual: {} {other}", q.name);
+        }
+    }
+    let text = String::from_utf8_lossy(&obsdeg(&P1P2).stdout).into_owned();
+    let line = "  psi_y, D_FZ: on the priors of psi_y, D_FZ together, which the outputs do not tell apart\n";
+    assert!(text.contains(line), "{text}");
+}
+
 /// A worst margin says whose it is where some that are missed have none.
 #[test]
 fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {

@@ -67,7 +67,7 @@ pub(crate) fn check_emptiness(path: &Path, force: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes the first file to `path` and the others into `folder`; the first one comes last.
+/// Writes the first file to `path` and the others below `folder`; the first one comes last.
 pub(crate) fn write_review(path: &Path, folder: &Path, files: &[File]) -> Result<(), Failure> {
     let Some((first, pictures)) = files.split_first() else { return Ok(()) };
     let pictures = pictures.iter().map(|file| (folder.join(&file.name), file.bytes.as_slice()));

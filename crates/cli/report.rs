@@ -8,7 +8,7 @@ use obsdeg_core::compare::Entry;
 use obsdeg_core::model::{Carry, Latitude};
 use obsdeg_core::review::{Options, ReviewError, review};
 use obsdeg_core::system::{SystemModel, model_file};
-use obsdeg_report::{PICTURES, ReviewFormat};
+use obsdeg_report::{ReviewFormat, picture_folder};
 
 use crate::arguments::scheme_of;
 use crate::conditions::ConditionArguments;
@@ -28,7 +28,7 @@ Examples:
   obsdeg report examples/two-compartment/model.toml -o review.md
 
 The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their
-pictures in the folder `figures` beside it. The same command writes the same bytes.
+pictures in a folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
 Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -90,9 +90,10 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let format = format(a)?;
     let pictures = matches!(format, ReviewFormat::Markdown | ReviewFormat::Latex);
     let parent = a.output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = picture_folder(&a.output.file_stem().unwrap_or_default().to_string_lossy());
     output::check_file(&a.output, a.force)?;
     if pictures {
-        output::check_emptiness(&parent.join(PICTURES), a.force)?;
+        output::check_emptiness(&parent.join(&folder), a.force)?;
     }
     let mut entries: Vec<Entry> = Vec::new();
     let mut files: Vec<ModelFile> = Vec::new();
@@ -127,12 +128,12 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         e @ (ReviewError::Analysis { .. } | ReviewError::Interrupted) => Failure::input(e.to_string()),
     })?;
     bar.says("writing");
-    let written = obsdeg_report::review(&reviewed, format).map_err(|e| match e {
+    let written = obsdeg_report::review(&reviewed, format, &folder).map_err(|e| match e {
         obsdeg_report::ReportError::NoPdf => Failure::input(e.to_string()),
         e => Failure::internal(e.to_string()),
     })?;
     notice(worker.as_ref(), a.quiet);
-    output::write_review(&a.output, &parent.join(PICTURES), &written)?;
+    output::write_review(&a.output, parent, &written)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -4,6 +4,7 @@ use crate::accuracy::{Accuracy, AccuracyError};
 use crate::analysis::{AnalysisError, few_enough};
 use crate::degree::coefficient::Coefficient;
 use crate::degree::ensemble::judge;
+use crate::degree::staircase::partners;
 use crate::degree::status::{Status, Verdict};
 use crate::model::Platform;
 use crate::solution::combinations::{combinations, null_space};
@@ -28,6 +29,8 @@ pub struct PredictedUnknown {
     pub order_at_end: Option<usize>,
     /// Whether samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves it.
     pub determined_at_end: bool,
+    /// Unknowns that derivatives do not tell it from.
+    pub partners: Vec<usize>,
 }
 
 /// An observable combination, or one that was asked for.
@@ -97,8 +100,10 @@ impl Prediction {
         let determined = |order: Option<usize>, degree: Option<usize>| {
             if accuracy.is_some() { order.is_some() } else { degree.is_some() }
         };
-        let unknowns: Vec<PredictedUnknown> = (0..n)
-            .map(|c| {
+        let unknowns: Vec<PredictedUnknown> = partners(n, &verdicts.stairs)
+            .into_iter()
+            .enumerate()
+            .map(|(c, partners)| {
                 let v = Verdict::of(&verdicts.degrees, c);
                 let accuracy_order = accuracy.as_ref().and_then(|a| a.order[c]);
                 let order_at_end = accuracy.as_ref().and_then(|a| a.order_at_end[c]);
@@ -109,6 +114,7 @@ impl Prediction {
                     determined: determined(accuracy_order, v.degree),
                     order_at_end,
                     determined_at_end: determined(order_at_end, v.degree),
+                    partners,
                 }
             })
             .collect();

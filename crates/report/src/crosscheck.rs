@@ -148,8 +148,13 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
     }
     assumed.push(format!("a prediction is wrong with probability below {:.0e}", c.error_bound));
     list("Assumed", assumed);
-    let verdict =
-        if c.passed { "filter and exact verdicts agree" } else { "filter and exact verdicts DISAGREE" };
+    let verdict = match (c.passed, c.verdicts_agree) {
+        (true, _) => "filter and exact verdicts agree",
+        (false, true) => {
+            "filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter"
+        }
+        (false, false) => "filter and exact verdicts DISAGREE",
+    };
     let mut lead: Vec<String> = warning(&c.conditions).into_iter().collect();
     lead.push(format!("{} of {} accuracy orders measured", c.orders.measured, c.orders.of));
     if c.timeline.iter().any(|t| t.slew) {

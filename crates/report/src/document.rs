@@ -88,7 +88,7 @@ pub(crate) struct Formula {
     pub(crate) latex: String,
 }
 
-/// A picture with a file name of its own and a caption.
+/// A picture with a caption, and its place relative to the text, without an ending.
 pub(crate) struct Picture {
     pub(crate) name: String,
     pub(crate) caption: String,
@@ -111,9 +111,6 @@ impl Picture {
         }
     }
 }
-
-/// Where the pictures of a Markdown or LaTeX text are: a folder beside it.
-pub const PICTURES: &str = "figures";
 
 /// A title and its parts.
 pub(crate) struct Document {
@@ -168,6 +165,16 @@ impl Document {
             }
         }
         out
+    }
+
+    /// The same with all pictures in `folder`.
+    pub(crate) fn with_pictures_in(mut self, folder: &str) -> Self {
+        for block in &mut self.blocks {
+            if let Block::Picture(p) = block {
+                p.name = format!("{folder}/{}", p.name);
+            }
+        }
+        self
     }
 
     pub(crate) fn pictures(&self) -> impl Iterator<Item = &Picture> {
@@ -256,7 +263,7 @@ impl Document {
                 }
                 Block::Picture(p) => {
                     let caption = markdown::escape(&p.caption);
-                    out.push_str(&format!("{gap}![{caption}]({PICTURES}/{}.svg)\n", p.name));
+                    out.push_str(&format!("{gap}![{caption}]({}.svg)\n", p.name));
                 }
                 Block::Status(_) => {}
             }
@@ -312,7 +319,7 @@ impl Document {
                     ));
                 }
                 Block::Picture(p) => out.push_str(&format!(
-                    "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{PICTURES}/{}.png}}\\\\{}\\end{{center}}\n",
+                    "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{}.png}}\\\\{}\\end{{center}}\n",
                     p.name,
                     latex::escape(&p.caption)
                 )),

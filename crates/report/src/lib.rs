@@ -21,7 +21,6 @@ mod table;
 mod visible;
 mod words;
 
-pub use document::PICTURES;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use series::{series_csv, series_parquet};
@@ -230,22 +229,30 @@ pub enum ReviewFormat {
     Pdf,
 }
 
-/// The files of a design review: the text first, then the pictures that it refers to.
+/// The folder of the pictures of a text whose file has this name without its ending: beside it, and its own.
+pub fn picture_folder(stem: &str) -> String {
+    let plain = |c: char| if c.is_alphanumeric() || "_-.".contains(c) { c } else { '_' };
+    format!("{}_figures", stem.chars().map(plain).collect::<String>())
+}
+
+/// The files of a design review: the text first, then the pictures that it refers to, in `folder` beside it.
 ///
 /// # Errors
 /// [`ReportError`].
-pub fn review(r: &DesignReview, format: ReviewFormat) -> Result<Vec<File>, ReportError> {
+pub fn review(r: &DesignReview, format: ReviewFormat, folder: &str) -> Result<Vec<File>, ReportError> {
     let boxes = review::document(r);
     let document = if format == ReviewFormat::Html { boxes } else { boxes.plain() };
     match format {
         ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),
         ReviewFormat::Markdown => {
+            let document = document.with_pictures_in(folder);
             let mut files = vec![File::new("review.md", document.markdown())];
             let svg = |p: &document::Picture| File::new(format!("{}.svg", p.name), p.svg());
             files.extend(document.pictures().map(svg));
             Ok(files)
         }
         ReviewFormat::Latex => {
+            let document = document.with_pictures_in(folder);
             let mut files = vec![File::new("review.tex", latex::document(&document))];
             for p in document.pictures() {
                 files.push(File::new(format!("{}.png", p.name), png(&p.svg())?));

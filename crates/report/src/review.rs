@@ -342,10 +342,10 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
     if let Some(kept) = &alternatives.kept {
         lines.push(match kept.positions {
             Some(k) if k == s.positions.len() => {
-                format!("all {k} positions are needed for what is determined ({})", alternatives.required.join(", "))
+                format!("all {k} positions are needed to observe {}", alternatives.required.join(", "))
             }
             Some(k) => format!(
-                "{k} of the {} positions ({}) suffice for what is determined ({}); the others only add accuracy",
+                "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is another question",
                 s.positions.len(),
                 kept.witness.join(", "),
                 alternatives.required.join(", ")
@@ -356,7 +356,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
     if let Some(all) = &alternatives.all {
         lines.push(match (all.positions, all.never.is_empty()) {
             (Some(k), _) => format!(
-                "every coefficient needs at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
+                "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
                 review.carry,
                 all.witness.join(", ")
             ),
@@ -400,7 +400,11 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
 fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
     match &s.evidence {
         Some(c) => {
-            let outcome = if c.passed { "agree in every check" } else { "DISAGREE, as listed below" };
+            let outcome = match (c.passed, c.verdicts_agree) {
+                (true, _) => "agree in every check",
+                (false, true) => "agree, but the Monte Carlo runs do NOT fit the filter, as listed below",
+                (false, false) => "DISAGREE, as listed below",
+            };
             // the run below has the truth of the checks
             let run = if s.simulation.consistency.consistent {
                 ""

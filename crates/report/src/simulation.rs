@@ -1,5 +1,7 @@
 //! One run of the filter.
 
+use std::collections::BTreeMap;
+
 use obsdeg_core::model::settings::{Propagation, Truth};
 use obsdeg_core::simulation::answer::{ConditionsReport, Estimate, Simulation, TimelineReport, Validity};
 
@@ -135,6 +137,20 @@ fn requirements(quantities: &[Estimate]) -> Vec<String> {
     out
 }
 
+/// On whose prior rests what the samples do not determine, a line for all that rest on each other.
+fn priors(quantities: &[Estimate]) -> Vec<String> {
+    let mut groups: BTreeMap<Vec<usize>, Vec<&str>> = BTreeMap::new();
+    for (i, q) in quantities.iter().enumerate().filter(|(_, q)| !q.prior_of.is_empty()) {
+        let of = |(k, o): (usize, &Estimate)| (k == i || q.prior_of.contains(&o.name)).then_some(k);
+        groups.entry(quantities.iter().enumerate().filter_map(of).collect()).or_default().push(&q.name);
+    }
+    let line = |(of, who): (Vec<usize>, Vec<&str>)| {
+        let of = words::names(of.iter().map(|&k| quantities[k].name.as_str()));
+        format!("{}: on the priors of {of} together, which the outputs do not tell apart", words::names(who))
+    };
+    groups.into_iter().map(line).collect()
+}
+
 /// What became of the requirements, and what that is worth.
 fn requirements_met(s: &Simulation) -> Vec<String> {
     let mut out = Vec::new();
@@ -169,6 +185,10 @@ pub(crate) fn document(s: &Simulation) -> Document {
     )];
     if !s.combinations.is_empty() {
         blocks.push(table("Combinations (psi: of the end)", &s.combinations));
+    }
+    let priors = priors(&s.quantities);
+    if !priors.is_empty() {
+        blocks.push(list("Known from the prior only: whose", priors));
     }
     blocks.push(list("Requirements (sigma of the filter at the end of the run)", requirements_met(s)));
     blocks.push(list("Consistency", words::consistency(&s.consistency)));

@@ -27,6 +27,8 @@ pub struct CrossCheck {
     pub timeline: Vec<TimelineReport>,
     /// Whether everything agrees.
     pub passed: bool,
+    /// Whether all but d agrees: d holds the filter against drawn truths, which fails where the small-angle model does, too.
+    pub verdicts_agree: bool,
     /// What disagrees, in words.
     pub disagreements: Vec<String>,
     /// How many accuracy orders were measured.

@@ -154,6 +154,7 @@ pub fn crosscheck(
         conditions: conditions_report(scheme, &truth, conditions),
         timeline: timeline_report(&truth),
         passed: false,
+        verdicts_agree: false,
         disagreements: Vec::new(),
         ranking: ranking(&structure.quantities),
         slopes: structure.slopes,
@@ -170,6 +171,8 @@ pub fn crosscheck(
         error_bound: prediction.error_bound,
     };
     out.disagreements = disagreements(&out);
+    out.verdicts_agree = out.disagreements.is_empty();
+    out.disagreements.extend(misfits(&out));
     out.passed = out.disagreements.is_empty();
     Ok(out)
 }
@@ -269,7 +272,20 @@ fn controls(
     Ok(out)
 }
 
-/// Everything that failed, in words.
+/// What failed of d, in words.
+fn misfits(c: &CrossCheck) -> Vec<String> {
+    let mut out = Vec::new();
+    for s in c.monte_carlo.statistics.iter().filter(|s| !s.pass) {
+        let (low, high) = s.wide_band;
+        out.push(format!("{} is {:.4}, outside {low:.3}..{high:.3}", s.name, s.measured));
+    }
+    if !c.monte_carlo.white {
+        out.push("innovations are not white".into());
+    }
+    out
+}
+
+/// What failed of a, b, c, e and f, in words.
 fn disagreements(c: &CrossCheck) -> Vec<String> {
     let mut out = Vec::new();
     let failed = |c: &Check| c.measured.filter(|_| c.fails());
@@ -297,13 +313,6 @@ fn disagreements(c: &CrossCheck) -> Vec<String> {
         out.push(format!("{} directions unseen instead of {}", c.defect.measured, c.defect.predicted));
     }
     out.extend(c.covariance.iter().filter(|d| !d.pass).map(|d| format!("{}: {:.1e}", d.name, d.difference)));
-    for s in c.monte_carlo.statistics.iter().filter(|s| !s.pass) {
-        let (low, high) = s.wide_band;
-        out.push(format!("{} is {:.4}, outside {low:.3}..{high:.3}", s.name, s.measured));
-    }
-    if !c.monte_carlo.white {
-        out.push("innovations are not white".into());
-    }
     if !c.ranking.pass {
         out.push("predicted and measured orders rank differently".into());
     }

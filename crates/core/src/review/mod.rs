@@ -293,6 +293,9 @@ fn alternatives(
         && let Ok(own) = Candidates::of_scheme(scheme)
     {
         out.kept = run(task(own, None, &seen)).map(|d| d.minimum);
+        if let Some(kept) = &mut out.kept {
+            kept.witness.sort_by_key(|name| scheme.positions.iter().position(|p| p.name == *name));
+        }
     }
     out.all = run(task(Candidates::cardinals(), None, &[])).map(|d| d.minimum);
     if !seen.is_empty() {

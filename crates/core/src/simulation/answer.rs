@@ -150,6 +150,8 @@ pub struct Estimate {
     pub time_to_requirement_s: Option<f64>,
     /// What came out.
     pub verdict: Outcome,
+    /// On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only.
+    pub prior_of: Vec<String>,
 }
 
 /// What a run says of one unknown.

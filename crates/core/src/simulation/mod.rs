@@ -166,7 +166,13 @@ fn summary(
         let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
         estimate(&names[c], units[c], verdict, c, record, required(c))
     });
-    let quantities: Vec<Estimate> = unknowns.collect();
+    let mut quantities: Vec<Estimate> = unknowns.collect();
+    for (q, u) in
+        quantities.iter_mut().zip(&prediction.unknowns).filter(|(q, _)| q.verdict == Outcome::PriorOnly)
+    {
+        let unseen = u.partners.iter().filter(|&&p| !prediction.unknowns[p].determined_at_end);
+        q.prior_of = unseen.map(|&p| names[p].clone()).collect();
+    }
     let combinations = prediction.combinations.iter().enumerate().map(|(i, c)| {
         let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
         let lead = c.terms[0].0;
@@ -290,6 +296,7 @@ fn estimate(
         required_sigma,
         time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
         verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], required_sigma),
+        prior_of: Vec::new(),
     }
 }
 

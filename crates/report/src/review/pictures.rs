@@ -95,7 +95,7 @@ pub(super) fn attitudes(s: &SchemeReview, name: &str) -> Block {
         ..Figure::default()
     };
     let starts: Vec<String> =
-        s.positions.iter().map(|p| format!("{} from {} s", p.name, p.start_s)).collect();
+        s.positions.iter().map(|p| format!("{} from {} s", p.name, super::seconds(p.start_s))).collect();
     curves(
         name,
         format!("Attitude over time, as gravity along the platform axes: {}", starts.join(", ")),

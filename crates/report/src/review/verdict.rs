@@ -58,7 +58,12 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
         }
         Some(e) => {
             let n = e.disagreements.len();
-            (Grade::Limited, format!("DISAGREE in {n} check{}", if n == 1 { "" } else { "s" }))
+            let checks = format!("{n} check{}", if n == 1 { "" } else { "s" });
+            let what = match e.verdicts_agree {
+                true => format!("agree, but the Monte Carlo runs do NOT fit the filter ({checks})"),
+                false => format!("DISAGREE in {checks}"),
+            };
+            (Grade::Limited, what)
         }
         None => (Grade::Open, format!("not taken: {}", s.notes.first().map_or("unknown", String::as_str))),
     }
