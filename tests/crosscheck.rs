@@ -402,3 +402,32 @@ fn the_folder_of_a_crosscheck() {
         assert!(slopes.contains(text), "{text}");
     }
 }
+
+/// Slopes are asymptotic in the dwell and limited by rounding: where they bend, or show the prior, they are neither for nor against.
+#[test]
+fn what_is_not_resolvable_is_no_disagreement() {
+    for (angles, latitude, unresolved) in
+        [(["0,0,0", "180,0,0"], "89.9999", "D_FY"), (["0,0,0", "0,0,0.1"], "28.2", "D_IZ")]
+    {
+        let arguments =
+            ["--angles", angles[0], "--angles", angles[1], "--latitude", latitude, "--runs", "20"];
+        let output = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+            .arg("crosscheck")
+            .args(arguments)
+            .args(["--format", "json"])
+            .output()
+            .expect("it runs");
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let quantities = json["quantities"].as_array().expect("a list");
+        let bent: Vec<&str> = quantities
+            .iter()
+            .filter(|q| q["slope"]["pass"].is_null())
+            .filter_map(|q| q["name"].as_str())
+            .collect();
+        assert_eq!(json["passed"], true, "{latitude}: {bent:?} {}", json["disagreements"]);
+        assert!(bent.contains(&unresolved), "{bent:?}");
+        let orders = &json["orders"];
+        assert_eq!(orders["measured"].as_u64(), orders["of"].as_u64().map(|n| n - bent.len() as u64));
+    }
+    // a verdict that is wrong has a straight slope: the papers filter at a pole is found out
+}

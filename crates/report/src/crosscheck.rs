@@ -17,6 +17,11 @@ fn mark(pass: impl Into<Option<bool>>) -> String {
     .into()
 }
 
+/// The mark of a slope; one that was measured and is none is no failure.
+fn slope(c: &Check) -> String {
+    if c.measured.is_some() && c.pass.is_none() { "not resolvable".into() } else { mark(c.pass) }
+}
+
 fn measured(c: &Check) -> String {
     let text = c.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}"));
     if text == "-0.000" { "0.000".into() } else { text }
@@ -52,7 +57,7 @@ pub(crate) fn document(c: &CrossCheck) -> Document {
                     words::accuracy_order(q.degree, q.accuracy_order, true),
                     format!("{:.1}", q.slope.predicted),
                     measured(&q.slope),
-                    mark(q.slope.pass),
+                    slope(&q.slope),
                     format!("{:.0}", q.inflation.predicted),
                     measured(&q.inflation),
                     mark(q.inflation.pass),

@@ -95,7 +95,7 @@ impl Measured {
     /// Counts over slopes, each with whether the verdict says an order.
     pub(crate) fn count<'a>(slopes: impl Iterator<Item = (&'a Check, bool)>) -> Self {
         let said: Vec<&Check> = slopes.filter(|(_, said)| *said).map(|(slope, _)| slope).collect();
-        Self { measured: said.iter().filter(|c| c.measured.is_some()).count(), of: said.len() }
+        Self { measured: said.iter().filter(|c| c.pass.is_some()).count(), of: said.len() }
     }
 }
 

@@ -207,12 +207,13 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
 /// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last.
 fn ranking(quantities: &[QuantityEvidence]) -> Ranking {
     const LAST: i64 = 1000;
+    // an order that no slope shows has no rank
+    let quantities = || quantities.iter().filter(|q| q.slope.measured.is_none() || q.slope.pass.is_some());
     // determined at the start and at the end
     let both = |q: &&QuantityEvidence| q.inflation.predicted < 5.0;
     let predicted = |q| Some(q).filter(both).and_then(|q| q.accuracy_order).map_or(LAST, |d| d as i64);
-    let predicted: Vec<i64> = quantities.iter().map(predicted).collect();
-    let measured: Vec<i64> = quantities
-        .iter()
+    let predicted: Vec<i64> = quantities().map(predicted).collect();
+    let measured: Vec<i64> = quantities()
         .map(|q| match (q.slope.measured, q.inflation.measured) {
             (Some(slope), Some(ratio)) if ratio < 5.0 && slope < -0.25 => (-slope - 0.5).round() as i64,
             _ => LAST,
@@ -233,7 +234,7 @@ fn controls(
     let conditions = &Conditions { slews: false, ..conditions.clone() };
     let truth = Plan::new(scheme, conditions)?;
     let other = if scheme.carry == Carry::Platform { Carry::Inertial } else { Carry::Platform };
-    let elsewhere = if scheme.latitude.is_some_and(Latitude::is_pole) { "0" } else { "90" };
+    let elsewhere = if scheme.latitude.is_some_and(|l| l.degrees().abs() > 80.0) { "0" } else { "90" };
     let last = scheme.positions.len() - 1;
     let many = last > 0;
     let changes = [

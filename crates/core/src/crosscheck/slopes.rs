@@ -16,6 +16,8 @@ const MEASURED: [f64; 5] = [2.0, 3.56, 6.32, 11.2, 20.0];
 const SHOWN: [f64; 6] = [63.2, 200.0, 632.0, 1120.0, 2000.0, 6320.0];
 /// The dwell whose measurements say how wide the prior is.
 const PRIOR_AT: f64 = 20.0;
+/// How far slopes between neighbouring dwells may differ.
+const BEND: f64 = 0.05;
 /// Samples per position: the noise of a sample is scaled so that its density stays.
 const SAMPLES: f64 = 50.0;
 
@@ -28,6 +30,9 @@ pub struct Slopes {
     pub sigmas: Vec<Vec<f64>>,
     /// Of every functional: the slope over the measured dwells.
     pub slopes: Vec<f64>,
+    /// Of every functional: whether that is a slope. It is none where sigma is that of the prior, nor where it bends: where rounding bounds
+    /// it, or where the dwells are not short (positions that hardly differ, a latitude close to a pole).
+    pub straight: Vec<bool>,
 }
 
 /// The slopes of `functionals` of the initial unknowns of `scheme`, without drift noise and with a diffuse prior.
@@ -73,7 +78,15 @@ pub fn slopes(
     }
     let measured: Vec<usize> = (0..dwells.len()).filter(|&i| MEASURED.contains(&dwells[i])).collect();
     let slope = |s: &Vec<f64>| regression(measured.iter().map(|&i| (dwells[i].ln(), s[i].ln())));
-    Ok(Slopes { slopes: sigmas.iter().map(slope).collect(), dwells, sigmas })
+    let straight = |(s, functional): (&Vec<f64>, &Vec<(usize, f64)>)| {
+        let given = functional.iter().map(|&(i, k)| (k * prior[i]).powi(2)).sum::<f64>().sqrt();
+        let local =
+            measured.windows(2).map(|w| (s[w[1]] / s[w[0]]).ln() / (dwells[w[1]] / dwells[w[0]]).ln());
+        let (least, most) = local.fold((f64::MAX, f64::MIN), |(l, m), x| (l.min(x), m.max(x)));
+        most - least <= BEND && measured.iter().all(|&i| s[i] < given / 10.0)
+    };
+    let straight = sigmas.iter().zip(functionals).map(straight).collect();
+    Ok(Slopes { slopes: sigmas.iter().map(slope).collect(), straight, dwells, sigmas })
 }
 
 /// The dwells differ so much that no slope can be measured.

@@ -59,7 +59,7 @@ pub(super) fn structure(
     let inflation = inflation(&filter, &known)?;
     let (null_space, defect) = null_evidence(truth, &filter, prediction, &inflation.correlation)?;
     Ok(Structure {
-        quantities: quantities(&names, prediction, &functionals, &measured.slopes, &inflation.ratios),
+        quantities: quantities(&names, prediction, &functionals, &measured, &inflation.ratios),
         null_space,
         defect,
         slopes: curves(truth, prediction, &names, &functionals, &measured),
@@ -136,23 +136,21 @@ fn quantities(
     names: &[String],
     prediction: &Prediction,
     functionals: &[Option<Combination>],
-    slopes: &[f64],
+    slopes: &slopes::Slopes,
     ratios: &[f64],
 ) -> Vec<QuantityEvidence> {
     let unknowns = prediction.unknowns.iter();
     let unknowns = unknowns.map(|u| (u.status, u.degree, u.accuracy_order, u.determined_at_end));
     let combinations = prediction.combinations.iter();
     let combinations = combinations.map(|c| (c.status, c.degree, c.accuracy_order, c.determined_at_end));
-    let mut measured = slopes.iter().zip(ratios);
+    let mut measured = slopes.slopes.iter().zip(&slopes.straight).zip(ratios);
     names
         .iter()
         .zip(unknowns.chain(combinations))
         .zip(functionals)
         .map(|((name, (status, degree, accuracy_order, at_end)), functional)| {
-            let (slope, ratio) = match functional.as_ref().and_then(|_| measured.next()) {
-                Some((slope, ratio)) => (Some(*slope), Some(*ratio)),
-                None => (None, None),
-            };
+            let found = functional.as_ref().and_then(|_| measured.next());
+            let (slope, ratio) = (found.map(|f| *f.0.0), found.map(|f| *f.1));
             let predicted = accuracy_order.map_or(0.0, |d| -(d as f64 + 0.5));
             // the slope is that of the start, the inflation that of the end
             let (expected, tolerance) = if at_end { (1.0, INFLATION_TOLERANCE) } else { (10.0, 1.0) };
@@ -162,14 +160,21 @@ fn quantities(
                 // nothing is learnt: sigma stays, or grows as drift that nobody sees turns psi
                 None => x >= -SLOPE_TOLERANCE,
             };
+            let inflation = Check::new(expected, ratio, |x| near(x, expected, tolerance));
+            let mut slope = Check::new(predicted, slope, slope_agrees);
+            // what no slope shows is no evidence against it, where the measurements determine it all the same
+            let bent = accuracy_order.is_some() && found.is_some_and(|f| !f.0.1);
+            if slope.fails() && bent && !inflation.fails() {
+                slope.pass = None;
+            }
             QuantityEvidence {
                 name: name.clone(),
                 status,
                 degree,
                 accuracy_order,
                 modelled: functional.is_some(),
-                slope: Check::new(predicted, slope, slope_agrees),
-                inflation: Check::new(expected, ratio, |x| near(x, expected, tolerance)),
+                slope,
+                inflation,
             }
         })
         .collect()

@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(decimal(1234567.0), "1234567");
         assert_eq!(decimal(-1.5), "-1.5");
         // terms of 1249.85 and -670.001 that nearly cancel
-        assert_eq!(decimal(1249.850_123_4), "1249.850123");
+        assert_eq!(decimal(1_249.850_123_4), "1249.850123");
         assert_eq!(["0", "0.001", "100000", "99999.9"], [0.0, 0.001, 1e5, 99_999.9].map(decimal)[..]);
     }
 }
