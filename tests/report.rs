@@ -442,6 +442,17 @@ fn a_browser_shows_it() {
     let (paper, _) = report(folder.path(), "paper.html", &[PAPER]);
     let scheme = twelve(folder.path()).display().to_string();
     let (long, _) = report(folder.path(), "twelve.html", &[&scheme]);
+    // formulas of dozens of terms are not cut at the edge of a sheet
+    let (formulas, _) = report(folder.path(), "five.html", &["examples/five-positions/scheme.toml"]);
+    browser.open(&formulas, 700, 900);
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+    browser.settle();
+    let cut = browser.value(
+        "(() => { const all = [...document.querySelectorAll('.formulas math')], w = document.documentElement.clientWidth; \
+         return [all.length, all.filter(e => e.getBoundingClientRect().right > w + 1).length]; })()",
+    );
+    assert!(cut[0].as_u64() > Some(200) && cut[1] == json!(0), "{cut}");
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
     // D_FY: two positions need Z'', twelve do not
     for (file, degree_of_d_fy) in [(&paper, "2"), (&long, "1")] {
         browser.events.clear();

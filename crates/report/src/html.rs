@@ -97,12 +97,42 @@ fn picture(p: &Picture) -> Json {
 
 /// MathML; program notation where the LaTeX is none.
 fn formula(f: &Formula) -> Json {
+    let pieces: Option<Vec<String>> = terms(&f.latex).iter().map(|piece| mathml(piece)).collect();
+    json!({ "text": f.text, "mathml": pieces.map_or(Json::Null, |p| Json::from(p.join(" "))) })
+}
+
+fn mathml(latex: &str) -> Option<String> {
     let storage = Storage::new();
-    let parser = Parser::new(&f.latex, &storage);
-    let mut mathml = String::new();
+    let parser = Parser::new(latex, &storage);
+    let mut out = String::new();
     let config = RenderConfig { display_mode: DisplayMode::Inline, ..RenderConfig::default() };
-    let failed = push_mathml(&mut mathml, parser, config).is_err() || mathml.contains("merror");
-    json!({ "text": f.text, "mathml": if failed { Json::Null } else { Json::from(mathml) } })
+    let failed = push_mathml(&mut out, parser, config).is_err() || out.contains("merror");
+    (!failed).then_some(out)
+}
+
+/// A long formula before each of its plus and minus signs: browsers break lines between formulas, not in them.
+fn terms(latex: &str) -> Vec<String> {
+    const LONG: usize = 120;
+    let mut out = vec![String::new()];
+    let (mut depth, mut escaped) = (0usize, false);
+    for (i, c) in latex.char_indices() {
+        match c {
+            _ if escaped => {}
+            '{' => depth += 1,
+            '}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        escaped = c == '\\' && !escaped;
+        let sign = latex[i..].starts_with(" + ") || latex[i..].starts_with(" - ");
+        if latex.len() > LONG && depth == 0 && sign {
+            // an empty operand before the sign keeps it binary
+            out.push("{}".into());
+        }
+        if let Some(last) = out.last_mut() {
+            last.push(c);
+        }
+    }
+    out
 }
 
 /// The SVG with ids of its own, in the colours of the page.
@@ -170,4 +200,23 @@ fn curves(f: &Figure) -> Json {
         "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
         "series": series, "tables": tables, "bands": bands,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_formulas_break_before_their_signs() {
+        assert_eq!(terms("D = a + b"), ["D = a + b"]);
+        let long = "x".repeat(120);
+        let text = format!("D = \\frac{{a + b}}{{c}} (\\text{{p 1 - 2 \\}} + }} - {long}) + \\{{ + e");
+        let expected = [
+            "D = \\frac{a + b}{c} (\\text{p 1 - 2 \\} + }".to_string(),
+            format!("{{}} - {long})"),
+            "{} + \\{".into(),
+            "{} + e".into(),
+        ];
+        assert_eq!(terms(&text), expected);
+    }
 }
