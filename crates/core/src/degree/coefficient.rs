@@ -236,6 +236,43 @@ fn has_sum(text: &str) -> bool {
     false
 }
 
+/// The parts of a product and quotient outside of all brackets: `(above, below)`, brackets around a product below taken off.
+fn bars(text: &str) -> (Vec<&str>, Vec<&str>) {
+    let (mut above, mut below) = (Vec::new(), Vec::new());
+    let (mut depth, mut start, mut under) = (0, 0, false);
+    for (i, c) in text.char_indices().chain([(text.len(), '*')]) {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        if depth != 0 || !matches!(c, '*' | '/') {
+            continue;
+        }
+        let part = &text[start..i];
+        let inner = part.strip_prefix('(').and_then(|p| p.strip_suffix(')'));
+        match inner.filter(|p| under && !has_sum(p) && !p.contains('/')) {
+            Some(inner) => below.extend(bars(inner).0),
+            None if under => below.push(part),
+            None => above.push(part),
+        }
+        (start, under) = (i + 1, c == '/');
+    }
+    (above, below)
+}
+
+/// Factors as one text with one bar, so that no reader takes for below what is above: `wU*w@p1/(2*wN)`. A number in front keeps its own:
+/// `1/2*wU`.
+pub fn product(factors: &[String]) -> String {
+    let text = factors.join("*");
+    let (mut above, below) = bars(&text);
+    if below.iter().all(|b| b.bytes().all(|c| c.is_ascii_digit())) && below.len() < 2 {
+        return text;
+    }
+    above.retain(|a| *a != "1");
+    let above = if above.is_empty() { "1".into() } else { above.join("*") };
+    match &below[..] {
+        [one] => format!("{above}/{one}"),
+        several => format!("{above}/({})", several.join("*")),
+    }
+}
+
 /// Six decimals, and six significant digits of what is small, without trailing zeros: terms of a solution that nearly cancel are as
 /// certain as others.
 pub fn decimal(x: f64) -> String {
@@ -259,7 +296,7 @@ pub fn linear_combination<'a>(terms: impl IntoIterator<Item = (&'a Coefficient, 
             (false, false) => " + ",
             (false, true) => " - ",
         });
-        out.push_str(&factors.join("*"));
+        out.push_str(&product(&factors));
     }
     if out.is_empty() { "0".into() } else { out }
 }
@@ -270,7 +307,7 @@ impl fmt::Display for Coefficient {
             return f.write_str("0");
         }
         let (negative, factors) = self.sign_and_factors();
-        let magnitude = if factors.is_empty() { "1".into() } else { factors.join("*") };
+        let magnitude = if factors.is_empty() { "1".into() } else { product(&factors) };
         write!(f, "{}{magnitude}", if negative { "-" } else { "" })
     }
 }
@@ -292,6 +329,25 @@ mod tests {
         let sum =
             linear_combination([(&coefficient(1.0, [0, 0]), "D_FZ"), (&coefficient(-1.0, [1, 0]), "psi_y")]);
         assert_eq!(sum, "D_FZ - wN*psi_y");
+    }
+
+    #[test]
+    fn one_bar() {
+        for (factors, printed) in [
+            (&["1/2", "wU"][..], "1/2*wU"),
+            (&["sqrt(2)/2", "wU^2"], "sqrt(2)/2*wU^2"),
+            (&["wU/wN"], "wU/wN"),
+            (&["1/2*wU/wN", "w@p1"], "wU*w@p1/(2*wN)"),
+            (&["1/2/cos(alpha)^2", "wN"], "wN/(2*cos(alpha)^2)"),
+            (&["1/2/(cos(a)*sin(a))", "wN"], "wN/(2*cos(a)*sin(a))"),
+            (&["(1+sqrt(3))/cos(a + b)/wN"], "(1+sqrt(3))/(cos(a + b)*wN)"),
+            (&["1/(1+sin(a))"], "1/(1+sin(a))"),
+            (&["1/wN"], "1/wN"),
+            (&["cos(a)^2/sin(a)", "D_SZ"], "cos(a)^2*D_SZ/sin(a)"),
+        ] {
+            let factors: Vec<String> = factors.iter().map(ToString::to_string).collect();
+            assert_eq!(product(&factors), printed);
+        }
     }
 
     #[test]

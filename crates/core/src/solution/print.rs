@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::solver::{Frame, Solved, Term};
-use crate::degree::coefficient::Coefficient;
+use crate::degree::coefficient::{Coefficient, product};
 use crate::model::Scheme;
 
 /// Where derivatives of Z are taken, as formulas name it.
@@ -146,7 +146,7 @@ pub fn z_name(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
 /// One term of a solution, for programs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SolutionTerm {
-    /// The coefficient with its sign, such as `-1/2*wU/wN*w@p1`; decimals with all their digits.
+    /// The coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits.
     pub coefficient: String,
     /// The derivative of the observation, such as `Z1'`.
     pub observation: String,
@@ -160,7 +160,7 @@ pub fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<So
         let (negative, mut factors) = t.coefficient.precise_sign_and_factors();
         let station = &stations[t.station];
         factors.extend(station.rate.as_deref().filter(|_| t.turns > 0).map(|rate| rate_power(rate, t.turns)));
-        let magnitude = if factors.is_empty() { "1".into() } else { factors.join("*") };
+        let magnitude = if factors.is_empty() { "1".into() } else { product(&factors) };
         SolutionTerm {
             coefficient: format!("{}{magnitude}", if negative { "-" } else { "" }),
             observation: observed(t, frame),
@@ -172,7 +172,7 @@ pub fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<So
 
 /// Factors as one, to be followed by a blank and what they multiply: `wU`, `1/2*wU`, `(wU/wN)`.
 fn before_a_blank(factors: &[String]) -> String {
-    let text = factors.join("*");
+    let text = product(factors);
     // quotients outside of all brackets, but for the number in front
     let digits = |t: &str| t.find(|c: char| !c.is_ascii_digit()).unwrap_or(t.len());
     let rest = &text[digits(&text)..];
@@ -289,8 +289,8 @@ mod tests {
             ("1/2*wU", "1/2*wU"),
             ("3*wU", "3*wU"),
             ("1/wN", "(1/wN)"),
-            ("1/2*wU/wN", "(1/2*wU/wN)"),
-            ("1/2/sin(a)", "(1/2/sin(a))"),
+            ("1/2*wU/wN", "(wU/(2*wN))"),
+            ("1/2/sin(a)", "(1/(2*sin(a)))"),
             ("1/2a", "(1/2a)"),
             ("sqrt(2)/2", "(sqrt(2)/2)"),
             ("(1/2+sqrt(2)/2)*wU", "(1/2+sqrt(2)/2)*wU"),
