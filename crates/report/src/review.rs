@@ -81,6 +81,12 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usi
     blocks.push(section(level, "Verdict"));
     blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
     blocks.push(Block::Text(verdict::sentences(s, review, &coefficients)));
+    if s.simulation.timeline.iter().any(|t| t.slew) {
+        let text = "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be told apart, formulas and the fewest \
+                    positions are exact and of repositioning at once; predicted sigmas, requirements and the run are with the slews, by which psi \
+                    moves and which may determine more, or less.";
+        blocks.push(Block::Text(text.into()));
+    }
     blocks.extend(simulation::warning(&s.simulation.conditions).map(Block::Text));
     blocks.push(section(level, "Unknowns"));
     blocks.push(unknowns(a, review));

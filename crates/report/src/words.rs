@@ -314,7 +314,7 @@ pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
 pub(crate) fn missed(r: &Requirements) -> String {
     let reasons = [
         (Miss::TooLarge, ""),
-        (Miss::NotObservable, " (not observable)"),
+        (Miss::NotObservable, " (not determined)"),
         (Miss::RestsOnPrior, " (resting on the prior)"),
         (Miss::Inconsistent, " (the filter is wrong about it)"),
         (Miss::NoNumber, " (no number)"),

@@ -19,10 +19,10 @@ use crate::model::{Carry, Platform, Position, Scheme};
 use crate::prediction::Prediction;
 use crate::requirements::{Basis, Requirements};
 use crate::simulation::answer::MeasurementReport;
-use crate::simulation::batch::{batch, diffuse_prior};
+use crate::simulation::batch::batch;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::plan::MAX_UNKNOWNS;
-use crate::simulation::{Plan, SimulationError, predict};
+use crate::simulation::{Plan, SimulationError, no_prior, predict};
 use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
 
 /// Latitudes of the sweep, in degrees.
@@ -120,7 +120,7 @@ impl Judged {
         let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions };
         let plan = Plan::new(scheme, &still)?;
         let prediction = predict(&plan, seed)?;
-        let prior = SquareRootInformation::prior(&diffuse_prior(&plan)?)?;
+        let prior = SquareRootInformation::prior(&no_prior(&plan)?)?;
         let sigmas = batch(&plan, prior)?.information.sigmas()?;
         let units = plan.platform.units().iter();
         let sigmas = sigmas

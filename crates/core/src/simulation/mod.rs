@@ -15,7 +15,7 @@ pub use answer::{Simulation, Validity};
 pub use conditions::Conditions;
 pub use plan::Plan;
 pub use record::{Record, Start, Traces, run};
-pub use seen::predict;
+pub use seen::{no_prior, predict, predict_run};
 
 use crate::degree::status::Status;
 use crate::model::settings::DriftNoise;
@@ -144,7 +144,7 @@ pub fn simulate(
 ) -> Result<(Simulation, Record), SimulationError> {
     let plan = Plan::new(scheme, conditions)?;
     let start = Start::new(&plan, conditions)?;
-    let prediction = predict(&plan, seed)?;
+    let prediction = predict_run(&plan, &start.sigma, seed)?;
     let record = run(&plan, conditions, &start, &prediction, seed)?;
     let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
     Ok((summary, record))

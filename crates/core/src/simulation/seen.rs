@@ -5,15 +5,19 @@ use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
 
 use super::SimulationError;
-use super::batch::{Batch, batch, wider};
+use super::batch::{Batch, batch, diffuse_prior, wider};
 use super::plan::Plan;
 use crate::prediction::Prediction;
 
-/// Two priors, so many times wider than what the samples say of the best known unknown: wide against all that is of use, and far from 1e16,
-/// where rounding looks like information.
-const WIDTHS: [f64; 2] = [1e7, 1e9];
-/// What a hundredfold prior may do to the standard deviation of what is determined.
-const UNMOVED: f64 = 3.0;
+/// Two priors that say nothing, so many times wider than what the samples say of the best known unknown: far from 1e16, where rounding
+/// looks like information.
+const WIDTHS: [f64; 2] = [1e11, 1e13];
+/// What the wider of these may do to a standard deviation that comes of the samples alone.
+const ALONE: f64 = 1.05;
+/// How many times wider the prior of a run is made.
+const WIDER: f64 = 10.0;
+/// What that does to a standard deviation that comes of the prior only, nearly.
+const MOSTLY: f64 = 9.0;
 
 /// Inverse roots of the information of all samples with either prior: of the unknowns at the start, and at the end.
 struct Seen {
@@ -22,46 +26,83 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(plan: &Plan) -> Result<Self, EkfError> {
-        let n = plan.unknowns();
-        let Batch { information, to_end } = batch(plan, SquareRootInformation::none(n))?;
-        let root = |width: f64| {
-            let mut with = SquareRootInformation::prior(&wider(plan, &information, width, width))?;
+    /// With the priors that `priors` makes of the information.
+    fn of(
+        plan: &Plan,
+        priors: impl FnOnce(&SquareRootInformation) -> [Vec<f64>; 2],
+    ) -> Result<Self, EkfError> {
+        let Batch { information, to_end } = batch(plan, SquareRootInformation::none(plan.unknowns()))?;
+        let root = |sigmas: Vec<f64>| {
+            let mut with = SquareRootInformation::prior(&sigmas)?;
             with.add(information.root())?;
             with.inverse_root()
         };
-        let start = [root(WIDTHS[0])?, root(WIDTHS[1])?];
+        let [narrow, wide] = priors(&information);
+        let start = [root(narrow)?, root(wide)?];
         let end = start.each_ref().map(|root| &to_end * root);
         Ok(Self { start, end })
     }
 }
 
-/// Whether a wider prior leaves the standard deviation of a combination.
-fn determined(roots: &[DMatrix<f64>; 2], terms: &[(usize, f64)]) -> bool {
+/// Whether the wider prior leaves the standard deviation of a combination, but for a factor.
+fn determined(roots: &[DMatrix<f64>; 2], terms: &[(usize, f64)], factor: f64) -> bool {
     let sigma = |root: &DMatrix<f64>| {
         let zero = nalgebra::RowDVector::zeros(root.ncols());
         terms.iter().fold(zero, |sum, &(c, k)| sum + root.row(c) * k).norm()
     };
     let [narrow, wide] = roots.each_ref().map(sigma);
-    wide <= UNMOVED * narrow
+    wide <= factor * narrow
 }
 
-/// The prediction for `plan`: where slews take time, what samples determine is what they determine with the slews.
-///
-/// # Errors
-/// [`SimulationError`].
-pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
+/// The exact prediction; where slews take time, what samples determine is what `seen` says.
+fn with_slews(
+    plan: &Plan,
+    seed: u64,
+    factor: f64,
+    seen: impl FnOnce() -> Result<Seen, EkfError>,
+) -> Result<Prediction, SimulationError> {
     let mut out = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
     if plan.slews().next().is_none() {
         return Ok(out);
     }
-    let seen = Seen::of(plan)?;
+    let seen = seen()?;
     for (c, u) in out.unknowns.iter_mut().enumerate() {
-        u.determined = determined(&seen.start, &[(c, 1.0)]);
-        u.determined_at_end = determined(&seen.end, &[(c, 1.0)]);
+        u.determined = determined(&seen.start, &[(c, 1.0)], factor);
+        u.determined_at_end = determined(&seen.end, &[(c, 1.0)], factor);
     }
     for c in &mut out.combinations {
-        c.determined_at_end = determined(&seen.end, &c.terms);
+        c.determined_at_end = determined(&seen.end, &c.terms, factor);
     }
     Ok(out)
+}
+
+/// Standard deviations that say nothing beside the samples of `plan`, as they are decided about here.
+///
+/// # Errors
+/// [`EkfError`] when a number is not finite.
+pub fn no_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
+    if plan.slews().next().is_none() {
+        return diffuse_prior(plan);
+    }
+    let information = batch(plan, SquareRootInformation::none(plan.unknowns()))?.information;
+    Ok(wider(plan, &information, WIDTHS[0], WIDTHS[0]))
+}
+
+/// The prediction for `plan` without a prior: with slews, what the samples alone determine.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
+    let wide = |information: &SquareRootInformation| WIDTHS.map(|w| wider(plan, information, w, w));
+    with_slews(plan, seed, ALONE, || Seen::of(plan, wide))
+}
+
+/// The prediction for a run of `plan` with a prior: with slews, an unknown counts as determined unless a prior ten times wider widens its
+/// standard deviation (nearly) as much.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn predict_run(plan: &Plan, prior: &[f64], seed: u64) -> Result<Prediction, SimulationError> {
+    let wide = [1.0, WIDER].map(|w| prior.iter().map(|s| s * w).collect());
+    with_slews(plan, seed, MOSTLY, || Seen::of(plan, |_| wide))
 }

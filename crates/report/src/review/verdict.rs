@@ -101,6 +101,11 @@ fn limits(s: &SchemeReview) -> Vec<String> {
     out
 }
 
+/// What samples have that derivatives have not.
+fn dwell_or_slews(s: &SchemeReview) -> &'static str {
+    if s.simulation.timeline.iter().any(|t| t.slew) { "dwell and slews" } else { "dwell" }
+}
+
 /// Requirements by prediction and in the run, what is missed first.
 fn requirements(s: &SchemeReview, review: &Review) -> (Grade, String) {
     let mut both = [&review.requirements, &s.simulation.requirements];
@@ -124,8 +129,9 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
         (n, true) if n == all => format!("The scheme determines every one of the {all} {what}"),
         (n, true) => format!("The scheme determines {n} of the {all} {what}"),
         (n, false) => format!(
-            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with dwell, during which psi moves",
-            with_dwell.len()
+            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with {}, during which psi moves",
+            with_dwell.len(),
+            dwell_or_slews(s)
         ),
     };
     if let Some(worst) = seen.iter().filter_map(|q| q.degree).max() {
@@ -192,7 +198,8 @@ pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
         if review.quantities.iter().all(|q| by(&q) == with(&q)) {
             text
         } else {
-            format!("by derivatives {text}; with dwell {} and {}", count(false, with), count(true, with))
+            let how = dwell_or_slews(s);
+            format!("by derivatives {text}; with {how} {} and {}", count(false, with), count(true, with))
         }
     };
     let dwell = match lost.is_empty() {
