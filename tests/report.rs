@@ -32,17 +32,17 @@ fn report(folder: &Path, name: &str, inputs: &[&str]) -> (PathBuf, String) {
     (file, String::from_utf8_lossy(&text).into_owned())
 }
 
-/// Twelve positions, with slews, under names that try to be markup.
-fn twelve(folder: &Path) -> PathBuf {
+/// Positions, up to twelve, with slews, under names that try to be markup.
+fn hostile(folder: &Path, positions: usize) -> PathBuf {
     let attitudes = ["NUE", "NED", "SUW", "SEU", "UNW", "UEN", "DNE", "DES", "ENU", "EUS", "WND", "WUN"];
     let mut text = format!(
         "name = '''{HOSTILE}'''\ndescription = '''{HOSTILE}'''\ncarry = \"inertial\"\nlatitude_deg = 48\n\
          [simulation]\ndwell_s = 300\nslew_rate_deg_s = 3\nstep_s = 10\n[requirements]\nD = 0.05\n"
     );
-    for (i, attitude) in attitudes.iter().enumerate() {
+    for (i, attitude) in attitudes.iter().take(positions).enumerate() {
         text.push_str(&format!("[[position]]\nname = \"q_{}\"\nattitude = \"{attitude}\"\n", i + 1));
     }
-    let file = folder.join("twelve.toml");
+    let file = folder.join(format!("{positions}.toml"));
     std::fs::write(&file, text).expect("written");
     file
 }
@@ -345,7 +345,7 @@ fn a_verdict_leads_with_what_limits_it() {
 #[test]
 fn text_from_files_is_text_in_every_format() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scheme = twelve(folder.path()).display().to_string();
+    let scheme = hostile(folder.path(), 12).display().to_string();
     let (_, text) = report(folder.path(), "review.html", &[&scheme, PAPER, MODEL]);
     assert!(text.len() < 2_000_000, "{} bytes", text.len());
     let page = Html::parse_document(&text);
@@ -364,6 +364,7 @@ fn text_from_files_is_text_in_every_format() {
     assert_eq!(texts(&page, ".status > .heading"), [HOSTILE, "paper-p1-p2", "two compartments, one sampled"]);
     assert!(text.find("class=\"statuses\"") < text.find("<main>"), "at the top");
 
+    let scheme = hostile(folder.path(), 5).display().to_string();
     let (file, text) = report(folder.path(), "review.md", &[&scheme]);
     assert!(!text.contains("<script>") && text.contains("\\<script\\>"), "markup in Markdown");
     assert!(text.contains("#### Status: ") && text.contains("| Small-angle model | LIMITED |"));
@@ -396,6 +397,7 @@ fn text_from_files_is_text_in_every_format() {
     );
     assert!(first != std::fs::read(folder.path().join("b_figures/s1_staircase.svg")).expect("its own"));
     let other = tempfile::tempdir().expect("a folder");
+    let scheme = hostile(folder.path(), 3).display().to_string();
     let (file, text) = report(other.path(), "review.tex", &[&scheme]);
     assert_eq!(text.matches("\\end{document}").count(), 1);
     assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & LIMITED & "));
@@ -440,7 +442,7 @@ fn a_browser_shows_it() {
     };
     let folder = tempfile::tempdir().expect("a folder");
     let (paper, _) = report(folder.path(), "paper.html", &[PAPER]);
-    let scheme = twelve(folder.path()).display().to_string();
+    let scheme = hostile(folder.path(), 12).display().to_string();
     let (long, _) = report(folder.path(), "twelve.html", &[&scheme]);
     // formulas of dozens of terms are not cut at the edge of a sheet
     let (formulas, _) = report(folder.path(), "five.html", &["examples/five-positions/scheme.toml"]);
@@ -526,7 +528,7 @@ fn a_browser_shows_it() {
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
 fn the_pdf_holds_every_table() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scheme = twelve(folder.path()).display().to_string();
+    let scheme = hostile(folder.path(), 12).display().to_string();
     let inputs = [scheme.as_str(), PAPER, MODEL];
     let (file, _) = report(folder.path(), "review.pdf", &inputs);
     let (again, _) = report(folder.path(), "again.pdf", &inputs);
