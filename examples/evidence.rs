@@ -1,9 +1,9 @@
 //! The library in a few lines: predicted and measured slopes of sigma against the dwell for five positions.
 #![allow(clippy::print_stdout, reason = "an example")]
 
-use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_core::model::{Angle, Scheme};
-use obsdeg_core::simulation::{Conditions, SimulationError};
+use obsdeg_evidence::crosscheck::{FilterChange, Options, crosscheck};
+use obsdeg_evidence::simulation::{Conditions, SimulationError};
 
 fn main() -> Result<(), SimulationError> {
     let positions = [[10, 25, 40], [130, -50, 70], [-95, 33, -160], [60, 80, 15], [-20, -70, 110]];

@@ -2,15 +2,15 @@
 
 use std::process::Command;
 
-use obsdeg_core::compare::answer::Review;
-use obsdeg_core::compare::{Entry, compare};
 use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_core::requirements::Miss;
-use obsdeg_core::simulation::conditions::Conditions;
-use obsdeg_core::simulation::simulate;
+use obsdeg_evidence::compare::answer::Review;
+use obsdeg_evidence::compare::{Entry, compare};
+use obsdeg_evidence::requirements::Miss;
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::simulate;
 
 const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
 

@@ -2,16 +2,16 @@
 
 use std::process::Command;
 
-use obsdeg_core::crosscheck::answer::CrossCheck;
-use obsdeg_core::crosscheck::monte_carlo::{Experiment, Prepared};
-use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::settings::{Assignment, Truth};
 use obsdeg_core::model::{Carry, Scheme, Unknowns};
-use obsdeg_core::simulation::batch::batch;
-use obsdeg_core::simulation::conditions::Conditions;
-use obsdeg_core::simulation::plan::Plan;
 use obsdeg_ekf::SquareRootInformation;
+use obsdeg_evidence::crosscheck::answer::CrossCheck;
+use obsdeg_evidence::crosscheck::monte_carlo::{Experiment, Prepared};
+use obsdeg_evidence::crosscheck::{FilterChange, Options, crosscheck};
+use obsdeg_evidence::simulation::batch::batch;
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::plan::Plan;
 use obsdeg_report::{Format, Layout};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};

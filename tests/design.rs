@@ -9,22 +9,22 @@ use std::process::Command;
 
 use brute::Brute;
 use obsdeg_core::analysis::{Options as AnalysisOptions, analyze};
-use obsdeg_core::compare::predicted;
-use obsdeg_core::design::answer::Found;
-use obsdeg_core::design::criterion::{Criterion, Limits};
-use obsdeg_core::design::information::Evaluator;
-use obsdeg_core::design::observability::Rows;
-use obsdeg_core::design::search::{Constraints, Progress, Search};
-use obsdeg_core::design::symmetry::Symmetry;
-use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design};
 use obsdeg_core::model::attitude::cardinal;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo};
-use obsdeg_core::simulation::batch::batch;
-use obsdeg_core::simulation::conditions::Conditions;
-use obsdeg_core::simulation::plan::Plan;
-use obsdeg_core::simulation::simulate;
+use obsdeg_design::design::answer::Found;
+use obsdeg_design::design::criterion::{Criterion, Limits};
+use obsdeg_design::design::information::Evaluator;
+use obsdeg_design::design::observability::Rows;
+use obsdeg_design::design::search::{Constraints, Progress, Search};
+use obsdeg_design::design::symmetry::Symmetry;
+use obsdeg_design::design::{Candidates, Design, DesignError, Kind, Options, design};
 use obsdeg_ekf::SquareRootInformation;
+use obsdeg_evidence::compare::predicted;
+use obsdeg_evidence::simulation::batch::batch;
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::plan::Plan;
+use obsdeg_evidence::simulation::simulate;
 use obsdeg_exact::SplitMix64;
 
 fn base(carry: Carry) -> Scheme {
@@ -638,7 +638,7 @@ fn requirements_on_psi_count() {
                 let (axis, angle) = (Some(SlewAxis::Direction(turn.about)), "180".parse().ok());
                 scheme.positions[i].slew = Some(SlewTo { axis, angle, rate_deg_s: None });
             }
-            let of = obsdeg_core::compare::predicted(&scheme, &free, 1).expect("predicted");
+            let of = obsdeg_evidence::compare::predicted(&scheme, &free, 1).expect("predicted");
             let psi = evaluator.psi_sigmas(sequence).concat();
             if of.iter().all(|(_, sigma)| sigma.is_some()) {
                 for ((name, sigma), found) in of.iter().zip(&psi) {
@@ -788,7 +788,7 @@ fn what_is_not_required_may_be_lost() {
     let mut scheme = scheme_of(&chosen, Carry::Platform);
     scheme.positions[1].name = "p2".into();
     let plan = Plan::new(&scheme, &quiet()).expect("a plan");
-    let prior = obsdeg_core::simulation::batch::diffuse_prior(&plan).expect("a prior");
+    let prior = obsdeg_evidence::simulation::batch::diffuse_prior(&plan).expect("a prior");
     let prior = SquareRootInformation::prior(&prior).expect("a prior");
     let all = batch(&plan, prior).expect("a batch").information.sigmas().expect("regular");
     for (own, c) in sigmas.iter().zip([3, 12]) {

@@ -6,12 +6,13 @@ use std::path::PathBuf;
 use obsdeg_core::analysis::{Options, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::attitude::cardinal;
-use obsdeg_core::system::evidence::SystemEvidence;
-use obsdeg_core::system::numeric::Numeric;
 use obsdeg_core::system::rows::Unknown;
-use obsdeg_core::system::{Judgement, crosscheck_system, json, judge, model_file, simulate_system};
+use obsdeg_core::system::{Judgement, json, judge, model_file};
 use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{Measurement, Process};
+use obsdeg_evidence::system::evidence::SystemEvidence;
+use obsdeg_evidence::system::numeric::Numeric;
+use obsdeg_evidence::system::{crosscheck_system, simulate_system};
 use serde_json::Value;
 
 /// The reference models: name, JSON, text.

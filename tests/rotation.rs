@@ -4,8 +4,8 @@ use obsdeg_core::analysis::{Analysis, Options, analyze};
 use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_core::simulation::conditions::Conditions;
-use obsdeg_core::simulation::simulate;
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::simulate;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 

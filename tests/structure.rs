@@ -1,4 +1,4 @@
-//! The house: crates and the modules of the core import only from what lies below them, as crates/README.md draws it.
+//! The house: crates and the modules in them import only from what lies below them, as crates/README.md draws it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -41,26 +41,31 @@ fn named(place: &Path, prefix: &str) -> BTreeSet<String> {
     out
 }
 
-/// Modules of the core and what they import from it.
-fn modules() -> Imports {
-    let core = root().join("crates/core/src");
-    let places: Vec<(String, PathBuf)> = fs::read_dir(core)
+/// Modules of a crate and what they import from it.
+fn modules_of(name: &str) -> Imports {
+    let source = root().join("crates").join(name).join("src");
+    let places: Vec<(String, PathBuf)> = fs::read_dir(source)
         .expect("a folder")
         .map(|e| e.expect("an entry").path())
         .map(|p| (p.file_stem().expect("a name").to_string_lossy().into_owned(), p))
         .filter(|(name, _)| name != "lib")
         .collect();
     let known: BTreeSet<String> = places.iter().map(|p| p.0.clone()).collect();
-    let imports = |(name, place): &(String, PathBuf)| {
-        let all = named(place, "crate::").into_iter().filter(|m| known.contains(m) && m != name);
-        (format!("core/{name}"), all.map(|m| format!("core/{m}")).collect())
+    let imports = |(module, place): &(String, PathBuf)| {
+        let all = named(place, "crate::").into_iter().filter(|m| known.contains(m) && m != module);
+        (format!("{name}/{module}"), all.map(|m| format!("{name}/{m}")).collect())
     };
     places.iter().map(imports).collect()
 }
 
+/// Modules of the crates that have more than a page of them.
+fn modules() -> Imports {
+    ["core", "evidence", "design"].into_iter().flat_map(modules_of).collect()
+}
+
 /// Crates of the workspace and what they import from it.
 fn crates() -> Imports {
-    let names = ["exact", "ekf", "symbolic", "core", "report", "cli"];
+    let names = ["exact", "ekf", "symbolic", "core", "evidence", "design", "report", "cli"];
     let imports = |name: &&str| {
         let place = root().join("crates").join(name);
         let place = if place.join("src").is_dir() { place.join("src") } else { place };

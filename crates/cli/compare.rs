@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use obsdeg_core::compare::{Entry, compare};
 use obsdeg_core::model::{Carry, Latitude};
+use obsdeg_evidence::compare::{Entry, compare};
 
 use crate::arguments::{OutputArguments, read_scheme};
 use crate::conditions::MeasurementArguments;

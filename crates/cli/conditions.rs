@@ -4,8 +4,8 @@ use clap::{Args, ValueEnum};
 use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth, concerns, known};
 use obsdeg_core::model::{Platform, Scheme};
-use obsdeg_core::simulation::Conditions;
-use obsdeg_core::simulation::conditions::general_first;
+use obsdeg_evidence::simulation::Conditions;
+use obsdeg_evidence::simulation::conditions::general_first;
 
 use crate::failure::Failure;
 

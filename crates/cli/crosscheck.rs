@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use obsdeg_core::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_core::model::{Carry, Latitude, Scheme};
-use obsdeg_core::system::crosscheck_system;
+use obsdeg_evidence::crosscheck::{FilterChange, Options, crosscheck};
+use obsdeg_evidence::system::crosscheck_system;
 use obsdeg_report::{File, Format, Layout};
 
 use crate::arguments::{FolderArguments, SchemeArguments};

@@ -5,13 +5,13 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use clap::{Args, ValueEnum};
-use obsdeg_core::design::answer::Found;
-use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design, scheme_found};
 use obsdeg_core::model::angle::parse_decimal;
 use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
-use obsdeg_core::simulation::Conditions;
+use obsdeg_design::design::answer::Found;
+use obsdeg_design::design::{Candidates, Design, DesignError, Kind, Options, design, scheme_found};
+use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, Format, Layout, ReportError, design_figures, visible};
 
 use crate::arguments::{FolderArguments, read_scheme};

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use obsdeg_core::model::scheme_file;
-use obsdeg_core::system::run::RunError;
 use obsdeg_core::system::{ModelError, SystemModel, json, model_file};
+use obsdeg_evidence::system::run::RunError;
 
 use crate::failure::Failure;
 use crate::input::read_text;

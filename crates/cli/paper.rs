@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use obsdeg_core::audit::audit;
+use obsdeg_evidence::audit::audit;
 
 use crate::arguments::OutputArguments;
 use crate::failure::Failure;

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use obsdeg_core::compare::Entry;
 use obsdeg_core::model::{Carry, Latitude};
-use obsdeg_core::review::{Options, ReviewError, review};
 use obsdeg_core::system::{SystemModel, model_file};
+use obsdeg_design::review::{Options, ReviewError, review};
+use obsdeg_evidence::compare::Entry;
 use obsdeg_report::{ReviewFormat, picture_folder};
 
 use crate::arguments::scheme_of;

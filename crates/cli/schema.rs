@@ -4,14 +4,15 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::audit::Audit;
-use obsdeg_core::compare::Comparison;
-use obsdeg_core::crosscheck::CrossCheck;
-use obsdeg_core::design::Design;
 use obsdeg_core::model::scheme_file::SchemeFile;
-use obsdeg_core::simulation::Simulation;
+use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
-use obsdeg_core::system::{SystemAnalysis, SystemEvidence, SystemRun};
+use obsdeg_design::design::Design;
+use obsdeg_evidence::audit::Audit;
+use obsdeg_evidence::compare::Comparison;
+use obsdeg_evidence::crosscheck::CrossCheck;
+use obsdeg_evidence::simulation::Simulation;
+use obsdeg_evidence::system::{SystemEvidence, SystemRun};
 use schemars::schema_for;
 
 use crate::failure::Failure;

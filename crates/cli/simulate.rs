@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 use obsdeg_core::analysis::AnalysisError;
-use obsdeg_core::prediction::PredictionError;
-use obsdeg_core::simulation::{SimulationError, Traces, simulate};
 use obsdeg_core::solution::requested::CombinationError;
-use obsdeg_core::system::simulate_system;
+use obsdeg_evidence::prediction::PredictionError;
+use obsdeg_evidence::simulation::{SimulationError, Traces, simulate};
+use obsdeg_evidence::system::simulate_system;
 use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
 
 use crate::arguments::{FolderArguments, SchemeArguments};

@@ -1,16 +1,16 @@
 //! The order of the criteria, constraints, worst degree, criterion, against every sequence of small random tasks, one by one.
 
-use obsdeg_core::compare::predicted;
-use obsdeg_core::design::criterion::{Criterion, Limits};
-use obsdeg_core::design::information::Evaluator;
-use obsdeg_core::design::observability::Rows;
-use obsdeg_core::design::search::{Constraints, Search};
-use obsdeg_core::design::ways::Stop;
-use obsdeg_core::design::{Candidates, Design, DesignError, Kind, Options, design};
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Scheme};
-use obsdeg_core::simulation::conditions::Conditions;
-use obsdeg_core::simulation::plan::Plan;
+use obsdeg_design::design::criterion::{Criterion, Limits};
+use obsdeg_design::design::information::Evaluator;
+use obsdeg_design::design::observability::Rows;
+use obsdeg_design::design::search::{Constraints, Search};
+use obsdeg_design::design::ways::Stop;
+use obsdeg_design::design::{Candidates, Design, DesignError, Kind, Options, design};
+use obsdeg_evidence::compare::predicted;
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::plan::Plan;
 use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
 
@@ -309,7 +309,7 @@ fn hold_refinement(
     seed: u64,
     t: &Task,
     all: &Judged,
-    f: &obsdeg_core::design::answer::Found,
+    f: &obsdeg_design::design::answer::Found,
     (degree, value): (usize, f64),
 ) {
     assert!(f.worst_degree <= degree && f.value < value, "{seed}: {f:?}");

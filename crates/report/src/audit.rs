@@ -1,6 +1,6 @@
 //! The audit of the paper in every text format.
 
-use obsdeg_core::audit::{Audit, Finding};
+use obsdeg_evidence::audit::{Audit, Finding};
 
 use crate::table::{heading, table as new_table};
 use crate::{Layout, ReportError, csv_text, latex, markdown};

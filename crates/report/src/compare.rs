@@ -1,8 +1,8 @@
 //! Schemes side by side.
 
-use obsdeg_core::compare::Comparison;
-use obsdeg_core::compare::answer::{DropOne, Quantity, Review, Worst};
-use obsdeg_core::requirements::Requirements;
+use obsdeg_evidence::compare::Comparison;
+use obsdeg_evidence::compare::answer::{DropOne, Quantity, Review, Worst};
+use obsdeg_evidence::requirements::Requirements;
 
 use crate::document::{Block, Document, number, optional};
 use crate::words;

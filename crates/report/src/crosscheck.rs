@@ -1,7 +1,7 @@
 //! The cross-check of exact verdicts and filter.
 
-use obsdeg_core::crosscheck::CrossCheck;
-use obsdeg_core::crosscheck::answer::{Check, Statistic};
+use obsdeg_evidence::crosscheck::CrossCheck;
+use obsdeg_evidence::crosscheck::answer::{Check, Statistic};
 
 use crate::document::{Block, Document, number, optional};
 use crate::simulation::{conditions, validity, warning};

@@ -1,9 +1,9 @@
 //! Schemes that were found.
 
-use obsdeg_core::design::Design;
-use obsdeg_core::design::answer::{Found, SearchReport};
+use obsdeg_design::design::Design;
+use obsdeg_design::design::answer::{Found, SearchReport};
 
-use obsdeg_core::requirements::{Miss, Requirements};
+use obsdeg_evidence::requirements::{Miss, Requirements};
 
 use crate::document::{Block, Document, number};
 use crate::figure::{BLUE, Figure, FigureError, Line, Stroke};

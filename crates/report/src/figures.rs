@@ -1,13 +1,13 @@
 //! Which figures a result has.
 
-use obsdeg_core::simulation::Traces;
-use obsdeg_core::simulation::record::Series;
+use obsdeg_evidence::simulation::Traces;
+use obsdeg_evidence::simulation::record::Series;
 
 use crate::figure::{
     BLACK, BLUE, Band, Figure, FigureError, GREEN, GREY, Line, ORANGE, SKY, Stroke, grid, heat, png,
 };
-use obsdeg_core::crosscheck::CrossCheck;
-use obsdeg_core::crosscheck::answer::{HistoryPoint, SlopeCurve};
+use obsdeg_evidence::crosscheck::CrossCheck;
+use obsdeg_evidence::crosscheck::answer::{HistoryPoint, SlopeCurve};
 
 /// A file: its name and its bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -177,7 +177,7 @@ pub(crate) fn history_figure(
 ) -> Figure {
     let history = &c.monte_carlo.history;
     let band = |p: &HistoryPoint| {
-        let (low, high) = obsdeg_core::crosscheck::mean_band(dof, count(p));
+        let (low, high) = obsdeg_evidence::crosscheck::mean_band(dof, count(p));
         (p.t_s, low, high)
     };
     let end = history.last().map_or(1.0, |p| p.t_s);

@@ -30,13 +30,14 @@ use std::fmt;
 use std::str::FromStr;
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::audit::Audit;
-use obsdeg_core::compare::Comparison;
-use obsdeg_core::crosscheck::CrossCheck;
-use obsdeg_core::design::Design;
-use obsdeg_core::review::DesignReview;
-use obsdeg_core::simulation::Simulation;
-use obsdeg_core::system::{SystemAnalysis, SystemEvidence, SystemRun};
+use obsdeg_core::system::SystemAnalysis;
+use obsdeg_design::design::Design;
+use obsdeg_design::review::DesignReview;
+use obsdeg_evidence::audit::Audit;
+use obsdeg_evidence::compare::Comparison;
+use obsdeg_evidence::crosscheck::CrossCheck;
+use obsdeg_evidence::simulation::Simulation;
+use obsdeg_evidence::system::{SystemEvidence, SystemRun};
 
 /// A text format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,10 +5,10 @@ mod pictures;
 mod verdict;
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::compare::answer::{Quantity, Review};
-use obsdeg_core::crosscheck::CrossCheck;
-use obsdeg_core::review::answer::PositionReview;
-use obsdeg_core::review::{DesignReview, SchemeReview};
+use obsdeg_design::review::answer::PositionReview;
+use obsdeg_design::review::{DesignReview, SchemeReview};
+use obsdeg_evidence::compare::answer::{Quantity, Review};
+use obsdeg_evidence::crosscheck::CrossCheck;
 
 use crate::document::{Block, Document, Formula, optional};
 use crate::{compare, crosscheck, latex, simulation, words};
@@ -318,7 +318,7 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
 }
 
 fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) {
-    let row = |c: &obsdeg_core::compare::answer::Sensitivity| {
+    let row = |c: &obsdeg_evidence::compare::answer::Sensitivity| {
         vec![
             c.condition.clone(),
             compare::rank(c.rank, review.has_accuracy_orders),
@@ -376,7 +376,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
         });
     }
     blocks.push(list("", lines));
-    let row = |d: &obsdeg_core::compare::answer::DropOne| {
+    let row = |d: &obsdeg_evidence::compare::answer::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
         vec![
             d.position.clone(),

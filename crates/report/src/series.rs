@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use obsdeg_core::simulation::Traces;
+use obsdeg_evidence::simulation::Traces;
 use parquet::basic::{Compression, Type as Physical};
 use parquet::data_type::{DoubleType, Int32Type};
 use parquet::file::properties::WriterProperties;

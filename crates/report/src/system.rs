@@ -1,12 +1,12 @@
 //! Any system.
 
-use obsdeg_core::crosscheck::answer::Check;
 use obsdeg_core::degree::status::Status;
-use obsdeg_core::simulation::answer::Outcome;
 use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination, SystemQuantity};
-use obsdeg_core::system::evidence::{SystemEvidence, SystemQuantityEvidence};
-use obsdeg_core::system::run::{SystemEstimate, SystemRun};
 use obsdeg_core::system::symmetry::POLYNOMIAL_DEGREE;
+use obsdeg_evidence::crosscheck::answer::Check;
+use obsdeg_evidence::simulation::answer::Outcome;
+use obsdeg_evidence::system::evidence::{SystemEvidence, SystemQuantityEvidence};
+use obsdeg_evidence::system::run::{SystemEstimate, SystemRun};
 
 use crate::document::{Block, Document, Formula, number};
 use crate::{latex, words};

@@ -7,10 +7,10 @@ use obsdeg_core::degree::coefficient::Form;
 use obsdeg_core::degree::status::{Difference, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
-use obsdeg_core::requirements::{Basis, Miss, Requirements};
-use obsdeg_core::simulation::answer::MeasurementReport;
-use obsdeg_core::simulation::consistency::{Consistency, Doubt};
 use obsdeg_core::solution::solver::{Frame, Verification};
+use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
+use obsdeg_evidence::simulation::answer::MeasurementReport;
+use obsdeg_evidence::simulation::consistency::{Consistency, Doubt};
 
 use crate::document::number;
 

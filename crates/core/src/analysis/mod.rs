@@ -135,7 +135,7 @@ pub fn analyze(
 }
 
 /// Refuses more unknowns than an analysis takes, before anything grows.
-pub(crate) fn few_enough(platform: &Platform) -> Result<(), SchemeError> {
+pub fn few_enough(platform: &Platform) -> Result<(), SchemeError> {
     let found = platform.names().len();
     if found <= MAX_UNKNOWNS { Ok(()) } else { Err(SchemeError::TooManyUnknowns { found }) }
 }

@@ -1,7 +1,7 @@
 //! Passive Euler matrices, and the 24 cardinal attitudes by direction letters.
 
 use super::angle::Angle;
-use super::ring::Ring;
+use super::ring::{Float, Ring};
 use super::rotation::Axis;
 
 /// A 3x3 matrix, row by row.
@@ -56,6 +56,11 @@ pub fn c_n<R: Ring>(
     let (cos, sin) = cos_sin(&t.angle);
     let turn = elementary(ring, t.axis.index, &(cos, ring.neg(&sin)));
     if t.axis.geographic { product(ring, &turn, &c) } else { product(ring, &c, &turn) }
+}
+
+/// `C_c^n` of Euler angles in floating point.
+pub fn c_n_f64(euler: &Euler) -> Matrix3<f64> {
+    c_n(&Float, euler, None, |a| a.turn().cos_sin_f64())
 }
 
 /// The geographic directions and their components (North, Up, East).

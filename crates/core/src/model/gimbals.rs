@@ -3,8 +3,7 @@
 use std::fmt;
 
 use super::angle::{format_decimal, parse_decimal};
-use super::attitude::{Euler, Matrix3, c_n};
-use super::ring::Float;
+use super::attitude::{Euler, Matrix3, c_n_f64};
 use super::scheme::Position;
 use crate::model::slew::Slew;
 
@@ -96,7 +95,7 @@ impl Gimbals {
         if position.angles.iter().any(|a| a.generic().is_some()) {
             return None;
         }
-        let start = c_n(&Float, &position.angles, None, |a| a.turn().cos_sin_f64());
+        let start = c_n_f64(&position.angles);
         // a turn of so many degrees in so many seconds; behind a whole turn nothing is new
         let whole = r.angle.nanodeg() as f64 / 1e9;
         let path = Slew::about(&start, r, whole.abs());
@@ -153,7 +152,7 @@ mod tests {
 
     fn of_degrees(angles: [f64; 3]) -> Matrix3<f64> {
         let cs = angles.map(|x: f64| (x.to_radians().cos(), x.to_radians().sin()));
-        crate::model::attitude::c_n_from_euler(&Float, &cs)
+        crate::model::attitude::c_n_from_euler(&crate::model::ring::Float, &cs)
     }
 
     proptest! {

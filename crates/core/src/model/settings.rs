@@ -54,7 +54,7 @@ impl DriftNoise {
     }
 
     /// Refuses what is neither zero nor in its range.
-    pub(crate) fn check(self, what: &str) -> Result<(), RangeError> {
+    pub fn check(self, what: &str) -> Result<(), RangeError> {
         if self.amount() == 0.0 { Ok(()) } else { ranges::DRIFT_NOISE.check(what, self.amount()) }
     }
 
@@ -232,7 +232,7 @@ pub(crate) fn may_be_unknown(name: &str) -> bool {
 }
 
 /// Whether a gyro model may have it, even if the scheme at hand does not.
-pub(crate) fn is_family(name: &str) -> bool {
+pub fn is_family(name: &str) -> bool {
     let letters = name.strip_prefix("D_").unwrap_or("");
     let letters = letters.strip_suffix(['X', 'Y', 'Z']).unwrap_or(letters);
     ["psi", "eps", "D"].contains(&name) || super::Term::ALL.iter().any(|t| t.letters() == letters)

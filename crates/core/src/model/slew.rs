@@ -27,22 +27,22 @@ impl Turn {
 }
 
 /// `a b` in floating point.
-pub(crate) fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
     crate::model::attitude::product(&Float, a, b)
 }
 
 /// `a b`.
-pub(crate) fn apply(a: &Matrix3<f64>, b: &[f64; 3]) -> [f64; 3] {
+pub fn apply(a: &Matrix3<f64>, b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|j| a[i][j] * b[j]).sum())
 }
 
 /// The transpose.
-pub(crate) fn transpose(a: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn transpose(a: &Matrix3<f64>) -> Matrix3<f64> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
 }
 
 /// `exp([v x])`: the active rotation by the vector `v` (rad).
-pub(crate) fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
+pub fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
     let angle = v.iter().map(|x| x * x).sum::<f64>().sqrt();
     // sin(a)/a and (1 - cos a)/a^2
     let (s, c) = if angle < 1e-4 {
@@ -56,7 +56,7 @@ pub(crate) fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
 }
 
 /// `[v x]`.
-pub(crate) fn cross(v: &[f64; 3]) -> Matrix3<f64> {
+pub fn cross(v: &[f64; 3]) -> Matrix3<f64> {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
 
@@ -67,7 +67,7 @@ const COMPONENT: f64 = 1e-6;
 
 /// The rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi. Of the two vectors of a half turn the one whose
 /// first component that is not zero is positive.
-pub(crate) fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
+pub fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
     let sine = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]].map(|x| x / 2.0);
     let length = norm(&sine);
     let cosine = (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0;
@@ -222,7 +222,7 @@ mod tests {
         let names = crate::model::attitude::cardinal_names();
         let matrix = |name: &String| {
             let angles = crate::model::attitude::cardinal(name).expect("an attitude");
-            crate::design::information::attitude(&angles)
+            crate::model::attitude::c_n_f64(&angles)
         };
         let all: Vec<Matrix3<f64>> = names.iter().map(matrix).collect();
         let mut half_turns = 0;

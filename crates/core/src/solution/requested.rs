@@ -27,19 +27,19 @@ pub struct CombinationError {
 }
 
 /// A combination that was asked for.
-pub(crate) struct Requested {
+pub struct Requested {
     /// As written.
-    pub(crate) text: String,
+    pub text: String,
     /// Its coefficients in the first field of the verdicts.
-    pub(crate) row: Vec<u64>,
+    pub row: Vec<u64>,
     /// Its exact coefficients.
-    pub(crate) terms: Sparse,
+    pub terms: Sparse,
     /// What the staircase says.
-    pub(crate) verdict: Verdict,
+    pub verdict: Verdict,
 }
 
 /// Reads and judges the combinations that a scheme asks for; the seed chooses the points at which they are looked at.
-pub(crate) fn requested_combinations(
+pub fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
     seed: u64,

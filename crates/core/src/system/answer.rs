@@ -1,5 +1,6 @@
 //! The answer for one system: plain data, serialisable.
 
+use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -9,7 +10,6 @@ use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::staircase::partners;
 use crate::degree::status::Status;
-use obsdeg_symbolic::Worker;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
@@ -134,12 +134,7 @@ pub fn analyze_system(
 }
 
 /// The answer for a model that was judged.
-pub(super) fn answer(
-    model: &SystemModel,
-    judged: &Judgement,
-    symmetries: &Symmetries,
-    seed: u64,
-) -> SystemAnalysis {
+pub fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries, seed: u64) -> SystemAnalysis {
     let partners = partners(judged.layout.unknowns.len(), &judged.stairs);
     // known constants are counted on behind the unknowns
     let name = |c: usize| match judged.layout.unknowns.get(c) {

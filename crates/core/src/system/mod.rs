@@ -7,21 +7,16 @@
 pub mod answer;
 mod canonical;
 pub mod dag;
-pub mod evidence;
 mod functions;
 pub mod json;
 pub mod judge;
 pub mod model;
 pub mod model_file;
-pub mod numeric;
 pub mod rows;
-pub mod run;
 mod solutions;
 pub mod symmetry;
 pub mod taylor;
 
 pub use answer::{SystemAnalysis, analyze_system};
-pub use evidence::{SystemEvidence, crosscheck_system};
 pub use judge::{Judgement, judge};
 pub use model::{ModelError, SystemModel};
-pub use run::{SystemRun, simulate_system};

@@ -1,13 +1,13 @@
 //! The pictures of a review.
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::compare::answer::{Quantity, Review};
-use obsdeg_core::crosscheck::CrossCheck;
-use obsdeg_core::crosscheck::answer::SlopeCurve;
-use obsdeg_core::review::SchemeReview;
-use obsdeg_core::review::answer::Sweep;
-use obsdeg_core::simulation::Traces;
 use obsdeg_core::system::SystemAnalysis;
+use obsdeg_design::review::SchemeReview;
+use obsdeg_design::review::answer::Sweep;
+use obsdeg_evidence::compare::answer::{Quantity, Review};
+use obsdeg_evidence::crosscheck::CrossCheck;
+use obsdeg_evidence::crosscheck::answer::SlopeCurve;
+use obsdeg_evidence::simulation::Traces;
 
 use crate::document::{Block, Drawing, Picture};
 use crate::figure::{BLACK, BLUE, Band, Figure, GREEN, GREY, Line, ORANGE, SKY, Stroke, heat};

@@ -1,9 +1,9 @@
 //! The verdict on a scheme in words, led by what limits it, and its status at a glance.
 
-use obsdeg_core::compare::answer::{Quantity, Review};
 use obsdeg_core::degree::status::Status as Exact;
-use obsdeg_core::review::SchemeReview;
-use obsdeg_core::simulation::answer::Outcome;
+use obsdeg_design::review::SchemeReview;
+use obsdeg_evidence::compare::answer::{Quantity, Review};
+use obsdeg_evidence::simulation::answer::Outcome;
 
 use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};

@@ -1,0 +1,80 @@
+//! What a search repeats: exact verdicts of candidate sets, information of candidate sequences.
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_design::design::criterion::Criterion;
+use obsdeg_design::design::information::Evaluator;
+use obsdeg_design::design::observability::Rows;
+use obsdeg_design::design::search::{Constraints, Search};
+use obsdeg_design::design::{Candidates, Design, Kind, Options, design};
+use obsdeg_evidence::simulation::conditions::Conditions;
+
+fn main() {
+    divan::main();
+}
+
+const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
+fn base(carry: Carry) -> Scheme {
+    Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::default() }
+}
+
+/// All sets of six of 24 judged exactly, on all cores; items are sets.
+#[divan::bench(args = [Carry::Platform, Carry::Inertial, Carry::Reset])]
+fn sets_of_six(bencher: Bencher<'_, '_>, carry: &Carry) {
+    let rows = Rows::new(&base(*carry), &Candidates::cardinals().attitudes, &ALL, 1).expect("rows");
+    bencher.counter(ItemsCount::new(134_596usize)).bench(|| black_box(rows.observable_sets(6).len()));
+}
+
+/// The information of a sequence of five and its worst sigma, from nothing, on one core.
+#[divan::bench]
+fn sigma_of_five(bencher: Bencher<'_, '_>) {
+    let candidates = Candidates::cardinals().attitudes;
+    let evaluator = Evaluator::new(&base(Carry::Inertial), &candidates, &ALL, &Conditions::default())
+        .expect("an evaluator");
+    bencher
+        .counter(ItemsCount::new(1usize))
+        .bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10]), &Criterion::Worst));
+}
+
+/// The best five of 24 in all orders, proven, without the front, on all cores; items are the sequences it stands for.
+#[divan::bench(sample_count = 10)]
+fn best_five_of_24(bencher: Bencher<'_, '_>) {
+    let base = base(Carry::Inertial);
+    let candidates = Candidates::cardinals().attitudes;
+    let rows = Rows::new(&base, &candidates, &ALL, 1).expect("rows");
+    let evaluator = Evaluator::new(&base, &candidates, &ALL, &Conditions::default()).expect("an evaluator");
+    let search = Search {
+        rows: &rows,
+        evaluator: &evaluator,
+        criterion: &Criterion::Worst,
+        constraints: &Constraints::default(),
+        keep: 10,
+        floor: 2,
+        progress: &|_| true,
+    };
+    let symmetry = rows.symmetry(&|_, _| true);
+    bencher.counter(ItemsCount::new(2_897_280usize)).bench(|| search.exhaust(&symmetry, 5));
+}
+
+/// The same with the front, as the command runs it.
+#[divan::bench(sample_count = 3)]
+fn the_command_for_five_of_24() -> Design {
+    let options = Options {
+        candidates: Candidates::cardinals(),
+        positions: Some(5),
+        required: Vec::new(),
+        degree_caps: Vec::new(),
+        meet: false,
+        total_s: None,
+        slew_s: None,
+        criterion: Kind::Worst,
+        keep: 10,
+        restarts: 200,
+        refine: false,
+        front: Vec::new(),
+        seed: 1,
+    };
+    design(&base(Carry::Inertial), &Conditions::default(), &options, &|_| true).expect("designed")
+}

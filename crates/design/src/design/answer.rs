@@ -1,0 +1,155 @@
+//! Schemes that were found: plain data.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use obsdeg_core::model::{Carry, Geometry};
+use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::answer::MeasurementReport;
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.design/1";
+
+/// The result of a search.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Design {
+    /// `obsdeg.design/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// Latitude in degrees.
+    pub latitude_deg: f64,
+    /// Whether the latitude was chosen by the program.
+    pub latitude_by_default: bool,
+    /// Axes of the gyros.
+    pub geometry: Geometry,
+    /// Unknown besides psi; all of them are estimated.
+    pub terms: String,
+    /// The attitudes to choose from.
+    pub candidates: Vec<String>,
+    /// Attitudes that the gimbals do not reach.
+    pub beyond_gimbals: Vec<String>,
+    /// Rotations of the platform axes that turn schemes into equally good ones (1: the identity).
+    pub symmetry: usize,
+    /// Coefficients that must be observable, and that the criterion is about.
+    pub required: Vec<String>,
+    /// The fewest positions.
+    pub minimum: Minimum,
+    /// What was searched; null when only the minimum was asked for.
+    pub search: Option<SearchReport>,
+    /// The best schemes, best first.
+    pub found: Vec<Found>,
+    /// Schemes that none found beats in both total time and criterion, by total time.
+    pub front: Vec<Found>,
+    /// How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so.
+    pub primes: usize,
+    /// Bound on the probability that an observable set was overlooked, or a degree taken too large; nothing is called proven unless it is
+    /// below 1e-12.
+    pub error_bound: f64,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// The fewest positions that make every required coefficient observable.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Minimum {
+    /// Their number; null when all candidates together do not do, or when the sets are too many to be examined.
+    pub positions: Option<usize>,
+    /// A set that does.
+    pub witness: Vec<String>,
+    /// No fewer can do: that many rows are needed.
+    pub counting_bound: usize,
+    /// `[size, number of sets]`: none of these does, by exhaustion.
+    pub none_of: Vec<[u64; 2]>,
+    /// Coefficients that all candidates together leave unobservable.
+    pub never: Vec<String>,
+    /// Whether `positions` is the fewest, or `never` is never, by more than rounding and chance: nothing smaller was left out, and the
+    /// bound on the probability of an error is below 1e-12.
+    pub proven: bool,
+}
+
+/// What was searched, and how.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SearchReport {
+    /// The number of positions.
+    pub positions: usize,
+    /// What every sigma rests on: the information of all samples on psi and all coefficients. Every position has the dwell, slews are about
+    /// the eigenaxis, Z is not used meanwhile.
+    pub conditions: MeasurementReport,
+    /// Random drift that sigmas allow for; null: none.
+    pub drift_noise: Option<String>,
+    /// Knowledge beforehand that sigmas rest on; null: none.
+    pub prior: Option<String>,
+    /// What makes a scheme better: worst, A, D, E or margin.
+    pub criterion: String,
+    /// Sequences whose sigma was computed.
+    pub examined: u64,
+    /// Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
+    /// required coefficient as far as double precision tells: they count as worse than all others.
+    pub lost: u64,
+    /// Whether no sequence of candidates within the constraints is better than the first, by exhaustion: none has a smaller worst degree, or
+    /// the same and a smaller criterion.
+    pub proven: bool,
+    /// How many sequences are as good as the first; null where not all were searched.
+    pub ties: Option<TiesReport>,
+    /// Whether orders of the same positions count as different schemes.
+    pub order_matters: bool,
+    /// Whether the search was interrupted; if the first is proven nevertheless, before the front was complete.
+    pub interrupted: bool,
+    /// The smallest worst degree that all candidates together allow.
+    pub degree_floor: usize,
+    /// The constraints in words.
+    pub constraints: Vec<String>,
+}
+
+/// Sequences that are as good as the best.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct TiesReport {
+    /// How many, the best and all their images under turns of the platform axes among them.
+    pub sequences: u64,
+    /// Two tie when their worst degrees are equal and their criteria differ by less than this part.
+    pub within: f64,
+}
+
+/// A scheme that was found.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Found {
+    /// Its positions in order.
+    pub positions: Vec<String>,
+    /// Their Euler angles in degrees.
+    pub angles: Vec<String>,
+    /// The half turns between them, each with its direction: the other one is another scheme.
+    pub half_turns: Vec<HalfTurn>,
+    /// Its angles were refined continuously.
+    pub refined: bool,
+    /// Dwell of each position, in s.
+    pub dwell_s: f64,
+    /// Total time with turns, in s.
+    pub total_s: f64,
+    /// The criterion: a sigma in deg/h (per g), or for margin the largest sigma over its requirement, psi's too where it counts.
+    pub value: f64,
+    /// The largest sigma of a required coefficient in deg/h (per g): information of all samples, no prior, no drift noise.
+    pub worst_sigma_dph: f64,
+    /// The coefficient that has it.
+    pub worst: String,
+    /// What became of the requirements on what must be observable, and on psi (of the start, under reset carry of every position) when that is
+    /// every coefficient.
+    pub requirements: Requirements,
+    /// Its largest degree of a required coefficient.
+    pub worst_degree: usize,
+    /// Its largest accuracy order of a required coefficient.
+    pub worst_accuracy_order: Option<usize>,
+    /// Its exact rank by derivatives, and the number of unknowns.
+    pub rank: [usize; 2],
+}
+
+/// Half a turn to a position.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct HalfTurn {
+    /// Which position it leads to, counted from 1.
+    pub to: usize,
+    /// The axis, about which it is right-handed: a unit vector (North, Up, East).
+    pub about: [f64; 3],
+}

@@ -1,0 +1,145 @@
+//! Criteria of optimal design, from the information of a sequence.
+
+use nalgebra::DMatrix;
+use obsdeg_core::model::Carry;
+
+use super::information::{Evaluator, MAX, State};
+use super::ways::Stop;
+
+/// What makes one scheme better than another, of the coefficients that count.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Criterion {
+    /// The largest sigma.
+    #[default]
+    Worst,
+    /// The root of the mean variance (A-optimal).
+    A,
+    /// The geometric mean of the principal sigmas: the volume of the error ellipsoid (D-optimal).
+    D,
+    /// The largest principal sigma (E-optimal).
+    E,
+    /// The largest sigma over its requirement.
+    Margin(Limits),
+}
+
+/// The largest sigmas allowed; infinite where there is no requirement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Of the coefficients that count, in deg/h (per g) (shape d).
+    pub coefficients: Vec<f64>,
+    /// Of psi_x, psi_y, psi_z at the start, under reset carry at the start of every position, in deg.
+    pub psi: [f64; 3],
+}
+
+impl Criterion {
+    /// worst, A, D, E or margin.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Worst => "worst",
+            Self::A => "A",
+            Self::D => "D",
+            Self::E => "E",
+            Self::Margin(_) => "margin",
+        }
+    }
+}
+
+impl Evaluator {
+    /// The root of the information, psi and the coefficients that do not count first: the block of the others is the root of the
+    /// inverse of their covariance. False when one of them is not determined.
+    pub(super) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+        let n = self.n;
+        let first = if self.carry() == Carry::Reset { 3 } else { 0 };
+        root.resize(n * n, 0.0);
+        let l = &mut root[..];
+        for i in first..n {
+            let (done, rest) = l.split_at_mut(i * n);
+            let row = &mut rest[..=i];
+            let given = &state.information[i * n..=i * n + i];
+            for j in first..i {
+                let other = &done[j * n..=j * n + j];
+                let sum: f64 = row[first..j].iter().zip(&other[first..j]).map(|(a, b)| a * b).sum();
+                row[j] = if other[j] > 0.0 { (given[j] - sum) / other[j] } else { 0.0 };
+            }
+            let pivot = given[i] - row[first..i].iter().map(|a| a * a).sum::<f64>();
+            // what rounding leaves of an undetermined direction
+            row[i] = match pivot <= 1e-13 * given[i] {
+                false => pivot.sqrt(),
+                // it couples with nothing that comes later
+                true if i < 3 + self.nuisance => 0.0,
+                true => return false,
+            };
+        }
+        true
+    }
+
+    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient that counts
+    /// is not determined. Sigmas are in deg/h (per g). `root` is working space.
+    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+        if !self.root(state, root) {
+            return f64::INFINITY;
+        }
+        let (n, begin) = (self.n, 3 + self.nuisance);
+        let d = n - begin;
+        let l = &root[..];
+        if *criterion == Criterion::D {
+            // the geometric mean of the principal sigmas
+            let logs: f64 = (begin..n).map(|i| l[i * n + i].ln()).sum();
+            return (-logs / d as f64).exp() / self.dph;
+        }
+        if *criterion == Criterion::E {
+            let block =
+                DMatrix::from_fn(d, d, |i, j| if j <= i { l[(i + begin) * n + j + begin] } else { 0.0 });
+            let information = &block * block.transpose();
+            return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
+        }
+        let variances = (begin..n).map(|i| self.variance(l, i));
+        match criterion {
+            Criterion::A => (variances.sum::<f64>() / d as f64).sqrt() / self.dph,
+            Criterion::Margin(limits) => {
+                let over = variances.zip(&limits.coefficients).map(|(v, limit)| v.sqrt() / self.dph / limit);
+                over.fold(self.psi_over(state, l, &limits.psi), f64::max)
+            }
+            _ => variances.fold(0.0, f64::max).sqrt() / self.dph,
+        }
+    }
+
+    /// The variance of unknown `i`: the square of column i of the inverse of the root `l`.
+    fn variance(&self, l: &[f64], i: usize) -> f64 {
+        let n = self.n;
+        let mut column = [0.0; MAX];
+        column[i] = 1.0 / l[i * n + i];
+        let mut variance = column[i] * column[i];
+        for r in i + 1..n {
+            let row = &l[r * n..=r * n + r];
+            let product: f64 = row[i..r].iter().zip(&column[i..r]).map(|(a, b)| a * b).sum();
+            column[r] = -product / row[r];
+            variance += column[r] * column[r];
+        }
+        variance
+    }
+
+    /// The state behind a whole sequence.
+    pub fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
+        let (mut now, mut next) = (self.start(), self.start());
+        for &stop in sequence {
+            self.extend(&now, stop.into(), &mut next);
+            std::mem::swap(&mut now, &mut next);
+        }
+        now
+    }
+
+    /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not determined.
+    pub fn sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<f64> {
+        let mut root = Vec::new();
+        if !self.root(&self.state_of(sequence), &mut root) {
+            return Vec::new();
+        }
+        (3 + self.nuisance..self.n).map(|i| self.variance(&root, i).sqrt() / self.dph).collect()
+    }
+
+    /// The criterion of a whole sequence.
+    pub fn of_sequence<S: Copy + Into<Stop>>(&self, sequence: &[S], criterion: &Criterion) -> f64 {
+        self.value(&self.state_of(sequence), criterion, &mut Vec::new())
+    }
+}

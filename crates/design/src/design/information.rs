@@ -1,0 +1,311 @@
+//! The information of a sequence of positions, built up position by position: what a search evaluates millions of times.
+
+use nalgebra::DMatrix;
+use obsdeg_core::model::attitude::{Euler, Matrix3, c_n_f64};
+use obsdeg_core::model::platform::{LOCAL, local_dynamics, local_output};
+use obsdeg_core::model::ring::Float;
+use obsdeg_core::model::slew::W_IE;
+use obsdeg_core::model::{Carry, Gimbals, Platform, Scheme};
+use obsdeg_ekf::integrate::van_loan;
+use obsdeg_evidence::simulation::SimulationError;
+use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of, si_per_shown};
+use obsdeg_evidence::simulation::plan::{Plan, steps};
+
+use super::DesignError;
+use super::ways::{Stop, Way};
+
+/// Most unknowns of a search: psi and the coefficients of ten terms.
+pub const MAX: usize = 33;
+
+/// One candidate: its attitude, and how coefficients become drift there.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    pub(super) c: Matrix3<f64>,
+    /// `C E(g)` (3 x d), columns in the order of the evaluator.
+    pub(super) drift: [Vec<f64>; 3],
+}
+
+/// What every evaluation shares.
+#[derive(Debug, Clone)]
+pub struct Evaluator {
+    pub(super) platform: Platform,
+    pub(super) conditions: Conditions,
+    /// The column of every coefficient in the order of the evaluator: those that count come last.
+    order: Vec<usize>,
+    /// How many coefficients do not count.
+    pub(super) nuisance: usize,
+    /// Unknowns: psi, then d coefficients.
+    pub(super) n: usize,
+    /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
+    pub(super) w: Matrix3<f64>,
+    /// Dwell of each position, in s.
+    dwell_s: f64,
+    /// Information of one position on its `(psi^n, eps^n)`.
+    pub(super) local: [[f64; LOCAL]; LOCAL],
+    /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
+    phi: [[f64; LOCAL]; 3],
+    pub(super) candidates: Vec<Candidate>,
+    /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
+    pub(super) ways: Vec<Way>,
+    /// deg/h per unit of each coefficient.
+    pub(super) dph: f64,
+}
+
+/// A sequence so far.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Information (n x n), row by row, lower triangle.
+    pub(super) information: Vec<f64>,
+    /// psi in the carried axes as a functional of the unknowns (3 x n).
+    psi: [Vec<f64>; 3],
+    /// The candidates in order.
+    pub(super) path: Vec<usize>,
+    /// Dwells and turns, in s.
+    pub seconds: f64,
+}
+
+impl Evaluator {
+    /// The evaluator for positions of `dwell_s` each, without drift noise. `required` are the coefficients that count (indices
+    /// among the coefficients); the others are estimated with them.
+    ///
+    /// # Errors
+    /// [`DesignError`].
+    pub fn new(
+        base: &Scheme,
+        candidates: &[Euler],
+        required: &[usize],
+        conditions: &Conditions,
+    ) -> Result<Self, DesignError> {
+        Self::while_going(base, candidates, required, conditions, &|| true)
+    }
+
+    /// The same, as long as `going` says so: the ways between many candidates take a while.
+    pub(super) fn while_going(
+        base: &Scheme,
+        candidates: &[Euler],
+        required: &[usize],
+        conditions: &Conditions,
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self, DesignError> {
+        let scheme = Scheme {
+            positions: Scheme::of_angles(candidates.iter().take(1).cloned()).positions,
+            latitude: latitude_of(base),
+            combinations: Vec::new(),
+            gimbals: Gimbals::default(),
+            ..base.clone()
+        };
+        let latitude = scheme
+            .latitude
+            .map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
+        if conditions.slew_rate_deg_s.is_some() && scheme.carry != Carry::Inertial {
+            return Err(SimulationError::SlewCarry { carry: scheme.carry }.into());
+        }
+        let platform = Platform::new(scheme)?;
+        let d = platform.coefficients();
+        if d + 3 > MAX {
+            return Err(DesignError::TooManyUnknowns { found: d + 3 });
+        }
+        let f = local_dynamics(&Float, &(W_IE * latitude.0), &(W_IE * latitude.1));
+        let counts = |c: &usize| required.contains(c);
+        let order: Vec<usize> = (0..d).filter(|c| !counts(c)).chain((0..d).filter(|c| counts(c))).collect();
+        let empty = Self {
+            platform,
+            conditions: conditions.clone(),
+            nuisance: d - required.len(),
+            order,
+            n: d + 3,
+            w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
+            dwell_s: conditions.dwell_s,
+            local: [[0.0; LOCAL]; LOCAL],
+            phi: [[0.0; LOCAL]; 3],
+            candidates: Vec::new(),
+            ways: Vec::new(),
+            dph: si_per_shown("deg/h"),
+        };
+        let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(c_n_f64).collect();
+        empty.with_dwell(conditions.dwell_s)?.among(&attitudes, going)
+    }
+
+    /// The same with another dwell.
+    ///
+    /// # Errors
+    /// [`DesignError::Filter`].
+    pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
+        let mut f = DMatrix::zeros(LOCAL, LOCAL);
+        for i in 0..3 {
+            for j in 0..3 {
+                f[(i, j)] = self.w[i][j];
+            }
+            f[(i, i + 3)] = 1.0;
+        }
+        let steps = steps(dwell_s, self.conditions.step_s)?;
+        let none = DMatrix::zeros(LOCAL, LOCAL);
+        let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
+        let outputs = local_output(&Float, self.platform.scheme().measured_azimuth);
+        let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
+        self.local = [[0.0; LOCAL]; LOCAL];
+        for _ in 0..steps {
+            now = &step * now;
+            for (component, h) in &outputs {
+                let weight = 1.0 / Plan::output_sigma(*component, &self.conditions).powi(2);
+                let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
+                for i in 0..LOCAL {
+                    for j in 0..LOCAL {
+                        self.local[i][j] += weight * row[i] * row[j];
+                    }
+                }
+            }
+        }
+        self.phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
+        self.dwell_s = dwell_s;
+        Ok(self)
+    }
+
+    /// The candidates without the ways between them.
+    pub(super) fn stand_at(&mut self, attitudes: &[Matrix3<f64>]) {
+        self.candidates = attitudes
+            .iter()
+            .map(|c| Candidate { drift: self.ordered_columns(self.platform.drift_rows(&Float, c)), c: *c })
+            .collect();
+        self.ways.clear();
+    }
+
+    pub(super) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
+        rows.map(|row| self.order.iter().map(|&c| row[c]).collect())
+    }
+
+    /// Nothing yet.
+    pub fn start(&self) -> State {
+        let unit = |r: usize| (0..self.n).map(|c| f64::from(u8::from(c == r))).collect();
+        State {
+            information: vec![0.0; self.n * self.n],
+            psi: std::array::from_fn(unit),
+            path: Vec::new(),
+            seconds: 0.0,
+        }
+    }
+
+    /// Whether the order of positions makes a difference.
+    pub fn ordered(&self) -> bool {
+        self.carry() != Carry::Reset
+    }
+
+    pub(super) fn carry(&self) -> Carry {
+        self.platform.scheme().carry
+    }
+
+    /// Dwell of each position, in s.
+    pub fn dwell_s(&self) -> f64 {
+        self.dwell_s
+    }
+
+    /// Adds a position to `state`; the result goes to `out`.
+    pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
+        let n = self.n;
+        let carry = self.carry();
+        let Candidate { c, drift } = &self.candidates[stop.candidate];
+        let turn = self.way_to(state.path.last().copied(), stop);
+        let mut local = [[0.0; MAX]; LOCAL];
+        for r in 0..3 {
+            match (carry, turn) {
+                (Carry::Inertial, None) => local[r][..n].copy_from_slice(&state.psi[r]),
+                (Carry::Inertial, Some(turn)) => {
+                    for (j, x) in local[r][..n].iter_mut().enumerate() {
+                        *x = (0..3).map(|k| turn.phi[r][k] * state.psi[k][j]).sum();
+                    }
+                    for (x, y) in local[r][3..n].iter_mut().zip(&turn.drift[r]) {
+                        *x += y;
+                    }
+                }
+                // psi of the position is eliminated below
+                (Carry::Reset, _) => local[r][..3].copy_from_slice(&c[r]),
+                (Carry::Platform, _) => {
+                    for (j, x) in local[r][..n].iter_mut().enumerate() {
+                        *x = (0..3).map(|k| c[r][k] * state.psi[k][j]).sum();
+                    }
+                }
+            }
+            local[3 + r][3..n].copy_from_slice(&drift[r]);
+        }
+        out.path.clone_from(&state.path);
+        out.path.push(stop.candidate);
+        out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
+        // G L, then L^T (G L)
+        let mut weighted = [[0.0; MAX]; LOCAL];
+        for (i, row) in weighted.iter_mut().enumerate() {
+            for (k, l) in local.iter().enumerate() {
+                let g = self.local[i][k];
+                if g != 0.0 {
+                    for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
+                        *x += g * y;
+                    }
+                }
+            }
+        }
+        out.information.copy_from_slice(&state.information);
+        if carry == Carry::Reset {
+            let mut own = [[0.0; MAX]; MAX];
+            for (i, row) in own[..n].iter_mut().enumerate() {
+                for (l, w) in local.iter().zip(&weighted) {
+                    for (x, y) in row[..=i].iter_mut().zip(&w[..=i]) {
+                        *x += l[i] * y;
+                    }
+                }
+            }
+            eliminate(&mut own, n, 3);
+            for (i, row) in own[..n].iter().enumerate() {
+                for (x, y) in out.information[i * n..=i * n + i].iter_mut().zip(row) {
+                    *x += y;
+                }
+            }
+        } else {
+            for i in 0..n {
+                let row = &mut out.information[i * n..=i * n + i];
+                for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
+                    for (x, y) in row.iter_mut().zip(&w[..=i]) {
+                        *x += l[i] * y;
+                    }
+                }
+            }
+        }
+        if carry != Carry::Reset {
+            let mut after = [[0.0; MAX]; 3];
+            for (row, phi) in after.iter_mut().zip(&self.phi) {
+                for (l, p) in local.iter().zip(phi) {
+                    for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
+                        *x += p * y;
+                    }
+                }
+            }
+            for (k, row) in out.psi.iter_mut().enumerate() {
+                match carry {
+                    Carry::Platform => {
+                        for (j, x) in row.iter_mut().enumerate() {
+                            *x = (0..3).map(|r| c[r][k] * after[r][j]).sum();
+                        }
+                    }
+                    _ => row.copy_from_slice(&after[k][..n]),
+                }
+            }
+        }
+    }
+}
+
+/// The Schur complement of the first `leading` unknowns of a symmetric matrix (lower triangle); these are set to zero.
+fn eliminate(m: &mut [[f64; MAX]; MAX], n: usize, leading: usize) {
+    for p in 0..leading {
+        let pivot = m[p][p];
+        if pivot <= 0.0 {
+            continue;
+        }
+        let column: [f64; MAX] = std::array::from_fn(|i| if i < n && i >= p { m[i][p] } else { 0.0 });
+        for i in p + 1..n {
+            for j in p + 1..=i {
+                m[i][j] -= column[i] * column[j] / pivot;
+            }
+        }
+        for row in m.iter_mut().take(n).skip(p) {
+            row[p] = 0.0;
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! Finding schemes: the fewest positions, and the best of a number of positions.
+//!
+//! Sets of candidates are first judged exactly ([`observability`]). Sequences of those that make the required coefficients observable, in
+//! every order where the carry makes order matter and by both ways of half turns ([`ways`]), are then ranked ([`search`]): constraints
+//! first, then the worst degree, then a criterion of optimal design ([`information`]), up to turns of the platform axes ([`symmetry`]).
+
+pub mod answer;
+pub mod candidates;
+pub mod criterion;
+pub mod information;
+pub mod observability;
+mod psi;
+mod refine;
+pub mod search;
+pub mod symmetry;
+mod task;
+pub mod ties;
+pub mod ways;
+mod winner;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use obsdeg_ekf::EkfError;
+
+pub use answer::Design;
+pub use candidates::Candidates;
+pub use winner::scheme as scheme_found;
+
+use answer::{Found, SCHEMA, SearchReport, TiesReport};
+use candidates::MAX_CANDIDATES;
+use information::Evaluator;
+use obsdeg_core::degree::ensemble::EnsembleError;
+use obsdeg_core::model::{Scheme, SchemeError};
+use obsdeg_evidence::simulation::SimulationError;
+use obsdeg_evidence::simulation::answer::MeasurementReport;
+use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of};
+use search::{Progress, Search};
+use task::Task;
+use ties::TIE;
+
+/// Most sequences that are searched exhaustively, up to symmetry.
+pub const EXHAUSTIVE: u64 = 50_000_000;
+/// What may be wrong with a larger probability is not proven.
+const PROOF: f64 = 1e-12;
+
+/// Why no scheme is found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    /// Nothing to choose from, or too much.
+    #[error("{found} candidates; expected at least one and at most {MAX_CANDIDATES}")]
+    Candidates {
+        /// Their number.
+        found: usize,
+    },
+    /// Too many turns between candidates.
+    #[error("{found} candidates with slews; expected at most {}", ways::MAX_TURNING)]
+    Pairs {
+        /// Their number.
+        found: usize,
+    },
+    /// Steps that do not fit.
+    #[error("a grid of {found} degrees; expected a step that divides 90 degrees, as in grid:45")]
+    Grid {
+        /// The step.
+        found: String,
+    },
+    /// A number of positions that cannot be.
+    #[error("{found} positions; expected 1 to 100")]
+    Positions {
+        /// The number asked for.
+        found: usize,
+    },
+    /// The drift itself is constant at one position only.
+    #[error("a design needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
+    Drift,
+    /// A rotating segment has no place among candidates.
+    #[error("a design chooses among positions; found the rotating segment `{name}`")]
+    Rotation {
+        /// The segment.
+        name: String,
+    },
+    /// A generic angle has no sigma.
+    #[error("the angle `{name}` is generic; expected numbers for a design")]
+    GenericAngle {
+        /// Its name.
+        name: String,
+    },
+    /// A name that is no coefficient.
+    #[error("`{found}` is no coefficient of this scheme; expected some of {known}, or families such as D_F")]
+    UnknownName {
+        /// The name found.
+        found: String,
+        /// The coefficients.
+        known: String,
+    },
+    /// A requirement that cannot be.
+    #[error("the requirement for {name} is {found}; expected a sigma above 0")]
+    Requirement {
+        /// The coefficient.
+        name: String,
+        /// The number found.
+        found: f64,
+    },
+    /// Positions are what is searched for.
+    #[error(
+        "the requirement for `{found}` is that of one position; expected psi, psi_x, psi_y or psi_z, for every position"
+    )]
+    OnePosition {
+        /// The name found.
+        found: String,
+    },
+    /// A limit that cannot be.
+    #[error("{what} of {found} s; expected more than 0")]
+    Limit {
+        /// What is limited.
+        what: &'static str,
+        /// The number found.
+        found: f64,
+    },
+    /// Too many coefficients.
+    #[error("{found} unknowns; expected at most {}", information::MAX)]
+    TooManyUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
+    /// No sequence of that many candidates is what is wanted.
+    #[error("no scheme of {positions} of these candidates {wanted}: {why}")]
+    Impossible {
+        /// The number of positions.
+        positions: usize,
+        /// What is wanted, with all limits.
+        wanted: String,
+        /// What is missed, or how that is known.
+        why: String,
+    },
+    /// Of those that were looked at, no sequence is what is wanted.
+    #[error(
+        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were looked at {wanted}; there are too many to look at all"
+    )]
+    NotFound {
+        /// The number of positions.
+        positions: usize,
+        /// What is wanted, with all limits.
+        wanted: String,
+        /// How many were looked at.
+        examined: u64,
+    },
+    /// Stopped before anything was found.
+    #[error("interrupted before anything was found")]
+    Interrupted,
+    /// The scheme.
+    #[error(transparent)]
+    Scheme(#[from] SchemeError),
+    /// Conditions that do not go together.
+    #[error(transparent)]
+    Conditions(#[from] SimulationError),
+    /// No verdict.
+    #[error(transparent)]
+    Verdict(#[from] EnsembleError),
+    /// A number is not finite.
+    #[error(transparent)]
+    Filter(#[from] EkfError),
+}
+
+/// What is to be found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// What to choose from.
+    pub candidates: Candidates,
+    /// Number of positions; `None`: only the minimum is asked for.
+    pub positions: Option<usize>,
+    /// Coefficients or families that must be observable; none: all.
+    pub required: Vec<String>,
+    /// Largest degrees: of a coefficient or family, or of all that are required.
+    pub degree_caps: Vec<(Option<String>, usize)>,
+    /// Only schemes that meet the requirements of the conditions on what is required, and on psi when that is everything.
+    pub meet: bool,
+    /// Largest total time, in s.
+    pub total_s: Option<f64>,
+    /// Longest turn between successive positions, in s.
+    pub slew_s: Option<f64>,
+    /// What makes one scheme better than another.
+    pub criterion: Kind,
+    /// How many schemes are listed.
+    pub keep: usize,
+    /// Restarts of the exchange, where the space is too large for exhaustion.
+    pub restarts: u64,
+    /// Refine the angles of the best continuously.
+    pub refine: bool,
+    /// Numbers of positions for the front of total time, besides that asked for.
+    pub front: Vec<usize>,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// The name of a criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kind {
+    /// The largest sigma.
+    #[default]
+    Worst,
+    /// A-optimal.
+    A,
+    /// D-optimal.
+    D,
+    /// E-optimal.
+    E,
+    /// The largest sigma over its requirement.
+    Margin,
+}
+
+/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise, the dwell, the rate of
+/// slews and the requirements. `progress` says whether to go on: a search that is stopped gives the best so far.
+///
+/// # Errors
+/// [`DesignError`].
+pub fn design(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &Options,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Design, DesignError> {
+    let stopped = AtomicBool::new(false);
+    // once stopped, always stopped
+    let progress = |now: Progress| {
+        if !stopped.load(Ordering::Relaxed) && !progress(now) {
+            stopped.store(true, Ordering::Relaxed);
+        }
+        !stopped.load(Ordering::Relaxed)
+    };
+    let nothing_yet = Progress { done: 0, total: 1, examined: 0, best: f64::INFINITY };
+    let going = || progress(nothing_yet);
+    let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
+    let task = Task::new(base, conditions, options, reached)?;
+    let every: Vec<usize> = (0..task.rows.candidates()).collect();
+    let best_degrees = task.rows.degrees(&every);
+    let minimum = task.minimum(&best_degrees, &going)?;
+    let mut sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
+    let mut out = Design {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        carry: base.carry,
+        latitude_deg: latitude_of(base).map_or(0.0, |l| l.degrees()),
+        latitude_by_default: base.latitude.is_none(),
+        geometry: base.geometry,
+        terms: base.unknowns.to_string(),
+        candidates: task.candidates.names.clone(),
+        beyond_gimbals: beyond,
+        symmetry: task.symmetry.order,
+        required: task.required.iter().map(|r| r.0.clone()).collect(),
+        minimum,
+        search: None,
+        found: Vec::new(),
+        front: Vec::new(),
+        primes: task.rows.fields(),
+        error_bound: task.rows.error_bound(sets),
+        seed: options.seed,
+    };
+    out.minimum.proven &= out.error_bound < PROOF;
+    let Some(k) = options.positions else { return Ok(out) };
+    if let Some(limit) = options.total_s
+        && limit < k as f64 * conditions.dwell_s
+    {
+        let why = format!("{k} times {} s at a position are more than {limit} s", conditions.dwell_s);
+        return Err(DesignError::Impossible { positions: k, wanted: task.wanted(), why });
+    }
+    if !out.minimum.never.is_empty() {
+        let why = format!("all together leave {} unobservable", out.minimum.never.join(", "));
+        return Err(DesignError::Impossible { positions: k, wanted: task.wanted(), why });
+    }
+    let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
+    let evaluator = Evaluator::while_going(base, &task.candidates.attitudes, &indices, conditions, &going)?;
+    let floor = best_degrees.iter().flatten().max().copied().unwrap_or(0);
+    let search = Search {
+        rows: &task.rows,
+        evaluator: &evaluator,
+        criterion: &task.criterion,
+        constraints: &task.constraints,
+        keep: options.keep,
+        floor,
+        progress: &progress,
+    };
+    let exhaustive = task.space(k, &evaluator);
+    let best = if let Some(more) = exhaustive {
+        sets += more as f64;
+        out.error_bound = task.rows.error_bound(sets);
+        search.exhaust(&task.symmetry, k)
+    } else {
+        search.exchange(k, &[], options.restarts, options.seed)
+    };
+    let all = exhaustive.is_some() && best.complete;
+    out.found = task.all_found(&evaluator, &best.found)?;
+    let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
+        let (positions, wanted) = (k, task.wanted());
+        return Err(match (best.complete, exhaustive) {
+            (false, _) => DesignError::Interrupted,
+            (true, Some(_)) => DesignError::Impossible {
+                positions,
+                wanted,
+                why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
+            },
+            (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
+        });
+    };
+    out.front = task.all_found(&evaluator, &best.front)?;
+    if best.complete {
+        task.front(&evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
+    }
+    if options.refine && going() {
+        let refined = task.refined(&evaluator, first, &going)?;
+        out.front.extend(refined.iter().cloned());
+        out.found.splice(0..0, refined);
+    }
+    out.front = pareto(std::mem::take(&mut out.front));
+    out.search = Some(SearchReport {
+        positions: k,
+        conditions: MeasurementReport::new(base, conditions),
+        drift_noise: None,
+        prior: None,
+        criterion: task.criterion.name().into(),
+        examined: best.examined,
+        lost: best.lost,
+        proven: all && out.error_bound < PROOF,
+        ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
+        order_matters: evaluator.ordered(),
+        interrupted: stopped.load(Ordering::Relaxed),
+        degree_floor: floor,
+        constraints: task.constraints_in_words(),
+    });
+    Ok(out)
+}
+
+/// Why an exhaustive search found nothing.
+fn examined(lost: u64, slews: bool) -> String {
+    let with = if slews { " with the slews" } else { "" };
+    match lost {
+        0 => "every sequence was examined".into(),
+        _ => format!(
+            "every sequence was examined; the samples of {lost} with observable positions do not determine it{with}, as far as double precision \
+             tells"
+        ),
+    }
+}
+
+/// Those that none beats in both total time and criterion, by time.
+fn pareto(mut found: Vec<Found>) -> Vec<Found> {
+    found.sort_by(|a, b| a.total_s.total_cmp(&b.total_s).then(a.value.total_cmp(&b.value)));
+    let mut least = f64::INFINITY;
+    found.retain(|f| {
+        let better = f.value < least;
+        least = least.min(f.value);
+        better
+    });
+    found
+}

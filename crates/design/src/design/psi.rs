@@ -1,0 +1,99 @@
+//! The accuracy of psi: what requirements on it are held against.
+
+use obsdeg_core::model::Carry;
+
+use super::information::{Evaluator, State};
+use super::ways::Stop;
+
+impl Evaluator {
+    /// Sigma in deg of psi in platform axes at the start of a whole sequence, or of its every position under reset carry; infinite where it is
+    /// not determined, none when a coefficient that counts is not.
+    pub fn psi_sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<[f64; 3]> {
+        let (state, mut root) = (self.state_of(sequence), Vec::new());
+        if self.root(&state, &mut root) { self.psi_of(&state, &root) } else { Vec::new() }
+    }
+
+    /// The largest sigma of psi over its limit (deg).
+    pub(super) fn psi_over(&self, state: &State, root: &[f64], limits: &[f64; 3]) -> f64 {
+        if limits.iter().all(|l| l.is_infinite()) {
+            return 0.0;
+        }
+        let over = |sigmas: [f64; 3]| sigmas.iter().zip(limits).map(|(s, l)| s / l).fold(0.0, f64::max);
+        self.psi_of(state, root).into_iter().map(over).fold(0.0, f64::max)
+    }
+
+    /// Sigma in deg of psi in platform axes at the start, or of every position under reset carry; infinite where it is not determined.
+    fn psi_of(&self, state: &State, root: &[f64]) -> Vec<[f64; 3]> {
+        let n = self.n;
+        let unit = |k: usize| -> [f64; 3] { std::array::from_fn(|r| f64::from(u8::from(r == k))) };
+        match (self.carry(), state.path.first()) {
+            (Carry::Reset, _) => state.path.iter().map(|&c| self.psi_of_position(c, root)).collect(),
+            (carry, first) => {
+                // psi is carried in platform axes, or in n: psi^c = C^T psi^n
+                let inertial = first.filter(|_| carry == Carry::Inertial);
+                let c = inertial.map_or_else(|| [0, 1, 2].map(unit), |&c| self.candidates[c].c);
+                let sigma = |k: usize| {
+                    let psi = (0..n).map(|r| if r < 3 { c[r][k] } else { 0.0 });
+                    solved(root, n, 0, psi).map_or(f64::INFINITY, |y| norm(&y).to_degrees())
+                };
+                vec![[0, 1, 2].map(sigma)]
+            }
+        }
+    }
+
+    /// Sigma in deg of psi of a position with a psi of its own, when the rest of the scheme knows the coefficients as `root` says.
+    fn psi_of_position(&self, candidate: usize, root: &[f64]) -> [f64; 3] {
+        let (n, c) = (self.n, &self.candidates[candidate].c);
+        let drift = &self.candidates[candidate].drift;
+        let local = |i: usize, j: usize| self.local[i][j];
+        // information on psi^c, and between psi^c and the coefficients
+        let weighted = |k: usize, j: usize| (0..3).map(|r| c[r][k] * local(r, j)).sum::<f64>();
+        let own = |i: usize, k: usize| (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();
+        let cross = |i: usize, d: usize| (0..3).map(|r| weighted(i, 3 + r) * drift[r][d]).sum::<f64>();
+        let mut l = [0.0; 9];
+        for i in 0..3 {
+            for j in 0..=i {
+                let sum: f64 = (0..j).map(|k| l[3 * i + k] * l[3 * j + k]).sum();
+                let rest = own(i, j) - sum;
+                l[3 * i + j] = match i == j {
+                    true if rest <= 1e-13 * own(i, i) => 0.0,
+                    true => rest.sqrt(),
+                    false if l[4 * j] > 0.0 => rest / l[4 * j],
+                    false => 0.0,
+                };
+            }
+        }
+        [0, 1, 2].map(|k| {
+            let unit = (0..3).map(|r| f64::from(u8::from(r == k)));
+            let Some(y) = solved(&l, 3, 0, unit) else { return f64::INFINITY };
+            // A^-1 e = L^-T y, from the last
+            let mut x = [0.0; 3];
+            for i in (0..3).rev() {
+                let sum: f64 = (i + 1..3).map(|j| l[3 * j + i] * x[j]).sum();
+                x[i] = if l[4 * i] > 0.0 { (y[i] - sum) / l[4 * i] } else { 0.0 };
+            }
+            let moved = (0..n - 3).map(|d| (0..3).map(|i| cross(i, d) * x[i]).sum());
+            let rest = solved(root, n, 3, moved);
+            rest.map_or(f64::INFINITY, |z| norm(&y).hypot(norm(&z)).to_degrees())
+        })
+    }
+}
+
+/// `L^-1 b` of a lower triangular `l` (rows of length n) from row `first` on; `None` where a zero on its diagonal leaves it open.
+fn solved(l: &[f64], n: usize, first: usize, b: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
+    let mut y: Vec<f64> = Vec::with_capacity(n - first);
+    for (i, b) in (first..n).zip(b) {
+        let row = &l[i * n + first..=i * n + i];
+        let rest = b - row.iter().zip(&y).map(|(a, y)| a * y).sum::<f64>();
+        y.push(match row[i - first] {
+            d if d > 0.0 => rest / d,
+            _ if rest.abs() < 1e-12 => 0.0,
+            _ => return None,
+        });
+    }
+    Some(y)
+}
+
+fn norm(y: &[f64]) -> f64 {
+    y.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

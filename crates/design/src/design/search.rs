@@ -1,0 +1,592 @@
+//! The search for good sequences: exhaustion, and coordinate exchange where the space is too large.
+
+use std::collections::{BTreeMap, HashSet};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use obsdeg_evidence::requirements::meets;
+use obsdeg_exact::SplitMix64;
+use rayon::prelude::*;
+
+use super::criterion::{Criterion, Limits};
+use super::information::{Evaluator, State};
+use super::observability::{Patience, Rows};
+use super::symmetry::Symmetry;
+use super::ties::Ties;
+use super::ways::Stop;
+
+/// Rounds of one exchange before it is given up.
+const ROUNDS: usize = 50;
+/// Sequences between two questions whether to go on.
+const PATIENCE: u64 = 256;
+
+/// What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct Worth {
+    /// How far time limits, requirements and degree caps are missed; 0 when kept.
+    pub violation: f64,
+    /// The largest degree of a required coefficient.
+    pub degree: usize,
+    /// The criterion.
+    pub value: f64,
+}
+
+impl Worth {
+    const NONE: Self = Self { violation: f64::INFINITY, degree: usize::MAX, value: f64::INFINITY };
+
+    fn key(&self) -> (f64, usize, f64) {
+        (self.violation, self.degree, self.value)
+    }
+
+    fn order(&self, other: &Self) -> std::cmp::Ordering {
+        let ((a, b, c), (x, y, z)) = (self.key(), other.key());
+        a.total_cmp(&x).then(b.cmp(&y)).then(c.total_cmp(&z))
+    }
+
+    pub(super) fn better_than(&self, other: &Self) -> bool {
+        self.order(other).is_lt()
+    }
+
+    fn is_valid(&self) -> bool {
+        self.violation == 0.0 && self.value.is_finite()
+    }
+}
+
+/// A sequence with its worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scored {
+    /// What it is worth.
+    pub worth: Worth,
+    /// Dwells and turns, in s.
+    pub seconds: f64,
+    /// The candidates in order, with the ways there.
+    pub sequence: Vec<Stop>,
+}
+
+/// How far a search is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Parts done.
+    pub done: u64,
+    /// Parts in all.
+    pub total: u64,
+    /// Sequences whose sigma was computed.
+    pub examined: u64,
+    /// The best criterion so far; infinite when there is none.
+    pub best: f64,
+}
+
+/// What a scheme must keep besides observability.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Constraints {
+    /// Largest total time with turns, in s.
+    pub total_s: Option<f64>,
+    /// Longest turn between successive positions, in s.
+    pub slew_s: Option<f64>,
+    /// Largest sigmas.
+    pub sigmas: Option<Limits>,
+    /// Largest degree of every required coefficient.
+    pub degrees: Option<Vec<usize>>,
+}
+
+impl Constraints {
+    /// Whether the degrees of the required coefficients are within the caps.
+    pub(super) fn cap(&self, degrees: &[usize]) -> bool {
+        self.degrees.as_ref().is_none_or(|caps| degrees.iter().zip(caps).all(|(d, cap)| d <= cap))
+    }
+
+    /// How far times and sigmas of a sequence, with `state` behind it, are beyond the limits; 0 when they are kept.
+    fn violation(&self, evaluator: &Evaluator, sequence: &[Stop], state: &State, root: &mut Vec<f64>) -> f64 {
+        let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);
+        let slews = sequence.windows(2).map(|w| beyond(slew(w), self.slew_s)).sum::<f64>();
+        let margin = |limits: &Limits| {
+            // a margin has no unit: largest sigma over requirement
+            let over = evaluator.value(state, &Criterion::Margin(limits.clone()), root);
+            if meets(over, 1.0) { 0.0 } else { over - 1.0 }
+        };
+        slews + beyond(state.seconds, self.total_s) + self.sigmas.as_ref().map_or(0.0, margin)
+    }
+
+    /// Whether times and sigmas of a sequence are within the limits.
+    pub(super) fn keep(&self, evaluator: &Evaluator, sequence: &[Stop]) -> bool {
+        self.violation(evaluator, sequence, &evaluator.state_of(sequence), &mut Vec::new()) == 0.0
+    }
+}
+
+/// How far a limit is passed, as a part of it; 0 for what rounding may do.
+fn beyond(found: f64, limit: Option<f64>) -> f64 {
+    limit.map(|l| found / l - 1.0).filter(|over| *over > 1e-9).unwrap_or(0.0)
+}
+
+/// The best sequences, best first, and the front of time against the criterion.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Best {
+    /// At most as many as are kept.
+    pub found: Vec<Scored>,
+    /// Sequences of the smallest worst degree that none of these beats in both time and criterion, by time.
+    pub front: Vec<Scored>,
+    /// Those that are as good as the best.
+    pub ties: Ties,
+    /// Whether everything was searched.
+    pub complete: bool,
+    /// Sequences whose sigma was computed.
+    pub examined: u64,
+    /// Of these, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what is required, as far
+    /// as double precision tells.
+    pub lost: u64,
+}
+
+impl Best {
+    /// Whether a sequence would be kept.
+    fn wants(&self, keep: usize, worth: &Worth, seconds: f64) -> bool {
+        worth.is_valid()
+            && (self.found.len() < keep
+                || self.found.last().is_some_and(|last| !last.worth.better_than(worth))
+                || self.is_on_front(worth, seconds))
+    }
+
+    fn is_on_front(&self, worth: &Worth, seconds: f64) -> bool {
+        let degree = self.front.first().map_or(usize::MAX, |f| f.worth.degree);
+        worth.degree < degree
+            || worth.degree == degree
+                && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
+    }
+
+    fn add(&mut self, keep: usize, new: Scored) {
+        if !new.worth.is_valid() {
+            return;
+        }
+        self.add_to_front(&new);
+        let place = self.found.partition_point(|b| before(b, &new));
+        if place < keep && self.found.get(place).is_none_or(|b| b.sequence != new.sequence) {
+            self.found.insert(place, new);
+            self.found.truncate(keep);
+        }
+    }
+
+    /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion; drops what it beats.
+    fn add_to_front(&mut self, new: &Scored) {
+        if self.is_on_front(&new.worth, new.seconds) {
+            let beaten = |f: &Scored| {
+                f.worth.degree > new.worth.degree
+                    || f.seconds >= new.seconds && f.worth.value >= new.worth.value
+            };
+            self.front.retain(|f| !beaten(f));
+            let place = self.front.partition_point(|f| f.seconds < new.seconds);
+            self.front.insert(place, new.clone());
+        }
+    }
+
+    fn merge(&mut self, keep: usize, other: Self) {
+        for s in other.found.into_iter().chain(other.front) {
+            self.add(keep, s);
+        }
+        self.ties.merge(other.ties);
+        self.complete &= other.complete;
+        self.examined += other.examined;
+        self.lost += other.lost;
+    }
+}
+
+/// Ties in lexicographic order.
+fn before(a: &Scored, b: &Scored) -> bool {
+    a.worth.order(&b.worth).then_with(|| a.sequence.cmp(&b.sequence)).is_lt()
+}
+
+/// What every search shares.
+pub struct Search<'a> {
+    /// Exact verdicts.
+    pub rows: &'a Rows,
+    /// Sigmas.
+    pub evaluator: &'a Evaluator,
+    /// What is to be small.
+    pub criterion: &'a Criterion,
+    /// What must be kept.
+    pub constraints: &'a Constraints,
+    /// How many are kept.
+    pub keep: usize,
+    /// The smallest worst degree that all candidates together allow: no set is better.
+    pub floor: usize,
+    /// Hears of progress, says whether to go on.
+    pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
+}
+
+/// What the workers of a search report to.
+struct Meter<'a> {
+    progress: &'a (dyn Fn(Progress) -> bool + Sync),
+    stopped: AtomicBool,
+    done: AtomicU64,
+    examined: AtomicU64,
+    best: Mutex<f64>,
+    total: u64,
+}
+
+impl<'a> Meter<'a> {
+    fn new(search: &Search<'a>, total: usize) -> Self {
+        Self {
+            progress: search.progress,
+            stopped: AtomicBool::new(false),
+            done: AtomicU64::new(0),
+            examined: AtomicU64::new(0),
+            best: Mutex::new(f64::INFINITY),
+            total: total as u64,
+        }
+    }
+
+    /// So much more is done; whether to go on.
+    fn report(&self, parts: u64, examined: u64, best: Option<&Scored>) -> bool {
+        let value = best.map_or(f64::INFINITY, |b| b.worth.value);
+        // a poisoned lock comes of a panic that is reported already
+        let best = self.best.lock().map_or(value, |mut b| {
+            *b = b.min(value);
+            *b
+        });
+        let now = Progress {
+            done: self.done.fetch_add(parts, Ordering::Relaxed) + parts,
+            total: self.total,
+            examined: self.examined.fetch_add(examined, Ordering::Relaxed) + examined,
+            best,
+        };
+        if !(self.progress)(now) && now.done < now.total {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        !self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// Runs one part, unless the search was stopped.
+    fn part(&self, work: impl FnOnce() -> Best) -> Best {
+        if self.stopped.load(Ordering::Relaxed) {
+            return Best::default();
+        }
+        let best = work();
+        self.report(1, best.examined % PATIENCE, best.found.first());
+        best
+    }
+
+    /// All parts, in their order.
+    fn gather(&self, keep: usize, parts: Vec<Best>) -> Best {
+        let mut out = Best { complete: true, ..Best::default() };
+        for part in parts {
+            out.merge(keep, part);
+        }
+        out.complete = !self.stopped.load(Ordering::Relaxed);
+        out
+    }
+}
+
+/// A walk over sequences that shares what their prefixes have in common.
+struct Walk<'a> {
+    search: &'a Search<'a>,
+    meter: &'a Meter<'a>,
+    states: Vec<State>,
+    root: Vec<f64>,
+    sequence: Vec<Stop>,
+    best: Best,
+    /// Positions that were put behind others.
+    pushed: u64,
+    stopped: bool,
+}
+
+impl<'a> Walk<'a> {
+    fn new(search: &'a Search<'a>, meter: &'a Meter<'a>, k: usize) -> Self {
+        Self {
+            search,
+            meter,
+            states: (0..=k).map(|_| search.evaluator.start()).collect(),
+            root: Vec::new(),
+            sequence: Vec::with_capacity(k),
+            best: Best::default(),
+            pushed: 0,
+            stopped: false,
+        }
+    }
+
+    /// Whether times are within the limits.
+    fn push(&mut self, stop: Stop) -> bool {
+        let (search, depth) = (self.search, self.sequence.len());
+        self.pushed += 1;
+        if self.pushed.is_multiple_of(PATIENCE) {
+            self.stopped = !self.meter.report(0, 0, None);
+        }
+        let last = self.sequence.last().map(|s| s.candidate);
+        let slew = last.map_or(0.0, |last| search.evaluator.slew_s(last, stop.candidate));
+        let (behind, ahead) = self.states.split_at_mut(depth + 1);
+        search.evaluator.extend(&behind[depth], stop, &mut ahead[0]);
+        self.sequence.push(stop);
+        let c = search.constraints;
+        beyond(slew, c.slew_s) == 0.0 && beyond(ahead[0].seconds, c.total_s) == 0.0
+    }
+
+    /// The sequence as it is; `images` of it are searched.
+    fn score(&mut self, degree: usize, images: usize) {
+        let (search, state) = (self.search, &self.states[self.sequence.len()]);
+        let value = search.evaluator.value(state, search.criterion, &mut self.root);
+        self.best.examined += 1;
+        if self.best.examined.is_multiple_of(PATIENCE) {
+            self.stopped = !self.meter.report(0, PATIENCE, self.best.found.first());
+        }
+        let worth = Worth { violation: 0.0, degree, value };
+        if !worth.is_valid() {
+            self.best.lost += 1;
+            return;
+        }
+        let ties = self.best.ties.wants(&worth);
+        let kept = self.best.wants(search.keep, &worth, state.seconds);
+        if !ties && !kept {
+            return;
+        }
+        if search.constraints.violation(search.evaluator, &self.sequence, state, &mut self.root) > 0.0 {
+            return;
+        }
+        self.best.ties.add(&worth, images, 1);
+        if kept {
+            let scored = Scored { worth, seconds: state.seconds, sequence: self.sequence.clone() };
+            self.best.add(search.keep, scored);
+        }
+    }
+
+    /// All continuations to `k` positions with one of `sets`, all of this worst degree.
+    fn visit(&mut self, sets: &HashSet<u128>, degree: usize, key: u128, k: usize) {
+        if self.sequence.len() == k {
+            self.score(degree, 1);
+            return;
+        }
+        let (rows, evaluator) = (self.search.rows, self.search.evaluator);
+        let before = self.sequence.last().map(|s| s.candidate);
+        let last = self.sequence.len() + 1 == k;
+        for c in 0..rows.candidates() {
+            let there = self.sequence.iter().any(|s| s.candidate == c);
+            let longer = if there { key } else { key ^ rows.key(c) };
+            if last && !sets.contains(&longer) {
+                continue;
+            }
+            for stop in evaluator.stops(before, c) {
+                if self.push(stop) {
+                    self.visit(sets, degree, longer, k);
+                }
+                self.sequence.pop();
+                if self.stopped {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// One given sequence; the states of what it has in common with the one before are kept.
+    fn go_to(&mut self, sequence: &[Stop]) -> bool {
+        let common = self.sequence.iter().zip(sequence).take_while(|(a, b)| a == b).count();
+        self.sequence.truncate(common);
+        let mut within = beyond(self.states[common].seconds, self.search.constraints.total_s) == 0.0;
+        for &stop in &sequence[common..] {
+            within &= self.push(stop);
+        }
+        within
+    }
+}
+
+impl Search<'_> {
+    /// The worst of these degrees, if they are within the caps.
+    fn worst(&self, degrees: Vec<Option<usize>>) -> Option<usize> {
+        let degrees: Vec<usize> = degrees.into_iter().collect::<Option<_>>()?;
+        degrees.iter().max().copied().filter(|_| self.constraints.cap(&degrees))
+    }
+
+    /// The worst degree of every observable set, where it is known beforehand: none is better than all candidates together, none worse
+    /// than the last order.
+    fn only_degree(&self) -> Option<usize> {
+        (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
+    }
+
+    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the first of an orbit (where order
+    /// does not matter: that have one of them as their smallest). As many of the best as are kept: worst degrees that are too large for
+    /// these are not looked at.
+    pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
+        if !self.evaluator.ordered() {
+            return self.exhaust_sets(symmetry, k);
+        }
+        let Some(levels) = self.levels(k) else { return Best::default() };
+        let mut best = Best { complete: true, ..Best::default() };
+        for (degree, sets) in levels {
+            best.merge(self.keep, self.exhaust_level(symmetry, k, degree, &sets));
+            if !best.complete || best.found.len() >= self.keep.max(1) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The sequences whose set is one of `sets`, all of this worst degree.
+    fn exhaust_level(&self, symmetry: &Symmetry, k: usize, degree: usize, sets: &HashSet<u128>) -> Best {
+        let second = |a: usize| {
+            let stops = (0..self.rows.candidates()).flat_map(move |b| self.evaluator.stops(Some(a), b));
+            stops.map(move |b| vec![a.into(), b])
+        };
+        let firsts = symmetry.representatives();
+        let starts: Vec<Vec<Stop>> = match k {
+            1 => firsts.into_iter().map(|a| vec![a.into()]).collect(),
+            _ => firsts.into_iter().flat_map(second).collect(),
+        };
+        let meter = Meter::new(self, starts.len());
+        let from = |start: &Vec<Stop>| {
+            let mut walk = Walk::new(self, &meter, k);
+            let (a, b) = (start[0].candidate, start[start.len() - 1].candidate);
+            let key = if a == b { self.rows.key(a) } else { self.rows.key(a) ^ self.rows.key(b) };
+            if walk.go_to(start) && (start.len() < k || sets.contains(&key)) {
+                walk.visit(sets, degree, key, k);
+            }
+            walk.best
+        };
+        let parts = starts.par_iter().map(|start| meter.part(|| from(start))).collect();
+        meter.gather(self.keep, parts)
+    }
+
+    /// [`Self::exhaust`] where order does not matter.
+    fn exhaust_sets(&self, symmetry: &Symmetry, k: usize) -> Best {
+        let second = |a: usize| (a..self.rows.candidates()).map(move |b| vec![a, b]);
+        let firsts = symmetry.representatives();
+        let starts: Vec<Vec<usize>> = match k {
+            1 => firsts.into_iter().map(|a| vec![a]).collect(),
+            _ => firsts.into_iter().flat_map(second).collect(),
+        };
+        let meter = Meter::new(self, starts.len());
+        let going = || meter.report(0, 0, None);
+        let from = |start: &Vec<usize>| {
+            let mut walk = Walk::new(self, &meter, k);
+            let mut sequence = Vec::with_capacity(k);
+            self.rows.each(start, k, true, &mut Patience::while_going(&going), &mut |set| {
+                let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+                sequence.clear();
+                sequence.extend(set.iter().map(|&c| Stop::from(c)));
+                if let Some(degree) = degree
+                    && walk.go_to(&sequence)
+                {
+                    walk.score(degree, symmetry.searched_images(set));
+                }
+                !walk.stopped
+            });
+            walk.best
+        };
+        let parts = starts.par_iter().map(|start| meter.part(|| from(start))).collect();
+        meter.gather(self.keep, parts)
+    }
+
+    /// The keys of all observable sets of up to `k` within the caps, by their worst degree; `None` when the search was stopped.
+    fn levels(&self, k: usize) -> Option<BTreeMap<usize, HashSet<u128>>> {
+        let meter = Meter::new(self, 1);
+        let going = || meter.report(0, 0, None);
+        let mut levels: BTreeMap<usize, HashSet<u128>> = BTreeMap::new();
+        for size in 1..=k.min(self.rows.candidates()) {
+            let sets = self.rows.observable_sets_while(size, &going)?;
+            let judged = |set: &Vec<usize>| {
+                let key = set.iter().fold(0, |key, &c| key ^ self.rows.key(c));
+                let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+                degree.map(|degree| (degree, key))
+            };
+            let chunks = sets.par_chunks(PATIENCE as usize).map(|chunk| {
+                let judged = || chunk.iter().filter_map(judged).collect();
+                going().then(judged)
+            });
+            let chunks: Vec<Vec<(usize, u128)>> = chunks.collect::<Option<_>>()?;
+            for (degree, key) in chunks.into_iter().flatten() {
+                levels.entry(degree).or_default().insert(key);
+            }
+        }
+        going().then_some(levels)
+    }
+
+    /// What a sequence is worth, with its time. Its degrees are those of one field.
+    fn worth(&self, sequence: &[Stop]) -> Scored {
+        let state = self.evaluator.state_of(sequence);
+        let mut root = Vec::new();
+        let value = self.evaluator.value(&state, self.criterion, &mut root);
+        let mut violation = self.constraints.violation(self.evaluator, sequence, &state, &mut root);
+        let degree =
+            self.only_degree().or_else(|| self.worst(self.rows.likely_degrees(&candidates(sequence))));
+        if degree.is_none() {
+            violation += 1.0;
+        }
+        let worth = Worth { violation, degree: degree.unwrap_or(usize::MAX), value };
+        Scored { worth, seconds: state.seconds, sequence: sequence.to_vec() }
+    }
+
+    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at once, does not.
+    fn judged(&self, mut scored: Scored) -> Scored {
+        let degrees = self.rows.likely_degrees(&candidates(&scored.sequence));
+        scored.worth.violation += degrees.iter().filter(|d| d.is_none()).count() as f64;
+        scored
+    }
+
+    /// What may stand at a place, with the ways there and from there.
+    fn choices(&self, now: &[Stop], place: usize) -> Vec<(Stop, Option<Stop>)> {
+        let last = place.checked_sub(1).map(|p| now[p].candidate);
+        let next = now.get(place + 1).map(|next| next.candidate);
+        let ways = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
+            let Some(next) = next else { return vec![(stop, None)] };
+            self.evaluator.stops(Some(stop.candidate), next).map(|next| (stop, Some(next))).collect()
+        };
+        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
+    }
+
+    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of half turns, then any
+    /// two change places, until none helps. From the sequences given, then from random ones.
+    pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
+        let candidates = self.rows.candidates();
+        let total = given.len() + restarts as usize;
+        let meter = Meter::new(self, total);
+        let from = |start: u64| {
+            let mut rng = SplitMix64::new(seed ^ start.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            let random = || (0..k).map(|_| Stop::from(rng.below(candidates as u64) as usize)).collect();
+            let mut now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
+            let mut best = Best::default();
+            let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
+            // takes what is better; false when the search is stopped
+            let mut try_out = |now: &[Stop], held: &mut Scored| {
+                best.examined += 1;
+                let other = self.worth(now);
+                if other.worth.better_than(&held.worth) {
+                    let other = self.judged(other);
+                    if other.worth.better_than(&held.worth) {
+                        *held = other;
+                    }
+                }
+                !best.examined.is_multiple_of(PATIENCE)
+                    || meter.report(0, PATIENCE, Some(&*held).filter(|h| h.worth.is_valid()))
+            };
+            'rounds: for _ in 0..ROUNDS {
+                let round = held.worth;
+                for place in 0..k {
+                    for (stop, next) in self.choices(&now, place) {
+                        now[place] = stop;
+                        next.into_iter().for_each(|next| now[place + 1] = next);
+                        if !try_out(&now, &mut held) {
+                            break 'rounds;
+                        }
+                    }
+                    now.copy_from_slice(&held.sequence);
+                }
+                for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                    if self.evaluator.ordered() && now[a].candidate != now[b].candidate {
+                        now.swap(a, b);
+                        if !try_out(&now, &mut held) {
+                            break 'rounds;
+                        }
+                        now.copy_from_slice(&held.sequence);
+                    }
+                }
+                if !held.worth.better_than(&round) {
+                    break;
+                }
+            }
+            self.evaluator.tidy(&mut held.sequence);
+            best.add(self.keep, held);
+            best
+        };
+        let parts = (0..total as u64).into_par_iter().map(|start| meter.part(|| from(start))).collect();
+        meter.gather(self.keep, parts)
+    }
+}
+
+/// The candidates of a sequence.
+pub(super) fn candidates(sequence: &[Stop]) -> Vec<usize> {
+    sequence.iter().map(|s| s.candidate).collect()
+}

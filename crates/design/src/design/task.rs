@@ -1,0 +1,424 @@
+//! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
+
+use obsdeg_core::accuracy::Accuracy;
+use obsdeg_core::degree::ensemble::judge;
+use obsdeg_core::model::attitude::{Euler, c_n_f64};
+use obsdeg_core::model::settings::concerns;
+use obsdeg_core::model::{Platform, Scheme, Unknowns};
+use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
+use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of, resolve};
+use rayon::prelude::*;
+
+use super::answer::{Found, HalfTurn, Minimum};
+use super::candidates::{Candidates, MAX_CANDIDATES};
+use super::criterion::{Criterion, Limits};
+use super::information::Evaluator;
+use super::observability::Rows;
+use super::search::{Best, Constraints, Scored, Search};
+use super::symmetry::Symmetry;
+use super::ways::Stop;
+use super::{Design, DesignError, EXHAUSTIVE, Kind, Options, refine};
+
+/// Most sets whose keys are held.
+const MOST_SETS: u64 = 5_000_000;
+/// Most prefixes and sets that are looked at for the minimum, when it is not what was asked for.
+const MINIMUM_SETS: u64 = 1_000_000;
+/// Factors on the dwell for the front of total time.
+const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
+/// Restarts of the exchange at each of them, besides those from the schemes found.
+const FRONT_RESTARTS: u64 = 8;
+
+/// A search in preparation: names resolved, candidates ordered by orbits.
+pub(super) struct Task<'a> {
+    pub(super) base: &'a Scheme,
+    pub(super) options: &'a Options,
+    pub(super) candidates: Candidates,
+    /// Names of the coefficients that count, and their indices.
+    pub(super) required: Vec<(String, usize)>,
+    pub(super) criterion: Criterion,
+    pub(super) constraints: Constraints,
+    /// Requirements on what must be observable; on psi when that is everything.
+    limits: Limits,
+    /// Whether the requirements are those of the program.
+    by_default: bool,
+    pub(super) rows: Rows,
+    pub(super) symmetry: Symmetry,
+    /// Whether repositioning takes time.
+    slews: bool,
+}
+
+impl<'a> Task<'a> {
+    pub(super) fn new(
+        base: &'a Scheme,
+        conditions: &Conditions,
+        options: &'a Options,
+        candidates: Candidates,
+    ) -> Result<Self, DesignError> {
+        conditions.validate()?;
+        let found = candidates.attitudes.len();
+        if !(1..=MAX_CANDIDATES).contains(&found) {
+            return Err(DesignError::Candidates { found });
+        }
+        let counts = options.positions.iter().chain(&options.front);
+        if let Some(&found) = counts.into_iter().find(|k| !(1..=100).contains(*k)) {
+            return Err(DesignError::Positions { found });
+        }
+        if base.unknowns == Unknowns::Drift {
+            return Err(DesignError::Drift);
+        }
+        for (what, limit) in [("a total time", options.total_s), ("a longest slew", options.slew_s)] {
+            if let Some(found) = limit.filter(|l| !(l.is_finite() && *l > 0.0)) {
+                return Err(DesignError::Limit { what, found });
+            }
+        }
+        let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
+        if let Some((name, _)) = generic {
+            return Err(DesignError::GenericAngle { name: name.into() });
+        }
+        let positions = Scheme::of_angles(candidates.attitudes.iter().take(1).cloned()).positions;
+        let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
+        let first = platform.names().len() - platform.coefficients();
+        let all: Vec<(String, usize)> = platform.names()[first..].iter().cloned().zip(0..).collect();
+        let named = |asked: &String| {
+            let known = all.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(", ");
+            let found: Vec<usize> = all.iter().filter(|c| concerns(asked, &c.0)).map(|c| c.1).collect();
+            let unknown = DesignError::UnknownName { found: asked.clone(), known };
+            if found.is_empty() { Err(unknown) } else { Ok(found) }
+        };
+        let mut required = all.clone();
+        if !options.required.is_empty() {
+            let asked = options.required.iter().map(named).collect::<Result<Vec<_>, _>>()?.concat();
+            required.retain(|c| asked.contains(&c.1));
+        }
+        let mut caps = vec![usize::MAX; required.len()];
+        for (name, cap) in &options.degree_caps {
+            let concerned = name.as_ref().map(named).transpose()?;
+            for (slot, c) in caps.iter_mut().zip(&required) {
+                if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
+                    *slot = *cap;
+                }
+            }
+        }
+        if let Some(of_one) = conditions.requirements.iter().find(|r| r.name.contains('@')) {
+            return Err(DesignError::OnePosition { found: of_one.name.clone() });
+        }
+        let all_requirements = resolve("required sigma", &platform, &conditions.requirements, f64::NAN)?;
+        let requirements: Vec<f64> = required.iter().map(|c| all_requirements[first + c.1]).collect();
+        // with some coefficients asked for, psi is not
+        let psi = |k: usize| Some(all_requirements[k]).filter(|x| !x.is_nan() && options.required.is_empty());
+        let limits = Limits {
+            coefficients: requirements.iter().map(|x| if x.is_nan() { f64::INFINITY } else { *x }).collect(),
+            psi: [0, 1, 2].map(|k| psi(k).unwrap_or(f64::INFINITY)),
+        };
+        if options.meet || options.criterion == Kind::Margin {
+            let wrong = |x: &f64| !(x.is_finite() && *x > 0.0);
+            if let Some((c, found)) = required.iter().zip(&requirements).find(|(_, x)| wrong(x)) {
+                return Err(DesignError::Requirement { name: c.0.clone(), found: *found });
+            }
+        }
+        let criterion = match options.criterion {
+            Kind::Worst => Criterion::Worst,
+            Kind::A => Criterion::A,
+            Kind::D => Criterion::D,
+            Kind::E => Criterion::E,
+            Kind::Margin => Criterion::Margin(limits.clone()),
+        };
+        let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
+        let rows = Rows::new(base, &candidates.attitudes, &indices, options.seed)?;
+        // an attitude counts once
+        let repeated = rows.repeated();
+        let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
+        let place = |c: usize| required.iter().position(|r| r.1 == c);
+        let uses_requirements = options.meet || options.criterion == Kind::Margin;
+        // a turn of the platform axes renames psi as well
+        let turned = !uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]);
+        let same = |i: usize, j: usize| match (place(i), place(j)) {
+            _ if !turned && i != j => false,
+            (None, None) => true,
+            (Some(i), Some(j)) => {
+                caps[i] == caps[j] && (!uses_requirements || requirements[i] == requirements[j])
+            }
+            _ => false,
+        };
+        let symmetry = rows.select(&kept).symmetry(&same);
+        // orbit by orbit: a set that begins with a representative stands for all its images
+        let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
+        order.sort_unstable();
+        let order: Vec<usize> = order.into_iter().map(|(_, c)| c).collect();
+        let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
+        let symmetry = rows.symmetry(&same);
+        let constraints = Constraints {
+            total_s: options.total_s,
+            slew_s: options.slew_s,
+            sigmas: options.meet.then(|| limits.clone()),
+            degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
+        };
+        let by_default = conditions.requires_by_default();
+        Ok(Self {
+            base,
+            options,
+            candidates,
+            required,
+            criterion,
+            constraints,
+            limits,
+            by_default,
+            rows,
+            symmetry,
+            slews: conditions.slew_rate_deg_s.is_some(),
+        })
+    }
+
+    /// The fewest candidates that do, with the proof; `proven` without regard to the bound on errors.
+    ///
+    /// # Errors
+    /// [`DesignError::Interrupted`].
+    pub(super) fn minimum(
+        &self,
+        best_degrees: &[Option<usize>],
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Minimum, DesignError> {
+        let names = |set: &[usize]| set.iter().map(|&c| self.candidates.names[c].clone()).collect();
+        let lost = self.required.iter().zip(best_degrees).filter(|(_, d)| d.is_none());
+        let mut out = Minimum {
+            positions: None,
+            witness: Vec::new(),
+            counting_bound: self.rows.counting_bound(),
+            none_of: Vec::new(),
+            never: lost.map(|(c, _)| c.0.clone()).collect(),
+            proven: true,
+        };
+        if !out.never.is_empty() {
+            return Ok(out);
+        }
+        let firsts = self.symmetry.representatives();
+        let asked = self.options.positions.is_none();
+        let most = if asked { EXHAUSTIVE } else { MINIMUM_SETS / firsts.len() as u64 };
+        let n = self.rows.candidates() as u64;
+        for size in out.counting_bound..=self.rows.candidates() {
+            let sets = choose(n, size as u64).unwrap_or(u64::MAX);
+            let (set, all) = self.rows.first_observable_set(size, &firsts, most, going);
+            if !going() {
+                return Err(DesignError::Interrupted);
+            }
+            match set {
+                Some(set) => {
+                    out.positions = Some(size);
+                    out.witness = names(&set);
+                    return Ok(out);
+                }
+                None if all => out.none_of.push([size as u64, sets]),
+                None => break,
+            }
+        }
+        out.proven = false;
+        Ok(out)
+    }
+
+    /// The number of sets behind an exhaustive search of `k` positions; `None` where the space is too large.
+    pub(super) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<u64> {
+        let n = self.rows.candidates() as u64;
+        let sets: u64 = (1..=k as u64).try_fold(0u64, |sum, size| sum.checked_add(choose(n, size)?))?;
+        let searched = if evaluator.ordered() {
+            evaluator.sequences(&self.symmetry.representatives(), k).filter(|_| sets <= MOST_SETS)?
+        } else {
+            choose(n + k as u64 - 1, k as u64)? / self.symmetry.order as u64
+        };
+        (searched <= EXHAUSTIVE).then_some(sets)
+    }
+
+    /// A sequence with its exact verdict; `None` when rounding called it determined and it is not.
+    fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
+        let attitudes: Vec<Euler> =
+            scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
+        let names = scored.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
+        self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)
+    }
+
+    /// Those of some sequences that are what they seem.
+    pub(super) fn all_found(
+        &self,
+        evaluator: &Evaluator,
+        list: &[Scored],
+    ) -> Result<Vec<Found>, DesignError> {
+        let found: Vec<Option<Found>> =
+            list.par_iter().map(|scored| self.found(evaluator, scored)).collect::<Result<_, _>>()?;
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    fn judged(
+        &self,
+        evaluator: &Evaluator,
+        sequence: &[Stop],
+        attitudes: Vec<Euler>,
+        positions: Vec<String>,
+        value: f64,
+    ) -> Result<Option<Found>, DesignError> {
+        let angles = attitudes.iter().map(|a| a.each_ref().map(ToString::to_string).join(","));
+        let angles = angles.collect();
+        let scheme = Scheme {
+            positions: Scheme::of_angles(attitudes).positions,
+            latitude: latitude_of(self.base),
+            combinations: Vec::new(),
+            ..self.base.clone()
+        };
+        let platform = Platform::new(scheme)?;
+        let verdicts = judge(&platform, self.options.seed)?;
+        let first = platform.names().len() - platform.coefficients();
+        let columns = || self.required.iter().map(|r| first + r.1);
+        let degrees: Option<Vec<usize>> = columns().map(|c| verdicts.degrees.degree[c]).collect();
+        let Some(degrees) = degrees.filter(|d| self.constraints.cap(d)) else { return Ok(None) };
+        // beyond the precision of the series the order is not known
+        let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
+        let order_of = |c: usize| accuracy.as_ref().and_then(|a| a.order[c]);
+        let orders = columns().map(order_of).collect::<Option<Vec<_>>>();
+        let half_turns = evaluator.half_turns(sequence).into_iter();
+        let sigmas = evaluator.sigmas(sequence);
+        let worst = sigmas.iter().zip(&self.required).max_by(|a, b| a.0.total_cmp(b.0));
+        let Some((&worst_sigma_dph, (worst, _))) = worst else { return Ok(None) };
+        let determined = |c: usize| match accuracy {
+            Some(_) => order_of(c).is_some(),
+            None => verdicts.degrees.degree[c].is_some(),
+        };
+        let limit = |x: f64| Some(x).filter(|x| x.is_finite());
+        let psi: Vec<f64> = evaluator.psi_sigmas(sequence).concat();
+        let psi = platform.names()[..first].iter().enumerate().map(|(c, name)| Claim {
+            name,
+            required: limit(self.limits.psi[c % 3]),
+            sigma: if determined(c) {
+                Ok(psi.get(c).copied().unwrap_or(f64::NAN))
+            } else {
+                Err(Miss::NotObservable)
+            },
+        });
+        let coefficients = self.required.iter().zip(&sigmas).zip(&self.limits.coefficients);
+        let coefficients = coefficients.map(|(((name, c), sigma), required)| Claim {
+            name,
+            required: limit(*required),
+            sigma: if determined(first + c) { Ok(*sigma) } else { Err(Miss::NotObservable) },
+        });
+        let requirements = Requirements::of(Basis::Predicted, psi.chain(coefficients), self.by_default);
+        if self.options.meet && !requirements.all_met() {
+            return Ok(None);
+        }
+        Ok(Some(Found {
+            positions,
+            angles,
+            half_turns: half_turns.map(|(k, turn)| HalfTurn { to: k + 1, about: turn.about }).collect(),
+            refined: false,
+            dwell_s: evaluator.dwell_s(),
+            total_s: evaluator.state_of(sequence).seconds,
+            value,
+            worst_sigma_dph,
+            worst: worst.clone(),
+            requirements,
+            worst_degree: degrees.into_iter().max().unwrap_or(0),
+            worst_accuracy_order: orders.and_then(|o| o.into_iter().max()),
+            rank: [verdicts.degrees.rank(), platform.names().len()],
+        }))
+    }
+
+    /// Adds what is found at other dwells and numbers of positions.
+    pub(super) fn front(
+        &self,
+        evaluator: &Evaluator,
+        search: &Search<'_>,
+        (k, dwell_s): (usize, f64),
+        main: &Best,
+        out: &mut Design,
+    ) -> Result<(), DesignError> {
+        let mut counts = vec![k];
+        counts.extend(self.options.front.iter().filter(|f| **f != k));
+        for count in counts {
+            let known = main.found.iter().filter(|s| s.sequence.len() == count);
+            let mut given: Vec<Vec<Stop>> = known.map(|s| s.sequence.clone()).collect();
+            for factor in DWELLS {
+                if (count, factor) == (k, 1.0) {
+                    continue;
+                }
+                // a dwell of too many steps is no point of the front
+                let Ok(other) = evaluator.clone().with_dwell(dwell_s * factor) else { continue };
+                // the schemes are compared by their criterion alone
+                let there = Search { evaluator: &other, keep: 1, ..*search };
+                let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };
+                let best = there.exchange(count, &given, restarts, self.options.seed);
+                if !best.complete {
+                    return Ok(());
+                }
+                given.extend(best.found.iter().map(|s| s.sequence.clone()));
+                out.front.extend(self.all_found(&other, &best.front)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a smaller criterion.
+    pub(super) fn refined(
+        &self,
+        evaluator: &Evaluator,
+        best: &Scored,
+        going: &dyn Fn() -> bool,
+    ) -> Result<Option<Found>, DesignError> {
+        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
+        let start: Vec<Euler> = best.sequence.iter().map(attitude).collect();
+        let path: Vec<Stop> =
+            best.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s }).collect();
+        let c = &self.constraints;
+        let allowed = |there: &Evaluator| going() && c.keep(there, &path);
+        let refined = refine::refine(evaluator, &start, &path, &self.criterion, &self.base.gimbals, &allowed);
+        let Some((value, attitudes)) = refined else { return Ok(None) };
+        let matrices: Vec<_> = attitudes.iter().map(c_n_f64).collect();
+        let there = evaluator.along(&matrices);
+        let mut names = Candidates::default();
+        attitudes.iter().for_each(|a| names.add(a.clone()));
+        let found = self.judged(&there, &path, attitudes, names.names, value)?;
+        let found = found.filter(|f| f.worst_degree <= best.worth.degree);
+        Ok(found.map(|f| Found { refined: true, ..f }))
+    }
+
+    /// `makes D_FX, D_FY observable with at most 10 s in all`.
+    pub(super) fn wanted(&self) -> String {
+        let every = self.options.required.is_empty();
+        let names: Vec<&str> = self.required.iter().map(|r| r.0.as_str()).collect();
+        let what = if every { "every coefficient".into() } else { names.join(", ") };
+        let limits = self.constraints_in_words();
+        let limits = if limits.is_empty() { String::new() } else { format!(" with {}", limits.join(", ")) };
+        let slews = if self.slews { " by repositioning at once as well as with its slews" } else { "" };
+        format!("makes {what} observable{slews}{limits}")
+    }
+
+    pub(super) fn constraints_in_words(&self) -> Vec<String> {
+        let c = &self.constraints;
+        let mut out = Vec::new();
+        out.extend(c.total_s.map(|s| format!("at most {s} s in all")));
+        out.extend(c.slew_s.map(|s| format!("slews of at most {s} s")));
+        if c.sigmas.is_some() {
+            out.push(match self.options.required.is_empty() {
+                true => "every requirement met as predicted, on psi (at the start) too".into(),
+                false => {
+                    "the requirements on what must be observable met as predicted; those on psi and the rest do not count"
+                        .into()
+                }
+            });
+        }
+        for (name, cap) in &self.options.degree_caps {
+            let name = name.as_deref().unwrap_or("every required coefficient");
+            out.push(format!("degree of {name} at most {cap}"));
+        }
+        if !self.base.gimbals.are_free() {
+            out.push(format!("gimbals: {}", self.base.gimbals));
+        }
+        out
+    }
+}
+
+/// The number of sets of `k` of `n`; `None` beyond 2^64.
+fn choose(n: u64, k: u64) -> Option<u64> {
+    if k > n {
+        return Some(0);
+    }
+    let k = k.min(n - k);
+    (0..k)
+        .try_fold(1u128, |product, i| product.checked_mul(u128::from(n - i)).map(|p| p / u128::from(i + 1)))
+        .and_then(|x| u64::try_from(x).ok())
+}

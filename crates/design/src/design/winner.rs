@@ -1,0 +1,63 @@
+//! A scheme that was found, as a scheme.
+
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::settings::Settings;
+use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo};
+use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of};
+
+use super::DesignError;
+use super::answer::Found;
+
+/// Half a turn in degrees.
+const HALF: i32 = 180;
+
+/// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of half turns: its sigmas are
+/// those that the search gave. Positions are p1, p2, ...
+///
+/// # Errors
+/// [`DesignError::Scheme`] for a dwell that no scheme has.
+pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<Scheme, DesignError> {
+    let attitudes = found.angles.iter().filter_map(|text| parse_attitude(text).ok());
+    let mut positions = Scheme::of_angles(attitudes).positions;
+    let seconds = found.dwell_s.to_string();
+    let dwell = Dwell::from_seconds(found.dwell_s).ok_or(SchemeError::Dwell { found: seconds })?;
+    for p in &mut positions {
+        p.dwell = Some(dwell);
+    }
+    for turn in &found.half_turns {
+        if let Some(p) = positions.get_mut(turn.to - 1) {
+            p.slew = Some(half_turn(&turn.about));
+        }
+    }
+    // the defaults come first
+    let given = conditions.requirements.iter().skip(Conditions::default().requirements.len());
+    Ok(Scheme {
+        name: String::new(),
+        description: String::new(),
+        positions,
+        latitude: latitude_of(base),
+        combinations: Vec::new(),
+        simulation: Settings {
+            step_s: Some(conditions.step_s),
+            dwell_s: None,
+            slew_rate_deg_s: conditions.slew_rate_deg_s,
+            accelerometer_noise_g: Some(conditions.accelerometer_noise_g),
+            azimuth_noise_deg: base.measured_azimuth.then_some(conditions.azimuth_noise_deg),
+            ..base.simulation.clone()
+        },
+        requirements: given.map(|r| (r.name.clone(), r.value)).collect(),
+        ..base.clone()
+    })
+}
+
+/// Half a turn about a direction in n: an axis by its name, others by components of which the largest is 1.
+fn half_turn(about: &[f64; 3]) -> SlewTo {
+    let largest = about.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let direction = about.map(|x| (x / largest * 1e12).round() / 1e12 + 0.0);
+    let named = ["N", "U", "E"].iter().zip(direction).filter(|(_, x)| *x != 0.0).collect::<Vec<_>>();
+    let (axis, angle) = match named[..] {
+        [(name, x)] => (name.parse().ok(), if x < 0.0 { -HALF } else { HALF }),
+        _ => (Some(SlewAxis::Direction(direction)), HALF),
+    };
+    SlewTo { rate_deg_s: None, axis, angle: Some(Angle::from_degrees(angle)) }
+}

@@ -1,0 +1,4 @@
+//! The search for torquing schemes, and all that a review of them needs.
+
+pub mod design;
+pub mod review;

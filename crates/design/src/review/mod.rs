@@ -1,0 +1,347 @@
+//! All that a design review of torquing schemes needs, gathered: verdicts, predictions, evidence, alternatives.
+
+pub mod answer;
+
+use obsdeg_core::analysis::{self, AnalysisError, analyze};
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::model::{Dwell, Scheme};
+use obsdeg_core::system::{ModelError, SystemModel, analyze_system};
+use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
+use obsdeg_evidence::crosscheck::{self, crosscheck};
+use obsdeg_evidence::simulation::plan::Kind as Part;
+use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, simulate};
+use obsdeg_evidence::system::run::RunError;
+use obsdeg_evidence::system::{crosscheck_system, simulate_system};
+use obsdeg_symbolic::Worker;
+use rayon::prelude::*;
+
+pub use answer::{DesignReview, ModelReview, SchemeReview};
+
+use crate::design::{self, Candidates, DesignError, Kind, design};
+use answer::{Alternatives, Attitude, PositionReview, Sweep};
+
+/// Between two latitudes of the sweep, in degrees.
+const LATITUDE_STEP: i32 = 5;
+/// The dwells are scaled by up to so many octaves, in halves.
+const OCTAVES: i32 = 3;
+/// Most positions of the schemes that the front is searched for.
+const FRONT_POSITIONS: usize = 5;
+/// Most positions of a scheme whose smallest sufficient part is looked for.
+const SUBSETS: usize = 24;
+
+/// How much is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Monte Carlo runs of the evidence.
+    pub runs: usize,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// Why there is no review.
+#[derive(Debug, thiserror::Error)]
+pub enum ReviewError {
+    /// A verdict.
+    #[error("{name}: {error}")]
+    Analysis {
+        /// The scheme.
+        name: String,
+        /// What is wrong.
+        error: AnalysisError,
+    },
+    /// A scheme that cannot be simulated.
+    #[error("{name}: {error}")]
+    Simulation {
+        /// The scheme.
+        name: String,
+        /// What is wrong.
+        error: SimulationError,
+    },
+    /// A model.
+    #[error("model {}: {error}", model + 1)]
+    Model {
+        /// Its index.
+        model: usize,
+        /// What is wrong.
+        error: ModelError,
+    },
+    /// Interrupted.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Reviews schemes and models. `progress` hears what is done next, with a share of the whole, and says whether to go on.
+///
+/// # Errors
+/// [`ReviewError`].
+pub fn review(
+    entries: &[Entry],
+    models: &[SystemModel],
+    options: Options,
+    mut worker: Option<&mut Worker>,
+    progress: &dyn Fn(&str, f64) -> bool,
+) -> Result<DesignReview, ReviewError> {
+    let parts = (entries.len() + models.len()).max(1) as f64;
+    let step = |part: usize, share: f64, what: &str| match progress(what, (part as f64 + share) / parts) {
+        true => Ok(()),
+        false => Err(ReviewError::Interrupted),
+    };
+    for Entry { name, scheme, .. } in entries {
+        comparable(scheme).map_err(|error| ReviewError::Simulation { name: name.clone(), error })?;
+    }
+    let mut schemes = Vec::new();
+    for (i, entry) in entries.iter().enumerate() {
+        let step = |share: f64, what: &str| step(i, share, &format!("{}: {what}", entry.name));
+        schemes.push(scheme(entry, options, worker.as_deref_mut(), &step)?);
+    }
+    let mut out = Vec::new();
+    for (i, model) in models.iter().enumerate() {
+        step(entries.len() + i, 0.0, &model.name)?;
+        let part = self::model(model, options.seed, worker.as_deref_mut());
+        out.push(part.map_err(|error| ReviewError::Model { model: i, error })?);
+    }
+    let comparison =
+        compare(entries, options.seed).map_err(|(name, error)| ReviewError::Simulation { name, error })?;
+    Ok(DesignReview {
+        version: env!("CARGO_PKG_VERSION").into(),
+        schemes,
+        models: out,
+        comparison,
+        runs: options.runs,
+        seed: options.seed,
+    })
+}
+
+fn scheme(
+    entry: &Entry,
+    options: Options,
+    mut worker: Option<&mut Worker>,
+    step: &dyn Fn(f64, &str) -> Result<(), ReviewError>,
+) -> Result<SchemeReview, ReviewError> {
+    let Entry { name, scheme, conditions } = entry;
+    let failed = |error: SimulationError| ReviewError::Simulation { name: name.clone(), error };
+    // what needs numbers refuses generic angles before anything is computed
+    let plan = Plan::new(scheme, conditions).map_err(failed)?;
+    step(0.0, "verdicts")?;
+    let verdicts = analysis::Options { seed: options.seed, ..analysis::Options::default() };
+    let analysis = analyze(scheme, verdicts, worker.as_deref_mut())
+        .map_err(|error| ReviewError::Analysis { name: name.clone(), error })?;
+    rest(worker);
+    step(0.2, "a run of the filter")?;
+    let (simulation, record) = simulate(scheme, conditions, options.seed).map_err(failed)?;
+    step(0.3, "evidence")?;
+    let mut notes = Vec::new();
+    let check = crosscheck::Options { runs: options.runs, seed: options.seed, filter: Default::default() };
+    let going = |done: usize| step(0.3 + 0.4 * done as f64 / options.runs.max(1) as f64, "evidence").is_ok();
+    let evidence = match crosscheck(scheme, conditions, &check, &going) {
+        Ok(evidence) => Some(evidence),
+        Err(SimulationError::Interrupted) => return Err(ReviewError::Interrupted),
+        Err(SimulationError::CrosscheckRotation) => {
+            notes.push(
+                "this scheme has a rotating segment, and the evidence by a filter takes positions".into(),
+            );
+            None
+        }
+        Err(error) if error.is_numeric() => {
+            notes.push(format!("no evidence by a filter: {error}"));
+            None
+        }
+        Err(error) => return Err(failed(error)),
+    };
+    step(0.7, "sweeps")?;
+    let latitudes = latitudes(scheme, conditions, options.seed).map_err(failed)?;
+    let dwells = dwells(scheme, conditions, options.seed).map_err(failed)?;
+    step(0.8, "alternatives")?;
+    let alternatives = alternatives(scheme, conditions, &analysis, options.seed, &mut notes);
+    Ok(SchemeReview {
+        name: name.clone(),
+        description: scheme.description.clone(),
+        positions: positions(scheme, conditions, &plan),
+        attitudes: attitudes(&plan),
+        analysis,
+        simulation,
+        traces: record.traces,
+        evidence,
+        latitudes,
+        dwells,
+        alternatives,
+        notes,
+    })
+}
+
+/// Gravity in platform axes is the second row of `C_c^n`: North, Up, East.
+const UP: usize = 1;
+
+fn positions(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Vec<PositionReview> {
+    let slew = |i: usize| {
+        let of = |p: &&obsdeg_evidence::simulation::plan::Segment| {
+            p.position == i && matches!(p.kind, Part::Slew(_))
+        };
+        plan.segments.iter().find(of).map(|s| s.dt * s.steps as f64)
+    };
+    let start = |i: usize| {
+        let of = |p: &&obsdeg_evidence::simulation::plan::Segment| {
+            p.position == i && !matches!(p.kind, Part::Slew(_))
+        };
+        plan.segments.iter().find(of).map_or(0.0, |s| s.start_s)
+    };
+    let row = |(i, p): (usize, &obsdeg_core::model::Position)| {
+        let g = plan.attitudes[i][UP];
+        let along = |axis: obsdeg_core::model::geometry::SignedAxis| {
+            let component: f64 = axis.vector().iter().zip(&g).map(|(&a, g)| f64::from(a) * g).sum();
+            // a multiple of a right angle leaves a rounding error of the sine
+            if component.abs() < 1e-15 { 0.0 } else { component }
+        };
+        PositionReview {
+            name: p.name.clone(),
+            start_s: start(i),
+            dwell_s: p.dwell.map_or(conditions.dwell_s, Dwell::seconds),
+            slew_s: slew(i),
+            turn: plan.slews().find(|s| s.0 == i).map(|s| s.1),
+            g: scheme.geometry.gyros().map(|gyro| [along(gyro.I), along(gyro.O), along(gyro.S)]),
+        }
+    };
+    scheme.positions.iter().enumerate().map(row).collect()
+}
+
+/// Gravity along the platform axes over time.
+fn attitudes(plan: &Plan) -> Vec<Attitude> {
+    const STEPS: usize = 24;
+    let mut out = Vec::new();
+    for s in &plan.segments {
+        let duration = s.dt * s.steps as f64;
+        let mut at = |t: f64, c: &obsdeg_core::model::attitude::Matrix3<f64>| {
+            out.push(Attitude { t_s: s.start_s + t, position: s.position, g: c[UP] });
+        };
+        match &s.kind {
+            Part::Dwell => {
+                at(0.0, &plan.attitudes[s.position]);
+                at(duration, &plan.attitudes[s.position]);
+            }
+            Part::Slew(slew) => {
+                (0..=STEPS).for_each(|k| {
+                    let t = duration * k as f64 / STEPS as f64;
+                    at(t, &slew.at(t));
+                });
+            }
+            Part::Rotation(turn) => {
+                at(0.0, &turn.at(0.0));
+                at(duration, &turn.at(duration));
+            }
+        }
+    }
+    out
+}
+
+fn latitudes(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
+    let at = |k: i32| {
+        let degrees = k * LATITUDE_STEP;
+        let other = Scheme { latitude: degrees.to_string().parse().ok(), ..scheme.clone() };
+        Ok((f64::from(degrees), predicted(&other, conditions, seed)?))
+    };
+    Ok(Sweep::of((0..=90 / LATITUDE_STEP).into_par_iter().map(at).collect::<Result<_, SimulationError>>()?))
+}
+
+fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
+    let at = |k: i32| {
+        let factor = 2f64.powf(f64::from(k) / 2.0);
+        let other = scheme.with_dwells(conditions.dwell_s, factor)?;
+        // a step is at most half a dwell
+        let shortest = other.positions.iter().filter_map(|p| p.dwell).map(Dwell::seconds);
+        let step_s = shortest.fold(conditions.step_s, |step, dwell| step.min(dwell / 2.0));
+        Ok((factor, predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?))
+    };
+    let factors = (-2 * OCTAVES..=2 * OCTAVES).into_par_iter();
+    Ok(Sweep::of(factors.map(at).collect::<Result<_, SimulationError>>()?))
+}
+
+/// The least that keeps what is seen, the least that sees all, and the front of schemes out of the cardinal attitudes.
+fn alternatives(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    analysis: &obsdeg_core::analysis::Analysis,
+    seed: u64,
+    notes: &mut Vec<String>,
+) -> Alternatives {
+    let mut out = Alternatives::default();
+    let seen: Vec<String> = (analysis.quantities.iter())
+        .filter(|q| q.status == Status::Observable && q.name.starts_with("D_"))
+        .map(|q| q.name.clone())
+        .collect();
+    let task = |candidates, positions, required: &[String]| design::Options {
+        candidates,
+        positions,
+        required: required.to_vec(),
+        degree_caps: Vec::new(),
+        meet: false,
+        total_s: None,
+        slew_s: None,
+        criterion: Kind::Worst,
+        keep: 1,
+        restarts: 40,
+        refine: false,
+        front: Vec::new(),
+        seed,
+    };
+    let going = |_| true;
+    let mut run = |options: design::Options| match design(scheme, conditions, &options, &going) {
+        Ok(found) => Some(found),
+        // no coefficients, generic angles, rotations: nothing to choose from
+        Err(DesignError::Drift | DesignError::Rotation { .. } | DesignError::GenericAngle { .. }) => None,
+        Err(e) => {
+            notes.push(format!("no alternatives: {e}"));
+            None
+        }
+    };
+    if !seen.is_empty()
+        && scheme.positions.len() <= SUBSETS
+        && let Ok(own) = Candidates::of_scheme(scheme)
+    {
+        out.kept = run(task(own, None, &seen)).map(|d| d.minimum);
+        if let Some(kept) = &mut out.kept {
+            kept.witness.sort_by_key(|name| scheme.positions.iter().position(|p| p.name == *name));
+        }
+    }
+    out.all = run(task(Candidates::cardinals(), None, &[])).map(|d| d.minimum);
+    if !seen.is_empty() {
+        let positions = scheme.positions.len().min(FRONT_POSITIONS);
+        let found = run(task(Candidates::cardinals(), Some(positions), &seen));
+        out.front = found.map(|d| d.front).unwrap_or_default();
+        out.front_positions = positions;
+    }
+    out.required = seen;
+    out
+}
+
+/// A model with its run and its evidence, where it has the numbers for them.
+/// What follows needs no formulas, and may take long: another process may have the engine.
+fn rest(worker: Option<&mut Worker>) {
+    if let Some(worker) = worker {
+        worker.rest();
+    }
+}
+
+fn model(model: &SystemModel, seed: u64, mut worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
+    let analysis = analyze_system(model, seed, None, Some(worker.as_deref_mut()))?;
+    rest(worker);
+    let mut note = None;
+    let run = simulate_system(model, seed);
+    let evidence = run.as_ref().ok().map(|_| crosscheck_system(model, seed));
+    let mut unless_wrong = |e: RunError| match e {
+        RunError::Model(error) if model.simulation.duration.is_some() => Err(error),
+        e => {
+            note = Some(format!("no run or no evidence: {e}"));
+            Ok(())
+        }
+    };
+    let run = match run {
+        Ok(run) => Some(run),
+        Err(e) => unless_wrong(e).map(|()| None)?,
+    };
+    let evidence = match evidence {
+        Some(Ok(evidence)) => Some(evidence),
+        Some(Err(e)) => unless_wrong(e).map(|()| None)?,
+        None => None,
+    };
+    Ok(ModelReview { analysis, run, evidence, note })
+}

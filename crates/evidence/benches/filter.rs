@@ -1,0 +1,64 @@
+//! The paper's run, 15 states and 200 steps: the whole of it, its parts, and a thousand of them.
+
+use divan::{Bencher, black_box};
+use obsdeg_core::model::scheme::parse_attitude;
+use obsdeg_core::model::settings::Truth;
+use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_ekf::Form;
+use obsdeg_ekf::linear::covariance_pass;
+use obsdeg_evidence::crosscheck::monte_carlo::{Experiment, Prepared};
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::plan::Plan;
+use obsdeg_evidence::simulation::record::Start;
+
+fn main() {
+    divan::main();
+}
+
+fn paper(truth: Truth) -> (Plan, Conditions) {
+    let attitudes = ["0,0,0", "180,0,0"].map(|a| parse_attitude(a).expect("an attitude"));
+    let scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };
+    let conditions = Conditions { truth, ..Conditions::default() };
+    (Plan::new(&scheme, &conditions).expect("a plan"), conditions)
+}
+
+fn experiment<'a>(plan: &'a Plan, conditions: &'a Conditions) -> Experiment<'a> {
+    Experiment { filter: plan, truth: plan, conditions, null_space: None, seed: 1 }
+}
+
+/// Covariance pass, truth, state pass, NEES, NIS and autocorrelations of one run.
+#[divan::bench]
+fn one_run_whole(bencher: Bencher<'_, '_>) {
+    let (plan, conditions) = paper(Truth::Linear);
+    bencher.bench(|| {
+        let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+        black_box(prepared.chunk(0, 1))
+    });
+}
+
+/// The covariance pass alone, in both forms.
+#[divan::bench(args = [Form::Joseph, Form::Ud])]
+fn covariance(bencher: Bencher<'_, '_>, form: &Form) {
+    let (plan, conditions) = paper(Truth::Linear);
+    let start = Start::new(&plan, &conditions).expect("a start");
+    bencher.bench(|| {
+        let prior = start.covariance(*form).expect("a prior");
+        black_box(covariance_pass(&plan.stages, prior, |_, _| {}).expect("shapes"))
+    });
+}
+
+/// One more run, once the gains are known: truth, state pass and statistics.
+#[divan::bench(args = [Truth::Linear, Truth::Exact])]
+fn one_more_run(bencher: Bencher<'_, '_>, truth: &Truth) {
+    let (plan, conditions) = paper(*truth);
+    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    bencher.bench(|| black_box(prepared.chunk(0, 1)));
+}
+
+/// Monte Carlo on all cores.
+#[divan::bench(args = [1000, 10_000])]
+fn monte_carlo(bencher: Bencher<'_, '_>, runs: usize) {
+    let (plan, conditions) = paper(Truth::Linear);
+    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    bencher.bench(|| black_box(prepared.run(runs, &|_| true)));
+}

@@ -1,0 +1,139 @@
+//! Schemes side by side: plain data.
+
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::model::Carry;
+use obsdeg_core::model::slew::Turn;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::requirements::{Claim, Miss, Requirements};
+use crate::simulation::answer::MeasurementReport;
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.comparison/1";
+
+/// Several schemes, judged alike.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Comparison {
+    /// `obsdeg.comparison/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The schemes in the order given.
+    pub schemes: Vec<Review>,
+    /// What differs between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step.
+    pub differ: Vec<String>,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// One scheme.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Review {
+    /// Its name: the file's.
+    pub name: String,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// What its sigmas rest on.
+    pub conditions: MeasurementReport,
+    /// Its positions.
+    pub positions: Vec<String>,
+    /// The turns between them that take time, with the position that each leads to.
+    pub slews: Vec<Slew>,
+    /// Total time with slews, in s.
+    pub total_s: f64,
+    /// The rank with dwell (by derivatives where accuracy orders are not computed), and the number of unknowns.
+    pub rank: [usize; 2],
+    /// Per unknown.
+    pub quantities: Vec<Quantity>,
+    /// The largest sigma of a coefficient; null when one is not observable.
+    pub worst: Option<Worst>,
+    /// Whether every unknown with a requirement meets it.
+    pub meets_requirements: bool,
+    /// What became of the requirements: predicted sigma (psi: of the start, under reset carry of the start of each position).
+    pub requirements: Requirements,
+    /// Whether accuracy orders are computed: none are for rotating segments.
+    pub has_accuracy_orders: bool,
+    /// What happens without each of the positions.
+    pub drop_one: Vec<DropOne>,
+    /// The worst sigma under other conditions.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// A turn to a position.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Slew {
+    /// The position.
+    pub to: String,
+    /// How it turns.
+    pub turn: Turn,
+}
+
+/// One unknown of a scheme.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Quantity {
+    /// Its name.
+    pub name: String,
+    /// Unit of sigma.
+    pub unit: String,
+    /// The exact verdict.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+    /// The accuracy order.
+    pub accuracy_order: Option<usize>,
+    /// Standard deviation by the information of all samples, without prior and drift noise; null when these do not determine it.
+    pub sigma: Option<f64>,
+    /// The largest sigma allowed.
+    pub requirement: Option<f64>,
+    /// Requirement over sigma: above 1 is met.
+    pub margin: Option<f64>,
+    /// Per position: how it moves the drift there, as a product of components of g (1 for D_F); its root mean square over the arc of a
+    /// rotating segment; empty for psi.
+    pub excitation: Vec<f64>,
+    /// Positions without which it is not observable.
+    pub carried_by: Vec<String>,
+}
+
+impl Quantity {
+    /// What is held against its requirement.
+    pub(super) fn claim(&self) -> Claim<'_> {
+        Claim { name: &self.name, required: self.requirement, sigma: self.sigma.ok_or(Miss::NotObservable) }
+    }
+}
+
+/// The largest sigma of a coefficient.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Worst {
+    /// The coefficient.
+    pub name: String,
+    /// Its sigma in deg/h (per g).
+    pub sigma_dph: f64,
+}
+
+/// A scheme without one of its positions.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DropOne {
+    /// The position left out.
+    pub position: String,
+    /// Unknowns that are not observable without it.
+    pub lost: Vec<String>,
+    /// The worst sigma without it.
+    pub worst: Option<Worst>,
+    /// What becomes of the requirements without it.
+    pub requirements: Requirements,
+}
+
+/// The worst sigma under another condition.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Sensitivity {
+    /// The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` where the scheme has slews, which only
+    /// inertial carry knows.
+    pub condition: String,
+    /// The rank with dwell and the number of unknowns there.
+    pub rank: [usize; 2],
+    /// The worst sigma there.
+    pub worst: Option<Worst>,
+    /// The worst sigma there of the coefficients that the scheme itself makes observable; null when one is not.
+    pub worst_determined: Option<Worst>,
+}

@@ -1,0 +1,340 @@
+//! Schemes side by side, for design reviews: verdicts, predicted accuracy, what each position is for, what the
+//! assumptions are worth.
+
+pub mod answer;
+
+use std::collections::BTreeMap;
+
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::model::attitude::Matrix3;
+use obsdeg_core::model::ring::Float;
+use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::slew;
+use obsdeg_core::model::{Carry, Platform, Position, Scheme};
+use obsdeg_ekf::SquareRootInformation;
+use rayon::prelude::*;
+
+pub use answer::Comparison;
+
+use crate::prediction::Prediction;
+use crate::requirements::{Basis, Requirements};
+use crate::simulation::answer::MeasurementReport;
+use crate::simulation::batch::batch;
+use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
+use crate::simulation::plan::MAX_UNKNOWNS;
+use crate::simulation::{Plan, SimulationError, no_prior, predict};
+use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
+
+/// Latitudes of the sweep, in degrees.
+const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
+/// Factors on the dwells.
+const DWELLS: [f64; 2] = [0.5, 2.0];
+
+/// A scheme to be compared, with its name and conditions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Its name in the comparison.
+    pub name: String,
+    /// The scheme.
+    pub scheme: Scheme,
+    /// Its conditions; requirements are the requirements.
+    pub conditions: Conditions,
+}
+
+/// Refuses, before anything is computed, a scheme that is too large under one of the carries that are looked at.
+///
+/// # Errors
+/// [`SimulationError::ComparedUnknowns`].
+pub fn comparable(scheme: &Scheme) -> Result<(), SimulationError> {
+    let found = Platform::new(Scheme { carry: Carry::Reset, ..scheme.clone() })?.names().len();
+    if found <= MAX_UNKNOWNS { Ok(()) } else { Err(SimulationError::ComparedUnknowns { found }) }
+}
+
+/// Compares schemes.
+///
+/// # Errors
+/// The name of the scheme that cannot be judged, and why.
+pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, SimulationError)> {
+    for e in entries {
+        comparable(&e.scheme).map_err(|error| (e.name.clone(), error))?;
+    }
+    let schemes = entries.iter().map(|e| review(e, seed).map_err(|error| (e.name.clone(), error)));
+    let schemes = schemes.collect::<Result<Vec<_>, _>>()?;
+    Ok(Comparison {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        differ: differ(&schemes),
+        schemes,
+        seed,
+    })
+}
+
+/// What differs between schemes besides positions, dwells and slews.
+fn differ(schemes: &[Review]) -> Vec<String> {
+    let Some((first, others)) = schemes.split_first() else { return Vec::new() };
+    // psi of every position counts as psi
+    let required = |r: &Review| -> BTreeMap<String, Option<f64>> {
+        let family = |name: &str| name.split('@').next().unwrap_or_default().to_string();
+        r.quantities.iter().map(|q| (family(&q.name), q.requirement)).collect()
+    };
+    let here = required(first);
+    let other = |differs: &dyn Fn(&Review) -> bool| others.iter().any(differs);
+    let noise = |r: &Review| (r.conditions.accelerometer_noise_g, r.conditions.azimuth_noise_deg);
+    let found = [
+        ("carry", other(&|r| r.carry != first.carry)),
+        ("latitude", other(&|r| r.conditions.latitude_deg != first.conditions.latitude_deg)),
+        ("unknowns", other(&|r| !required(r).keys().eq(here.keys()))),
+        ("requirements", other(&|r| required(r).iter().any(|(n, x)| here.get(n).is_some_and(|y| x != y)))),
+        ("noise", other(&|r| noise(r) != noise(first))),
+        ("step", other(&|r| r.conditions.step_s != first.conditions.step_s)),
+    ];
+    found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
+}
+
+/// Every unknown with its standard deviation in deg, deg/h, deg/h/g by the information of all samples, without prior and drift noise;
+/// `None` when it is not observable.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn predicted(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<Vec<(String, Option<f64>)>, SimulationError> {
+    let judged = Judged::new(scheme, conditions, seed)?;
+    Ok(judged.platform().names().iter().cloned().zip(judged.sigmas.iter().copied()).collect())
+}
+
+/// The verdicts and the accuracy of one scheme.
+struct Judged {
+    plan: Plan,
+    prediction: Prediction,
+    /// Per unknown, in its own unit; `None` when it is not observable.
+    sigmas: Vec<Option<f64>>,
+}
+
+impl Judged {
+    fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
+        // other carries and fewer positions have other unknowns
+        let conditions = conditions.within(&Platform::new(scheme.clone())?);
+        let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions };
+        let plan = Plan::new(scheme, &still)?;
+        let prediction = predict(&plan, seed)?;
+        let prior = SquareRootInformation::prior(&no_prior(&plan)?)?;
+        let sigmas = batch(&plan, prior)?.information.sigmas()?;
+        let units = plan.platform.units().iter();
+        let sigmas = sigmas
+            .iter()
+            .zip(units)
+            .zip(&prediction.unknowns)
+            .map(|((s, unit), u)| u.determined.then(|| s / si_per_shown(unit)))
+            .collect();
+        Ok(Self { plan, prediction, sigmas })
+    }
+
+    fn platform(&self) -> &Platform {
+        &self.plan.platform
+    }
+
+    fn rank(&self) -> [usize; 2] {
+        [self.prediction.rank, self.platform().names().len()]
+    }
+
+    /// The largest sigma of a coefficient, if all are observable.
+    fn worst(&self) -> Option<Worst> {
+        self.worst_of(&|_| true)
+    }
+
+    /// Names of the coefficients that are observable.
+    fn determined(&self) -> Vec<String> {
+        let (names, units) = (self.platform().names(), self.platform().units());
+        let determined = (0..names.len()).filter(|&c| units[c] != "rad" && self.sigmas[c].is_some());
+        determined.map(|c| names[c].clone()).collect()
+    }
+
+    /// The largest sigma of a coefficient that counts, if all of these are observable.
+    fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
+        let units = self.platform().units();
+        let counts = |c: &usize| units[*c] != "rad" && counts(&self.platform().names()[*c]);
+        let drifts = (0..units.len()).filter(counts);
+        let mut worst: Option<Worst> = None;
+        for c in drifts {
+            let sigma_dph = self.sigmas[c]?;
+            if worst.as_ref().is_none_or(|w| sigma_dph > w.sigma_dph) {
+                worst = Some(Worst { name: self.platform().names()[c].clone(), sigma_dph });
+            }
+        }
+        worst
+    }
+}
+
+fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
+    let Entry { name, scheme, conditions } = entry;
+    let judged = Judged::new(scheme, conditions, seed)?;
+    conditions.concern(judged.platform())?;
+    let drop_one = drop_one(scheme, conditions, &judged, seed)?;
+    let quantities = quantities(&judged, conditions, &drop_one)?;
+    let requirements = required(&quantities, conditions);
+    let slews = judged.plan.slews();
+    let has_slews = judged.plan.slews().next().is_some();
+    Ok(Review {
+        name: name.clone(),
+        carry: scheme.carry,
+        conditions: MeasurementReport::new(scheme, conditions),
+        positions: scheme.positions.iter().map(|p| p.name.clone()).collect(),
+        slews: slews.map(|(p, turn)| Slew { to: scheme.positions[p].name.clone(), turn }).collect(),
+        total_s: judged.plan.duration_s(),
+        rank: judged.rank(),
+        meets_requirements: requirements.all_met(),
+        requirements,
+        has_accuracy_orders: judged.prediction.has_accuracy_orders,
+        quantities,
+        worst: judged.worst(),
+        drop_one,
+        sensitivity: sensitivity(scheme, conditions, &judged.determined(), has_slews, seed)?,
+    })
+}
+
+/// The requirements of `conditions` against predicted sigmas.
+fn required(quantities: &[Quantity], conditions: &Conditions) -> Requirements {
+    Requirements::of(
+        Basis::Predicted,
+        quantities.iter().map(Quantity::claim),
+        conditions.requires_by_default(),
+    )
+}
+
+fn quantities(
+    judged: &Judged,
+    conditions: &Conditions,
+    drop_one: &[DropOne],
+) -> Result<Vec<Quantity>, SimulationError> {
+    let platform = judged.platform();
+    let requirements = resolve("required sigma", platform, &conditions.requirements, f64::NAN)?;
+    let first_d = platform.names().len() - platform.coefficients();
+    let excitations = excitations(judged);
+    let excitation = |c: usize| -> Vec<f64> {
+        let Some(d) = c.checked_sub(first_d) else { return Vec::new() };
+        excitations.iter().map(|of| of[d]).collect()
+    };
+    let of_unknown = |(c, u): (usize, &crate::prediction::PredictedUnknown)| {
+        let name = &platform.names()[c];
+        let requirement = Some(requirements[c]).filter(|r| !r.is_nan());
+        let sigma = judged.sigmas[c];
+        let carries = drop_one.iter().filter(|d| d.lost.contains(name));
+        let mut out = Quantity {
+            name: name.clone(),
+            unit: shown_unit(platform.units()[c]).into(),
+            status: u.status,
+            degree: u.degree,
+            accuracy_order: u.accuracy_order,
+            sigma,
+            requirement,
+            margin: None,
+            excitation: excitation(c),
+            carried_by: carries.map(|d| d.position.clone()).collect(),
+        };
+        out.margin = out.claim().margin();
+        out
+    };
+    Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
+}
+
+/// Per position and coefficient: the length of its column of `eps^n = C E(g) D` at a position, its root mean square over the arc of a
+/// rotating segment (the columns of C are orthonormal, so this is the product of components of g).
+fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
+    let (plan, platform) = (&judged.plan, judged.platform());
+    let squares = |c: &Matrix3<f64>| -> Vec<f64> {
+        let rows = platform.drift_rows(&Float, c);
+        (0..platform.coefficients()).map(|d| rows.iter().map(|r| r[d] * r[d]).sum()).collect()
+    };
+    let of = |(i, position): (usize, &Position)| -> Vec<f64> {
+        let Some(turn) = &position.rotation else {
+            return squares(&plan.attitudes[i]).iter().map(|x| x.sqrt()).collect();
+        };
+        let arc = slew::Slew::about(&plan.attitudes[i], turn, 1.0);
+        let mut mean = vec![0.0; platform.coefficients()];
+        for (t, weight) in quadrature(arc.rate.iter().map(|x| x * x).sum::<f64>().sqrt()) {
+            for (m, x) in mean.iter_mut().zip(squares(&arc.at(t))) {
+                *m += weight * x;
+            }
+        }
+        mean.iter().map(|x| x.max(0.0).sqrt()).collect()
+    };
+    platform.scheme().positions.iter().enumerate().map(of).collect()
+}
+
+/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five degrees, which is exact to 1e-10
+/// for the squares of second-order terms.
+fn quadrature(arc: f64) -> Vec<(f64, f64)> {
+    const PART: f64 = std::f64::consts::PI / 36.0;
+    const MOST: f64 = 10_000.0;
+    let parts = (arc / PART).ceil().clamp(1.0, MOST);
+    let offset = 0.6f64.sqrt();
+    let of = |i: usize| {
+        let points = [(-offset, 5.0), (0.0, 8.0), (offset, 5.0)];
+        points.map(|(x, weight)| ((i as f64 + 0.5 + x / 2.0) / parts, weight / 18.0 / parts))
+    };
+    (0..parts as usize).flat_map(of).collect()
+}
+
+/// The scheme without each of its positions in turn.
+fn drop_one(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    whole: &Judged,
+    seed: u64,
+) -> Result<Vec<DropOne>, SimulationError> {
+    if scheme.positions.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let observable = |j: &Judged, name: &String| {
+        let c = j.platform().names().iter().position(|n| n == name);
+        c.is_some_and(|c| j.prediction.unknowns[c].status == Status::Observable || j.sigmas[c].is_some())
+    };
+    (0..scheme.positions.len())
+        .into_par_iter()
+        .map(|i| {
+            let position = scheme.positions[i].name.clone();
+            let judged = Judged::new(&scheme.without_position(i), conditions, seed)?;
+            let names = whole.platform().names().iter();
+            // under reset carry every position has a psi of its own
+            let names = names.filter(|n| !n.contains('@'));
+            let lost = names.filter(|n| observable(whole, n) && !observable(&judged, n)).cloned().collect();
+            let still = conditions.within(judged.platform());
+            let requirements = required(&quantities(&judged, &still, &[])?, conditions);
+            Ok(DropOne { position, lost, worst: judged.worst(), requirements })
+        })
+        .collect()
+}
+
+/// The worst sigma at other latitudes, dwells and carries.
+fn sensitivity(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    determined: &[String],
+    slews: bool,
+    seed: u64,
+) -> Result<Vec<Sensitivity>, SimulationError> {
+    let mut others: Vec<(String, Scheme, Conditions)> = Vec::new();
+    for latitude in LATITUDES {
+        let other = Scheme { latitude: latitude.parse().ok(), ..scheme.clone() };
+        others.push((format!("latitude {latitude} deg"), other, conditions.clone()));
+    }
+    for factor in DWELLS {
+        let other = scheme.with_dwells(conditions.dwell_s, factor)?;
+        others.push((format!("dwell x {factor}"), other, conditions.clone()));
+    }
+    let without = if slews { ", no slews" } else { "" };
+    for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
+        // slews carry psi^n: without them another carry can be asked for
+        let still = Conditions { slews: false, ..conditions.clone() };
+        others.push((format!("{carry} carry{without}"), Scheme { carry, ..scheme.clone() }, still));
+    }
+    let judged = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
+        let judged = Judged::new(&scheme, &conditions, seed)?;
+        let worst_determined = judged.worst_of(&|name| determined.contains(name));
+        Ok(Sensitivity { condition, rank: judged.rank(), worst: judged.worst(), worst_determined })
+    };
+    others.into_par_iter().map(judged).collect()
+}

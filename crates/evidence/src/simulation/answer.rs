@@ -1,0 +1,238 @@
+//! The answer of one run: plain data.
+
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::model::settings::{Propagation, Truth};
+use obsdeg_core::model::slew::Turn;
+use obsdeg_core::model::{Carry, Scheme};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::conditions::{Conditions, latitude_of};
+use super::consistency::{CREDIBLE, Consistency};
+use crate::requirements::{Miss, Requirements, meets};
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.simulation/1";
+
+/// One run of the filter against a simulated truth.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Simulation {
+    /// `obsdeg.simulation/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// Under which conditions.
+    pub conditions: ConditionsReport,
+    /// The timeline.
+    pub timeline: Vec<TimelineReport>,
+    /// The unknowns in model order: at the end of the run.
+    pub quantities: Vec<Estimate>,
+    /// Observable combinations of unknowns that are not observable alone.
+    pub combinations: Vec<Estimate>,
+    /// What became of the requirements: sigma of the filter at the end, with prior and drift noise.
+    pub requirements: Requirements,
+    /// Whether errors and innovations are what the filter believes.
+    pub consistency: Consistency,
+    /// Whether the linear model holds for these drifts.
+    pub validity: Validity,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// The conditions of a run with their units.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ConditionsReport {
+    /// How the truth is generated.
+    pub truth: Truth,
+    /// Latitude in degrees.
+    pub latitude_deg: f64,
+    /// Whether the latitude was chosen by the program.
+    pub latitude_by_default: bool,
+    /// Largest step in s.
+    pub step_s: f64,
+    /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
+    pub slew_rate_deg_s: Option<f64>,
+    /// Noise of the observation per sample in g.
+    pub accelerometer_noise_g: f64,
+    /// Random drift with its unit.
+    pub drift_noise: String,
+    /// Its density in deg/sqrt(h) in the shortest and in the longest step of the timeline.
+    pub drift_noise_density_deg_sqrt_h: [f64; 2],
+    /// The step in s for which a bias of one step was given; null for a density.
+    pub drift_noise_step_s: Option<f64>,
+    /// Whether the density is another than with that step, by more than 1 %.
+    pub drift_noise_differs: bool,
+    /// Propagation of the filter.
+    pub propagation: Propagation,
+    /// Factor on true drifts and their priors.
+    pub drift_scale: f64,
+}
+
+/// What a predicted sigma rests on: the information of all samples, without prior and without drift noise.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct MeasurementReport {
+    /// Latitude in degrees.
+    pub latitude_deg: f64,
+    /// Whether the latitude was chosen by the program.
+    pub latitude_by_default: bool,
+    /// Dwell of positions that do not say theirs, in s.
+    pub dwell_s: f64,
+    /// Largest step between samples in s; a position is divided into equal steps.
+    pub step_s: f64,
+    /// Noise of the observation per sample and axis in g.
+    pub accelerometer_noise_g: f64,
+    /// Noise of the azimuth per sample in deg; null where it is not measured.
+    pub azimuth_noise_deg: Option<f64>,
+    /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
+    pub slew_rate_deg_s: Option<f64>,
+}
+
+impl MeasurementReport {
+    /// Of `scheme` under `conditions`.
+    pub fn new(scheme: &Scheme, conditions: &Conditions) -> Self {
+        Self {
+            latitude_deg: latitude_of(scheme).map_or(0.0, |l| l.degrees()),
+            latitude_by_default: scheme.latitude.is_none(),
+            dwell_s: conditions.dwell_s,
+            step_s: conditions.step_s,
+            accelerometer_noise_g: conditions.accelerometer_noise_g,
+            azimuth_noise_deg: scheme.measured_azimuth.then_some(conditions.azimuth_noise_deg),
+            slew_rate_deg_s: conditions.slew_rate_deg_s.filter(|_| conditions.slews),
+        }
+    }
+}
+
+/// A position or slew of the timeline.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TimelineReport {
+    /// The position, or the one a slew goes to.
+    pub position: String,
+    /// Whether it is a slew.
+    pub slew: bool,
+    /// Start in s.
+    pub start_s: f64,
+    /// End in s.
+    pub end_s: f64,
+    /// How a slew turns; null at a position.
+    pub turn: Option<Turn>,
+}
+
+/// The estimate of one unknown or combination at the end of the run.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Estimate {
+    /// The unknown or combination.
+    pub name: String,
+    /// Unit of all its numbers.
+    pub unit: String,
+    /// The exact verdict.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+    /// The accuracy order.
+    pub accuracy_order: Option<usize>,
+    /// The truth.
+    pub truth: f64,
+    /// The estimate.
+    pub estimate: f64,
+    /// Estimate minus truth.
+    pub error: f64,
+    /// What the filter believes of the error.
+    pub sigma: f64,
+    /// Error over sigma.
+    pub error_over_sigma: f64,
+    /// Sigma at the start.
+    pub prior_sigma: f64,
+    /// The sigma to be reached.
+    pub required_sigma: Option<f64>,
+    /// When it was reached first, in s; null for what the samples do not determine.
+    pub time_to_requirement_s: Option<f64>,
+    /// What came out.
+    pub verdict: Outcome,
+    /// On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only.
+    pub prior_of: Vec<String>,
+}
+
+/// What a run says of one unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Sigma is at or below what is required.
+    Reached,
+    /// Sigma fell, but not to what is required, or nothing is.
+    Converging,
+    /// The samples determine it, but sigma is (nearly) that of the prior.
+    RestsOnPrior,
+    /// The samples do not determine it: whatever sigma says, it comes of the prior.
+    PriorOnly,
+    /// The error is beyond four sigma: the filter is wrong about it.
+    Inconsistent,
+    /// The error or sigma is no number.
+    NoNumber,
+}
+
+impl Outcome {
+    /// The outcome for an unknown that samples determine or not, with its sigma at the start and at the end.
+    pub(crate) fn of(
+        determined: bool,
+        error_over_sigma: f64,
+        [prior, sigma]: [f64; 2],
+        required: Option<f64>,
+    ) -> Self {
+        if !(error_over_sigma.is_finite() && sigma.is_finite()) {
+            Self::NoNumber
+        } else if !determined {
+            Self::PriorOnly
+        } else if error_over_sigma.abs() > CREDIBLE {
+            Self::Inconsistent
+        } else if sigma > 0.9 * prior {
+            Self::RestsOnPrior
+        } else if required.is_some_and(|r| meets(sigma, r)) {
+            Self::Reached
+        } else {
+            Self::Converging
+        }
+    }
+
+    /// Why it meets no requirement, whatever sigma is.
+    pub(crate) fn miss(self) -> Option<Miss> {
+        match self {
+            Self::Reached | Self::Converging => None,
+            Self::RestsOnPrior => Some(Miss::RestsOnPrior),
+            Self::PriorOnly => Some(Miss::NotObservable),
+            Self::Inconsistent => Some(Miss::Inconsistent),
+            Self::NoNumber => Some(Miss::NoNumber),
+        }
+    }
+}
+
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Reached => "reached",
+            Self::Converging => "converging",
+            Self::RestsOnPrior => "rests on the prior",
+            Self::PriorOnly => "known from the prior only",
+            Self::Inconsistent => "inconsistent",
+            Self::NoNumber => "no number",
+        })
+    }
+}
+
+/// Whether the small-angle model holds for the drifts of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Validity {
+    /// Largest `|psi|`, in deg.
+    pub largest_psi_deg: f64,
+    /// Largest `|psi|^2/2`, in g: what the observation model (6) leaves out.
+    pub neglected_g: f64,
+    /// Noise of the observation, in g.
+    pub accelerometer_noise_g: f64,
+    /// Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: what the drift model (3) leaves out.
+    pub neglected_dph: f64,
+    /// The smallest sigma required of a drift coefficient, in deg/h (per g).
+    pub smallest_requirement_dph: Option<f64>,
+    /// Whether both are small.
+    pub holds: bool,
+}

@@ -1,0 +1,257 @@
+//! The conditions of a run: noise, steps, true values, priors. All in the units of the report.
+
+use std::collections::BTreeMap;
+
+use obsdeg_core::model::ranges::{self, Range};
+use obsdeg_core::model::settings::{
+    Assignment, DriftNoise, Propagation, Settings, Truth, concerns, is_family, known,
+};
+use obsdeg_core::model::{Latitude, Platform, Position, Scheme};
+
+use super::SimulationError;
+
+/// Everything that a run needs besides the scheme.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditions {
+    /// How the truth is generated.
+    pub truth: Truth,
+    /// Largest step, in s; a position is divided into equal steps.
+    pub step_s: f64,
+    /// Dwell of positions that do not say theirs, in s.
+    pub dwell_s: f64,
+    /// Rate of the rotations between positions in deg/s; `None`: instantaneous, unless the position says otherwise.
+    pub slew_rate_deg_s: Option<f64>,
+    /// False: every position is reached at once, whatever it says.
+    pub slews: bool,
+    /// White noise of the observation per sample and axis, in g.
+    pub accelerometer_noise_g: f64,
+    /// Noise of a measured azimuth per sample, in deg.
+    pub azimuth_noise_deg: f64,
+    /// Random drift.
+    pub drift_noise: DriftNoise,
+    /// The step in s for which it was given: a bias of one step has another density with other steps.
+    pub drift_noise_step_s: f64,
+    /// How the filter is propagated.
+    pub propagation: Propagation,
+    /// True values, later ones override.
+    pub values: Vec<Assignment>,
+    /// Factor on the true drift coefficients and their priors.
+    pub drift_scale: f64,
+    /// Initial estimates.
+    pub estimates: Vec<Assignment>,
+    /// Initial standard deviations.
+    pub priors: Vec<Assignment>,
+    /// The largest standard deviations allowed.
+    pub requirements: Vec<Assignment>,
+}
+
+/// The latitude of a scheme that names none, in degrees (the paper's is not given).
+pub const DEFAULT_LATITUDE: &str = "28.2";
+
+fn assign(name: &str, value: f64) -> Assignment {
+    Assignment { name: name.into(), value }
+}
+
+impl Default for Conditions {
+    /// The paper's run; what it does not give (prior, latitude, requirements) is chosen here.
+    fn default() -> Self {
+        let first_order = |value| ["D_I", "D_O", "D_S"].map(|name| assign(name, value));
+        let drift = [("D_FX", 11.0), ("D_FY", 12.0), ("D_FZ", 13.0)].map(|(n, v)| assign(n, v));
+        let values = [assign("D", 0.5), assign("psi", 0.1), assign("eps", 10.0)].into_iter();
+        let priors = [assign("D", 1.0), assign("psi", 0.1), assign("eps", 20.0), assign("D_F", 20.0)];
+        Self {
+            truth: Truth::Linear,
+            step_s: 10.0,
+            dwell_s: 1000.0,
+            slew_rate_deg_s: None,
+            slews: true,
+            accelerometer_noise_g: 1e-5,
+            azimuth_noise_deg: 0.001,
+            drift_noise: DriftNoise::OneStep(0.01),
+            drift_noise_step_s: 10.0,
+            propagation: Propagation::Exponential,
+            values: values.chain(first_order(5.0)).chain(drift).collect(),
+            drift_scale: 1.0,
+            estimates: Vec::new(),
+            priors: priors.into_iter().chain(first_order(10.0)).collect(),
+            requirements: vec![assign("D", 0.1), assign("eps", 0.1), assign("psi", 0.01)],
+        }
+    }
+}
+
+/// Families before single unknowns, so that these are what they say in whatever order they are given; of equal names the last counts.
+pub fn general_first(mut given: Vec<Assignment>) -> Vec<Assignment> {
+    given.sort_by_key(|a| a.name.len());
+    given
+}
+
+fn by_family(given: &BTreeMap<String, f64>) -> Vec<Assignment> {
+    general_first(given.iter().map(|(n, v)| assign(n, *v)).collect())
+}
+
+impl Conditions {
+    /// Overrides what `settings` gives.
+    pub fn apply(&mut self, settings: &Settings) {
+        fn set<T: Copy>(slot: &mut T, value: Option<T>) {
+            if let Some(value) = value {
+                *slot = value;
+            }
+        }
+        set(&mut self.truth, settings.truth);
+        set(&mut self.step_s, settings.step_s);
+        set(&mut self.dwell_s, settings.dwell_s);
+        set(&mut self.accelerometer_noise_g, settings.accelerometer_noise_g);
+        set(&mut self.azimuth_noise_deg, settings.azimuth_noise_deg);
+        if let Some(noise) = settings.drift_noise {
+            self.drift_noise = noise;
+            self.drift_noise_step_s = self.step_s;
+        }
+        set(&mut self.propagation, settings.propagation);
+        set(&mut self.drift_scale, settings.drift_scale);
+        self.slew_rate_deg_s = settings.slew_rate_deg_s.or(self.slew_rate_deg_s);
+        for (list, given) in [
+            (&mut self.values, &settings.values),
+            (&mut self.estimates, &settings.estimates),
+            (&mut self.priors, &settings.priors),
+        ] {
+            list.extend(by_family(given));
+        }
+    }
+
+    /// The conditions of a scheme: the paper's, with what the scheme gives.
+    pub fn of(scheme: &Scheme) -> Self {
+        let mut out = Self::default();
+        out.apply(&scheme.simulation);
+        out.requirements.extend(by_family(&scheme.requirements));
+        out
+    }
+
+    /// Whether the requirements are those of the program: neither file nor option states one.
+    pub fn requires_by_default(&self) -> bool {
+        self.requirements == Self::default().requirements
+    }
+
+    /// The rate in deg/s at which a position is reached; `None`: at once.
+    pub fn slew_rate(&self, position: &Position) -> Option<f64> {
+        let own = position.slew.as_ref().and_then(|s| s.rate_deg_s);
+        own.or(self.slew_rate_deg_s).filter(|_| self.slews)
+    }
+
+    /// Checks what the types do not: every number is in its range.
+    ///
+    /// # Errors
+    /// [`SimulationError::Range`] naming the offender.
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        let single = [
+            ("step_s", self.step_s, ranges::STEP_S),
+            ("dwell_s", self.dwell_s, ranges::DWELL_S),
+            ("slew_rate_deg_s", self.slew_rate_deg_s.unwrap_or(1.0), ranges::SLEW_RATE_DEG_S),
+            ("accelerometer_noise_g", self.accelerometer_noise_g, ranges::NOISE_G),
+            ("azimuth_noise_deg", self.azimuth_noise_deg, ranges::AZIMUTH_NOISE_DEG),
+            ("drift_scale", self.drift_scale, ranges::DRIFT_SCALE),
+        ];
+        for (what, x, range) in single {
+            range.check(what, x)?;
+        }
+        self.drift_noise.check("drift_noise")?;
+        for (what, list, range) in self.lists() {
+            for a in list {
+                range.check(format!("the {what} of {}", a.name), a.value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Every list of assignments, in words, with the range of its numbers.
+    fn lists(&self) -> [(&'static str, &[Assignment], Range); 4] {
+        [
+            (TRUE_VALUE, &self.values, ranges::VALUE),
+            (ESTIMATE, &self.estimates, ranges::VALUE),
+            (PRIOR, &self.priors, ranges::PRIOR),
+            (REQUIRED, &self.requirements, ranges::REQUIREMENT),
+        ]
+    }
+
+    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or other positions.
+    pub(crate) fn within(&self, platform: &Platform) -> Self {
+        let kept = |list: &[Assignment]| -> Vec<Assignment> {
+            let has = |a: &&Assignment| {
+                is_family(&a.name) || platform.names().iter().any(|name| concerns(&a.name, name))
+            };
+            list.iter().filter(has).cloned().collect()
+        };
+        Self {
+            values: kept(&self.values),
+            estimates: kept(&self.estimates),
+            priors: kept(&self.priors),
+            requirements: kept(&self.requirements),
+            ..self.clone()
+        }
+    }
+
+    /// Checks that every assignment concerns an unknown of `platform`, or a family that a gyro model may have.
+    ///
+    /// # Errors
+    /// [`SimulationError::UnknownName`].
+    pub fn concern(&self, platform: &Platform) -> Result<(), SimulationError> {
+        self.lists()
+            .into_iter()
+            .try_for_each(|(what, list, _)| resolve(what, platform, list, 0.0).map(|_| ()))
+    }
+}
+
+/// A true value in words.
+pub const TRUE_VALUE: &str = "true value";
+/// An initial estimate in words.
+pub const ESTIMATE: &str = "initial estimate";
+/// A prior standard deviation in words.
+pub const PRIOR: &str = "prior sigma";
+/// A requirement in words.
+pub const REQUIRED: &str = "required sigma";
+
+/// The latitude of a scheme, or the default.
+pub fn latitude_of(scheme: &Scheme) -> Option<Latitude> {
+    scheme.latitude.or_else(|| DEFAULT_LATITUDE.parse().ok())
+}
+
+/// One number per unknown of `platform`, in the unit of the unknown (psi in deg): `default` where nothing is
+/// assigned.
+///
+/// # Errors
+/// [`SimulationError::UnknownName`] for an assignment that concerns nothing; a family that the scheme does not have is
+/// accepted when the gyro model has it.
+pub fn resolve(
+    what: &'static str,
+    platform: &Platform,
+    assignments: &[Assignment],
+    default: f64,
+) -> Result<Vec<f64>, SimulationError> {
+    let mut out = vec![default; platform.names().len()];
+    for a in assignments {
+        let mut found = is_family(&a.name);
+        for (slot, name) in out.iter_mut().zip(platform.names()) {
+            if concerns(&a.name, name) {
+                *slot = a.value;
+                found = true;
+            }
+        }
+        if !found {
+            return Err(SimulationError::UnknownName {
+                what,
+                found: a.name.clone(),
+                known: known(platform, &a.name),
+            });
+        }
+    }
+    Ok(out)
+}
+
+/// The unit in which an unknown is given and reported: degrees for psi.
+pub fn shown_unit(unit: &str) -> &str {
+    if unit == "rad" { "deg" } else { unit }
+}
+
+/// SI units per shown unit of an unknown: rad per deg, rad/s per deg/h.
+pub fn si_per_shown(unit: &str) -> f64 {
+    if unit == "rad" { 1f64.to_radians() } else { 1f64.to_radians() / 3600.0 }
+}

@@ -1,0 +1,322 @@
+//! A torquing scheme run through the filter: one run against one truth, and what it says.
+
+pub mod answer;
+pub mod batch;
+pub mod conditions;
+pub mod consistency;
+pub mod plan;
+pub mod record;
+mod seen;
+pub mod truth;
+
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::{Carry, Scheme, SchemeError};
+use obsdeg_ekf::EkfError;
+
+pub use answer::{Simulation, Validity};
+pub use conditions::Conditions;
+pub use plan::Plan;
+pub use record::{Record, Start, Traces, run};
+pub use seen::{no_prior, predict, predict_run};
+
+use crate::prediction::{Prediction, PredictionError};
+use crate::requirements::{Basis, Claim, Requirements, meets};
+use answer::{ConditionsReport, Estimate, Outcome, SCHEMA, TimelineReport};
+use conditions::{resolve, shown_unit, si_per_shown};
+use consistency::{Consistency, Outcomes};
+use plan::Kind;
+
+/// Why a scheme cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// A generic angle has no number.
+    #[error("the angle `{name}` is generic; expected numbers for a simulation")]
+    GenericAngle {
+        /// Its name.
+        name: String,
+    },
+    /// Slews carry psi^n.
+    #[error(
+        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or no slew rate)"
+    )]
+    SlewCarry {
+        /// The carry found.
+        carry: Carry,
+    },
+    /// The turn of a slew ends elsewhere.
+    #[error(
+        "the slew to `{name}` does not lead there: expected an axis and angle that turn the position before into it"
+    )]
+    SlewMisses {
+        /// The position.
+        name: String,
+    },
+    /// A filter that does not know of a position knows of no slew to it.
+    #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
+    DroppedSlew,
+    /// The only position cannot be dropped.
+    #[error("the only position cannot be dropped; expected a scheme of at least two positions")]
+    DroppedOnly,
+    /// Whoever asked wanted no more.
+    #[error("interrupted before the runs were done")]
+    Interrupted,
+    /// The accuracy orders of a rotation are not known.
+    #[error("the cross-check takes positions; found a rotating segment")]
+    CrosscheckRotation,
+    /// The exact truth turns an attitude by coefficients.
+    #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
+    ExactDrift,
+    /// Too many unknowns for a full covariance.
+    #[error("{found} unknowns; expected at most {} for a simulation", plan::MAX_UNKNOWNS)]
+    TooManyUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
+    /// Too many unknowns under a carry that is looked at for comparison.
+    #[error(
+        "{found} unknowns under reset carry, which is compared too; expected at most {}",
+        plan::MAX_UNKNOWNS
+    )]
+    ComparedUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
+    /// Too many steps.
+    #[error("{found} {what}; expected at most {most} (take longer steps)")]
+    TooManySteps {
+        /// Their number.
+        found: String,
+        /// What is counted.
+        what: &'static str,
+        /// The most.
+        most: usize,
+    },
+    /// Numbers that are admitted, but that doubles cannot tell apart.
+    #[error("not resolvable in double precision: {what}")]
+    Unresolvable {
+        /// What is not.
+        what: String,
+    },
+    /// A condition beyond its range.
+    #[error(transparent)]
+    Range(#[from] obsdeg_core::model::ranges::RangeError),
+    /// A value for something that the scheme does not have.
+    #[error("{what} for `{found}`: no such unknown; {known}")]
+    UnknownName {
+        /// Which list.
+        what: &'static str,
+        /// The name found.
+        found: String,
+        /// What was expected.
+        known: String,
+    },
+    /// The scheme itself.
+    #[error(transparent)]
+    Scheme(#[from] SchemeError),
+    /// No exact verdicts.
+    #[error(transparent)]
+    Prediction(#[from] PredictionError),
+    /// The filter refuses a number.
+    #[error(transparent)]
+    Filter(#[from] EkfError),
+}
+
+impl SimulationError {
+    /// Whether admitted numbers went beyond what doubles resolve.
+    pub fn is_numeric(&self) -> bool {
+        match self {
+            Self::Unresolvable { .. } => true,
+            Self::Filter(e) => e.is_numeric(),
+            _ => false,
+        }
+    }
+}
+
+/// Simulates `scheme` once: the summary and the time series.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn simulate(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<(Simulation, Record), SimulationError> {
+    let plan = Plan::new(scheme, conditions)?;
+    let start = Start::new(&plan, conditions)?;
+    let prediction = predict_run(&plan, &start.sigma, seed)?;
+    let record = run(&plan, conditions, &start, &prediction, seed)?;
+    let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
+    Ok((summary, record))
+}
+
+fn summary(
+    scheme: &Scheme,
+    plan: &Plan,
+    conditions: &Conditions,
+    prediction: &Prediction,
+    record: &Record,
+    seed: u64,
+) -> Result<Simulation, SimulationError> {
+    let n = plan.unknowns();
+    let (names, units) = (plan.platform.names(), plan.platform.units());
+    let requirements = resolve("required sigma", &plan.platform, &conditions.requirements, f64::NAN)?;
+    let required = |c: usize| Some(requirements[c]).filter(|r| !r.is_nan());
+    let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
+        let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
+        estimate(&names[c], units[c], verdict, c, record, required(c))
+    });
+    let mut quantities: Vec<Estimate> = unknowns.collect();
+    for (q, u) in
+        quantities.iter_mut().zip(&prediction.unknowns).filter(|(q, _)| q.verdict == Outcome::PriorOnly)
+    {
+        let unseen = u.partners.iter().filter(|&&p| !prediction.unknowns[p].determined_at_end);
+        q.prior_of = unseen.map(|&p| names[p].clone()).collect();
+    }
+    let combinations = prediction.combinations.iter().enumerate().map(|(i, c)| {
+        let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
+        let lead = c.terms[0].0;
+        estimate(&c.expression, units[lead], verdict, n + i, record, required(lead))
+    });
+    let combinations: Vec<Estimate> = combinations.collect();
+    let last = |v: &[f64]| v.last().copied().unwrap_or(f64::NAN);
+    let consistency = Consistency::of(Outcomes {
+        whitened: &record.whitened,
+        outputs: plan.components.len(),
+        error: record.traces.series[..n].iter().map(|s| last(&s.estimate) - last(&s.truth)).collect(),
+        covariance: &record.last_covariance,
+        normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
+    })?;
+    let validity = validity(plan, conditions, record, &requirements);
+    Ok(Simulation {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        carry: scheme.carry,
+        conditions: conditions_report(scheme, plan, conditions),
+        timeline: timeline_report(plan),
+        requirements: Requirements::of(
+            Basis::Run,
+            quantities.iter().map(|q| Claim {
+                name: &q.name,
+                required: q.required_sigma,
+                sigma: q.verdict.miss().map_or(Ok(q.sigma), Err),
+            }),
+            conditions.requires_by_default(),
+        ),
+        quantities,
+        combinations,
+        consistency,
+        validity,
+        seed,
+    })
+}
+
+/// The conditions as they are reported.
+pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
+    let noise = conditions.drift_noise;
+    let given = matches!(noise, DriftNoise::OneStep(_)).then_some(conditions.drift_noise_step_s);
+    // a slew takes as many steps as a position would
+    let steps = plan.segments.iter().map(|s| match s.kind {
+        Kind::Slew(_) => s.dt.min(conditions.step_s),
+        _ => s.dt,
+    });
+    let (shortest, longest) = steps.fold((f64::MAX, 0.0f64), |(l, h), dt| (l.min(dt), h.max(dt)));
+    let density = [shortest, longest].map(|dt| noise.density_deg_sqrt_h(dt));
+    let differs = |step: f64| density.iter().any(|d| (d / noise.density_deg_sqrt_h(step) - 1.0).abs() > 0.01);
+    ConditionsReport {
+        truth: conditions.truth,
+        latitude_deg: plan.platform.scheme().latitude.map_or(0.0, |l| l.degrees()),
+        latitude_by_default: scheme.latitude.is_none(),
+        step_s: conditions.step_s,
+        slew_rate_deg_s: conditions.slew_rate_deg_s,
+        accelerometer_noise_g: conditions.accelerometer_noise_g,
+        drift_noise: noise.to_string(),
+        drift_noise_density_deg_sqrt_h: density,
+        drift_noise_step_s: given,
+        drift_noise_differs: given.is_some_and(differs),
+        propagation: conditions.propagation,
+        drift_scale: conditions.drift_scale,
+    }
+}
+
+/// The timeline as it is reported.
+pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
+    let positions = &plan.platform.scheme().positions;
+    let mut out: Vec<TimelineReport> = Vec::new();
+    for s in &plan.segments {
+        let (slew, end_s) = (matches!(s.kind, Kind::Slew(_)), s.start_s + s.dt * s.steps as f64);
+        let position = &positions[s.position].name;
+        match out.last_mut() {
+            // a rotation is one segment per step
+            Some(last) if last.position == *position && last.slew == slew => last.end_s = end_s,
+            _ => {
+                let turn = if let Kind::Slew(slew) = &s.kind { Some(slew.turn()) } else { None };
+                out.push(TimelineReport {
+                    position: position.clone(),
+                    slew,
+                    start_s: s.start_s,
+                    end_s,
+                    turn,
+                });
+            }
+        }
+    }
+    out
+}
+
+/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it.
+fn estimate(
+    name: &str,
+    unit: &str,
+    verdict: (Status, Option<usize>, Option<usize>, bool),
+    i: usize,
+    record: &Record,
+    required_sigma: Option<f64>,
+) -> Estimate {
+    let (status, degree, accuracy_order, determined) = verdict;
+    let (series, scale) = (&record.traces.series[i], si_per_shown(unit));
+    let last = |v: &[f64]| v.last().map_or(f64::NAN, |x| x / scale);
+    let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
+    let prior_sigma = series.sigma[0] / scale;
+    let error = estimate - truth;
+    let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
+    let reached = required_sigma.and_then(|r| series.sigma.iter().position(|s| meets(s / scale, r)));
+    Estimate {
+        name: name.into(),
+        unit: shown_unit(unit).into(),
+        status,
+        degree,
+        accuracy_order,
+        truth,
+        estimate,
+        error,
+        sigma,
+        error_over_sigma,
+        prior_sigma,
+        required_sigma,
+        time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
+        verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], required_sigma),
+        prior_of: Vec::new(),
+    }
+}
+
+/// The validity of the small-angle model, by the figures that decide it.
+pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, requirements: &[f64]) -> Validity {
+    let psi = record.largest_psi;
+    let dph = si_per_shown("deg/h");
+    let sensitive =
+        plan.platform.units().iter().zip(&record.traces.series).filter(|(unit, _)| unit.contains("/g"));
+    let coefficient = sensitive.map(|(_, s)| s.truth[0].abs()).fold(0.0, f64::max) / dph;
+    let smallest =
+        plan.platform.units().iter().zip(requirements).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
+    let smallest = smallest.map(|(_, t)| *t).reduce(f64::min);
+    let (neglected_g, neglected_dph) = (psi * psi / 2.0, coefficient * psi);
+    Validity {
+        largest_psi_deg: psi.to_degrees(),
+        neglected_g,
+        accelerometer_noise_g: conditions.accelerometer_noise_g,
+        neglected_dph,
+        smallest_requirement_dph: smallest,
+        holds: neglected_g <= conditions.accelerometer_noise_g && smallest.is_none_or(|t| neglected_dph <= t),
+    }
+}

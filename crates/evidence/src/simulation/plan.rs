@@ -1,0 +1,502 @@
+//! A scheme in numbers: the timeline of positions and slews, and the linear model of each as filter stages.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::attitude::Matrix3;
+use obsdeg_core::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
+use obsdeg_core::model::ring::Float;
+use obsdeg_core::model::scheme::Station;
+use obsdeg_core::model::settings::Propagation;
+use obsdeg_core::model::slew::Turn;
+use obsdeg_core::model::slew::W_IE;
+use obsdeg_core::model::slew::{Slew, times, transpose};
+use obsdeg_core::model::{Carry, Platform, Scheme, Unknowns};
+use obsdeg_ekf::integrate::{runge_kutta, van_loan};
+use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
+
+use super::SimulationError;
+use super::conditions::{Conditions, latitude_of};
+
+/// Most unknowns of a run: the covariance is a full matrix.
+pub const MAX_UNKNOWNS: usize = 300;
+/// Most steps of a run.
+pub const MAX_STEPS: usize = 1_000_000;
+/// Most steps of rotating segments: each has a model of its own.
+pub const MAX_TURNING_STEPS: usize = 100_000;
+/// Most numbers of a series: steps times unknowns.
+pub const MAX_NUMBERS: usize = 20_000_000;
+/// Most integration steps, of slews and rotations or of a true attitude.
+pub const MAX_INTEGRATION: usize = 2_000_000;
+/// Largest turn of one integration step, in rad.
+const MAX_TURN: f64 = 0.02;
+
+/// A count that has been found in floating point, so that nothing overflows.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`] above `most`, and for what is no number.
+fn counted(what: &'static str, found: f64, most: usize) -> Result<usize, SimulationError> {
+    if found <= most as f64 {
+        return Ok(found as usize);
+    }
+    let found = if found < 1e9 { format!("{found:.0}") } else { format!("{found:.3e}") };
+    Err(SimulationError::TooManySteps { found, what, most })
+}
+
+/// The equal steps of at most `step_s` that a dwell is divided into.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`].
+pub fn steps(dwell_s: f64, step_s: f64) -> Result<usize, SimulationError> {
+    // a hair less, so that 1000 s in steps of 10 s are 100
+    counted("steps", (dwell_s / step_s - 1e-9).ceil().max(1.0), MAX_STEPS)
+}
+
+/// Integration steps for a turn of so many rad.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`].
+pub(super) fn integration_steps(turn: f64) -> Result<usize, SimulationError> {
+    counted("integration steps", (turn / MAX_TURN).ceil().max(1.0), MAX_INTEGRATION)
+}
+
+/// What a part of the timeline is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// A position, tracked; Z is sampled at the end of every step.
+    Dwell,
+    /// A turn to the position; Z is not used.
+    Slew(Slew),
+    /// A step of a rotating segment; Z is sampled at its end.
+    Rotation(Slew),
+}
+
+/// A part of the timeline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segment {
+    /// The position: where it is spent, or where the slew goes.
+    pub position: usize,
+    /// Position or slew.
+    pub kind: Kind,
+    /// Start in s.
+    pub start_s: f64,
+    /// Number of steps.
+    pub steps: usize,
+    /// Length of a step in s.
+    pub dt: f64,
+}
+
+/// A scheme and its conditions in SI units, ready to be run.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The platform.
+    pub platform: Platform,
+    /// Rates and attitudes.
+    pub point: Point<Float>,
+    /// `C_c^n` at the start of every position.
+    pub attitudes: Vec<Matrix3<f64>>,
+    /// `C_c^n` at the end of every position.
+    pub ends: Vec<Matrix3<f64>>,
+    /// `S_i` at the start of every position.
+    pub blocks: Vec<Block<f64>>,
+    /// Positions and slews in order.
+    pub segments: Vec<Segment>,
+    /// The filter's model of every segment.
+    pub stages: Vec<Stage>,
+    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad).
+    pub noise_roots: Vec<Matrix3<f64>>,
+    /// Components of Z that are used (1, 3, and 2 for a measured azimuth).
+    pub components: Vec<usize>,
+}
+
+impl Plan {
+    /// The plan of `scheme`; a scheme without latitude is put at the default.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for what cannot be run: generic angles, slews without inertial carry, too many unknowns
+    /// or steps, conditions that are not positive.
+    pub fn new(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
+        conditions.validate()?;
+        Self::derived(scheme, conditions)
+    }
+
+    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond what is admitted.
+    ///
+    /// # Errors
+    /// [`SimulationError`], as [`Self::new`].
+    pub fn derived(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
+        let scheme = Scheme { latitude: latitude_of(scheme), ..scheme.clone() };
+        if let Some(name) = scheme.generic_names().first() {
+            return Err(SimulationError::GenericAngle { name: name.clone() });
+        }
+        let rates = scheme.positions.iter().skip(1).map(|p| conditions.slew_rate(p));
+        if scheme.carry != Carry::Inertial && rates.flatten().next().is_some() {
+            return Err(SimulationError::SlewCarry { carry: scheme.carry });
+        }
+        let platform = Platform::new(scheme.clone())?;
+        conditions.concern(&platform)?;
+        let n = platform.names().len();
+        if n > MAX_UNKNOWNS {
+            return Err(SimulationError::TooManyUnknowns { found: n });
+        }
+        let point = point_of(&scheme);
+        let stations = scheme.stations();
+        // the attitude at the first station of every position, and at the last
+        let bounds: Vec<(usize, usize)> = (0..scheme.positions.len())
+            .filter_map(|p| {
+                let of = |s: &Station<'_>| s.index == p;
+                Some((stations.iter().position(of)?, stations.iter().rposition(of)?))
+            })
+            .collect();
+        let attitudes: Vec<_> = bounds.iter().map(|b| point.attitudes[b.0]).collect();
+        let ends: Vec<_> = bounds.iter().map(|b| point.attitudes[b.1]).collect();
+        let segments = timeline(&scheme, conditions, n, &attitudes, &ends)?;
+        let mut blocks: Vec<Option<Block<f64>>> = platform.blocks(&point).into_iter().map(Some).collect();
+        let blocks: Vec<_> = bounds.iter().filter_map(|b| blocks[b.0].take()).collect();
+        let outputs = local_output(&Float, scheme.measured_azimuth);
+        let components = outputs.iter().map(|(c, _)| *c).collect();
+        let mut plan = Self {
+            platform,
+            point,
+            attitudes,
+            ends,
+            blocks,
+            segments,
+            stages: Vec::new(),
+            noise_roots: Vec::new(),
+            components,
+        };
+        for i in 0..plan.segments.len() {
+            let (stage, root) = plan.stage(i, conditions)?;
+            plan.stages.push(stage);
+            plan.noise_roots.push(root);
+        }
+        Ok(plan)
+    }
+
+    /// The number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.platform.names().len()
+    }
+
+    /// The total time in s.
+    pub fn duration_s(&self) -> f64 {
+        self.segments.last().map_or(0.0, |s| s.start_s + s.dt * s.steps as f64)
+    }
+
+    /// The slews: the position that each leads to, and how it turns.
+    pub fn slews(&self) -> impl Iterator<Item = (usize, Turn)> {
+        self.segments.iter().filter_map(|s| match &s.kind {
+            Kind::Slew(slew) => Some((s.position, slew.turn())),
+            Kind::Dwell | Kind::Rotation(_) => None,
+        })
+    }
+
+    /// The psi states of a segment: the first three columns of its block.
+    pub fn psi_columns(&self, segment: usize) -> &[usize] {
+        &self.blocks[self.segments[segment].position].columns[..3]
+    }
+
+    /// `psi^n` of the unknowns `x` at a segment's position (during a slew: psi^n is carried).
+    pub fn psi_n(&self, segment: usize, x: &[f64]) -> [f64; 3] {
+        let block = &self.blocks[self.segments[segment].position];
+        std::array::from_fn(|r| (0..3).map(|k| block.rows[r][k] * x[block.columns[k]]).sum())
+    }
+
+    /// The standard deviation of a component of Z (1, 3: g; 2: the azimuth in rad).
+    pub fn output_sigma(component: usize, conditions: &Conditions) -> f64 {
+        if component == 2 {
+            conditions.azimuth_noise_deg.to_radians()
+        } else {
+            conditions.accelerometer_noise_g
+        }
+    }
+
+    /// The rows of Z at a position (one per component), as functionals of the unknowns.
+    pub fn output_rows(&self, position: usize) -> Vec<Vec<(usize, f64)>> {
+        let block = &self.blocks[position];
+        local_output(&Float, self.components.contains(&2))
+            .iter()
+            .map(|(_, local)| {
+                let entry = |k: usize| (0..LOCAL).map(|r| local[r] * block.rows[r][k]).sum::<f64>();
+                let entries = block.columns.iter().enumerate().map(|(k, &c)| (c, entry(k)));
+                entries.filter(|(_, x)| *x != 0.0).collect()
+            })
+            .collect()
+    }
+
+    fn stage(
+        &self,
+        segment: usize,
+        conditions: &Conditions,
+    ) -> Result<(Stage, Matrix3<f64>), SimulationError> {
+        let s = &self.segments[segment];
+        let held = conditions.drift_noise.held_rad_s(s.dt);
+        let block = &self.blocks[s.position];
+        let n = self.unknowns();
+        let process = PlatformProcess { plan: self, segment };
+        let (phi, q) = match &s.kind {
+            Kind::Dwell => {
+                let phi = match conditions.propagation {
+                    Propagation::Exponential => self.exponential(block, s.dt)?,
+                    Propagation::Rk4 => {
+                        runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi
+                    }
+                };
+                (phi, self.held_noise(block, s.dt, held))
+            }
+            Kind::Rotation(_) => {
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
+                (phi, self.held_noise(block, s.dt, held))
+            }
+            Kind::Slew(_) => {
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
+                // the noise of a slew: that of as many steps as it would have
+                let dt = conditions.step_s.min(s.dt);
+                let held = conditions.drift_noise.held_rad_s(dt);
+                let q = self.held_noise(block, dt, held).map(|row| row.map(|x| x * s.dt / dt));
+                (phi, q)
+            }
+        };
+        let columns = &block.columns[..3];
+        let mut full = DMatrix::zeros(n, n);
+        for (i, &r) in columns.iter().enumerate() {
+            for (j, &c) in columns.iter().enumerate() {
+                full[(r, c)] = q[i][j];
+            }
+        }
+        let outputs = match s.kind {
+            Kind::Slew(_) => Vec::new(),
+            Kind::Dwell | Kind::Rotation(_) => self
+                .output_rows(s.position)
+                .into_iter()
+                .zip(&self.components)
+                .map(|(h, &c)| ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) })
+                .collect(),
+        };
+        let stage = Stage {
+            transition: Transition::new(&phi)?,
+            noise: ProcessNoise::new(&full)?,
+            outputs,
+            steps: s.steps,
+        };
+        Ok((stage, cholesky(&q)))
+    }
+
+    /// Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by `S_i`.
+    fn exponential(&self, block: &Block<f64>, dt: f64) -> Result<DMatrix<f64>, SimulationError> {
+        let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
+        let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
+        let (local, _) = van_loan(&f, &DMatrix::zeros(LOCAL, LOCAL), dt)?;
+        let n = self.unknowns();
+        let mut phi = DMatrix::identity(n, n);
+        // psi+ = P^T (A P psi + B E D); in local unknowns (drift alone) P = 1
+        for (i, &row) in block.columns[..3].iter().enumerate() {
+            for (k, &column) in block.columns.iter().enumerate() {
+                phi[(row, column)] = (0..3)
+                    .map(|r| {
+                        let to_n = block.rows[r][i];
+                        to_n * (0..LOCAL).map(|l| local[(r, l)] * block.rows[l][k]).sum::<f64>()
+                    })
+                    .sum();
+            }
+        }
+        Ok(phi)
+    }
+
+    /// The covariance on psi of a drift of standard deviation `held` (rad/s) held over `dt`.
+    fn held_noise(&self, block: &Block<f64>, dt: f64, held: f64) -> Matrix3<f64> {
+        // B = integral of exp(W t) = 1 dt + (1 - cos x)/x^2 W dt^2 + (x - sin x)/x^3 W^2 dt^3 with x = w dt
+        let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
+        let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j] * dt));
+        let x = W_IE * dt;
+        let half = (x / 2.0).sin() / (x / 2.0);
+        let (first, second) = (
+            0.5 * half * half,
+            if x < 0.1 { 1.0 / 6.0 - x * x / 120.0 + x.powi(4) / 5040.0 } else { (x - x.sin()) / x.powi(3) },
+        );
+        let w2 = times(&w, &w);
+        let b: Matrix3<f64> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| (f64::from(u8::from(i == j)) + first * w[i][j] + second * w2[i][j]) * dt)
+        });
+        let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
+        let to_psi = times(&transpose(&p), &b);
+        times(&to_psi, &transpose(&to_psi)).map(|row| row.map(|x| x * held * held))
+    }
+}
+
+/// Rates and attitudes of a scheme with a latitude and without generic angles.
+fn point_of(scheme: &Scheme) -> Point<Float> {
+    let (c, s) =
+        scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
+    let attitudes =
+        scheme.stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
+    Point { ring: Float, w_n: W_IE * c, w_u: W_IE * s, attitudes }
+}
+
+/// The positions and slews in order; what there would be too much of is refused before it is made.
+fn timeline(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    unknowns: usize,
+    attitudes: &[Matrix3<f64>],
+    ends: &[Matrix3<f64>],
+) -> Result<Vec<Segment>, SimulationError> {
+    let mut segments: Vec<Segment> = Vec::new();
+    let mut start_s = 0.0;
+    let mut push = |position, kind, duration: f64, steps: usize| {
+        let dt = duration / steps as f64;
+        segments.push(Segment { position, kind, start_s, steps, dt });
+        start_s += duration;
+    };
+    let (mut all, mut turning, mut integration) = (0.0, 0.0, 0.0);
+    for (position, p) in scheme.positions.iter().enumerate() {
+        if let (Some(rate), true) = (conditions.slew_rate(p), position > 0) {
+            let how = p.slew.clone().unwrap_or_default();
+            let slew = Slew::to(&ends[position - 1], &attitudes[position], &how, rate.to_radians());
+            let name = || p.name.clone();
+            if let Some(slew) = slew.map_err(|_| SimulationError::SlewMisses { name: name() })? {
+                let duration = slew.duration_s;
+                all += 1.0;
+                integration += slew.turned(duration) / MAX_TURN;
+                counted("integration steps", integration, MAX_INTEGRATION)?;
+                push(position, Kind::Slew(slew), duration, 1);
+            }
+        }
+        let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
+        let steps = steps(dwell, conditions.step_s)?;
+        all += steps as f64;
+        counted("steps", all, MAX_STEPS)?;
+        counted("steps times unknowns", all * unknowns as f64, MAX_NUMBERS)?;
+        match p.rotation.as_ref() {
+            None => push(position, Kind::Dwell, dwell, steps),
+            Some(r) => {
+                let dt = dwell / steps as f64;
+                let whole = Slew::about(&attitudes[position], r, dwell);
+                turning += steps as f64;
+                integration += whole.turned(dwell) / MAX_TURN;
+                counted("steps of rotating segments", turning, MAX_TURNING_STEPS)?;
+                counted("integration steps", integration, MAX_INTEGRATION)?;
+                for k in 0..steps {
+                    let from = whole.at(k as f64 * dt);
+                    push(position, Kind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }), dt, 1);
+                }
+            }
+        }
+    }
+    Ok(segments)
+}
+
+/// The lower triangular root of a covariance, zero in directions without noise.
+fn cholesky(q: &Matrix3<f64>) -> Matrix3<f64> {
+    let mut l = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..=i {
+            let sum: f64 = q[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            l[i][j] = match (i == j, l[j][j]) {
+                (true, _) => sum.max(0.0).sqrt(),
+                (false, d) if d > 0.0 => sum / d,
+                _ => 0.0,
+            };
+        }
+    }
+    l
+}
+
+/// The linear model of one segment as a process: `psi' = psi x omega + eps` in the axes of the unknowns.
+pub struct PlatformProcess<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// The segment, whose time starts at 0.
+    pub segment: usize,
+}
+
+impl PlatformProcess<'_> {
+    /// The rows of `psi'` in the axes of psi (3 x n).
+    fn rows(&self, t: f64) -> [Vec<f64>; 3] {
+        let plan = self.plan;
+        let segment = &plan.segments[self.segment];
+        let block = &plan.blocks[segment.position];
+        let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
+        let f = local_dynamics(&Float, &plan.point.w_n, &plan.point.w_u);
+        let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j]));
+        let to_psi = transpose(&p);
+        let turning = times(&to_psi, &times(&w, &p));
+        let drift: [Vec<f64>; 3] = match &segment.kind {
+            Kind::Slew(slew) | Kind::Rotation(slew) => plan.platform.drift_rows(&Float, &slew.at(t)),
+            Kind::Dwell => std::array::from_fn(|r| block.rows[3 + r][3..].to_vec()),
+        };
+        let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; plan.unknowns()]);
+        for (i, row) in rows.iter_mut().enumerate() {
+            for (k, &c) in block.columns.iter().enumerate() {
+                row[c] = match k {
+                    0..3 => turning[i][k],
+                    _ => (0..3).map(|r| to_psi[i][r] * drift[r][k - 3]).sum(),
+                };
+            }
+        }
+        rows
+    }
+}
+
+impl Process for PlatformProcess<'_> {
+    fn states(&self) -> usize {
+        self.plan.unknowns()
+    }
+
+    fn f(&self, t: f64, x: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(x.len());
+        for (row, &c) in self.rows(t).iter().zip(self.plan.psi_columns(self.segment)) {
+            out[c] = row.iter().zip(x.iter()).map(|(a, b)| a * b).sum();
+        }
+        out
+    }
+
+    fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(x.len(), x.len());
+        for (row, &c) in self.rows(t).iter().zip(self.plan.psi_columns(self.segment)) {
+            for (j, &value) in row.iter().enumerate() {
+                out[(c, j)] = value;
+            }
+        }
+        out
+    }
+
+    /// None: random drift is held over a step and enters as its covariance.
+    fn noise(&self, _: f64) -> DMatrix<f64> {
+        DMatrix::zeros(self.plan.unknowns(), self.plan.unknowns())
+    }
+}
+
+/// `g^n` in g.
+pub(super) const G_N: [f64; 3] = [0.0, -1.0, 0.0];
+
+impl Plan {
+    /// `omega_ie^n` in rad/s.
+    pub fn earth_rate(&self) -> [f64; 3] {
+        [self.point.w_n, self.point.w_u, 0.0]
+    }
+
+    /// The computed attitude `C_c^n` at time `t` of a segment.
+    pub(super) fn attitude(&self, segment: usize, t: f64) -> Matrix3<f64> {
+        let s = &self.segments[segment];
+        match &s.kind {
+            Kind::Dwell => self.attitudes[s.position],
+            Kind::Slew(slew) | Kind::Rotation(slew) => slew.at(t),
+        }
+    }
+
+    /// Integration steps per step of a segment: psi turns with the earth rate, and the platform with what is commanded.
+    pub(super) fn substeps(&self, segment: usize) -> usize {
+        let s = &self.segments[segment];
+        let turn = match &s.kind {
+            Kind::Dwell => W_IE * s.dt,
+            Kind::Slew(slew) | Kind::Rotation(slew) => slew.turned(s.dt),
+        };
+        // the timeline has counted them
+        integration_steps(turn).unwrap_or(MAX_INTEGRATION)
+    }
+
+    /// Whether the unknowns are coefficients, not the drift itself.
+    pub fn has_coefficients(&self) -> bool {
+        self.platform.scheme().unknowns != Unknowns::Drift
+    }
+}

@@ -1,0 +1,216 @@
+//! The truth: the linear model itself, or direction cosines.
+
+use obsdeg_core::model::Carry;
+use obsdeg_core::model::attitude::Matrix3;
+use obsdeg_core::model::ring::Float;
+use obsdeg_core::model::settings::Truth;
+use obsdeg_core::model::slew::W_IE;
+use obsdeg_core::model::slew::{apply, cross, rotation, rotation_vector, times, transpose};
+use obsdeg_exact::SplitMix64;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::SimulationError;
+use super::conditions::Conditions;
+use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
+
+/// The stream of random numbers of one run.
+#[derive(Debug, Clone)]
+pub struct Noise(Pcg64);
+
+impl Noise {
+    /// The stream of run `run` under `seed`: streams do not depend on who else draws.
+    pub fn new(seed: u64, run: u64) -> Self {
+        let mut mixed = SplitMix64::new(seed ^ run.rotate_left(32));
+        let state = u128::from(mixed.next_u64()) << 64 | u128::from(mixed.next_u64());
+        Self(Pcg64::new(state, u128::from(run)))
+    }
+
+    /// A standard normal.
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+}
+
+/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at most.
+fn drift_turn(drifts: f64, dt: f64) -> f64 {
+    (drifts + W_IE) * dt
+}
+
+/// Refuses an exact truth whose drifts take too many integration steps: `drifts` bounds the sum of the coefficients, in rad/s.
+///
+/// # Errors
+/// [`SimulationError::TooManySteps`].
+pub(crate) fn check_drifts(plan: &Plan, conditions: &Conditions, drifts: f64) -> Result<(), SimulationError> {
+    if conditions.truth != Truth::Exact {
+        return Ok(());
+    }
+    let mut turn = 0.0;
+    for s in &plan.segments {
+        // the random drift of a step: six sigma of three axes
+        let kick = 11.0 * conditions.drift_noise.held_rad_s(s.dt);
+        turn += drift_turn(drifts + kick, s.dt) * s.steps as f64;
+    }
+    integration_steps(turn).map(|_| ())
+}
+
+/// A truth that is stepped in time with the filter.
+#[derive(Debug, Clone)]
+pub struct TruthModel<'a> {
+    plan: &'a Plan,
+    conditions: &'a Conditions,
+    /// The true unknowns, psi of now.
+    x: Vec<f64>,
+    scratch: Vec<f64>,
+    /// Standard deviations of the components of Z.
+    sigmas: Vec<f64>,
+    /// `E = C_p^n C_n^c = exp([psi^n x])` and the segment it belongs to, for the exact truth.
+    exact: Option<(Matrix3<f64>, usize)>,
+    /// Largest `|psi|` so far, in rad.
+    pub largest_psi: f64,
+}
+
+impl<'a> TruthModel<'a> {
+    /// The truth that starts from the unknowns `x` (shape n, SI).
+    pub fn new(plan: &'a Plan, conditions: &'a Conditions, x: Vec<f64>) -> Self {
+        let sigmas = plan.components.iter().map(|&c| Plan::output_sigma(c, conditions)).collect();
+        let mut out =
+            Self { plan, conditions, x, scratch: Vec::new(), sigmas, exact: None, largest_psi: 0.0 };
+        out.restart();
+        out
+    }
+
+    /// Starts again from other unknowns.
+    pub fn reset(&mut self, x: &[f64]) {
+        self.x.copy_from_slice(x);
+        self.restart();
+    }
+
+    fn restart(&mut self) {
+        self.largest_psi = 0.0;
+        // C_c^p = exp(-[psi^c x])
+        self.exact =
+            (self.conditions.truth == Truth::Exact).then(|| (rotation(&self.plan.psi_n(0, &self.x)), 0));
+        self.watch(0);
+    }
+
+    /// The true unknowns, psi of now.
+    pub fn x(&self) -> &[f64] {
+        &self.x
+    }
+
+    fn watch(&mut self, segment: usize) {
+        let length = self.plan.psi_n(segment, &self.x).iter().map(|x| x * x).sum::<f64>().sqrt();
+        self.largest_psi = self.largest_psi.max(length);
+    }
+
+    /// One step of a segment; `z` is filled for a dwell (shape m). `step` counts within the segment.
+    pub fn step(&mut self, segment: usize, step: usize, noise: &mut Noise, z: &mut [f64]) {
+        if self.exact.is_some() {
+            self.step_exact(segment, step, noise, z);
+        } else {
+            self.step_linear(segment, noise, z);
+        }
+        self.watch(segment);
+        for (z, sigma) in z.iter_mut().zip(&self.sigmas) {
+            *z += sigma * noise.normal();
+        }
+    }
+
+    fn step_linear(&mut self, segment: usize, noise: &mut Noise, z: &mut [f64]) {
+        let stage = &self.plan.stages[segment];
+        stage.transition.apply(&mut self.x, &mut self.scratch);
+        let kick = [noise.normal(), noise.normal(), noise.normal()];
+        let root = &self.plan.noise_roots[segment];
+        for (i, &c) in self.plan.psi_columns(segment).iter().enumerate() {
+            self.x[c] += (0..=i).map(|k| root[i][k] * kick[k]).sum::<f64>();
+        }
+        for (z, output) in z.iter_mut().zip(&stage.outputs) {
+            *z = output.predict(&self.x);
+        }
+    }
+
+    fn step_exact(&mut self, segment: usize, step: usize, noise: &mut Noise, z: &mut [f64]) {
+        let plan = self.plan;
+        let s = &plan.segments[segment];
+        let Some((mut e, before)) = self.exact else { return };
+        if plan.segments[before].position != s.position {
+            e = self.repositioned(&e, before, segment);
+        }
+        // the drift noise of the step, in platform axes
+        let held = self.conditions.drift_noise.held_rad_s(s.dt);
+        let kick = [0; 3].map(|_| held * noise.normal());
+        let kicked = kick.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let drifts =
+            self.x[self.x.len() - plan.platform.coefficients()..].iter().map(|d| d.abs()).sum::<f64>();
+        // as many as have been counted before the run
+        let turn = drift_turn(drifts + kicked, s.dt);
+        let substeps = plan.substeps(segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
+        let h = s.dt / substeps as f64;
+        for i in 0..substeps {
+            let t = step as f64 * s.dt + i as f64 * h;
+            e = self.runge_kutta(segment, t, h, &e, &kick);
+        }
+        self.exact = Some((e, segment));
+        let psi_n = rotation_vector(&e);
+        let block = &plan.blocks[s.position];
+        for (k, &column) in block.columns[..3].iter().enumerate() {
+            self.x[column] = (0..3).map(|r| block.rows[r][k] * psi_n[r]).sum();
+        }
+        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n
+        let seen = apply(&transpose(&e), &G_N);
+        for (z, &component) in z.iter_mut().zip(&plan.components) {
+            *z = if component == 2 { psi_n[1] } else { G_N[component - 1] - seen[component - 1] };
+        }
+    }
+
+    /// E after an instantaneous change of position, or the same before a slew.
+    fn repositioned(&self, e: &Matrix3<f64>, before: usize, segment: usize) -> Matrix3<f64> {
+        let plan = self.plan;
+        match plan.platform.scheme().carry {
+            // the platform turns by what is commanded, in its own axes
+            Carry::Inertial => *e,
+            // C_c^p goes on
+            Carry::Platform => {
+                let (old, new) = (plan.segments[before].position, plan.segments[segment].position);
+                let turn = times(&plan.attitudes[new], &transpose(&plan.ends[old]));
+                times(&turn, &times(e, &transpose(&turn)))
+            }
+            Carry::Reset => rotation(&plan.psi_n(segment, &self.x)),
+        }
+    }
+
+    /// One step of `E' = [(E omega_ie + eps + kick - omega_ie) x] E` in n: the platform turns at the commanded rate
+    /// in its own axes, plus its drift; the commanded rate itself drops out.
+    fn runge_kutta(&self, segment: usize, t: f64, h: f64, e: &Matrix3<f64>, kick: &[f64; 3]) -> Matrix3<f64> {
+        let earth = self.plan.earth_rate();
+        let slope = |t: f64, e: &Matrix3<f64>| {
+            let c = times(e, &self.plan.attitude(segment, t));
+            let (turned, noise, drift) = (apply(e, &earth), apply(&c, kick), self.drift_n(&c));
+            times(&cross(&std::array::from_fn(|i| turned[i] - earth[i] + drift[i] + noise[i])), e)
+        };
+        let moved = |k: &Matrix3<f64>, h: f64| -> Matrix3<f64> {
+            std::array::from_fn(|i| std::array::from_fn(|j| e[i][j] + h * k[i][j]))
+        };
+        let k1 = slope(t, e);
+        let k2 = slope(t + h / 2.0, &moved(&k1, h / 2.0));
+        let k3 = slope(t + h / 2.0, &moved(&k2, h / 2.0));
+        let k4 = slope(t + h, &moved(&k3, h));
+        let next: Matrix3<f64> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| e[i][j] + h / 6.0 * (k1[i][j] + 2.0 * (k2[i][j] + k3[i][j]) + k4[i][j]))
+        });
+        // back onto the rotations: E (3 - E^T E)/2
+        let square = times(&transpose(&next), &next);
+        let correction: Matrix3<f64> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| 1.5 * f64::from(u8::from(i == j)) - 0.5 * square[i][j])
+        });
+        times(&next, &correction)
+    }
+
+    /// `eps^n = C_p^n E(g^p) D` at the true attitude.
+    fn drift_n(&self, c: &Matrix3<f64>) -> [f64; 3] {
+        let first = self.x.len() - self.plan.platform.coefficients();
+        let rows = self.plan.platform.drift_rows(&Float, c);
+        std::array::from_fn(|r| rows[r].iter().zip(&self.x[first..]).map(|(a, d)| a * d).sum())
+    }
+}

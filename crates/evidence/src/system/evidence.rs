@@ -1,0 +1,363 @@
+//! Exact verdicts on any system against the information of its samples, linearised along the true run.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::system::answer::answer;
+use obsdeg_core::system::judge::judge_compiled;
+use obsdeg_core::system::model::{ModelError, Role, Start, SystemModel};
+use obsdeg_core::system::rows::Unknown;
+use obsdeg_core::system::symmetry::{PolynomialDirection, Symmetry, symmetries};
+use obsdeg_ekf::decomposition::singular_values;
+use obsdeg_ekf::integrate::runge_kutta;
+use obsdeg_ekf::{EkfError, Measurement, SquareRootInformation};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::numeric::{FilterState, Numeric};
+use super::run::{RunError, Setup};
+use crate::crosscheck::answer::{Check, Count, Measured};
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.system-evidence/1";
+/// Samples of a horizon.
+const SAMPLES: usize = 60;
+/// Runge-Kutta steps between two samples.
+const SUBSTEPS: usize = 2;
+/// The prior of the inflation, as a multiple of that of the file; then ten times as loose.
+const DIFFUSE: f64 = 1e3;
+/// A horizon is this much shorter than the one before.
+const SHORTER: f64 = 1.5;
+/// Horizons that are tried.
+const HORIZONS: i32 = 45;
+/// Singular values (columns of unit length) above this are seen, below the next are not.
+const SEEN: f64 = 1e-9;
+const UNSEEN: f64 = 1e-12;
+/// How far a measured slope may be from the predicted one, and from the slope at the next horizon.
+const TOLERANCE: f64 = 0.1;
+/// How many slopes in a row must settle, and how much rounding changes them.
+const SETTLED: usize = 4;
+const JITTER: f64 = 0.005;
+/// The factor of an observable unknown is below, that of another above.
+const OBSERVABLE_FACTOR: f64 = 1.5;
+const UNOBSERVABLE_FACTOR: f64 = 5.0;
+
+/// The evidence for one system.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemEvidence {
+    /// `obsdeg.system-evidence/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The system.
+    pub name: String,
+    /// Per unknown.
+    pub quantities: Vec<SystemQuantityEvidence>,
+    /// Symmetries: the information along each, relative to the largest.
+    pub symmetries: Vec<SymmetryEvidence>,
+    /// Unobservable directions: exact, and singular values that vanish.
+    pub defect: Count,
+    /// Checks that failed.
+    pub failures: usize,
+    /// How many degrees were measured.
+    pub orders: Measured,
+    /// Checks that were made: what could not be measured is none.
+    pub checks: usize,
+    /// Whether none failed.
+    pub passed: bool,
+    /// The longest horizon, in the unit of the model.
+    pub duration: f64,
+    /// Bound on the probability that a verdict is wrong.
+    pub error_bound: f64,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// What the information says of one unknown.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemQuantityEvidence {
+    /// The unknown.
+    pub name: String,
+    /// The exact verdict.
+    pub status: Status,
+    /// The degree.
+    pub degree: Option<usize>,
+    /// Log-log slope of sigma against the horizon: -(degree + 1/2); measured null where it does not settle above rounding.
+    pub slope: Check,
+    /// Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 where not observable.
+    pub inflation: Check,
+}
+
+/// A symmetry against the information.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SymmetryEvidence {
+    /// In words.
+    pub words: String,
+    /// The information along it.
+    pub seen: Check,
+}
+
+/// The rows of all samples until `horizon`, as derivatives by the unknowns at the start.
+fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
+    let numeric = &setup.numeric;
+    let n = numeric.states.len();
+    let segments = numeric.segments();
+    let outputs = setup.sigmas.len();
+    let dt = horizon / (segments * SAMPLES) as f64;
+    let mut out = DMatrix::zeros(segments * SAMPLES * outputs, n);
+    let (mut x, mut phi) = (setup.truth.clone(), DMatrix::identity(n, n));
+    for segment in 0..segments {
+        let begin = (segment * SAMPLES) as f64 * dt;
+        let (after, jump) = numeric.carry(segment, begin, &x);
+        (x, phi) = (after, jump * phi);
+        let (process, measurement) = (numeric.process(segment), numeric.measurement(segment, &setup.sigmas));
+        for k in 0..SAMPLES {
+            let t = begin + k as f64 * dt;
+            let next = runge_kutta(&process, t, &x, dt, SUBSTEPS);
+            (x, phi) = (next.x, next.phi * phi);
+            let h = measurement.jacobian(t + dt, &x) * &phi;
+            for (i, sigma) in setup.sigmas.iter().enumerate() {
+                out.row_mut((segment * SAMPLES + k) * outputs + i).copy_from(&(h.row(i) / *sigma));
+            }
+        }
+    }
+    match out.iter().all(|v| v.is_finite()) {
+        true => Ok(out),
+        false => Err(RunError::Filter {
+            time: 0.0,
+            duration: horizon,
+            error: EkfError::NotFinite {
+                what: "the derivative of an output by the unknowns",
+                value: f64::NAN,
+                row: 0,
+                column: 0,
+            },
+        }),
+    }
+}
+
+/// Rows for unknowns only (states whose start is known have none), with columns of unit length: `(rows, lengths)`.
+fn scaled(rows: &DMatrix<f64>, columns: &[usize]) -> (DMatrix<f64>, Vec<f64>) {
+    let picked = rows.select_columns(columns);
+    let norms: Vec<f64> =
+        picked.column_iter().map(|c| c.norm()).map(|x| if x > 0.0 { x } else { 1.0 }).collect();
+    let m = DMatrix::from_fn(picked.nrows(), columns.len(), |i, j| picked[(i, j)] / norms[j]);
+    (m, norms)
+}
+
+/// Sigma of every unknown from what is seen: `sum (V_ij / s_j)^2` over the first `rank` singular values; `None` when rounding and what is
+/// seen cannot be told apart.
+fn sigmas(rows: &DMatrix<f64>, columns: &[usize], rank: usize) -> Result<Option<Vec<f64>>, EkfError> {
+    let (m, norms) = scaled(rows, columns);
+    let square = m.qr().r();
+    let (values, v) = singular_values(&square)?;
+    let largest = values.first().copied().unwrap_or(0.0);
+    let clear = rank > 0
+        && values[rank - 1] > SEEN * largest
+        && values.get(rank).is_none_or(|s| *s < UNSEEN * largest);
+    if !clear {
+        return Ok(None);
+    }
+    let of = |i: usize| (0..rank).map(|j| (v[(i, j)] / values[j]).powi(2)).sum::<f64>().sqrt() / norms[i];
+    Ok(Some((0..columns.len()).map(of).collect()))
+}
+
+/// The place of an unknown of the exact verdict among the states of the filter.
+fn place(numeric: &Numeric<'_>, u: &Unknown) -> Option<usize> {
+    let state = match u.role {
+        Role::State(i) => FilterState::State(i),
+        Role::Parameter(i) => FilterState::Parameter(i),
+        Role::UnknownInput(i) => FilterState::Input(i, u.derivative),
+        Role::KnownInput(_) | Role::Constant(_) | Role::Time => return None,
+    };
+    numeric.states.iter().position(|s| *s == state)
+}
+
+/// Holds the exact verdicts on a model against the information of its samples.
+///
+/// # Errors
+/// [`RunError`].
+pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidence, RunError> {
+    let compiled = model.compile()?;
+    let judged = judge_compiled(model, &compiled, seed, None)?;
+    let found = symmetries(model, &compiled, &judged, seed)?;
+    let analysis = answer(model, &judged, &found, seed);
+    let setup = Setup::new(model, &compiled)?;
+    let unknowns = &judged.layout.unknowns;
+    let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();
+    if columns.len() != unknowns.len() {
+        let message = "some unknowns are no states of the filter".into();
+        return Err(ModelError { what: model.name.clone(), message, span: None }.into());
+    }
+    let filter = |error| RunError::Filter { time: setup.duration, duration: setup.duration, error };
+    let whole = rows(&setup, setup.duration)?;
+    let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
+    let rank = judged.degrees.rank();
+    // with jumps, dwell may see earlier what derivatives see late: slopes are those of accuracy orders then
+    let slopes = if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == Start::Unknown) {
+        slopes(&setup, &columns, rank)?
+    } else {
+        vec![None; columns.len()]
+    };
+    let quantities: Vec<SystemQuantityEvidence> = unknowns
+        .iter()
+        .enumerate()
+        .map(|(c, u)| {
+            let degree = judged.degrees.degree[c];
+            let status = Status::of(degree, judged.degrees.excited[c]);
+            let predicted = degree.map_or(0.0, |k| -(k as f64 + 0.5));
+            let measured = slopes[c].filter(|_| degree.is_some());
+            let factor = inflated[c];
+            let kept =
+                |x: f64| if degree.is_some() { x < OBSERVABLE_FACTOR } else { x > UNOBSERVABLE_FACTOR };
+            SystemQuantityEvidence {
+                name: u.name.clone(),
+                status,
+                degree,
+                slope: Check::new(predicted, measured, |x| (x - predicted).abs() <= TOLERANCE),
+                inflation: Check::new(if degree.is_some() { 1.0 } else { 10.0 }, Some(factor), kept),
+            }
+        })
+        .collect();
+    let (m, norms) = scaled(&whole, &columns);
+    let (values, _) = singular_values(&m.clone().qr().r()).map_err(filter)?;
+    let largest = values.first().copied().unwrap_or(1.0);
+    let measured = values.iter().filter(|s| **s <= SEEN * largest).count();
+    let predicted = unknowns.len() - rank;
+    let defect = Count { predicted, measured, pass: predicted == measured };
+    let directions = found
+        .found
+        .iter()
+        .map(|s| direction(s, &setup.truth, &columns))
+        .chain(found.polynomial.iter().map(|d| polynomial_direction(d, &setup, &columns)));
+    let symmetries: Vec<SymmetryEvidence> = directions
+        .zip(&analysis.symmetries)
+        .map(|(mut v, report)| {
+            for (x, norm) in v.iter_mut().zip(&norms) {
+                *x *= norm;
+            }
+            let seen = (&m * &v).norm() / (v.norm() * largest);
+            // the derivatives are integrated by Runge-Kutta: what a symmetry leaves alone, its error does not
+            SymmetryEvidence { words: report.words.clone(), seen: Check::new(0.0, Some(seen), |x| x <= 1e-6) }
+        })
+        .collect();
+    let checks: Vec<bool> = quantities
+        .iter()
+        .flat_map(|q| [q.slope.pass, q.inflation.pass])
+        .chain(symmetries.iter().map(|s| s.seen.pass))
+        .flatten()
+        .chain([defect.pass])
+        .collect();
+    let failures = checks.iter().filter(|pass| !**pass).count();
+    Ok(SystemEvidence {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        name: model.name.clone(),
+        orders: Measured::count(quantities.iter().map(|q| (&q.slope, q.degree.is_some()))),
+        quantities,
+        symmetries,
+        defect,
+        failures,
+        checks: checks.len(),
+        passed: failures == 0,
+        duration: setup.duration,
+        error_bound: analysis.error_bound,
+        seed,
+    })
+}
+
+fn quotient((p, q): (i64, i64)) -> f64 {
+    p as f64 / q as f64
+}
+
+/// A symmetry at the truth.
+fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
+    let mut v = DVector::zeros(columns.len());
+    for &(c, k) in &s.scaling {
+        v[c] += quotient(k) * truth[columns[c]];
+    }
+    for &(c, k) in &s.translation {
+        v[c] += quotient(k);
+    }
+    v
+}
+
+/// A direction that is polynomial in unknowns and known constants, at the truth.
+fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[usize]) -> DVector<f64> {
+    let mut v = DVector::zeros(columns.len());
+    let factor = |&j: &usize| match columns.get(j) {
+        Some(&state) => setup.truth[state],
+        None => setup.numeric.constant(j - columns.len()),
+    };
+    for (c, terms) in &d.components {
+        v[*c] = terms.iter().map(|(f, k)| quotient(*k) * f.iter().map(factor).product::<f64>()).sum();
+    }
+    v
+}
+
+/// The factor on sigma of every unknown at the start when a diffuse prior is ten times as loose.
+fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Result<Vec<f64>, EkfError> {
+    let picked = rows.select_columns(columns);
+    let sigmas = |factor: f64| {
+        let prior: Vec<f64> = columns.iter().map(|&c| setup.prior[c] * factor).collect();
+        let mut information = SquareRootInformation::prior(&prior)?;
+        information.add(&picked)?;
+        information.sigmas()
+    };
+    let (small, large) = (sigmas(DIFFUSE)?, sigmas(10.0 * DIFFUSE)?);
+    Ok(large.iter().zip(&small).map(|(l, s)| l / s).collect())
+}
+
+/// What slopes at shorter and shorter horizons settle at: the last one, if the last of them change little and less and less. Two that agree
+/// are no sign of it: slopes that go up and down meet.
+fn settled(slopes: &[f64]) -> Option<f64> {
+    let last = slopes.last_chunk::<SETTLED>()?;
+    let changes: Vec<f64> = last.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let less = changes.windows(2).all(|w| w[1] <= w[0].max(JITTER));
+    let little =
+        changes.iter().all(|x| *x <= TOLERANCE) && changes.last().is_some_and(|x| *x <= TOLERANCE / 4.0);
+    (less && little).then_some(last[SETTLED - 1])
+}
+
+/// The slope of every unknown at the shortest horizon at which rounding is out of sight, where those before it settle there.
+fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
+    let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
+    for j in 0..HORIZONS {
+        let horizon = setup.duration * SHORTER.powi(-j);
+        let error = |error| RunError::Filter { time: horizon, duration: horizon, error };
+        match sigmas(&rows(setup, horizon)?, columns, rank).map_err(error)? {
+            Some(s) => seen.push((horizon, s)),
+            None if seen.len() > 2 => break,
+            None => seen.clear(),
+        }
+    }
+    let slope = |c: usize, k: usize| {
+        let ((t1, s1), (t2, s2)) = (&seen[k], &seen[k + 1]);
+        // the number of samples stays; at a fixed density it would grow with the horizon
+        (s1[c] / s2[c]).ln() / (t1 / t2).ln() - 0.5
+    };
+    Ok((0..columns.len())
+        .map(|c| settled(&(0..seen.len().saturating_sub(1)).map(|k| slope(c, k)).collect::<Vec<_>>()))
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::settled;
+
+    #[test]
+    fn what_settles() {
+        assert_eq!(settled(&[-4.0, -4.351, -4.403, -4.436, -4.458]), Some(-4.458));
+        assert_eq!(settled(&[-0.5; 4]), Some(-0.5));
+        // too few; two that meet by chance; a drift at a steady pace; growing changes; rounding
+        for open in [
+            &[-0.5; 3][..],
+            &[-7.2, -1.6, -1.25, -1.27],
+            &[-1.3, -1.32, -1.34, -1.9],
+            &[-2.0, -2.08, -2.16, -2.24],
+            &[-2.5, -2.501, -2.51, -2.53],
+            &[-2.5, -2.5, -2.5, f64::NAN],
+        ] {
+            assert_eq!(settled(open), None, "{open:?}");
+        }
+    }
+}

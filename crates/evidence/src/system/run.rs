@@ -1,0 +1,308 @@
+//! One run of the extended Kalman filter on any system, against a truth from the same equations.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::degree::status::Status;
+use obsdeg_core::system::answer::{SystemAnalysis, answer};
+use obsdeg_core::system::judge::judge_compiled;
+use obsdeg_core::system::model::{Compiled, ModelError, Start, SystemModel};
+use obsdeg_core::system::symmetry::Symmetries;
+use obsdeg_ekf::integrate::runge_kutta;
+use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::numeric::{FilterState, Numeric};
+use crate::simulation::Traces;
+use crate::simulation::answer::Outcome;
+use crate::simulation::consistency::{Consistency, Outcomes};
+use crate::simulation::record::Series;
+use crate::simulation::truth::Noise;
+
+/// Name and version of the JSON layout.
+pub const SCHEMA: &str = "obsdeg.system-run/1";
+/// Most samples of a run.
+const MAX_SAMPLES: f64 = 1e6;
+/// Runge-Kutta steps between two samples.
+const SUBSTEPS: usize = 4;
+/// The standard deviation of a known start, as a part of its value (of 1 for zero): a covariance needs one.
+const KNOWN: f64 = 1e-9;
+
+/// A run of a system.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemRun {
+    /// `obsdeg.system-run/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The system.
+    pub name: String,
+    /// Estimates at the end.
+    pub estimates: Vec<SystemEstimate>,
+    /// Whether errors and innovations are what the filter believes.
+    pub consistency: Consistency,
+    /// How long it ran, in the unit of the model.
+    pub duration: f64,
+    /// Between two samples.
+    pub step: f64,
+    /// Standard deviation of the noise of a sample, by output.
+    pub noise: Vec<(String, f64)>,
+    /// Bound on the probability that a verdict is wrong.
+    pub error_bound: f64,
+    /// Seed of the noise and of the initial errors.
+    pub seed: u64,
+}
+
+/// The estimate of one unknown at the end.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemEstimate {
+    /// Its name.
+    pub name: String,
+    /// Its unit, as the file says.
+    pub unit: String,
+    /// The exact verdict; null for a state whose start is known.
+    pub status: Option<Status>,
+    /// The degree.
+    pub degree: Option<usize>,
+    /// The truth.
+    pub truth: f64,
+    /// The estimate.
+    pub estimate: f64,
+    /// Estimate minus truth.
+    pub error: f64,
+    /// What the filter believes of the error.
+    pub sigma: f64,
+    /// Error over sigma.
+    pub error_over_sigma: f64,
+    /// Sigma at the start.
+    pub prior_sigma: f64,
+    /// What came out; nothing is required.
+    pub verdict: Outcome,
+}
+
+impl SystemEstimate {
+    /// Whether the outputs determine it.
+    pub fn is_determined(&self) -> bool {
+        is_determined(self.status)
+    }
+}
+
+/// A start that is known is no unknown.
+fn is_determined(status: Option<Status>) -> bool {
+    status.is_none_or(|s| s == Status::Observable)
+}
+
+/// Why there is no run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RunError {
+    /// The model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The filter met a number that is none.
+    #[error("the filter stopped after {time} of {duration}: {error}")]
+    Filter {
+        /// How far it came.
+        time: f64,
+        /// How far it should have come.
+        duration: f64,
+        /// Why it stopped.
+        error: EkfError,
+    },
+}
+
+fn missing(what: &str, message: &str) -> ModelError {
+    ModelError { what: what.into(), message: message.into(), span: None }
+}
+
+/// Values and priors by filter state.
+fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, Vec<f64>), ModelError> {
+    let nominal = &model.simulation;
+    let n = numeric.states.len();
+    let (mut truth, mut sigmas) = (DVector::zeros(n), vec![1.0; n]);
+    let start = |state: &FilterState| match *state {
+        FilterState::State(i) => &model.states[i].start,
+        _ => &Start::Unknown,
+    };
+    for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
+        if !matches!(start(state), Start::Value(_)) {
+            truth[c] = *nominal.values.get(name).ok_or_else(|| {
+                missing(&format!("`{name}`"), "no true value; expected one under [simulation.values]")
+            })?;
+        }
+    }
+    numeric.set_known_starts(&mut truth);
+    for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
+        let size = if truth[c] == 0.0 { 1.0 } else { truth[c].abs() };
+        sigmas[c] = match start(state) {
+            Start::Unknown => nominal.priors.get(name).copied().unwrap_or(size),
+            Start::Known | Start::Value(_) => KNOWN * size,
+        };
+    }
+    Ok((truth, sigmas))
+}
+
+/// Everything that a run needs, in numbers.
+#[derive(Debug, Clone)]
+pub(super) struct Setup<'a> {
+    pub(super) numeric: Numeric<'a>,
+    /// The true states of the filter at the start, and the standard deviations of their first estimates.
+    pub(super) truth: DVector<f64>,
+    pub(super) prior: Vec<f64>,
+    /// Of the noise of every output.
+    pub(super) sigmas: Vec<f64>,
+    pub(super) duration: f64,
+    pub(super) step: f64,
+}
+
+impl<'a> Setup<'a> {
+    pub(super) fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
+        let numeric = Numeric::new(model, compiled)?;
+        let nominal = &model.simulation;
+        let no = |what: &str| {
+            missing(&format!("the {what} of the simulation"), "missing; expected one under [simulation]")
+        };
+        let noise =
+            |name: &String| nominal.noise.get(name).copied().ok_or_else(|| no(&format!("noise of {name}")));
+        let sigmas = model.outputs.iter().map(|o| noise(&o.0.name)).collect::<Result<_, _>>()?;
+        let duration = nominal.duration.ok_or_else(|| no("duration"))?;
+        let step = nominal.step.ok_or_else(|| no("step"))?;
+        let (truth, prior) = starts(model, &numeric)?;
+        Ok(Self { numeric, truth, prior, sigmas, duration, step })
+    }
+}
+
+/// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn from the prior, random numbers
+/// come from `seed`.
+///
+/// # Errors
+/// [`RunError`].
+pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
+    let compiled = model.compile()?;
+    let judged = judge_compiled(model, &compiled, seed, None)?;
+    let analysis = answer(model, &judged, &Symmetries::default(), seed);
+    let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
+    let segments = numeric.segments();
+    let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
+    if samples * segments as f64 > MAX_SAMPLES {
+        return Err(
+            missing("the step of the simulation", "too short; expected at most 1000000 samples").into()
+        );
+    }
+    let dt = duration / segments as f64 / samples;
+    let mut noise = Noise::new(seed, 0);
+    let n = truth.len();
+    let estimate = DVector::from_iterator(n, (0..n).map(|c| truth[c] + prior[c] * noise.normal()));
+    let p0 = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
+    let stopped = |time: f64| move |error| RunError::Filter { time, duration, error };
+    let mut filter = Filter::new(estimate, &p0, Form::Ud).map_err(stopped(0.0))?;
+    let mut traces = Traces {
+        names: numeric.names.clone(),
+        units: numeric.states.iter().map(|s| unit(model, s)).collect(),
+        scales: vec![1.0; n],
+        series: vec![Series::default(); n],
+        ..Traces::default()
+    };
+    let mut record = |time: f64, segment: usize, truth: &DVector<f64>, filter: &Filter| {
+        traces.time.push(time);
+        traces.position.push(segment);
+        let own = filter.covariance().sigmas();
+        for (c, s) in traces.series.iter_mut().enumerate() {
+            s.truth.push(truth[c]);
+            s.estimate.push(filter.x()[c]);
+            s.sigma.push(own[c]);
+        }
+    };
+    record(0.0, 0, &truth, &filter);
+    let mut whitened = Vec::new();
+    for segment in 0..segments {
+        let begin = segment as f64 * samples * dt;
+        let (behind, _) = numeric.carry(segment, begin, &truth);
+        let (x, phi) = numeric.carry(segment, begin, filter.x());
+        if behind != truth || x != *filter.x() {
+            truth = behind;
+            // a jump that forgets a state leaves its variance: as good as known
+            let p = &phi * filter.covariance().matrix() * phi.transpose();
+            let floor =
+                DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| (KNOWN * s).powi(2))));
+            filter = Filter::new(x, &(p + floor), Form::Ud).map_err(stopped(begin))?;
+        }
+        let process = numeric.process(segment);
+        let measurement = numeric.measurement(segment, &sigmas);
+        for k in 0..samples as usize {
+            let t = begin + k as f64 * dt;
+            truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).x;
+            filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
+            let mut z = measurement.h(t + dt, &truth);
+            for (z, sigma) in z.iter_mut().zip(&sigmas) {
+                *z += sigma * noise.normal();
+            }
+            whitened.extend(filter.update(&measurement, t + dt, &z).map_err(stopped(t + dt))?.whitened);
+            record(t + dt, segment, &truth, &filter);
+        }
+    }
+    let estimates = estimates(model, &analysis, &numeric, &traces);
+    traces.determined = estimates.iter().map(SystemEstimate::is_determined).collect();
+    let consistency = Consistency::of(Outcomes {
+        whitened: &whitened,
+        outputs: sigmas.len(),
+        error: (filter.x() - &truth).as_slice().to_vec(),
+        covariance: filter.covariance(),
+        normalised: estimates.iter().map(|e| (e.name.as_str(), e.error_over_sigma)).collect(),
+    });
+    Ok((
+        SystemRun {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            name: model.name.clone(),
+            estimates,
+            consistency: consistency.map_err(stopped(duration))?,
+            duration,
+            step: dt,
+            noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
+            error_bound: analysis.error_bound,
+            seed,
+        },
+        traces,
+    ))
+}
+
+fn unit(model: &SystemModel, state: &FilterState) -> String {
+    match *state {
+        FilterState::State(i) => model.states[i].named.unit.clone(),
+        FilterState::Parameter(i) => model.parameters[i].unit.clone(),
+        FilterState::Input(i, 0) => model.unknown_inputs[i].0.unit.clone(),
+        FilterState::Input(..) => String::new(),
+    }
+}
+
+fn estimates(
+    model: &SystemModel,
+    analysis: &SystemAnalysis,
+    numeric: &Numeric<'_>,
+    traces: &Traces,
+) -> Vec<SystemEstimate> {
+    let of = |(c, name): (usize, &String)| {
+        let series = &traces.series[c];
+        let last = |v: &Vec<f64>| v.last().copied().unwrap_or(f64::NAN);
+        let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
+        let verdict = analysis.quantities.iter().find(|q| q.name == *name);
+        let prior_sigma = series.sigma.first().copied().unwrap_or(f64::NAN);
+        let error = estimate - truth;
+        let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
+        let status = verdict.map(|q| q.status);
+        let determined = is_determined(status);
+        SystemEstimate {
+            name: name.clone(),
+            unit: unit(model, &numeric.states[c]),
+            status,
+            degree: verdict.and_then(|q| q.degree),
+            truth,
+            estimate,
+            error,
+            sigma,
+            error_over_sigma,
+            prior_sigma,
+            verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], None),
+        }
+    };
+    numeric.names.iter().enumerate().map(of).collect()
+}
