@@ -1,0 +1,328 @@
+//! Schemes side by side: what is predicted is what the filter does, and what each position is for.
+
+use std::process::Output;
+
+use obsdeg_core::model::rotation::Rotation;
+use obsdeg_core::model::settings::Assignment;
+use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_evidence::compare::answer::Review;
+use obsdeg_evidence::compare::{Entry, compare};
+use obsdeg_evidence::requirements::Miss;
+use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::simulate;
+
+use crate::program::{json, run, stderr, stdout};
+use crate::schemes::{S6, scheme};
+
+fn compared(arguments: &[&str]) -> Output {
+    run(&[&["compare"], arguments].concat())
+}
+
+fn printed(arguments: &[&str]) -> String {
+    stdout(&compared(arguments))
+}
+
+fn review(scheme: &Scheme) -> Review {
+    let entry = Entry { name: "it".into(), scheme: scheme.clone(), conditions: Conditions::default() };
+    compare(&[entry], 1).expect("compared").schemes.remove(0)
+}
+
+/// The information of the batch against a filter with a prior that says nothing and no drift noise.
+#[test]
+fn the_predicted_sigma_is_that_of_a_filter() {
+    for (attitudes, carry) in [
+        (&S6[..5], Carry::Inertial),
+        (&S6[..], Carry::Inertial),
+        (&S6[..4], Carry::Platform),
+        (&S6[..], Carry::Reset),
+    ] {
+        let scheme = scheme(attitudes, carry);
+        let prior = |name: &str| Assignment { name: name.into(), value: 1e7 };
+        let quiet = Conditions {
+            drift_noise: "0 deg/h".parse().expect("a drift noise"),
+            priors: vec![prior("psi"), prior("D")],
+            ..Conditions::default()
+        };
+        let (filter, _) = simulate(&scheme, &quiet, 1).expect("simulated");
+        for (q, f) in review(&scheme).quantities.iter().zip(&filter.quantities) {
+            // psi of the filter is that of the end
+            if q.name.starts_with("D_") {
+                let sigma = q.sigma.expect("observable");
+                assert!((sigma / f.sigma - 1.0).abs() < 1e-4, "{} {carry}: {sigma} {}", q.name, f.sigma);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_each_position_is_for() {
+    // five positions are the fewest under inertial carry, so none can go; of six, any one can
+    let five = review(&scheme(&S6[..5], Carry::Inertial));
+    assert!(five.drop_one.iter().all(|d| !d.lost.is_empty() && d.worst.is_none()));
+    assert!(five.quantities.iter().all(|q| q.carried_by.len() == 5));
+    let six = review(&scheme(&S6, Carry::Inertial));
+    let worst = six.worst.clone().expect("all observable").sigma_dph;
+    assert!(
+        six.drop_one
+            .iter()
+            .all(|d| d.lost.is_empty() && d.worst.as_ref().is_some_and(|w| w.sigma_dph > worst))
+    );
+    // the paper's: D_FX is told from D_SX by the second position; D_OX is not excited at either
+    let paper = review(&scheme(&["0,0,0", "180,0,0"], Carry::Platform));
+    let of = |name: &str| paper.quantities.iter().find(|q| q.name == name).expect("an unknown");
+    assert_eq!(of("D_FX").carried_by, ["p1", "p2"]);
+    assert_eq!(
+        (of("D_FX").excitation.as_slice(), of("D_OX").excitation.as_slice()),
+        (&[1.0, 1.0][..], &[0.0, 0.0][..])
+    );
+    assert_eq!((of("D_FZ").sigma, of("D_OX").sigma, paper.worst.as_ref()), (None, None, None));
+    assert!(!paper.meets_requirements);
+}
+
+#[test]
+fn sensitivity_says_what_the_assumptions_are_worth() {
+    let six = review(&scheme(&S6, Carry::Inertial));
+    let at =
+        |condition: &str| six.sensitivity.iter().find(|s| s.condition == condition).expect("a condition");
+    let sigma = |condition: &str| at(condition).worst.as_ref().map(|w| w.sigma_dph);
+    let here = six.worst.as_ref().map(|w| w.sigma_dph);
+    // eps_y is seen through wN: worse towards the pole, lost at it
+    assert!(sigma("latitude 30 deg") > here && sigma("latitude 75 deg") > sigma("latitude 30 deg"));
+    assert_eq!((at("latitude 90 deg").worst.as_ref(), at("latitude 90 deg").rank[0] < 15), (None, true));
+    // order 2: twice the dwell is 2^2.5 times better, a little less as the earth turns
+    let gain = sigma("dwell x 0.5").expect("there") / here.expect("there");
+    assert!((4.5..6.5).contains(&gain), "{gain}");
+    assert_eq!(at("reset carry").rank, [30, 30]);
+}
+
+/// Every unknown with a requirement counts, psi of every position too; what is not observable misses it.
+#[test]
+fn requirements_are_those_of_all_unknowns() {
+    let missed = |r: &Review| -> Vec<(String, Miss)> {
+        r.requirements.missed.iter().map(|m| (m.name.clone(), m.why)).collect()
+    };
+    let psi = |names: &[&str]| -> Vec<(String, Miss)> {
+        names.iter().map(|n| (n.to_string(), Miss::TooLarge)).collect()
+    };
+    let five = review(&scheme(&S6[..5], Carry::Inertial));
+    assert_eq!(missed(&five), psi(&["psi_x", "psi_y", "psi_z"]));
+    let worst = five.requirements.worst.clone().expect("a margin");
+    assert!(worst.name == "psi_y" && (worst.margin - 0.068).abs() < 1e-4, "{worst:?}");
+    assert!(!five.meets_requirements && five.worst.as_ref().is_some_and(|w| w.sigma_dph < 0.1));
+    // under reset carry each position has a psi of its own, and a requirement may name one of them
+    let of_position = |name: &str| Conditions {
+        requirements: vec![Assignment { name: name.into(), value: 1e-3 }],
+        ..Conditions::default()
+    };
+    let reset = |name: &str| {
+        let entry =
+            Entry { name: "it".into(), scheme: scheme(&S6, Carry::Reset), conditions: of_position(name) };
+        compare(&[entry], 1).expect("compared").schemes.remove(0)
+    };
+    let six = reset("psi_y@4");
+    assert_eq!((six.requirements.stated, missed(&six)), (1, psi(&["psi_y@4"])));
+    assert_eq!(reset("psi").requirements.stated, 18);
+    // one decision: what is met is what has a margin of at least one, by the numbers of the table
+    let paper = review(&scheme(&["0,0,0", "180,0,0"], Carry::Platform));
+    for r in [&five, &six, &paper] {
+        let asked = r.quantities.iter().filter(|q| q.requirement.is_some());
+        let met: Vec<bool> =
+            asked.clone().map(|q| q.sigma.zip(q.requirement).is_some_and(|(s, r)| s <= r)).collect();
+        assert_eq!(r.requirements.met, met.iter().filter(|m| **m).count());
+        assert_eq!(r.meets_requirements, met.iter().all(|m| *m));
+        let smallest = asked.filter_map(|q| q.margin).reduce(f64::min);
+        assert_eq!(r.requirements.worst.as_ref().map(|w| w.margin), smallest);
+    }
+    let unseen: Vec<String> =
+        (paper.quantities.iter().filter(|q| q.degree.is_none()).map(|q| q.name.clone())).collect();
+    let said = missed(&paper).into_iter().filter(|m| m.1 == Miss::NotObservable).map(|m| m.0);
+    assert_eq!(said.collect::<Vec<_>>(), unseen);
+}
+
+/// The excitation of a rotating segment is the root mean square over its arc: by integrals of squares of sines.
+#[test]
+fn excitation_of_an_arc() {
+    let turning = |angle: &str, terms: &str| {
+        let mut s = scheme(&["NUE", "UEN"], Carry::Inertial);
+        s.unknowns = terms.parse().expect("terms");
+        s.positions[0].rotation = Some(Rotation::new("X_p", angle).expect("a rotation"));
+        review(&s)
+    };
+    let at_first = |r: &Review, name: &str| {
+        r.quantities.iter().find(|q| q.name == name).expect("a coefficient").excitation[0]
+    };
+    // about X_p, horizontal: g goes round in Y_p, Z_p, from -Y_p; gyro Y has I = +y, gyro Z I = +z
+    for angle in ["360", "90", "-135", "30", "7200"] {
+        let a = angle.parse::<f64>().expect("degrees").to_radians();
+        let half = (2.0 * a).sin() / (4.0 * a);
+        let r = turning(angle, "F,I,II");
+        let near =
+            |found: f64, squared: f64| assert!((found - squared.sqrt()).abs() < 1e-8, "{angle}: {found}");
+        near(at_first(&r, "D_FX"), 1.0);
+        near(at_first(&r, "D_IX"), 0.0);
+        near(at_first(&r, "D_IY"), 0.5 + half);
+        near(at_first(&r, "D_IZ"), 0.5 - half);
+        // the mean of sin^4
+        near(at_first(&r, "D_IIZ"), 3.0 / 8.0 - half + (4.0 * a).sin() / (32.0 * a));
+    }
+    // the tumble: whatever is observable is excited somewhere
+    let json = json(&["compare", "examples/tumbling/scheme.toml", "--format", "json"]);
+    let coefficients = json["schemes"][0]["quantities"].as_array().expect("a list").iter();
+    for q in coefficients.filter(|q| q["unit"] != "deg" && q["status"] == "observable") {
+        let largest = q["excitation"].as_array().expect("a list").iter().filter_map(|x| x.as_f64());
+        assert!(largest.fold(0.0, f64::max) > 0.5, "{q}");
+    }
+}
+
+/// Observability and requirements are two questions: what can go for one cannot for the other.
+#[test]
+fn positions_that_can_go() {
+    let six = scheme(&S6, Carry::Inertial);
+    let of = |d: f64| {
+        let require = |name: &str, value| Assignment { name: name.into(), value };
+        let requirements = vec![require("D", d), require("psi", 1.0)];
+        let conditions = Conditions { requirements, ..Conditions::default() };
+        let entry = Entry { name: "it".into(), scheme: six.clone(), conditions };
+        compare(&[entry], 1).expect("compared").schemes.remove(0)
+    };
+    // by the worst sigma without each, which drop-one knows
+    let all = of(1e3);
+    let mut without: Vec<f64> =
+        all.drop_one.iter().filter_map(|d| Some(d.worst.as_ref()?.sigma_dph)).collect();
+    without.sort_by(f64::total_cmp);
+    let between = (without[2] + without[3]) / 2.0;
+    let r = of(between);
+    assert!(r.requirements.all_met() && r.drop_one.iter().all(|d| d.lost.is_empty()));
+    for d in &r.drop_one {
+        let sigma = d.worst.as_ref().expect("observable").sigma_dph;
+        assert_eq!(
+            (d.requirements.stated, d.requirements.all_met()),
+            (15, sigma <= between),
+            "{}",
+            d.position
+        );
+    }
+    assert_eq!(r.drop_one.iter().filter(|d| d.requirements.all_met()).count(), 3);
+    assert!(all.drop_one.iter().all(|d| d.requirements.all_met()));
+    let text = printed(&["examples/six-positions/scheme.toml", "--requirement", "D=1e-6"]);
+    let row = text.lines().find(|l| l.starts_with(" six-positions")).expect("a row");
+    assert!(
+        text.contains("observable without") && row.contains(" any one ") && row.ends_with("   -"),
+        "{row}"
+    );
+}
+
+/// A table says what it compares: other carries without the slews, and schemes that have different tasks.
+#[test]
+fn what_is_not_alike_is_said() {
+    let twelve = "examples/twelve-positions/scheme.toml";
+    let text = printed(&[twelve]);
+    assert!(
+        text.contains(" platform carry, no slews ") && text.contains(" reset carry, no slews "),
+        "{text}"
+    );
+    assert!(text.contains("no slews: slews need inertial carry") && !text.contains("not like with like"));
+    let (five, six) = ("examples/five-positions/scheme.toml", "examples/six-positions/scheme.toml");
+    let text = printed(&[five, six]);
+    assert!(text.contains(" inertial carry ") && !text.contains("slews:"), "{text}");
+    assert!(!text.contains("not like with like"), "{text}");
+    let text = printed(&[twelve, five]);
+    assert!(
+        text.contains("not like with like: the schemes differ in carry, latitude, requirements\n"),
+        "{text}"
+    );
+    let text = printed(&[twelve, five, "--carry", "inertial", "--latitude", "48", "--requirement", "D=1"]);
+    assert!(!text.contains("not like with like"), "{text}");
+    let json: serde_json::Value =
+        serde_json::from_str(&printed(&[twelve, five, "--latitude", "48", "--format", "json"]))
+            .expect("JSON");
+    assert_eq!(json["differ"], serde_json::json!(["carry", "requirements"]));
+    assert_eq!(json["schemes"][0]["sensitivity"][9]["condition"], "platform carry, no slews");
+}
+
+/// What the sigmas rest on is in the answer and in the table; what the dwell takes away has no sigma.
+#[test]
+fn conditions_and_dwell() {
+    let run = printed;
+    let five = "examples/five-positions/scheme.toml";
+    let given = ["--noise", "2e-6", "--step", "2.5", "--dwell", "300", "--latitude", "40"];
+    let text = run(&[&[five][..], &given].concat()).replace("\n      ", " ");
+    for said in [
+        "sigma: information of all samples, no prior, no drift noise; psi at the start",
+        "noise of Z 2e-6 g per sample and axis; steps of at most 2.5 s",
+        "300 s at a position unless it says otherwise, repositioning at once",
+        "latitude 40 deg",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&run(&[&[five][..], &given, &["--format", "json"]].concat())).expect("JSON");
+    let c = &json["schemes"][0]["conditions"];
+    let found = ["accelerometer_noise_g", "step_s", "dwell_s", "latitude_deg"].map(|k| c[k].as_f64());
+    assert_eq!(found, [Some(2e-6), Some(2.5), Some(300.0), Some(40.0)]);
+    let pole =
+        Scheme { latitude: "90".parse().ok(), ..scheme(&["0,0,0", "0,90,0", "45,0,0"], Carry::Platform) };
+    let r = review(&pole);
+    let psi_y = r.quantities.iter().find(|q| q.name == "psi_y").expect("psi_y");
+    assert_eq!((psi_y.degree, psi_y.accuracy_order, psi_y.sigma), (Some(0), None, None));
+}
+
+#[test]
+fn files_are_named_and_wrong_ones_refused() {
+    let run = compared;
+    let files = ["examples/five-positions/scheme.toml", "examples/simulated-run/scheme.toml"];
+    let output = run(&files);
+    let text = stdout(&output);
+    assert!(output.status.success(), "{}", stderr(&output));
+    insta::with_settings!({ omit_expression => true, prepend_module_to_snapshot => false }, {
+        insta::assert_snapshot!("compare_table", text);
+    });
+    for format in ["markdown", "latex", "csv", "json"] {
+        let output = run(&[&files[..], &["--format", format]].concat());
+        assert!(output.status.success() && stdout(&output).contains("five-positions"));
+    }
+    for (arguments, expected) in [
+        (&["no/such.toml"][..], "no/such.toml"),
+        (&["examples/wrong-gyro/scheme.toml"], "wrong-gyro"),
+        (&["examples/generic-angles/scheme.toml"], "generic"),
+        (&[files[0], "--requirement", "D_FW=1"], "D_FW"),
+        (&[], "FILE"),
+    ] {
+        let output = run(arguments);
+        let stderr = stderr(&output);
+        assert!(output.status.code() == Some(2) && stderr.contains(expected), "{arguments:?}: {stderr}");
+    }
+}
+
+/// What samples with slews determine without a prior, to the strict: the sigmas are from an independent computation of 70 digits; what is
+/// coupled by 6e-7 to what is not determined has none, however small that is.
+#[test]
+fn sigmas_with_slews_are_those_without_a_prior() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sigmas = |name: &str, text: &str| {
+        let path = folder.path().join(name).display().to_string();
+        std::fs::write(&path, text).expect("written");
+        let json = json(&["compare", "--format", "json", &path]);
+        let quantities = json["schemes"][0]["quantities"].as_array().expect("a list").clone();
+        let of =
+            |q: &serde_json::Value| (q["name"].as_str().expect("a name").to_string(), q["sigma"].as_f64());
+        quantities.iter().map(of).collect::<std::collections::BTreeMap<_, _>>()
+    };
+    let slow = sigmas(
+        "slow.toml",
+        "carry = \"inertial\"\nlatitude_deg = 89.9\n[simulation]\nslew_rate_deg_s = 0.01\n[[position]]\nattitude = \"EDN\"\n\
+         [[position]]\nangles_deg = [-177.94, 102.12, 115.37]\n[[position]]\nangles_deg = [-177.94, 102.12, -176.94]\n",
+    );
+    for (name, sigma) in
+        [("D_FX", 142.9), ("D_FY", 33.6), ("D_FZ", 2.577), ("D_OZ", 1.245), ("D_SX", 13.31), ("D_SZ", 2.577)]
+    {
+        let found = slow[name].expect("determined");
+        assert!((found / sigma - 1.0).abs() < 0.02, "{name}: {found} instead of {sigma}");
+    }
+    let coupled = sigmas(
+        "coupled.toml",
+        "carry = \"inertial\"\nlatitude_deg = 60\n[simulation]\nslew_rate_deg_s = 1\ndwell_s = 3000\n\
+         [[position]]\nattitude = \"DWN\"\n[[position]]\nattitude = \"SWD\"\n",
+    );
+    assert_eq!((coupled["D_SY"], coupled["D_IX"]), (None, None));
+}

@@ -1,0 +1,206 @@
+//! The command: what an answer says, the file of the winner, an interrupt.
+
+use std::process::{Command, Stdio};
+
+use crate::program::{json, obsdeg, run, stderr, stdout};
+
+/// An answer says what its sigmas rest on, in words and in JSON, and how many schemes are as good.
+#[test]
+fn an_answer_says_what_it_rests_on() {
+    let run = |more: &[&str]| {
+        let arguments =
+            ["design", "--positions", "3", "--carry", "inertial", "--observable", "D_F", "--dwell", "500"];
+        let arguments =
+            [&arguments[..], &["--step", "20", "--noise", "2e-5", "--slew-rate", "0.5"], more].concat();
+        stdout(&run(&arguments))
+    };
+    let table = run(&[]).replace("\n      ", " ");
+    for said in [
+        "latitude 28.2 deg (chosen here: nothing names one)",
+        "500 s at each position, steps of at most 20 s, a sample after each; slews at 0.5 deg/s",
+        "noise of Z 2e-5 g per sample and axis; random drift: none; prior: none",
+        "psi and all coefficients of the terms F,I,O,S",
+        "24 sequences are as good, itself and its images counted",
+        "half turns are tried in both directions",
+        "NUE (-N) NDW (-N) NUE",
+        "Best schemes (sigma: information of all samples, no prior, no drift noise; psi at the start)",
+        "by prediction (no prior, no drift noise, psi at the start) every requirement (the program's own: none is stated) is met, 3 of 3",
+        "to be checked with prior and drift noise, psi at the end: `obsdeg simulate`",
+    ] {
+        assert!(table.contains(said), "{said}: {table}");
+    }
+    assert!(!run(&["--latitude", "28.2"]).contains("chosen here"));
+    let json: serde_json::Value = serde_json::from_str(&run(&["--format", "json"])).expect("JSON");
+    let search = &json["search"];
+    let conditions = serde_json::json!({
+        "latitude_deg": 28.2, "latitude_by_default": true, "dwell_s": 500.0, "step_s": 20.0, "accelerometer_noise_g": 2e-5,
+        "azimuth_noise_deg": null, "slew_rate_deg_s": 0.5
+    });
+    assert_eq!(search["conditions"], conditions);
+    assert!(search["drift_noise"].is_null() && search["prior"].is_null());
+    assert_eq!(json["found"][0]["requirements"]["basis"], "predicted");
+    // what is missed by prediction needs no other check
+    assert!(!run(&["--requirement", "D=1e-9"]).contains("to be checked"));
+    assert_eq!(search["ties"], serde_json::json!({ "sequences": 24, "within": 1e-6 }));
+    let turns =
+        serde_json::json!([{ "to": 2, "about": [-1.0, 0.0, 0.0] }, { "to": 3, "about": [-1.0, 0.0, 0.0] }]);
+    assert_eq!(json["found"][0]["half_turns"], turns);
+}
+
+/// Ctrl-C ends the program with the exit code of a shell when nothing was found.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_program_ends_with_130() {
+    // minutes of work, whatever the machine
+    let arguments = ["design", "--minimum", "--carry", "inertial", "--candidates", "grid:30", "--quiet"];
+    // a signal that comes before the program listens ends it without a code: then it is tried again
+    let code = [300, 1000, 3000].into_iter().find_map(|wait| {
+        let program =
+            obsdeg(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+        std::thread::sleep(std::time::Duration::from_millis(wait));
+        let sent = Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+        assert!(sent.expect("a signal").success());
+        let output = program.wait_with_output().expect("it ends");
+        assert!(output.stdout.is_empty());
+        output.status.code()
+    });
+    assert_eq!(code, Some(130));
+}
+
+/// The winner's file is a scheme that `analyze` accepts and that has the sigma promised; wrong arguments are named.
+#[test]
+fn the_winner_is_a_scheme_file() {
+    let place = tempfile::tempdir().expect("a folder");
+    let folder = place.path().join("found").display().to_string();
+    let winner = place.path().join("found/winner.toml").display().to_string();
+    let file = "examples/six-positions/scheme.toml";
+    let found = run(&[
+        "design",
+        "--candidates",
+        file,
+        "--positions",
+        "5",
+        "--carry",
+        "inertial",
+        "--slew-rate",
+        "1",
+        "--gimbal",
+        "beta=-80:80",
+        "-o",
+        &folder,
+        "--format",
+        "json",
+    ]);
+    assert!(found.status.success(), "{}", stderr(&found));
+    let found: serde_json::Value = serde_json::from_slice(&found.stdout).expect("JSON");
+    assert_eq!((&found["schema"], &found["search"]["proven"]), (&"obsdeg.design/1".into(), &true.into()));
+    for name in ["design.json", "front.svg", "front.png"] {
+        assert!(place.path().join("found").join(name).is_file(), "{name}");
+    }
+    let compared = json(&["compare", &winner, "--format", "json"]);
+    let (promised, kept) =
+        (&found["found"][0]["worst_sigma_dph"], &compared["schemes"][0]["worst"]["sigma_dph"]);
+    let (promised, kept) = (promised.as_f64().expect("a number"), kept.as_f64().expect("a number"));
+    assert!((promised / kept - 1.0).abs() < 1e-6, "{promised} {kept}");
+    assert!(run(&["analyze", "--scheme", &winner, "--solutions", "off"]).status.success());
+    // half turns about an axis and about a diagonal, either way, are in the file: what the commands make of it is what was found
+    let two = place.path().join("two.toml").display().to_string();
+    for (attitudes, axes) in [
+        (["NUE", "NDW"], ["about = \"N\", angle_deg = 180", "about = \"N\", angle_deg = -180"]),
+        (["NUE", "WDS"], ["about = [1, 0, -1], angle_deg = 180", "about = [-1, 0, 1], angle_deg = 180"]),
+    ] {
+        let text = attitudes.map(|a| format!("[[position]]\nname = \"{a}\"\nattitude = \"{a}\"\n")).concat();
+        std::fs::write(&two, format!("carry = \"inertial\"\nlatitude_deg = 28.2\n{text}")).expect("written");
+        let list =
+            ["--positions", "4", "--slew-rate", "0.5", "--observable", "D_FY", "--format", "json", "--force"];
+        let found = run(&[&["design", "--candidates", &two, "-o", &folder], &list[..]].concat());
+        assert!(found.status.success(), "{}", stderr(&found));
+        let found: serde_json::Value = serde_json::from_slice(&found.stdout).expect("JSON");
+        let turns = found["found"][0]["half_turns"].as_array().expect("half turns");
+        let text = std::fs::read_to_string(&winner).expect("a winner");
+        assert!(
+            !turns.is_empty() && turns.len() == axes.map(|a| text.matches(a).count()).iter().sum::<usize>(),
+            "{text}"
+        );
+        let promised = found["found"][0]["worst_sigma_dph"].as_f64().expect("a number");
+        let sigma = |rows: &serde_json::Value| {
+            let row = rows.as_array().expect("rows").iter().find(|q| q["name"] == "D_FY").expect("D_FY");
+            row["sigma"].as_f64().expect("a number")
+        };
+        let compared = json(&["compare", &winner, "--format", "json"]);
+        let simulated = [
+            &["simulate", "--scheme", &winner, "--format", "json", "--drift-noise", "0 deg/h"][..],
+            &["--prior", "psi=1e6", "--prior", "D=1e6"],
+        ];
+        let simulated = json(&simulated.concat());
+        for (kept, within) in
+            [(sigma(&compared["schemes"][0]["quantities"]), 1e-6), (sigma(&simulated["quantities"]), 1e-3)]
+        {
+            assert!((promised / kept - 1.0).abs() < within, "{promised} {kept}");
+        }
+        // lists of slews say how they turn
+        let slews = [&compared["schemes"][0]["slews"], &simulated["timeline"]].map(|rows| {
+            let of = |r: &serde_json::Value| r["turn"]["about"].as_array().cloned();
+            rows.as_array().expect("rows").iter().filter_map(of).collect::<Vec<_>>()
+        });
+        let expected: Vec<_> = turns.iter().filter_map(|t| t["about"].as_array().cloned()).collect();
+        assert!(slews.iter().all(|about| *about == expected), "{slews:?} {expected:?}");
+    }
+    let again = ["design", "--candidates", file, "--positions", "5", "-o", &folder, "--force"];
+    assert!(run(&again).status.success());
+    for (arguments, expected) in [
+        (&["design", "--positions", "5", "-o", &folder][..], "--force"),
+        (&["design", "--positions", "5", "--candidates", "grid:40"], "divides 90"),
+        (&["design", "--positions", "5", "--candidates", "grid:x"], "grid:45"),
+        (
+            &["design", "--positions", "5", "--candidates", "examples/tumbling/scheme.toml"],
+            "rotating segment",
+        ),
+        (&["design", "--positions", "5", "--gimbal", "beta=80:-80"], "beta=-80:80"),
+        (&["design", "--positions", "5", "--observable", "D_FW"], "D_FX"),
+        (&["design", "--positions", "5", "--max-degree", "D_F=x"], "D_F=1"),
+        (&["design", "--positions", "5", "--max-degree", "1"], "every sequence was examined"),
+        (&["design", "--positions", "5", "--max-time", "0"], "more than 0"),
+        (&["design", "--positions", "5", "--slew-rate", "1"], "inertial"),
+        (&["design", "--positions", "4", "--meet", "--requirement", "D=1e-9"], "every sequence was examined"),
+        (
+            &["design", "--positions", "5", "--criterion", "margin", "--requirement", "D_F=0"],
+            "expected 1e-12 to 1e9",
+        ),
+        (&["design"], "--positions"),
+        (&["design", "--positions", "0"], "1 to 100"),
+        (
+            &["design", "--positions", "3", "--carry", "inertial"],
+            "no scheme of 3 of these candidates makes every coefficient observable: every sequence was examined",
+        ),
+        (
+            &["design", "--positions", "5", "--max-time", "10"],
+            "at most 10 s in all: 5 times 1000 s at a position are more",
+        ),
+        (
+            &["design", "--positions", "3", "--observable", "D_F", "--max-degree", "1"],
+            "makes D_FX, D_FY, D_FZ observable with degree of every required coefficient at most 1",
+        ),
+        (
+            &[
+                "design",
+                "--positions",
+                "4",
+                "--carry",
+                "inertial",
+                "--candidates",
+                "grid:45",
+                "--restarts",
+                "2",
+            ],
+            "sequences of 4 of these candidates that were looked at makes every coefficient observable",
+        ),
+        (&["design", "--minimum", "--terms", "drift"], "coefficients"),
+        (&["design", "--minimum", "--candidates", "examples/generic-angles/scheme.toml"], "generic"),
+        (&["design", "--positions", "5", "--dwell", "0"], "'--dwell <S>': expected"),
+    ] {
+        let output = run(arguments);
+        let stderr = stderr(&output);
+        assert!(output.status.code() == Some(2) && stderr.contains(expected), "{arguments:?}: {stderr}");
+    }
+}

@@ -1,0 +1,86 @@
+//! Schemes found: the fewest positions, the best of five of the cardinal attitudes, and what the filter makes of it.
+
+mod brute;
+mod command;
+mod orders;
+mod search;
+mod sigmas;
+
+use obsdeg_core::model::attitude::cardinal;
+use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo};
+use obsdeg_design::design::answer::Found;
+use obsdeg_design::design::information::Evaluator;
+use obsdeg_design::design::observability::Rows;
+use obsdeg_design::design::search::Progress;
+use obsdeg_design::design::{Candidates, Design, Kind, Options, design};
+use obsdeg_evidence::simulation::conditions::Conditions;
+
+fn base(carry: Carry) -> Scheme {
+    Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::default() }
+}
+
+/// All twelve coefficients.
+const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
+fn options(positions: Option<usize>) -> Options {
+    Options {
+        candidates: Candidates::cardinals(),
+        positions,
+        required: Vec::new(),
+        degree_caps: Vec::new(),
+        meet: false,
+        total_s: None,
+        slew_s: None,
+        criterion: Kind::Worst,
+        keep: 5,
+        restarts: 40,
+        refine: false,
+        front: Vec::new(),
+        seed: 1,
+    }
+}
+
+fn on(_: Progress) -> bool {
+    true
+}
+
+fn designed(carry: Carry, options: &Options) -> Design {
+    design(&base(carry), &quiet(), options, &on).expect("designed")
+}
+
+fn rows_of(carry: Carry, candidates: &Candidates) -> Rows {
+    Rows::new(&base(carry), &candidates.attitudes, &ALL, 1).expect("rows")
+}
+
+fn evaluator_of(carry: Carry, candidates: &Candidates) -> Evaluator {
+    Evaluator::new(&base(carry), &candidates.attitudes, &ALL, &quiet()).expect("an evaluator")
+}
+
+/// The sequence of some names.
+fn sequence_of(candidates: &Candidates, names: &[String]) -> Vec<usize> {
+    let place = |n: &String| candidates.names.iter().position(|c| c == n).expect("a candidate");
+    names.iter().map(place).collect()
+}
+
+fn scheme_of(names: &[String], carry: Carry) -> Scheme {
+    let attitudes = names.iter().map(|n| cardinal(n).expect("an attitude"));
+    Scheme { positions: Scheme::of_angles(attitudes).positions, ..base(carry) }
+}
+
+fn quiet() -> Conditions {
+    Conditions { drift_noise: "0 deg/h".parse().expect("a drift noise"), ..Conditions::default() }
+}
+
+/// A scheme that was found, with its half turns as they were found.
+fn scheme_found(found: &Found, like: &Scheme) -> Scheme {
+    let angles = found.angles.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("angles"));
+    let mut positions = Scheme::of_angles(angles).positions;
+    for turn in &found.half_turns {
+        let (axis, angle) = (Some(SlewAxis::Direction(turn.about)), "180".parse().ok());
+        positions[turn.to - 1].slew = Some(SlewTo { axis, angle, rate_deg_s: None });
+    }
+    for p in &mut positions {
+        p.dwell = Dwell::from_seconds(found.dwell_s);
+    }
+    Scheme { positions, ..like.clone() }
+}

@@ -1,0 +1,187 @@
+//! Files that are read and written, and interrupts, on the real system.
+
+use std::fs;
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use crate::program::{obsdeg, run, stderr};
+
+const SCHEME: &str = "[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n";
+
+/// A shell command with `$0` for the program.
+fn shell(script: &str) -> Output {
+    let mut command = Command::new("/bin/sh");
+    command.args(["-c", script, env!("CARGO_BIN_EXE_obsdeg")]).output().expect("it runs")
+}
+
+fn folder() -> (tempfile::TempDir, impl Fn(&str) -> String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().to_path_buf();
+    fs::write(path.join("scheme.toml"), SCHEME).expect("written");
+    (folder, move |name: &str| path.join(name).display().to_string())
+}
+
+/// All files and folders below, without the temporary folder itself.
+fn below(folder: &Path) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            out.extend(below(&path));
+        }
+        out.push(path);
+    }
+    out
+}
+
+/// What the user's umask leaves, for every command that writes.
+#[test]
+fn files_have_the_usual_permissions() {
+    let (folder, at) = folder();
+    fs::remove_file(at("scheme.toml")).expect("removed");
+    let scheme = tempfile::NamedTempFile::new().expect("a file");
+    fs::write(scheme.path(), SCHEME).expect("written");
+    for command in [
+        "analyze --scheme SCHEME --solutions off -o DIR/a.json",
+        "paper -o DIR/p.txt",
+        "compare SCHEME -o DIR/c.md",
+        "simulate --scheme SCHEME -o DIR/simulated",
+        "crosscheck --scheme SCHEME --runs 2 -o DIR/checked",
+        "design --positions 2 --observable D_FX --dwell 100 -o DIR/designed",
+        "report SCHEME --runs 2 -o DIR/review.html",
+        "report SCHEME --runs 2 -o DIR/written/review.md",
+    ] {
+        let command = command.replace("SCHEME", &scheme.path().display().to_string()).replace("DIR", &at(""));
+        fs::create_dir_all(at("written")).expect("made");
+        let output = shell(&format!("umask 027; exec \"$0\" {command} -q > /dev/null"));
+        let failed = output.status.code().is_none_or(|code| code > 1);
+        assert!(!failed, "{command}: {}", stderr(&output));
+    }
+    fs::set_permissions(at("written"), fs::Permissions::from_mode(0o750)).expect("set");
+    let all = below(folder.path());
+    assert!(all.len() > 60, "{all:?}");
+    for path in all {
+        let mode = fs::metadata(&path).expect("there").mode() & 0o777;
+        assert_eq!(mode, if path.is_dir() { 0o750 } else { 0o640 }, "{}", path.display());
+    }
+    // what is replaced keeps its own
+    let private = at("p.txt");
+    fs::set_permissions(&private, fs::Permissions::from_mode(0o600)).expect("set");
+    assert!(run(&["paper", "-o", &private, "--force"]).status.success());
+    assert_eq!(fs::metadata(&private).expect("there").mode() & 0o777, 0o600);
+}
+
+/// A device, a pipe, a folder: refused, with --force too, and still there; a link to a file leads to the file.
+#[test]
+fn only_files_are_replaced() {
+    let (_folder, at) = folder();
+    assert!(Command::new("mkfifo").arg(at("pipe")).status().expect("mkfifo").success());
+    symlink("/dev/full", at("device")).expect("made");
+    symlink(at("pipe"), at("to-pipe")).expect("made");
+    symlink(at("nowhere"), at("dangling")).expect("made");
+    fs::create_dir(at("folder")).expect("made");
+    for (name, kind) in [
+        ("pipe", "a pipe"),
+        ("device", "a device"),
+        ("to-pipe", "a pipe"),
+        ("dangling", "a symbolic link to nothing"),
+        ("folder", "a folder"),
+    ] {
+        for force in [&[][..], &["--force"]] {
+            let output = run(&[&["paper", "-o", &at(name)], force].concat());
+            assert_eq!(output.status.code(), Some(2), "{name}");
+            let expected = format!("it is {kind}; expected a file");
+            assert!(stderr(&output).contains(&expected), "{}", stderr(&output));
+        }
+    }
+    assert!(fs::symlink_metadata(at("pipe")).expect("there").file_type().is_fifo());
+    for link in ["device", "to-pipe", "dangling"] {
+        assert!(fs::symlink_metadata(at(link)).expect("there").is_symlink());
+    }
+    assert!(!Path::new(&at("nowhere")).exists());
+    // a folder of results takes the place of no folder either
+    fs::create_dir_all(at("run/summary.json")).expect("made");
+    let scheme = at("scheme.toml");
+    let output = run(&["simulate", "--scheme", &scheme, "-q", "-o", &at("run"), "--force"]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert_eq!(fs::read_dir(at("run")).expect("a folder").count(), 1);
+
+    fs::create_dir(at("elsewhere")).expect("made");
+    fs::write(at("elsewhere/file"), "old").expect("written");
+    symlink(at("elsewhere/file"), at("link")).expect("made");
+    assert_eq!(run(&["paper", "-o", &at("link")]).status.code(), Some(2), "it exists");
+    assert!(run(&["paper", "-o", &at("link"), "--force"]).status.success());
+    assert!(fs::symlink_metadata(at("link")).expect("there").is_symlink());
+    assert!(fs::read_to_string(at("elsewhere/file")).expect("readable").contains("disagree"));
+    assert_eq!(fs::read_dir(at("elsewhere")).expect("a folder").count(), 1);
+}
+
+/// Pipes and devices are read up to the limit of files; a pipe without a writer does not hold up.
+#[test]
+fn input_from_anywhere_is_limited() {
+    let (_folder, at) = folder();
+    assert!(Command::new("mkfifo").arg(at("pipe")).status().expect("mkfifo").success());
+    for (file, reason) in [
+        (at("pipe").as_str(), "nothing comes out of it"),
+        ("/dev/null", "nothing comes out of it"),
+        ("/dev/zero", "has more than 50000000 bytes; expected at most 50000000"),
+        (&at(""), "directory"),
+    ] {
+        for command in [
+            &["analyze", "--scheme"][..],
+            &["analyze", "--model"],
+            &["compare"],
+            &["report", "-o", &at("r.md")],
+        ] {
+            let output = run(&[command, &[file]].concat());
+            assert_eq!(output.status.code(), Some(2), "{command:?} {file}");
+            assert!(stderr(&output).contains(reason), "{command:?} {file}: {}", stderr(&output));
+        }
+    }
+    let file = run(&["analyze", "--scheme", &at("scheme.toml"), "--solutions", "off"]);
+    assert!(file.status.success());
+    for script in [
+        "cat SCHEME | \"$0\" analyze --solutions off --scheme /dev/stdin",
+        "cat SCHEME | \"$0\" analyze --solutions off --scheme /dev/fd/0",
+        "(cat SCHEME > PIPE &) ; \"$0\" analyze --solutions off --scheme /dev/fd/3 3< PIPE",
+        "\"$0\" analyze --solutions off --scheme /dev/stdin < SCHEME",
+    ] {
+        let output = shell(&script.replace("SCHEME", &at("scheme.toml")).replace("PIPE", &at("pipe")));
+        assert_eq!(output.stdout, file.stdout, "{script}: {}", stderr(&output));
+    }
+    // a report reads what it is given once
+    let script =
+        format!("cat {} | \"$0\" report -q --runs 2 -o {} /dev/stdin", at("scheme.toml"), at("review.html"));
+    let output = shell(&script);
+    assert!(output.status.success(), "{}", stderr(&output));
+}
+
+/// An interrupted command says nothing that it has not found: no evidence, no file, the exit code of an interrupt.
+#[test]
+fn an_interrupt_ends_with_its_code() {
+    let (folder, at) = folder();
+    let scheme = at("scheme.toml");
+    for arguments in [
+        &["crosscheck", "--scheme", &scheme, "--runs", "10000000", "-o", &at("evidence")][..],
+        &["report", &scheme, "--runs", "10000000", "-o", &at("review.html")],
+    ] {
+        let child =
+            obsdeg(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+        // whatever it is doing by then
+        std::thread::sleep(std::time::Duration::from_millis(700));
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+        assert!(sent.success());
+        let output = child.wait_with_output().expect("it ends");
+        // 130, or ended by the signal before it listened
+        let code = output.status.code().or(output.status.signal().map(|s| 128 + s));
+        assert_eq!(
+            (code, output.stdout.as_slice()),
+            (Some(130), &[][..]),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+    }
+    assert_eq!(below(folder.path()).len(), 1);
+}

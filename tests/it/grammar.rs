@@ -1,0 +1,238 @@
+//! Command lines drawn from the grammar of the program: each is done, refused as bad input or fails a check; none meets a defect.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+use obsdeg_exact::SplitMix64;
+
+use crate::program::{obsdeg, run, stdout};
+
+/// Command lines of each command.
+const DRAWN: usize = 8;
+
+const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n[requirements]\nD_F = 0.1\n\
+    [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\nangles_deg = [180, 0, 90]\n";
+const TURNING: &str = "name = 't'\nlatitude_deg = 45\n[[position]]\nangles_deg = [10, 20, 30]\nrotation = { about = 'X_p', angle_deg = 90 }\n\
+    [[position]]\nangles_deg = [0, 40, 0]\n";
+const MODEL: &str = "name = 'm'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n[simulation]\nduration = 10\nstep = 0.5\n\
+    values = { x = 1, k = 0.5 }\npriors = { x = 0.1, k = 0.1 }\nnoise = { y = 0.01 }\n";
+
+/// What may stand behind an option: fair values, extremes, what is none.
+fn values(option: &str) -> Option<&'static [&'static str]> {
+    let number: &[&str] =
+        &["1", "0.5", "30", "0", "-5", "1e-300", "1e200", "nan", "inf", "1e-6", "1e6", "x", "0,5"];
+    Some(match option {
+        "angles" => &[
+            "0,0,0",
+            "180,0,0",
+            "NUE",
+            "SEU",
+            "NUE@X_p:360",
+            "30,40,50@Z_n:-90",
+            "10,-20,30@Y_p:1e-9",
+            "0,90,45",
+            "beta,0,0",
+            "360,-360,0",
+            "1e-9,0,0",
+            "0 0 0",
+            "nue",
+            "0,0",
+            "1e300,0,0",
+        ],
+        "scheme" => &["s.toml", "t.toml", "m.toml", "none.toml", ".", "/dev/null"],
+        "model" => &["m.toml", "s.toml", "none.json", "."],
+        "carry" => &["inertial", "platform", "reset", "none"],
+        "latitude" => &["28.2", "0", "90", "-90", "-60", "45.000000001", "91", "x"],
+        "terms" => &["F", "F,I,O,S", "drift", "I,II", "F,I,O,S,II,OO,SS,IO,IS,OS", "F,F", "Q", ""],
+        "combination" => &[
+            "D_IX - D_IY",
+            "psi_y + D_FX",
+            "D_FX",
+            "sqrt(2)*D_FX - D_FY",
+            "1/0*D_FX",
+            "D_FX*D_FY",
+            "0*D_FX",
+            "((",
+            "D_FX + 1",
+        ],
+        "order" => &["0", "1", "5", "40", "-1", "x"],
+        "solutions" => &["off", "maybe"],
+        "frame" => &["n", "p", "q"],
+        "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
+        "symbolic-limit" => &["0", "1", "1000", "18446744073709551615", "-1"],
+        "format" => &["table", "json", "markdown", "csv", "latex", "html", "pdf", "xml"],
+        "dwell" => &["100", "300", "0.001", "1e6", "0", "-5", "nan", "inf", "1e300", "1e-300"],
+        "step" => &[
+            "50",
+            "100",
+            "20",
+            "1e-6",
+            "1e6",
+            "10",
+            "1.0842021724855044e-16",
+            "0",
+            "-1",
+            "inf",
+            "nan",
+            "1e300",
+        ],
+        "noise" => &["1e-5", "1e-15", "1", "1e-30", "1e-160", "1e155", "0", "-1", "nan"],
+        "azimuth-noise" => &["0.001", "1e-12", "1e200", "0", "nan"],
+        "requirement" => &["D_F=0.1", "psi=1e-9", "D_FX=1e-300", "D=-0.1", "D_QX=1", "D_F", "=1", "D_F=nan"],
+        "truth" => &["linear", "exact", "other"],
+        "slew-rate" => &["0.5", "10", "1e-6", "1e300", "0", "-1", "nan"],
+        "drift-noise" => {
+            &["0.01 deg/h", "0.001 deg/sqrt(h)", "1e200 deg/h", "0 deg/h", "0.01", "1e-300 deg/h", "x deg/h"]
+        }
+        "propagation" => &["exponential", "rk4", "euler"],
+        "value" | "estimate" => {
+            &["D_FX=11", "psi=0.1", "D=1e200", "D=1e-300", "psi=-1e6", "D_F=nan", "D_QX=1"]
+        }
+        "prior" => &["D=1", "psi=1e-12", "D=1e-300", "D=1e200", "psi=1e8", "D_F=0", "D_F=-1"],
+        "drift-scale" => &["1", "1e-6", "1e6", "1e-300", "0", "nan"],
+        "runs" => &["3", "2", "1", "0", "-1", "1e3"],
+        "filter-carry" => &["inertial", "reset", "x"],
+        "filter-latitude" => &["30", "90", "100", "x"],
+        "filter-drop" => &["p1", "p2", "p9", ""],
+        "positions" => &["5", "4", "3", "6", "2", "1", "0", "101", "x"],
+        "candidates" => &[
+            "cardinal",
+            "s.toml",
+            "t.toml",
+            "grid:90",
+            "grid:0",
+            "grid:7",
+            "grid:1e-9",
+            "grid:1",
+            "none.toml",
+            "x",
+        ],
+        "keep" => &["1", "3", "0", "-1", "18446744073709551615"],
+        "restarts" => &["2", "1", "0", "-1"],
+        "front" => &["1", "3", "0", "2:4", "1,2", "x"],
+        "observable" => &["D_F,D_O,D_S", "D_F", "D_FX", "psi", "D_Q", ""],
+        "max-degree" => &["1", "2", "D_F=1", "D_Q=1", "0", "-1"],
+        "criterion" => &["worst", "a", "d", "e", "margin", "x"],
+        "max-time" => &["1e4", "300", "10", "0", "nan", "1e300"],
+        "max-slew" => &["90", "200", "0", "-1", "nan"],
+        "gimbal" => &[
+            "alpha=-180:180",
+            "beta=-80:80",
+            "gamma=10:10",
+            "alpha=5:-5",
+            "delta=0:1",
+            "beta=nan:1",
+            "beta=-1e300:1e300",
+        ],
+        "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
+        "measured-azimuth" | "formulas" | "minimum" | "refine" | "meet" | "force" | "quiet" | "help" => {
+            return None;
+        }
+        _ => number,
+    })
+}
+
+/// What stands without an option.
+fn operands(command: &str) -> &'static [&'static str] {
+    match command {
+        "compare" | "report" => &["s.toml", "t.toml", "m.toml", "none.toml"],
+        "schema" => &["analysis", "scheme", "model", "comparison", "design", "nothing"],
+        "completions" => &["bash", "zsh", "nothing"],
+        _ => &[],
+    }
+}
+
+fn done(folder: &Path, arguments: &[String]) -> (Option<i32>, String) {
+    let output =
+        obsdeg(&[]).current_dir(folder).args(arguments).stdout(Stdio::null()).output().expect("it runs");
+    (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"))
+}
+
+/// The long options of a command, as its help lists them, and whether they take a value.
+fn options(command: &str) -> BTreeMap<String, bool> {
+    let help = stdout(&run(&[command, "--help"]));
+    let line = |l: &str| {
+        let l = l.trim_start();
+        let l = if l.starts_with("--") { l } else { l.strip_prefix('-')?.get(3..)? };
+        let mut words = l.strip_prefix("--")?.split_whitespace();
+        Some((words.next()?.to_string(), words.next().is_some_and(|w| w.starts_with('<'))))
+    };
+    help.lines().filter_map(line).collect()
+}
+
+#[test]
+fn no_command_line_of_the_grammar_meets_a_defect() {
+    let commands = [
+        "analyze",
+        "simulate",
+        "crosscheck",
+        "compare",
+        "design",
+        "report",
+        "paper",
+        "schema",
+        "completions",
+        "man",
+    ];
+    let codes = std::thread::scope(|scope| {
+        let draw = |(i, command)| scope.spawn(move || draws(i as u64, command));
+        let threads: Vec<_> = commands.into_iter().enumerate().map(draw).collect();
+        threads.into_iter().map(|t| t.join().expect("no defect")).collect::<Vec<_>>()
+    });
+    // of every command some lines are done, and some are refused
+    assert!(codes.iter().all(|of| of.get(&0).is_some_and(|n| *n > 1)), "{codes:?}");
+    assert!(codes.iter().any(|of| of.contains_key(&2)), "{codes:?}");
+}
+
+/// The exit codes of command lines of one command.
+fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
+    let mut rng = SplitMix64::new(0x6772_616d ^ stream << 40);
+    let options = options(command);
+    let fair = ["man", "schema", "completions"].contains(&command);
+    assert!(fair || options.len() > 4, "{command}: {options:?}");
+    let mut codes = BTreeMap::new();
+    for _ in 0..if fair { 4 } else { DRAWN } {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL)] {
+            fs::write(folder.path().join(name), text).expect("written");
+        }
+        let arguments = line(command, &options, &mut rng);
+        let (code, stderr) = done(folder.path(), &arguments);
+        let code = code.unwrap_or(-1);
+        assert!((0..3).contains(&code), "obsdeg {arguments:?}: {code}\n{stderr}");
+        assert!(!stderr.contains("panicked"), "obsdeg {arguments:?}: {stderr}");
+        *codes.entry(code).or_insert(0) += 1;
+    }
+    codes
+}
+
+/// One of a list, mostly of its first third, which are fair.
+fn pick(rng: &mut SplitMix64, from: &[&str]) -> String {
+    let n = if rng.below(15) == 0 { from.len() } else { from.len().div_ceil(3) };
+    from[rng.below(n as u64) as usize].to_string()
+}
+
+/// A command line: what the command cannot do without, then some of its options.
+fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -> Vec<String> {
+    let mut out = vec![command.to_string()];
+    let always: &[&str] = match command {
+        "simulate" | "crosscheck" | "analyze" => &["angles"],
+        "design" => &["positions", "restarts", "step"],
+        "report" => &["output", "runs"],
+        _ => &[],
+    };
+    let some = options.keys().map(String::as_str).filter(|name| *name != "help" && !always.contains(name));
+    let some: Vec<&str> = some.filter(|_| rng.below(10) == 0).collect();
+    for name in always.iter().copied().chain(some) {
+        let value = values(name).map(|from| pick(rng, from));
+        assert_eq!(value.is_some(), options[name], "--{name} of {command}");
+        out.push(format!("--{name}"));
+        out.extend(value);
+    }
+    let several = if ["compare", "report"].contains(&command) { 2 } else { 1 };
+    let operands = operands(command);
+    out.extend((0..several.min(operands.len())).map(|_| pick(rng, operands)));
+    out
+}

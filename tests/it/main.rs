@@ -1,0 +1,25 @@
+//! Everything that is tested from outside, in one binary: compiled once, linked once, its tests side by side. The tests of the
+//! symbolic worker are apart: they hold the lock for which others would wait.
+
+mod browser;
+mod cli;
+mod compare;
+mod crosscheck;
+mod design;
+mod examples;
+#[cfg(unix)]
+mod files;
+mod formulas;
+mod grammar;
+mod hostile;
+mod laws;
+mod models;
+mod program;
+mod reference_verdicts;
+mod report;
+mod rotation;
+mod scheme_schema;
+mod schemes;
+mod second_path;
+mod simulation;
+mod structure;

@@ -1,0 +1,560 @@
+//! Published systems with known verdicts: the engine for any system against all of them.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use obsdeg_core::analysis::{Options, analyze};
+use obsdeg_core::model::Scheme;
+use obsdeg_core::model::attitude::cardinal;
+use obsdeg_core::system::rows::Unknown;
+use obsdeg_core::system::{Judgement, json, judge, model_file};
+use obsdeg_ekf::model::central_difference;
+use obsdeg_ekf::{Measurement, Process};
+use obsdeg_evidence::system::evidence::SystemEvidence;
+use obsdeg_evidence::system::numeric::Numeric;
+use obsdeg_evidence::system::{crosscheck_system, simulate_system};
+use serde_json::Value;
+
+use crate::program;
+
+/// The reference models: name, JSON, text.
+fn models() -> Vec<(String, Value, String)> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "json"));
+    files.sort();
+    let read = |file: PathBuf| {
+        let text = std::fs::read_to_string(&file).expect("readable");
+        let name = file.file_stem().expect("a name").to_string_lossy().into_owned();
+        (name, serde_json::from_str(&text).expect("JSON"), text)
+    };
+    files.into_iter().map(read).collect()
+}
+
+fn names(value: &Value) -> Vec<String> {
+    value.as_array().into_iter().flatten().filter_map(|v| Some(v.as_str()?.to_string())).collect()
+}
+
+/// Degrees by name; of an unknown input that of the signal itself.
+fn degrees(j: &Judgement) -> BTreeMap<String, Option<usize>> {
+    let of = |(u, d): (&Unknown, &Option<usize>)| (u.derivative == 0).then(|| (u.name.clone(), *d));
+    j.layout.unknowns.iter().zip(&j.degrees.degree).filter_map(of).collect()
+}
+
+/// What differs from the reference.
+fn mismatches(reference: &Value, text: &str) -> Vec<String> {
+    let mut out = Vec::new();
+    let model = match json::read(text) {
+        Ok(model) => model,
+        Err(e) => return vec![e.to_string()],
+    };
+    let judged = match judge(&model, 1, None) {
+        Ok(judged) => judged,
+        Err(e) => return vec![e.to_string()],
+    };
+    let found = degrees(&judged);
+    let expected = &reference["expected"];
+    let known: Vec<String> = names(&reference["known_initial_conditions"])
+        .into_iter()
+        .chain(reference["known_initial_values"].as_object().into_iter().flatten().map(|(k, _)| k.clone()))
+        .collect();
+    for (list, wanted) in [("observable", true), ("unobservable", false)] {
+        for name in names(&expected[list]) {
+            let observable = known.contains(&name) || found.get(&name).is_some_and(Option::is_some);
+            if observable != wanted {
+                out.push(format!("{name} is {}observable", if observable { "" } else { "not " }));
+            }
+        }
+    }
+    for (name, order) in reference["min_order"].as_object().into_iter().flatten() {
+        let order = order.as_u64().map(|k| k as usize);
+        let own = found.get(name).copied().flatten();
+        if own != order {
+            out.push(format!("{name}: order {own:?}, expected {order:?}"));
+        }
+    }
+    if let Some(ranks) = reference["rank_by_order"].as_array() {
+        let ranks: Vec<usize> = ranks.iter().filter_map(|r| Some(r.as_u64()? as usize)).collect();
+        let profile = &judged.degrees.rank_profile;
+        for (k, rank) in ranks.iter().enumerate() {
+            let own = profile.get(k).or(profile.last()).copied().unwrap_or(0);
+            if own != *rank {
+                out.push(format!("rank {own} at order {k}, expected {rank}"));
+            }
+        }
+    }
+    for (text, degree) in names(&reference["observable_combinations"]).iter().zip(&judged.combinations) {
+        if degree.is_none() {
+            out.push(format!("{text} is not observable"));
+        }
+    }
+    if judged.error_bound > 1e-12 {
+        out.push(format!("error bound {:e}", judged.error_bound));
+    }
+    out
+}
+
+#[test]
+fn every_reference_verdict_and_order() {
+    let models = models();
+    assert_eq!(models.len(), 141);
+    let mut table = Vec::new();
+    for (name, reference, text) in &models {
+        table.extend(mismatches(reference, text).into_iter().map(|m| format!("{name}: {m}")));
+    }
+    assert!(table.is_empty(), "{} mismatches\n{}", table.len(), table.join("\n"));
+}
+
+fn judged(text: &str) -> Judgement {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    judge(&model, 7, None).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// `(name, degree)` in the order of the model.
+fn degree_of(j: &Judgement, name: &str) -> Option<usize> {
+    degrees(j)[name]
+}
+
+/// The paper's two positions as a model file and as a scheme.
+#[test]
+fn the_platform_is_one_of_them() {
+    let text = std::fs::read_to_string(
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/platform-as-model/model.toml"),
+    );
+    let model = judged(&text.expect("readable"));
+    let positions = ["NUE", "NDW"].map(|n| cardinal(n).expect("an attitude"));
+    let no_solutions = Options { solutions: false, ..Options::default() };
+    let platform = analyze(&Scheme::of_angles(positions), no_solutions, None).expect("analysed");
+    assert_eq!(model.degrees.rank_profile[..3], platform.rank_profile[..]);
+    let own = degrees(&model);
+    for q in &platform.quantities {
+        assert_eq!(own[&q.name], q.degree, "{}", q.name);
+    }
+    assert_eq!(model.combinations, [Some(1)]);
+}
+
+/// A known start is a special point: rank may grow after it has stood still.
+#[test]
+fn stagnation_is_no_end_at_a_known_start() {
+    let trap = |power: usize| {
+        judged(&format!(
+            "name='trap'\nparameters=['a']\n[states]\nx={{equation='1+a*x^{power}',initial=0}}\n[outputs]\ny='x'"
+        ))
+    };
+    let found = trap(2);
+    assert_eq!((degree_of(&found, "a"), found.layout.closed, found.rests_on_bound), (Some(3), false, false));
+    assert_eq!(found.degrees.rank_profile, [0, 0, 0, 1]);
+    // beyond the bound nothing is claimed
+    let late = trap(20);
+    assert!(degree_of(&late, "a").is_none() && late.rests_on_bound);
+    // with a generic start the first stagnation is the end
+    let open = judged("name='open'\nparameters=['a']\n[states]\nx='1+a*x^2'\n[outputs]\ny='x'");
+    assert_eq!((open.layout.closed, open.degrees.rank_profile), (true, vec![1, 2]));
+}
+
+/// Identities between functions hold exactly, at every order: what cancels moves no output.
+#[test]
+fn identities_of_functions_cancel() {
+    for identity in [
+        "sin(x)^2 + cos(x)^2",
+        "sin(2*x) - 2*sin(x)*cos(x)",
+        "sin(x + q) - sin(x)*cos(q) - cos(x)*sin(q)",
+        "cos(x/2)^2 - (1 + cos(x))/2",
+        "cos(3*x) - 4*cos(x)^3 + 3*cos(x)",
+        "tan(x) - sin(x)/cos(x)",
+        "exp(x + q) - exp(x)*exp(q)",
+        "exp(x/3)^3 - exp(x)",
+        "exp(log(x)) - x",
+        "log(exp(x)) - x",
+        "log(x*q) - log(x) - log(q)",
+        "log(x^3/q) - 3*log(x) + log(q)",
+        "sqrt(x)^2 - x",
+        "sqrt(x^2 + q)^2 - x^2 - q",
+        "x^(1/2) - sqrt(x)",
+        "x^0.75 - sqrt(x)*x^(1/4)",
+        "x^(1/3)*x^(2/3) - x",
+        "x^(q + 1) - x^q*x",
+        "x^(2*q) - (x^q)*x^q",
+        "x^q - exp(q*log(x))",
+        "asin(x) + acos(x)",
+        "atan(x) + atan(1/x)",
+        "atan(x) - asin(x/sqrt(1 + x^2))",
+        "x^-2 - 1/x^2",
+        "2^10*x - 1024*x",
+        "x*1e-3 - x/1000",
+    ] {
+        let text = format!(
+            "name='identity'\n[states]\nx='w*x + q'\nq='x - w'\nw='0'\nz='-z'\n[outputs]\ny='z + ({identity})'"
+        );
+        let found = judged(&text);
+        assert_eq!(degree_of(&found, "z"), Some(0), "{identity}");
+        assert_eq!(found.degrees.rank(), 1, "{identity}: {:?}", found.degrees);
+    }
+    // and what does not cancel is seen
+    for different in ["sin(x)^2 - cos(x)^2", "exp(x) - x", "sqrt(x) + x", "asin(x) - acos(x)", "x^q"] {
+        let text = format!(
+            "name='no identity'\n[states]\nx='w*x + q'\nq='x - w'\nw='0'\nz='-z'\n[outputs]\ny='z + ({different})'"
+        );
+        assert_eq!(judged(&text).degrees.rank(), 4, "{different}");
+    }
+}
+
+/// Functions against the same system written with polynomials and one more known state.
+#[test]
+fn functions_give_the_orders_that_can_be_seen() {
+    // the exponent of a power law, Torricelli's outflow, Michaelis-Menten-Hill, an Arrhenius law
+    for (equation, parameters, expected) in [
+        ("-k*x^n", "['k', 'n']", vec![("x", Some(0)), ("k", Some(2)), ("n", Some(2))]),
+        ("-k*sqrt(x)", "['k']", vec![("x", Some(0)), ("k", Some(1))]),
+        ("-v*x^n/(m^n + x^n)", "['v', 'm', 'n']", vec![("v", Some(3)), ("m", Some(3)), ("n", Some(3))]),
+        ("-a*exp(-e/x)", "['a', 'e']", vec![("a", Some(2)), ("e", Some(2))]),
+        ("a*sin(f*t)", "['a', 'f']", vec![("a", Some(2)), ("f", Some(2))]),
+        ("-log(b)*x", "['b']", vec![("b", Some(1))]),
+    ] {
+        let text = format!("name='f'\nparameters={parameters}\n[states]\nx='{equation}'\n[outputs]\ny='x'");
+        let found = judged(&text);
+        for (name, degree) in expected {
+            assert_eq!(degree_of(&found, name), degree, "{name} in {equation}");
+        }
+    }
+}
+
+/// Inputs of every kind, in TOML.
+#[test]
+fn inputs_constants_and_experiments() {
+    let with = |inputs: &str, equation: &str| {
+        judged(&format!(
+            "name='i'\nparameters=['a', 'b']\n{inputs}\n[states]\nx='{equation}'\n[outputs]\ny='x'"
+        ))
+    };
+    // a constant input of known value hides b behind a, a generic one does not
+    let generic = with("known_inputs={u='generic'}", "a + b*u");
+    assert_eq!((degree_of(&generic, "a"), degree_of(&generic, "b")), (Some(2), Some(2)));
+    let constant = with("known_inputs={u='constant'}", "a + b*u");
+    assert_eq!((degree_of(&constant, "a"), constant.degrees.rank()), (None, 2));
+    let ramp = with("known_inputs={u={polynomial=1}}", "a + b*u");
+    assert_eq!(degree_of(&ramp, "b"), Some(2));
+    let known = with("known_inputs={u={function='exp(-t)'}}", "a + b*u");
+    assert_eq!(degree_of(&known, "b"), Some(2));
+    // an arbitrary unknown input takes everything with it, an unknown ramp does not
+    let arbitrary = with("unknown_inputs={w='arbitrary'}", "a*x + w");
+    assert_eq!((degree_of(&arbitrary, "a"), arbitrary.rests_on_bound), (None, true));
+    let ramp = with("unknown_inputs={w={polynomial=1}}", "a*x + w");
+    assert_eq!((degree_of(&ramp, "a"), degree_of(&ramp, "w")), (Some(3), Some(3)));
+    // two experiments with constant inputs of their own tell a from b
+    let twice = with("experiments=2\nknown_inputs={u='constant'}", "a + b*u");
+    assert_eq!((degree_of(&twice, "a"), degree_of(&twice, "b")), (Some(1), Some(1)));
+    assert_eq!(degree_of(&twice, "x@2"), Some(0));
+    // a jump of the state that is known
+    let jump = judged(
+        "name='jump'\nparameters=['a']\n[states]\nx='0'\nz='0'\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + a*z'}",
+    );
+    assert_eq!((degree_of(&jump, "a"), jump.degrees.rank()), (None, 2));
+}
+
+/// The same system from JSON and from TOML.
+#[test]
+fn both_layouts_say_the_same() {
+    let toml = "name='s'\nparameters=['p1', 'p2']\nknown_inputs={u='generic'}\n[states]\nx1='-p1*x1 + u'\nx2='p2*x1 - x2'\n[outputs]\ny='x2'";
+    let json = r#"{"name": "s", "states": ["x1", "x2"], "params": ["p1", "p2"], "known_inputs": ["u"],
+        "equations": {"x1": "-p1*x1 + u", "x2": "p2*x1 - x2"}, "outputs": {"y": "x2"}}"#;
+    let of_json = judge(&json::read(json).expect("a model"), 7, None).expect("judged");
+    let of_toml = judged(toml);
+    assert_eq!((of_json.layout, of_json.degrees), (of_toml.layout, of_toml.degrees));
+}
+
+/// Ten megabytes of anything are refused, or read, in order.
+#[test]
+fn monsters_do_no_harm() {
+    let model = |equation: &str| {
+        format!("name='monster'\nparameters=['a']\n[states]\nx=\"{equation}\"\n[outputs]\ny='x'")
+    };
+    for piece in ["(", "-", "x^", "sin(", "((x)", ")"] {
+        let text = model(&piece.repeat(10_000_000 / piece.len()));
+        let error = model_file::read(&text).expect_err("refused");
+        assert!(error.span.is_some() && error.to_string().len() < 300, "{piece}: {error}");
+    }
+    let long = model(&format!("{}x", "a*x + ".repeat(200_000)));
+    let error = model_file::read(&long).and_then(|m| judge(&m, 1, None)).expect_err("too many operations");
+    assert!(error.to_string().contains("operations"), "{error}");
+    let sum = model(&format!("{}x", "a*x + ".repeat(20_000)));
+    assert_eq!(judged(&sum).degrees.rank(), 2);
+    for fraction in ["x^(a + 1/6666666666666)", "exp(x/99999)", "x^0.1234567", "cos(0.00001*x)", "x^123456"] {
+        let error = model_file::read(&model(fraction)).and_then(|m| judge(&m, 1, None)).expect_err(fraction);
+        assert!(error.to_string().contains("above 1000"), "{fraction}: {error}");
+    }
+    let many: String = (0..200_000).map(|i| format!("x{i} = \"-x{i}\"\n")).collect();
+    let error = model_file::read(&format!("name='many'\n[states]\n{many}[outputs]\ny='x0'"))
+        .and_then(|m| judge(&m, 1, None))
+        .expect_err("too many");
+    assert!(error.to_string().contains("200000 states"), "{error}");
+    let experiments = r#"{"name": "e", "experiments": 1000000000, "states": ["x"], "equations": {"x": "x"}, "outputs": {"y": "x"}}"#;
+    assert!(json::read(experiments).expect_err("too many").to_string().contains("1 to 20"));
+    for nested in ["sin(x + ", "exp(2*", "log(x + ", "sqrt(1 + "] {
+        let text = model(&format!("{}x{}", nested.repeat(150), ")".repeat(150)));
+        // judged or refused, but no panic
+        let _ = model_file::read(&text).and_then(|m| judge(&m, 1, None));
+    }
+}
+
+fn example(name: &str) -> obsdeg_core::system::SystemModel {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples").join(name).join("model.toml");
+    model_file::read(&std::fs::read_to_string(file).expect("readable")).expect("a model")
+}
+
+/// The Jacobians of the filter are those of its functions, for every function there is.
+#[test]
+fn jacobians_against_differences() {
+    let all = model_file::read(
+        "name='all'\nparameters=['a', 'n']\nknown_inputs={u={function='exp(-t)'}, v='generic'}\n\
+         unknown_inputs={w={polynomial=1}}\n[constants]\nk=2.5\n[states]\nx='-a*x^n + sin(2*x)*u + w'\n\
+         y={equation='exp(-x/3) + log(x*y) - sqrt(x + y) + v*k', initial='2*a'}\n\
+         [outputs]\np='atan(x/y) + asin(x/9) - acos(y/9)'\nq='tan(x/4)*cos(y)^3'\n\
+         [simulation.inputs]\nv='cos(2*t)'",
+    );
+    let models = [all.expect("a model"), example("unicycle-range"), example("lotka-volterra")];
+    for model in &models {
+        let compiled = model.compile().expect("compiled");
+        let numeric = Numeric::new(model, &compiled).expect("numbers");
+        let n = numeric.states.len();
+        let x = nalgebra::DVector::from_iterator(n, (0..n).map(|i| 0.8 + 0.23 * i as f64));
+        let step = nalgebra::DVector::from_element(n, 1e-5);
+        let sigmas = vec![1.0; model.outputs.len()];
+        let (process, outputs) = (numeric.process(0), numeric.measurement(0, &sigmas));
+        for (own, differences) in [
+            (process.jacobian(0.7, &x), central_difference(|x| process.f(0.7, x), &x, &step)),
+            (outputs.jacobian(0.7, &x), central_difference(|x| outputs.h(0.7, x), &x, &step)),
+        ] {
+            assert!(own.iter().all(|d| d.is_finite()), "{}", model.name);
+            assert!(
+                (&own - &differences).amax() < 1e-8 * own.amax().max(1.0),
+                "{} {own} {differences}",
+                model.name
+            );
+        }
+    }
+}
+
+/// Slopes, prior inflation and null vectors of the information confirm the exact verdicts on every example that has numbers.
+#[test]
+fn the_information_confirms_the_verdicts() {
+    let mut slopes = 0;
+    for name in [
+        "bearing-only",
+        "drift-product",
+        "lotka-volterra",
+        "sir",
+        "stationary-alignment",
+        "two-compartment",
+        "two-position-alignment",
+        "unicycle-range",
+    ] {
+        let e = crosscheck_system(&example(name), 1).expect("evidence");
+        assert!(e.passed && e.checks > 3, "{name}: {e:?}");
+        // every direction that no output sees is printed, and the samples do not see it either
+        assert_eq!(e.symmetries.len() + usize::from(name == "sir"), e.defect.predicted, "{name}");
+        assert!(e.symmetries.iter().all(|s| s.seen.measured.is_some_and(|x| x < 1e-9)), "{name}: {e:?}");
+        for q in &e.quantities {
+            let Some(measured) = q.slope.measured else { continue };
+            let degree = q.degree.expect("observable") as f64;
+            assert!((measured + degree + 0.5).abs() < 0.06, "{name}: {q:?}");
+            slopes += 1;
+        }
+    }
+    // degrees 0 to 4 are among them
+    assert!(slopes >= 15, "{slopes}");
+    // the verdict is one for generic inputs: a robot that stands still sees less, and the check says so
+    let text = std::fs::read_to_string(
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/unicycle-range/model.toml"),
+    );
+    let still = text.expect("readable").replace("1 + 0.5*sin(0.3*t)", "0").replace("0.2*cos(0.17*t)", "0");
+    let refuted = crosscheck_system(&model_file::read(&still).expect("a model"), 1).expect("evidence");
+    assert!(!refuted.passed && (refuted.defect.predicted, refuted.defect.measured) == (1, 2), "{refuted:?}");
+}
+
+/// With jumps no slope is measured: what the other evidence says is not said of the degrees.
+#[test]
+fn what_is_not_measured_is_no_agreement() {
+    let orders = |e: &SystemEvidence| (e.orders.measured, e.orders.of);
+    let e = crosscheck_system(&example("two-position-alignment"), 1).expect("evidence");
+    assert_eq!((e.passed, orders(&e)), (true, (0, 10)));
+    assert!(e.quantities.iter().all(|q| q.slope.pass.is_none() && q.inflation.pass == Some(true)));
+    // three states in closed form: degrees 0, 1, 2
+    let chain = "name='c'\n[states]\nx='y'\ny='z'\nz='0'\n[outputs]\no='x'\n[simulation]\nduration=1\nstep=0.1\n\
+                 noise={o=0.01}\nvalues={x=1, y=1, z=1}";
+    let e = crosscheck_system(&model_file::read(chain).expect("a model"), 1).expect("evidence");
+    assert!(e.passed && orders(&e) == (3, 3) && e.checks == 7, "{e:?}");
+    assert!(e.quantities.iter().all(|q| q.slope.pass == Some(true)));
+}
+
+/// A pendulum that starts at rest: its slopes go up and down with the horizon until rounding hides them. Two horizons that agree by chance
+/// refute nothing.
+#[test]
+fn slopes_that_do_not_settle_are_not_measured() {
+    for (theta, input) in [("0.5", "sin(t)"), ("1", "0.5*cos(3*t)")] {
+        let text = format!(
+            "name='pendulum'\nparameters=['k', 'c', 'b', 's', 'o']\nknown_inputs={{u='generic'}}\n[states]\ntheta='omega'\n\
+             omega='-k*sin(theta) - c*omega + b*u'\n[outputs]\ny='s*cos(theta) + o'\n[simulation]\nduration=10\nstep=0.01\n\
+             noise={{y=1e-3}}\ninputs={{u='{input}'}}\nvalues={{theta={theta}, omega=0, k=20, c=0.3, b=1, s=1.2, o=0.1}}"
+        );
+        let e = crosscheck_system(&model_file::read(&text).expect("a model"), 1).expect("evidence");
+        assert!(e.passed && (e.orders.measured, e.orders.of) == (0, 7), "{e:?}");
+    }
+}
+
+/// The filter of a model: consistent where everything is observable; where a direction is not, a filter that is linearised anew takes
+/// up information that is not there, and the run says whose.
+#[test]
+fn filters_of_models() {
+    let (run, traces) = simulate_system(&example("two-position-alignment"), 1).expect("a run");
+    assert!(run.consistency.consistent, "{run:?}");
+    for e in &run.estimates {
+        assert!(e.sigma < e.prior_sigma && e.error_over_sigma.abs() < 4.0, "{e:?}");
+    }
+    assert_eq!((traces.time.len(), traces.series.len()), (1201, 10));
+    // half way round nothing tells phE from bN, afterwards both are known
+    let sigma = |name: &str, k: usize| {
+        traces.series[traces.names.iter().position(|n| n == name).expect("a state")].sigma[k]
+    };
+    assert!(sigma("bN", 600) > 100.0 * sigma("bN", 1200));
+    let (prey, _) = simulate_system(&example("lotka-volterra"), 1).expect("a run");
+    let beyond: Vec<&str> =
+        prey.estimates.iter().filter(|e| e.error_over_sigma.abs() > 4.0).map(|e| e.name.as_str()).collect();
+    assert_eq!((beyond, prey.consistency.consistent), (vec!["x2", "b"], false));
+    // the product that is observable comes out all the same
+    let of = |name: &str| prey.estimates.iter().find(|e| e.name == name).expect("an unknown");
+    let product = of("b").estimate * of("x2").estimate / (of("b").truth * of("x2").truth);
+    assert!((product - 1.0).abs() < 0.03, "{product}");
+    // the same seed, the same run; what is missing is named
+    assert_eq!(simulate_system(&example("lotka-volterra"), 1).expect("a run").0, prey);
+    let error = simulate_system(&example("platform-as-model"), 1).map(|r| r.0).expect_err("no numbers");
+    assert!(error.to_string().contains("no value; expected one under [simulation.values]"), "{error}");
+}
+
+/// Solving expressions against derivatives taken by hand (chain rule, in floating point), and by the whole program.
+#[cfg(feature = "symbolica")]
+#[test]
+fn solving_expressions() {
+    use obsdeg_core::model::expression::{Names, evaluate_f64, parse_with};
+    let solved = |file: &str| -> (BTreeMap<String, String>, Value) {
+        let answer = program::json(&["analyze", "--format", "json", "--model", file]);
+        let of = |q: &Value| Some((q["name"].as_str()?.to_string(), q["solution"].as_str()?.to_string()));
+        (
+            answer["quantities"].as_array().into_iter().flatten().filter_map(of).collect(),
+            answer["note"].clone(),
+        )
+    };
+    let at = |text: &str, values: &[(&str, f64)]| {
+        // `y''` is no name to the parser
+        let text = text.replace("'''", "_3").replace("''", "_2").replace('\'', "_1");
+        let parsed = parse_with(&text, Names::Plain).expect("an expression");
+        evaluate_f64(&parsed, &|name| {
+            values.iter().find(|v| v.0 == name).unwrap_or_else(|| panic!("{name}")).1
+        })
+    };
+
+    // y = k I; I'/I = a, a' = beta S', S' = -beta S I
+    let (s, i, beta, gamma, k) = (0.9f64, 0.1, 0.5, 0.2, 0.3);
+    let a = beta * s - gamma;
+    let s1 = -beta * s * i;
+    let (a1, a2) = (beta * s1, -beta * beta * (s1 * i + s * a * i));
+    let y: Vec<f64> = [1.0, a, a * a + a1, a.powi(3) + 3.0 * a * a1 + a2].iter().map(|x| k * i * x).collect();
+    let (sir, note) = solved("examples/sir/model.toml");
+    assert_eq!((sir.keys().map(String::as_str).collect::<Vec<_>>(), note), (vec!["gamma"], Value::Null));
+    let found = at(&sir["gamma"], &[("y", y[0]), ("y_1", y[1]), ("y_2", y[2]), ("y_3", y[3])]);
+    assert!((found - gamma).abs() < 1e-9, "{found}");
+
+    // an input: y' = -(p/V) y + u/V, so that y'' and u' solve for both
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("m.toml");
+    let text = "name = \"m\"\n[states]\nx = \"-p*x/V + u/V\"\n[parameters]\np = {}\nV = {}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"x\"\n";
+    std::fs::write(&file, text).expect("written");
+    let (clearance, _) = solved(&file.display().to_string());
+    let (x, p, v, u, u1) = (0.7, 0.4, 2.5, 1.3, -0.6);
+    let y1 = (u - p * x) / v;
+    let y2 = (u1 - p * y1) / v;
+    let values = [("y", x), ("y_1", y1), ("y_2", y2), ("u", u), ("u_1", u1), ("p", p), ("V", v), ("x", x)];
+    for (name, truth) in [("p", p), ("V", v), ("x", x)] {
+        let found = at(&clearance[name], &values);
+        assert!((found - truth).abs() < 1e-9, "{name} = {}: {found}", clearance[name]);
+    }
+    // what has no expression says why
+    let (none, note) = solved("examples/bearing-only/model.toml");
+    assert!(none.is_empty() && note.as_str().is_some_and(|n| n.contains("not rational")), "{note}");
+}
+
+/// 1/x grows by 2k in time and y = s1/(1/x + s2), so that 1/x and s2 can be shifted against each other; a number of three digits in a
+/// direction comes out as itself.
+#[test]
+fn directions_that_are_polynomials() {
+    let read = |states: &str, parameters: &str, y: &str| {
+        let text =
+            format!("name = \"m\"\n[states]\n{states}\n[parameters]\n{parameters}\n[outputs]\ny = \"{y}\"\n");
+        let model = model_file::read(&text).expect("a model");
+        let a = obsdeg_core::system::analyze_system(&model, 1, None, None).expect("judged");
+        assert!(a.other_directions.is_empty(), "{:?}", a.other_directions);
+        a.symmetries.into_iter().map(|s| s.words).collect::<Vec<_>>()
+    };
+    let clock = read("x = \"-2*k*x^2\"", "k = {}\ns1 = {}\ns2 = {}", "s1*x/(1 + s2*x)");
+    assert_eq!(clock, ["multiply x by c; divide k, s1, s2 by c", "move x, s2 along x^2, 1"]);
+    let tilt = read("v = \"9.81*phi + b\"\nphi = \"0\"\nb = \"0\"", "", "v");
+    assert_eq!(tilt, ["add c to phi; subtract 981/100 c from b"]);
+}
+
+/// Primes are printed, so anybody can write a model in which they divide a factor: that model has other primes.
+#[test]
+fn nobody_aims_at_the_primes() {
+    // those of seed 1, when they did not depend on the input
+    let mut product = "1806122528306898383*1665232801720708243".to_string();
+    let mut seen: Vec<u64> = Vec::new();
+    for _ in 0..4 {
+        let text = format!("name='aimed'\n[states]\nx='-x'\n[outputs]\nz='x*{product}'");
+        let judged = judge(&model_file::read(&text).expect("a model"), 1, None).expect("judged");
+        assert_eq!((judged.degrees.rank(), degree_of(&judged, "x")), (1, Some(0)), "{product}");
+        let [p, q] = judged.fields.map(|f| f.modulus());
+        seen.extend([p, q]);
+        product = format!("{product}*{p}*{q}");
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), 8);
+}
+
+/// Whatever moves a verdict takes part in the choice of primes, nothing else does.
+#[test]
+fn the_input_chooses_the_primes() {
+    let first = |text: &str| {
+        let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+        model.random(1, "verdicts").next_u64()
+    };
+    let plain = "name='m'\nparameters=['a', 'b']\nknown_inputs={u='generic'}\nunknown_inputs={w='arbitrary'}\n[constants]\nc=2\n\
+                 [states]\nx='-a*x + u'\ny={equation='c*x + w', initial=1}\n[outputs]\nz='b*y'\n";
+    let words = plain.replace("name='m'", "name='another'\ndescription='words'");
+    assert_eq!(first(plain), first(&words));
+    let mut seen = vec![first(plain)];
+    for (old, new) in [
+        ("-a*x", "-2*a*x"),
+        ("z='b*y'", "q='b*y'"),
+        ("z='b*y'", "z='b*y'\nq='x'"),
+        ("u='generic'", "u='constant'"),
+        ("u='generic'", "u={function='t'}"),
+        ("w='arbitrary'", "w={polynomial=1}"),
+        ("initial=1", "initial=2"),
+        (", initial=1", ""),
+        ("c=2", "c=3"),
+        ("name='m'", "name='m'\nexperiments=2"),
+        ("name='m'", "name='m'\ncombinations=['a*b']"),
+        ("[states]", "[definitions]\nd='a'\n[states]"),
+        ("z='b*y'\n", "z='b*y'\n[[segment]]\n[[segment]]\n"),
+        ("z='b*y'\n", "z='b*y'\n[[segment]]\n[[segment]]\nconstants={c=5}\n"),
+        ("z='b*y'\n", "z='b*y'\n[[segment]]\n[[segment]]\ncarry={x='x + 1'}\n"),
+    ] {
+        assert!(plain.contains(old));
+        seen.push(first(&plain.replace(old, new)));
+    }
+    let all = seen.len();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), all);
+}

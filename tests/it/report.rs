@@ -1,0 +1,560 @@
+//! The design review as its reader sees it: valid, complete, escaped, the same each time; in a real browser where there is one.
+
+use std::path::{Path, PathBuf};
+
+use scraper::{Html, Selector};
+use serde_json::json;
+
+use crate::browser::Browser;
+use crate::program::{run, stderr};
+
+/// Markup of every format, in names and descriptions.
+const HOSTILE: &str = r#"<script>alert(1)</script> & "x" $a_b^c$ #let \end{document} *b* |c| `d` {{ e }} %"#;
+
+/// Writes a report and gives its text.
+fn report(folder: &Path, name: &str, inputs: &[&str]) -> (PathBuf, String) {
+    let file = folder.join(name);
+    let path = file.display().to_string();
+    let arguments = [&["report", "--runs", "20", "-q", "-o", &path], inputs].concat();
+    let output = run(&arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(output.stdout.is_empty());
+    let text = std::fs::read(&file).expect("written");
+    (file, String::from_utf8_lossy(&text).into_owned())
+}
+
+/// Positions, up to twelve, with slews, under names that try to be markup.
+fn hostile(folder: &Path, positions: usize) -> PathBuf {
+    let attitudes = ["NUE", "NED", "SUW", "SEU", "UNW", "UEN", "DNE", "DES", "ENU", "EUS", "WND", "WUN"];
+    let mut text = format!(
+        "name = '''{HOSTILE}'''\ndescription = '''{HOSTILE}'''\ncarry = \"inertial\"\nlatitude_deg = 48\n\
+         [simulation]\ndwell_s = 300\nslew_rate_deg_s = 3\nstep_s = 10\n[requirements]\nD = 0.05\n"
+    );
+    for (i, attitude) in attitudes.iter().take(positions).enumerate() {
+        text.push_str(&format!("[[position]]\nname = \"q_{}\"\nattitude = \"{attitude}\"\n", i + 1));
+    }
+    let file = folder.join(format!("{positions}.toml"));
+    std::fs::write(&file, text).expect("written");
+    file
+}
+
+const PAPER: &str = "examples/paper-p1-p2/scheme.toml";
+const MODEL: &str = "examples/two-compartment/model.toml";
+
+fn texts(page: &Html, selector: &str) -> Vec<String> {
+    let selector = Selector::parse(selector).expect("a selector");
+    page.select(&selector).map(|e| e.text().collect::<String>().trim().to_string()).collect()
+}
+
+/// Cells of the table whose caption begins so.
+fn table(page: &Html, caption: &str) -> Vec<Vec<String>> {
+    let parse = |s: &str| Selector::parse(s).expect("a selector");
+    let table = page
+        .select(&parse("table"))
+        .find(|t| t.select(&parse("caption")).any(|c| c.text().collect::<String>().starts_with(caption)))
+        .unwrap_or_else(|| panic!("no table {caption}"));
+    let cells = |row: scraper::ElementRef<'_>| {
+        row.select(&parse("td")).map(|c| c.text().collect::<String>()).collect()
+    };
+    table.select(&parse("tbody tr")).map(cells).collect()
+}
+
+fn assert_unique_ids(page: &Html) {
+    let selector = Selector::parse("[id]").expect("a selector");
+    let mut ids: Vec<&str> = page.select(&selector).filter_map(|e| e.attr("id")).collect();
+    ids.sort_unstable();
+    let twice: Vec<&str> = ids.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0]).collect();
+    assert!(twice.is_empty(), "{twice:?}");
+}
+
+/// The rows of the boxes at the top: what, grade, text.
+fn statuses(page: &Html) -> Vec<Vec<[String; 3]>> {
+    let parse = |s: &str| Selector::parse(s).expect("a selector");
+    let text = |e: scraper::ElementRef<'_>, s: &str| -> String {
+        let found = e.select(&parse(s)).next().unwrap_or_else(|| panic!("no {s}"));
+        found.text().collect::<Vec<_>>().concat().split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let row = |e: scraper::ElementRef<'_>| {
+        [text(e, "dt"), e.attr("class").unwrap_or_default().to_string(), text(e, "dd")]
+    };
+    let of = |e: scraper::ElementRef<'_>| e.select(&parse("dl > div")).map(row).collect();
+    page.select(&parse("body > .statuses > .status")).map(of).collect()
+}
+
+/// The box and the verdict of a page of one scheme or model say the same, and nothing further down the contrary.
+fn assert_status(page: &Html, verdict: &str) {
+    let boxes = statuses(page);
+    assert_eq!(boxes.len(), 1);
+    let of = |what: &str| boxes[0].iter().find(|r| r[0] == what);
+    let good = |what: &str| of(what).is_none_or(|r| r[1] == "good");
+    let whole: String = texts(page, "main").concat();
+    // by what the rest of the page says
+    let consistent = !whole.contains("the filter is NOT consistent with this truth:");
+    let valid = !whole.contains("the small-angle model does NOT hold for these drifts: a real platform");
+    let prior = whole.contains("known from the prior only") || whole.contains("rests on the prior");
+    let limits = |what: &str| of(what).is_some_and(|r| r[1] == "limited");
+    assert_eq!((!limits("Filter, one run"), !limits("Small-angle model")), (consistent, valid), "{verdict}");
+    assert!(good("Resting on the prior") || prior, "{verdict}");
+    let limited = !(consistent && valid && !prior && good("Filter and exact verdicts"));
+    assert!(!limited || verdict.contains("Limited: "), "{verdict}");
+    // what is missed anywhere on the page leads, and is never a green ok
+    let missed = whole.contains(" are NOT met, ");
+    let leads =
+        ["By prediction (no prior, ", "In the run (with prior "].iter().any(|l| verdict.starts_with(l));
+    assert_eq!((of("Requirements").is_some_and(|r| r[1] == "missed"), leads), (missed, missed), "{verdict}");
+    assert!(missed || !limited || verdict.starts_with("Limited: "), "{verdict}");
+    assert!(!(whole.contains("confirms the verdicts") && limited), "{verdict}");
+    assert_eq!(verdict.contains("confirms the verdicts"), !verdict.contains("Limited: "), "{verdict}");
+}
+
+#[test]
+fn every_example_has_a_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let mut inputs: Vec<PathBuf> = (std::fs::read_dir(root).expect("a folder"))
+        .map(|e| e.expect("an entry").path())
+        .filter(|p| !p.ends_with("generic-angles") && !p.display().to_string().contains("wrong-"))
+        .flat_map(|p| ["scheme.toml", "model.toml"].map(|name| p.join(name)))
+        .filter(|p| p.is_file())
+        .collect();
+    inputs.sort();
+    assert!(inputs.len() > 15);
+    for (i, input) in inputs.iter().enumerate() {
+        let (_, text) = report(folder.path(), &format!("{i}.html"), &[&input.display().to_string()]);
+        let page = Html::parse_document(&text);
+        assert!(page.errors.is_empty(), "{}: {:?}", input.display(), page.errors);
+        assert_unique_ids(&page);
+        assert!(text.len() < 2_000_000 && !text.contains("NaN"), "{}", input.display());
+        let verdict = texts(&page, "main > p")
+            .into_iter()
+            .find(|p| p.contains("The scheme determines") || p.contains("locally"))
+            .unwrap_or_else(|| panic!("{}: no verdict", input.display()));
+        assert!(
+            !verdict.contains("DISAGREE") && !verdict.contains("do NOT fit"),
+            "{}: {verdict}",
+            input.display()
+        );
+        assert_status(&page, &verdict);
+        assert!(texts(&page, ".formulas code").is_empty(), "{}: a formula without MathML", input.display());
+    }
+}
+
+#[test]
+fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_, text) = report(folder.path(), "review.html", &[PAPER]);
+    let (_, again) = report(folder.path(), "again.html", &[PAPER]);
+    assert!(text == again, "the same command gives the same bytes");
+    assert!(text.len() < 2_000_000, "{} bytes", text.len());
+    let page = Html::parse_document(&text);
+    assert!(page.errors.is_empty(), "{:?}", page.errors);
+    assert_eq!(
+        texts(&page, "h2"),
+        [
+            "Verdict",
+            "Unknowns",
+            "What cannot be told apart",
+            "Positions",
+            "How each is solved",
+            "Sensitivity",
+            "Fewest positions, and what each is for",
+            "Evidence by a filter",
+            "Validity of the small-angle model",
+            "Assumptions and certainty",
+            "About this report",
+        ]
+    );
+    // method.md, section 9: two positions, platform carry
+    let unknowns = table(&page, "Every unknown");
+    let degree = |name: &str| {
+        let row = unknowns.iter().find(|r| r[0] == name).unwrap_or_else(|| panic!("no {name}"));
+        row[3].clone()
+    };
+    assert_eq!(["psi_x", "D_FX", "D_FY", "D_FZ"].map(degree), ["0", "1", "2", "-"]);
+    let verdict = &texts(&page, "main > p")[0];
+    assert!(
+        verdict.starts_with("By prediction (no prior, no drift noise, psi at the start) requirements"),
+        "{verdict}"
+    );
+    assert!(verdict.contains(". Limited: the small-angle model does NOT hold"), "{verdict}");
+    assert!(verdict.contains(". The scheme determines 5 of the 12 gyro coefficients"), "{verdict}");
+    assert_eq!(verdict.matches(". ").count(), 3, "four sentences: {verdict}");
+    // formulas are math, pictures are there without scripts, ids are unique, nothing is fetched
+    assert!(texts(&page, "li math").len() >= 10);
+    assert!(texts(&page, "figure svg").len() > 20);
+    assert_unique_ids(&page);
+    for fetched in ["src=\"http", "href=\"http", "@import", "url(http"] {
+        assert!(!text.contains(fetched), "{fetched}");
+    }
+    let words: Vec<String> = texts(&page, "figcaption");
+    for picture in [
+        "Rank over",
+        "Attitude",
+        "Excitation",
+        "Predicted sigma",
+        "What longer dwells buy",
+        "Total time",
+        "Sigma against",
+        "Normalised estimation",
+        "Normalised innovation",
+        "Correlation",
+        "Error of the estimate of D_FX",
+    ] {
+        assert!(words.iter().any(|w| w.starts_with(picture)), "{picture}: {words:?}");
+    }
+}
+
+#[test]
+fn a_verdict_leads_with_what_limits_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let five = "examples/five-positions/scheme.toml";
+    let page_of = |name: &str, inputs: &[&str]| {
+        let page = Html::parse_document(&report(folder.path(), name, inputs).1);
+        let verdict = texts(&page, "main > p").into_iter().find(|p| p.contains("The scheme determines"));
+        let verdict = verdict.expect("a verdict");
+        assert_status(&page, &verdict);
+        (page, verdict)
+    };
+    let row = |page: &Html, what: &str| -> [String; 2] {
+        let all = statuses(page).remove(0);
+        let [_, grade, text] = all.into_iter().find(|r| r[0] == what).unwrap_or_else(|| panic!("no {what}"));
+        [grade, text]
+    };
+    // psi misses its requirement although every coefficient meets its own
+    let (page, verdict) = page_of("five.html", &[five, "--carry", "inertial"]);
+    assert!(!verdict.contains("every requirement"), "{verdict}");
+    let missed = "NOT met, 3 of 15 missed: psi_x, psi_y, psi_z; worst margin 0.06798 (psi_y)";
+    assert!(verdict.contains(missed) && row(&page, "Requirements")[1].contains(missed), "{verdict}");
+    assert_eq!(row(&page, "Requirements")[0], "missed");
+    assert_eq!(row(&page, "Observable"), ["good", "ok 12 of 12 gyro coefficients, 3 of 3 of psi"]);
+    // met by prediction, missed in the run: both are said, and the worse one counts
+    let noisy = ["examples/twelve-positions/scheme.toml", "--drift-noise", "0.05 deg/h"];
+    let (page, verdict) = page_of("noise.html", &noisy);
+    let said =
+        "In the run (with prior and drift noise, psi at the end) requirements are NOT met, 4 of 15 missed: ";
+    assert!(verdict.starts_with(said), "{verdict}");
+    let also = "by prediction (no prior, no drift noise, psi at the start) every requirement is met, 15 of 15; worst margin ";
+    let [grade, text] = row(&page, "Requirements");
+    assert!(grade == "missed" && text.contains(&said[1..]) && text.contains(also), "{grade} {text}");
+    // which positions suffice, in the order of the scheme, and for what
+    let few =
+        texts(&page, "li").into_iter().find(|l| l.contains(" of the 12 positions (")).expect("the fewest");
+    let names = few.split(['(', ')']).nth(1).expect("names");
+    let order: Vec<u32> = names.split(", ").map(|n| n[1..].parse().expect("p1, p2, ...")).collect();
+    assert!(order.len() == 5 && order.is_sorted(), "{few}");
+    assert!(
+        few.contains(") suffice to observe D_FX, ")
+            && few.ends_with("meet the requirements is another question"),
+        "{few}"
+    );
+    // small drifts, requirements that are met: nothing limits, and only then the filter confirms
+    let file = |name: &str, text: &str| -> String {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let good = file(
+        "good.toml",
+        "terms = ['F']\ncarry = 'inertial'\n[simulation]\ndrift_scale = 1e-4\nvalues = { psi = 0.001 }\n\
+         priors = { D = 1e5, psi = 10 }\n[requirements]\npsi = 1\n[[position]]\nattitude = 'NUE'\n\
+         [[position]]\nattitude = 'UEN'\n",
+    );
+    let (page, verdict) = page_of("good.html", &[&good]);
+    assert!(verdict.starts_with("The scheme determines every one"), "{verdict}");
+    assert!(verdict.contains("every requirement is met, 6 of 6; worst margin "), "{verdict}");
+    assert!(statuses(&page)[0].iter().all(|r| r[1] == "good"), "{:?}", statuses(&page));
+    // a truth that the linear filter cannot follow
+    let (page, verdict) = page_of("exact.html", &[PAPER, "--truth", "exact"]);
+    for limit in [
+        "does NOT hold",
+        "is NOT consistent with its truth (mean NIS",
+        "the Monte Carlo runs do NOT fit the filter (4 checks)",
+    ] {
+        let lead = verdict.split(". The scheme").next().unwrap_or_default();
+        let lead = lead.split_once(". Limited: ").map_or("", |(_, lead)| lead);
+        assert!(lead.contains(limit), "{limit}: {verdict}");
+    }
+    assert!(
+        row(&page, "Filter and exact verdicts")[1]
+            .starts_with("LIMITED agree, but the Monte Carlo runs do NOT fit ")
+    );
+    assert!(
+        !verdict.contains("DISAGREE") && !texts(&page, "main").concat().contains("DISAGREE"),
+        "{verdict}"
+    );
+    // what is not taken is said first, too; and a rotating segment excites all along its arc
+    let turning = file(
+        "turning.toml",
+        "terms = ['F', 'S']\ncarry = 'inertial'\n[[position]]\nattitude = 'NUE'\n\
+         rotation = { about = 'X_p', angle_deg = 90 }\n[[position]]\nattitude = 'UEN'\n",
+    );
+    let (page, verdict) = page_of("turning.html", &[&turning]);
+    assert!(
+        verdict.contains("not taken: ") && verdict.contains("accuracy orders are not computed"),
+        "{verdict}"
+    );
+    assert_eq!(row(&page, "Filter and exact verdicts")[0], "open");
+    // D_SZ is not excited at the start of the turn, nor at the second position
+    let excited: Vec<[String; 2]> = (table(&page, "Every unknown").iter())
+        .filter(|r| r[0].starts_with("D_"))
+        .map(|r| [r[0].clone(), r[9].clone()])
+        .collect();
+    assert!(excited.iter().all(|[_, at]| at != "-"), "{excited:?}");
+    // at a pole the dwell gives what no derivative sees
+    let (page, verdict) = page_of("dwell.html", &[five, "--latitude", "90"]);
+    let said = "The scheme determines 0 of the 12 gyro coefficients by derivatives, and 12 of them with dwell, during which psi moves. \
+                The largest predicted sigma of those is ";
+    assert!(
+        verdict.contains(said) && !verdict.contains("None of them") && !verdict.contains("cannot tell"),
+        "{verdict}"
+    );
+    let expected =
+        "LIMITED by derivatives 0 of 12 gyro coefficients, 3 of 3 of psi; with dwell 12 of 12 and 3 of 3";
+    assert_eq!(row(&page, "Observable"), ["limited", expected]);
+    let unseen =
+        texts(&page, "li").into_iter().filter(|l| l.starts_with("no derivative of Z changes when ")).count();
+    assert_eq!(unseen, 2, "the rank by derivatives is 13 of 15");
+    assert!(texts(&page, "li").iter().any(|l| {
+        l.starts_with("with dwell, during which psi moves, these are determined nonetheless: D_FX, ")
+    }));
+    assert!(texts(&page, "th").contains(&"rank with dwell".to_string()));
+    // or takes away what derivatives see
+    let pole = file(
+        "pole.toml",
+        "latitude_deg = 90\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\n\
+         angles_deg = [0, 90, 0]\n[[position]]\nangles_deg = [45, 0, 0]\n",
+    );
+    let (page, verdict) = page_of("pole.html", &[&pole]);
+    assert!(
+        verdict.contains("with dwell, psi_y are not determined although they have a degree"),
+        "{verdict}"
+    );
+    let psi_y = table(&page, "Every unknown").into_iter().find(|r| r[0] == "psi_y").expect("psi_y");
+    assert_eq!([&psi_y[3], &psi_y[4], &psi_y[6]], ["0", "not with dwell", "-"]);
+}
+
+#[test]
+fn text_from_files_is_text_in_every_format() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scheme = hostile(folder.path(), 12).display().to_string();
+    let (_, text) = report(folder.path(), "review.html", &[&scheme, PAPER, MODEL]);
+    assert!(text.len() < 2_000_000, "{} bytes", text.len());
+    let page = Html::parse_document(&text);
+    assert!(page.errors.is_empty(), "{:?}", page.errors);
+    assert!(!text.contains("<script>alert"), "a script of the input");
+    let title = texts(&page, "h1").remove(0);
+    assert!(title.contains(HOSTILE), "{title}");
+    assert!(texts(&page, "main > p").iter().any(|p| p == HOSTILE));
+    assert!(texts(&page, "td").iter().any(|c| c == "q_3"));
+    // several: parts of their own, and a comparison
+    let parts = texts(&page, "h2");
+    assert_eq!(parts.len(), 5, "{parts:?}");
+    assert_eq!(parts[2], "Comparison of the schemes");
+    assert!(table(&page, "Side by side").len() == 2);
+    // a box for each at the top; tables where there are no boxes
+    assert_eq!(texts(&page, ".status > .heading"), [HOSTILE, "paper-p1-p2", "two compartments, one sampled"]);
+    assert!(text.find("class=\"statuses\"") < text.find("<main>"), "at the top");
+
+    let scheme = hostile(folder.path(), 5).display().to_string();
+    let (file, text) = report(folder.path(), "review.md", &[&scheme]);
+    assert!(!text.contains("<script>") && text.contains("\\<script\\>"), "markup in Markdown");
+    assert!(text.contains("#### Status: ") && text.contains("| Small-angle model | LIMITED |"));
+    let first =
+        std::fs::read(file.with_file_name("review_figures").join("s1_staircase.svg")).expect("a picture");
+    // a second report beside it has pictures of its own, and both have all that they show
+    let (_, other) = report(folder.path(), "b.md", &["examples/simulated-run/scheme.toml"]);
+    let shown = |text: &str| -> Vec<String> {
+        let pictures = text.split("](").skip(1).filter_map(|t| t.split(')').next());
+        pictures.filter(|p| p.ends_with(".svg")).map(str::to_string).collect()
+    };
+    // times as people read them
+    let starts: Vec<&str> = (other.split(" from ").skip(1).filter_map(|t| t.split_once(" s").map(|t| t.0)))
+        .filter(|t| t.parse::<f64>().is_ok())
+        .collect();
+    assert!(starts.len() > 5, "{starts:?}");
+    assert!(
+        starts.iter().all(|t| t.split_once('.').is_none_or(|(_, digits)| digits.len() == 1)),
+        "{starts:?}"
+    );
+    for (text, own) in [(&text, "review_figures/"), (&other, "b_figures/")] {
+        let pictures = shown(text);
+        assert!(
+            pictures.len() > 10
+                && pictures.iter().all(|p| p.starts_with(own) && folder.path().join(p).is_file())
+        );
+    }
+    assert!(
+        first == std::fs::read(folder.path().join("review_figures/s1_staircase.svg")).expect("still there")
+    );
+    assert!(first != std::fs::read(folder.path().join("b_figures/s1_staircase.svg")).expect("its own"));
+    let other = tempfile::tempdir().expect("a folder");
+    let scheme = hostile(folder.path(), 3).display().to_string();
+    let (file, text) = report(other.path(), "review.tex", &[&scheme]);
+    assert_eq!(text.matches("\\end{document}").count(), 1);
+    assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & LIMITED & "));
+    assert!(text.contains("\\$a\\_b\\textasciicircum{}c\\$ \\#let \\textbackslash{}end\\{document\\}"));
+    assert!(file.with_file_name("review_figures").join("s1_staircase.png").is_file());
+}
+
+#[test]
+fn what_cannot_be_reported_is_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let refused = |arguments: &[&str], what: &str| {
+        let output = run(&[&["report"], arguments].concat());
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(what), "{said}");
+        assert!(
+            std::fs::read_dir(folder.path())
+                .expect("a folder")
+                .all(|f| f.expect("an entry").file_name() == "taken.html")
+        );
+    };
+    std::fs::write(at("taken.html"), "mine").expect("written");
+    refused(&[PAPER, "-o", &at("review.doc")], "expected a file that ends in .html, .pdf, .md or .tex");
+    refused(&[PAPER, "-o", &at("taken.html")], "--force replaces it");
+    refused(&["no-such-file.toml", "-o", &at("a.html")], "no-such-file.toml");
+    refused(&["examples/generic-angles/scheme.toml", "-o", &at("a.html")], "the angle `alpha` is generic");
+    refused(&["examples/wrong-models/unknown-name.toml", "-o", &at("a.html")], "did you mean");
+    refused(&["examples/wrong-gimbals/scheme.toml", PAPER, "-o", &at("a.html")], "wrong-gimbals");
+    assert_eq!(std::fs::read_to_string(at("taken.html")).expect("still there"), "mine");
+    if cfg!(not(feature = "pdf")) {
+        refused(&[PAPER, "-o", &at("a.pdf")], "without the feature `pdf`");
+    }
+}
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn a_browser_shows_it() {
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("skipped: no Chromium on this machine");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (paper, _) = report(folder.path(), "paper.html", &[PAPER]);
+    let scheme = hostile(folder.path(), 12).display().to_string();
+    let (long, _) = report(folder.path(), "twelve.html", &[&scheme]);
+    // formulas of dozens of terms are not cut at the edge of a sheet
+    let (formulas, _) = report(folder.path(), "five.html", &["examples/five-positions/scheme.toml"]);
+    browser.open(&formulas, 700, 900);
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+    browser.settle();
+    let cut = browser.value(
+        "(() => { const all = [...document.querySelectorAll('.formulas math')], w = document.documentElement.clientWidth; \
+         return [all.length, all.filter(e => e.getBoundingClientRect().right > w + 1).length]; })()",
+    );
+    assert!(cut[0].as_u64() > Some(200) && cut[1] == json!(0), "{cut}");
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    // D_FY: two positions need Z'', twelve do not
+    for (file, degree_of_d_fy) in [(&paper, "2"), (&long, "1")] {
+        browser.events.clear();
+        browser.open(file, 1280, 900);
+        // every figure with curves has a drawing of its own, and the still one is out of the way
+        let counts = browser.value(
+            "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves canvas').length, \
+             [...document.querySelectorAll('figure.curves > .still')].filter(e => e.checkVisibility()).length]",
+        );
+        assert!(counts[0].as_u64() > Some(10) && counts[0] == counts[1] && counts[2] == json!(0), "{counts}");
+        for width in [1280, 400] {
+            browser.size(width, 900);
+            browser.settle();
+            let beyond = browser.value(
+                "(() => { const w = document.documentElement.clientWidth; \
+                 const out = [...document.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || e.classList.contains('wide')) \
+                 .filter(e => e.getBoundingClientRect().right > w + 1 && !e.closest('svg, .u-wrap')) \
+                 .map(e => e.tagName + '.' + e.className); \
+                 return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
+            );
+            assert_eq!(beyond, json!([]), "at {width} px");
+        }
+        browser.size(1280, 900);
+        browser.settle();
+        // a curve is switched off and on, a value is read under the pointer
+        let series = "#s1_attitude .u-legend .u-series:nth-child(2)";
+        let off = format!("document.querySelector({series:?}).classList.contains('u-off')");
+        assert_eq!(browser.value(&off), json!(false));
+        browser.mouse(&format!("{series} .u-label"), true);
+        assert_eq!(browser.value(&off), json!(true));
+        browser.mouse(&format!("{series} .u-label"), true);
+        assert_eq!(browser.value(&off), json!(false));
+        browser.mouse("#s1_attitude .u-over", false);
+        let shown = browser
+            .value(&format!("document.querySelector({series:?}).querySelector('.u-value').textContent"));
+        assert!(shown.as_str().is_some_and(|v| v.parse::<f64>().is_ok()), "{shown}");
+        let degree = browser.value(
+            "[...document.querySelectorAll('td')].find(c => c.textContent == 'D_FY').parentElement.children[3].textContent",
+        );
+        assert_eq!(degree, json!(degree_of_d_fy));
+        // dark
+        let paper = browser.value("getComputedStyle(document.body).backgroundColor");
+        let dark = json!({ "features": [{ "name": "prefers-color-scheme", "value": "dark" }] });
+        browser.call("Emulation.setEmulatedMedia", dark);
+        browser.settle();
+        assert_ne!(browser.value("getComputedStyle(document.body).backgroundColor"), paper);
+        browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+        browser.settle();
+        let printed = browser.value(
+            "[...document.querySelectorAll('figure .still')].every(e => e.checkVisibility()) \
+             && ![...document.querySelectorAll('.plot')].some(e => e.checkVisibility())",
+        );
+        assert_eq!(printed, json!(true), "on paper the still pictures");
+        browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+        // no error, no request but for the page itself
+        for event in &browser.events {
+            let (method, of) = (event["method"].as_str().unwrap_or_default(), &event["params"]);
+            assert_ne!(method, "Runtime.exceptionThrown", "{of}");
+            assert_ne!(method, "Log.entryAdded", "{of}");
+            assert_ne!(method, "Runtime.consoleAPICalled", "{of}");
+            if method == "Network.requestWillBeSent" {
+                let url = of["request"]["url"].as_str().unwrap_or_default();
+                assert!(url.starts_with("data:") || url.ends_with(".html"), "{url}");
+            }
+        }
+    }
+}
+
+#[cfg(feature = "pdf")]
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn the_pdf_holds_every_table() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scheme = hostile(folder.path(), 12).display().to_string();
+    let inputs = [scheme.as_str(), PAPER, MODEL];
+    let (file, _) = report(folder.path(), "review.pdf", &inputs);
+    let (again, _) = report(folder.path(), "again.pdf", &inputs);
+    let bytes = std::fs::read(&file).expect("written");
+    assert!(bytes.starts_with(b"%PDF-"));
+    assert!(bytes == std::fs::read(&again).expect("written"), "the same command gives the same bytes");
+    let Ok(out) = Command::new("pdftotext").arg("-layout").arg(&file).arg("-").output() else {
+        eprintln!("skipped: no pdftotext on this machine");
+        return;
+    };
+    assert!(out.status.success());
+    // hyphens and line breaks aside, every cell and heading of the page is in the PDF
+    let squeezed =
+        |text: &str| -> String { text.chars().filter(|c| !c.is_whitespace() && *c != '\u{ad}').collect() };
+    let pages = squeezed(&String::from_utf8_lossy(&out.stdout));
+    let (_, html) = report(folder.path(), "review.html", &inputs);
+    let page = Html::parse_document(&html);
+    let missing: Vec<String> = (["h2", "h3", "caption", "th", "td"].iter())
+        .flat_map(|s| texts(&page, s))
+        .filter(|t| !t.is_empty() && t.split_whitespace().any(|word| !pages.contains(&squeezed(word))))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?}");
+    assert!(texts(&page, "table").len() > 20);
+}
+
+/// Schemes of which no dwell determines a coefficient have no curve of sigma against time.
+#[test]
+fn schemes_that_determine_nothing_have_no_front() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("one.toml");
+    std::fs::write(&file, "terms = [\"F\", \"I\", \"O\", \"S\"]\n[[position]]\nangles_deg = [0, 0, 0]\n")
+        .expect("written");
+    let file = file.display().to_string();
+    let (_, text) = report(folder.path(), "r.html", &[&file, &file]);
+    assert!(!text.contains("Pareto front"), "nothing to draw");
+    let (_, text) = report(folder.path(), "s.html", &[PAPER, PAPER]);
+    assert!(text.contains("Pareto front"));
+}
