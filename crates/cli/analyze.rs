@@ -1,20 +1,18 @@
 //! `obsdeg analyze`: the degree table of one scheme.
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use obsdeg_core::analysis::{AnalysisError, Options, analyze};
-use obsdeg_core::solution::requested::CombinationError;
+use obsdeg_core::analysis::{Options, analyze};
 use obsdeg_core::solution::solver::Frame;
 use obsdeg_core::system::analyze_system;
 
-use crate::arguments::{OutputArguments, SchemeArguments};
-use crate::engine::{EngineArguments, notice, rest};
+use crate::arguments::InputArguments;
+use crate::engine::EngineArguments;
 use crate::failure::Failure;
-use crate::model::ModelFile;
-use crate::progress::Spinner;
-use crate::{interrupt, output};
+use crate::input::Input;
+use crate::interrupt;
+use crate::output::Output;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -46,11 +44,7 @@ enum FrameArgument {
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    scheme: SchemeArguments,
-
-    /// Any other system: a model file (TOML, or JSON)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "frame", "formulas"])]
-    model: Option<PathBuf>,
+    input: InputArguments,
 
     /// The highest order of derivatives to look at in a model that has no proven end
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(0..=1000))]
@@ -76,57 +70,31 @@ pub(crate) struct Arguments {
     engine: EngineArguments,
 
     #[command(flatten)]
-    output: OutputArguments,
+    output: Output,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     interrupt::ends()?;
-    output::check(&a.output)?;
-    if let Some(path) = &a.model {
-        return system(a, path);
-    }
-    if a.order.is_some() {
+    a.output.target.check()?;
+    if a.order.is_some() && a.input.model.is_none() {
         return Err(Failure::input("--order goes with --model: a scheme has a proven end".into()));
     }
-    let scheme = a.scheme.scheme()?;
-    let options = Options {
-        seed: a.seed,
-        solutions: a.solutions == Switch::On,
-        formulas: a.formulas,
-        frame: if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform },
-    };
-    let mut worker = a.engine.worker(a.output.quiet)?;
-    let spinner = Spinner::start("solving symbolically (--solutions off leaves it out)", a.output.quiet);
-    let analysed = analyze(&scheme, options, worker.as_mut());
-    drop(spinner);
-    rest(worker.as_mut());
-    let analysis = analysed.map_err(|e| match e {
-        AnalysisError::Combination(CombinationError { text, reason, span }) => {
-            Failure::at(&format!("combination: {reason}"), "--combination", &text, span)
+    let (seed, solutions, quiet) = (a.seed, a.solutions == Switch::On, a.output.target.quiet);
+    match a.input.read()? {
+        Input::Scheme(scheme) => {
+            let frame = if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform };
+            let options = Options { seed, solutions, formulas: a.formulas, frame };
+            let message = "solving symbolically (--solutions off leaves it out)";
+            let analysis = a.engine.lend(message, quiet, |worker| Ok(analyze(&scheme, options, worker)?))?;
+            a.output.write(&analysis, obsdeg_report::analysis)?;
         }
-        AnalysisError::Scheme(e) => Failure::input(e.to_string()),
-        AnalysisError::Verdict(e) => Failure::internal(e.to_string()),
-    })?;
-    notice(worker.as_ref(), a.output.quiet);
-    let text = obsdeg_report::analysis(&analysis, a.output.format, output::layout(&a.output))
-        .map_err(|e| Failure::internal(e.to_string()))?;
-    output::write(&a.output, &text)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-/// A model file.
-fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let file = ModelFile::read(path)?;
-    let mut worker = a.engine.worker(a.output.quiet)?;
-    let spinner = Spinner::start("judging the model", a.output.quiet);
-    let engine = (a.solutions == Switch::On).then_some(worker.as_mut());
-    let analysed = analyze_system(&file.model, a.seed, a.order.map(Into::into), engine);
-    drop(spinner);
-    rest(worker.as_mut());
-    let analysis = analysed.map_err(|e| file.wrong(&e))?;
-    notice(worker.as_ref(), a.output.quiet);
-    let text = obsdeg_report::system(&analysis, a.output.format, output::layout(&a.output))
-        .map_err(|e| Failure::internal(e.to_string()))?;
-    output::write(&a.output, &text)?;
+        Input::Model(file) => {
+            let analysis = a.engine.lend("judging the model", quiet, |worker| {
+                let engine = solutions.then_some(worker);
+                analyze_system(&file.model, seed, a.order.map(Into::into), engine).map_err(|e| file.wrong(&e))
+            })?;
+            a.output.write(&analysis, obsdeg_report::system)?;
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,21 +1,23 @@
 //! Arguments that several commands share.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Command, Id};
 use obsdeg_core::model::attitude::Euler;
 use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns, scheme_file};
-use obsdeg_core::system::model_file;
-use obsdeg_report::Format;
+use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 
 use crate::failure::Failure;
-use crate::input::read_text;
+use crate::input::{Input, Source};
 
-/// What is analysed.
+/// Options that a model takes as well as a scheme, or a model alone; all others of a command are about schemes.
+const OF_MODELS: [&str; 9] =
+    ["model", "order", "solutions", "symbolic_limit", "seed", "format", "output", "force", "quiet"];
+
+/// What is judged: a scheme, or a model.
 #[derive(Debug, Args)]
-pub(crate) struct SchemeArguments {
+pub(crate) struct InputArguments {
     /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz); once per position.
     /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE). A,B,G@X_p:360 turns from there, at a constant
     /// rate for its dwell, about a platform axis (X_p, Y_p, Z_p) or a geographic one (N, U, E)
@@ -26,13 +28,8 @@ pub(crate) struct SchemeArguments {
     #[arg(long, value_name = "FILE")]
     scheme: Option<PathBuf>,
 
-    /// What is carried between positions: platform (the paper), inertial or reset
-    #[arg(long, value_name = "CARRY")]
-    carry: Option<Carry>,
-
-    /// Latitude in degrees, exact; left out: generic
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
-    latitude: Option<Latitude>,
+    #[command(flatten)]
+    assumptions: Assumptions,
 
     /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS; or drift for eps^n of one position
     #[arg(long, value_name = "TERMS")]
@@ -46,6 +43,38 @@ pub(crate) struct SchemeArguments {
     /// sines and cosines of the scheme's angles ("sin(20 deg)", "cos(alpha)")
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     combination: Vec<String>,
+
+    /// Any other system: a model file (TOML, or JSON)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+}
+
+/// What holds of schemes, whatever their files say.
+#[derive(Debug, Args)]
+pub(crate) struct Assumptions {
+    /// What is carried between positions: platform (the paper), inertial or reset
+    #[arg(long, value_name = "CARRY")]
+    carry: Option<Carry>,
+
+    /// Latitude in degrees, exact; left out: generic
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    latitude: Option<Latitude>,
+}
+
+impl Assumptions {
+    /// Makes them hold.
+    pub(crate) fn apply(&self, scheme: &mut Scheme) {
+        scheme.carry = self.carry.unwrap_or(scheme.carry);
+        scheme.latitude = self.latitude.or(scheme.latitude);
+    }
+}
+
+/// A command with `--model` refuses every option beside it that is about schemes.
+pub(crate) fn scheme_or_model(command: Command) -> Command {
+    let of_schemes = |id: &&Id| !OF_MODELS.contains(&id.as_str());
+    let of_schemes: Vec<Id> =
+        command.get_arguments().map(|a| a.get_id()).filter(of_schemes).cloned().collect();
+    command.mut_args(|a| if a.get_id() == "model" { a.conflicts_with_all(&of_schemes) } else { a })
 }
 
 /// Three Euler angles (a type of its own: clap would take a list for several values).
@@ -67,11 +96,14 @@ fn attitude(text: &str) -> Result<EulerArgument, String> {
     Ok(EulerArgument(euler, rotation.transpose()?))
 }
 
-impl SchemeArguments {
-    /// The scheme: from the file or the angles, with whatever options override.
-    pub(crate) fn scheme(&self) -> Result<Scheme, Failure> {
+impl InputArguments {
+    /// The model, or the scheme: from the file or the angles, with whatever options override.
+    pub(crate) fn read(&self) -> Result<Input, Failure> {
+        if let Some(path) = &self.model {
+            return Source::read(path, "model")?.model().map(Input::Model);
+        }
         let mut scheme = match &self.scheme {
-            Some(path) => read_scheme(path)?,
+            Some(path) => Source::read(path, "scheme")?.scheme()?,
             None if self.angles.is_empty() => {
                 return Err(Failure::input(
                     "nothing to judge; expected --angles A,B,G (once per position) or --scheme FILE".into(),
@@ -85,81 +117,12 @@ impl SchemeArguments {
                 scheme
             }
         };
-        if let Some(carry) = self.carry {
-            scheme.carry = carry;
-        }
-        if let Some(latitude) = self.latitude {
-            scheme.latitude = Some(latitude);
-        }
+        self.assumptions.apply(&mut scheme);
         if let Some(terms) = &self.terms {
             scheme.unknowns = terms.clone();
         }
         scheme.measured_azimuth |= self.measured_azimuth;
         scheme.combinations.extend(self.combination.iter().cloned());
-        Ok(scheme)
+        Ok(Input::Scheme(scheme))
     }
-}
-
-/// Whether a file that is no scheme is meant as a model.
-fn is_model(path: &Path, text: &str) -> bool {
-    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    json || text.trim_start().starts_with('{') || model_file::is_model(text)
-}
-
-/// The scheme of a file.
-pub(crate) fn read_scheme(path: &Path) -> Result<Scheme, Failure> {
-    scheme_of(path, &read_text(path, "scheme")?)
-}
-
-/// The scheme of a file that was read.
-pub(crate) fn scheme_of(path: &Path, text: &str) -> Result<Scheme, Failure> {
-    let name = path.display().to_string();
-    scheme_file::read(text).map_err(|e| match e.span {
-        _ if is_model(path, text) => Failure::input(format!(
-            "{name} is a model file; expected a scheme file, with [[position]] tables (models go with --model, or to report)"
-        )),
-        Some(span) => Failure::at(&e.message, &name, text, span),
-        None => Failure::input(format!("{name}: {}", e.message)),
-    })
-}
-
-/// Where and how results are written.
-#[derive(Debug, Args)]
-pub(crate) struct OutputArguments {
-    /// table, json, markdown, csv or latex
-    #[arg(long, value_name = "FORMAT", default_value_t = Format::Table)]
-    pub(crate) format: Format,
-
-    /// Write to a file instead of stdout
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: Option<PathBuf>,
-
-    /// Replace an existing file
-    #[arg(long)]
-    pub(crate) force: bool,
-
-    /// Say nothing on stderr but errors
-    #[arg(short, long)]
-    pub(crate) quiet: bool,
-}
-
-/// Where results go when there are figures and series too.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Output")]
-pub(crate) struct FolderArguments {
-    /// Format on stdout: table, json, markdown, csv or latex
-    #[arg(long, value_name = "FORMAT", default_value_t = Format::Table)]
-    pub(crate) format: Format,
-
-    /// Write summary, series and figures to a folder
-    #[arg(short, long, value_name = "DIR")]
-    pub(crate) output: Option<PathBuf>,
-
-    /// Replace files in an existing folder
-    #[arg(long)]
-    pub(crate) force: bool,
-
-    /// Say nothing on stderr but errors
-    #[arg(short, long)]
-    pub(crate) quiet: bool,
 }

@@ -2,11 +2,11 @@
 
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
 use crate::failure::Failure;
-use crate::{Cli, output};
+use crate::{command, output};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -22,15 +22,15 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let mut text = Vec::new();
-    clap_complete::generate(a.shell, &mut Cli::command(), "obsdeg", &mut text);
-    output::print(&String::from_utf8_lossy(&text))?;
+    clap_complete::generate(a.shell, &mut command(), "obsdeg", &mut text);
+    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// The manual page: the program, then every command.
 pub(crate) fn man() -> Result<ExitCode, Failure> {
     let mut text = Vec::new();
-    let mut command = Cli::command();
+    let mut command = command();
     command.build();
     let mut render = |c: clap::Command| {
         clap_mangen::Man::new(c).render(&mut text).map_err(|e| Failure::internal(e.to_string()))
@@ -39,6 +39,6 @@ pub(crate) fn man() -> Result<ExitCode, Failure> {
     for sub in command.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help") {
         render(sub.clone().name(format!("obsdeg-{}", sub.get_name())))?;
     }
-    output::print(&String::from_utf8_lossy(&text))?;
+    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,22 +1,21 @@
 //! `obsdeg crosscheck`: the exact verdicts against a filter.
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use obsdeg_core::model::{Carry, Latitude, Scheme};
 use obsdeg_evidence::crosscheck::{FilterChange, Options, crosscheck};
 use obsdeg_evidence::system::crosscheck_system;
-use obsdeg_report::{File, Format, Layout};
+use obsdeg_report::{ReportError, crosscheck_figures};
 
-use crate::arguments::{FolderArguments, SchemeArguments};
+use crate::arguments::InputArguments;
 use crate::conditions::ConditionArguments;
 use crate::failure::{CHECK, Failure};
+use crate::input::Input;
 use crate::interrupt;
-use crate::model::ModelFile;
-use crate::output;
+use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
-use crate::simulate::failure;
+use crate::simulate::with_numbers;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -31,14 +30,10 @@ With -o it writes evidence.json and its figures as SVG and PNG.
 Exit codes: 0 everything agrees, 1 something disagrees, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = AFTER_HELP, mut_args(with_numbers), mut_args(to_a_folder))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    scheme: SchemeArguments,
-
-    /// Any other system: a model file with its table of numbers for a simulation
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "dwell", "step", "noise", "azimuth_noise", "requirement", "truth", "slew_rate", "drift_noise", "propagation", "value", "prior", "estimate", "drift_scale", "filter_carry", "filter_latitude", "filter_drop", "runs"])]
-    model: Option<PathBuf>,
+    input: InputArguments,
 
     #[command(flatten)]
     conditions: ConditionArguments,
@@ -64,51 +59,38 @@ pub(crate) struct Arguments {
     filter_drop: Option<String>,
 
     #[command(flatten)]
-    output: FolderArguments,
+    output: Output,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     interrupt::ends()?;
-    output::check_folder(&a.output)?;
-    if let Some(path) = &a.model {
-        return system(a, path);
-    }
-    let scheme = a.scheme.scheme()?;
-    a.conditions.concern(std::iter::once(&scheme))?;
-    let conditions = a.conditions.conditions(&scheme);
-    let dropped = a.filter_drop.as_ref().map(|name| position(&scheme, name)).transpose()?;
-    let filter = FilterChange { carry: a.filter_carry, latitude: a.filter_latitude, dropped };
-    let options = Options { runs: a.runs as usize, seed: a.seed, filter };
-    let bar = Bar::start(u64::from(a.runs), "Monte Carlo", a.output.quiet);
-    let checked = crosscheck(&scheme, &conditions, &options, &|done| {
-        bar.at(done as u64);
-        true
-    });
-    drop(bar);
-    let evidence = checked.map_err(failure)?;
-    let internal = |e: obsdeg_report::ReportError| Failure::internal(e.to_string());
-    let text = obsdeg_report::crosscheck(&evidence, a.output.format, output::terminal()).map_err(internal)?;
-    if a.output.output.is_some() {
-        output::write_folder(&a.output, &obsdeg_report::crosscheck_files(&evidence).map_err(internal)?)?;
-    }
-    output::print(&text)?;
-    Ok(if evidence.passed { ExitCode::SUCCESS } else { ExitCode::from(CHECK) })
-}
-
-/// A model file.
-fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let file = ModelFile::read(path)?;
-    let evidence = crosscheck_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
-    let internal = |e: obsdeg_report::ReportError| Failure::internal(e.to_string());
-    let text =
-        obsdeg_report::system_evidence(&evidence, a.output.format, output::terminal()).map_err(internal)?;
-    if a.output.output.is_some() {
-        let json = obsdeg_report::system_evidence(&evidence, Format::Json, Layout::default());
-        let file = File { name: "evidence.json".into(), bytes: json.map_err(internal)?.into_bytes() };
-        output::write_folder(&a.output, &[file])?;
-    }
-    output::print(&text)?;
-    Ok(if evidence.passed { ExitCode::SUCCESS } else { ExitCode::from(CHECK) })
+    a.output.target.check_folder()?;
+    let passed = match a.input.read()? {
+        Input::Scheme(scheme) => {
+            a.conditions.concern(std::iter::once(&scheme))?;
+            let conditions = a.conditions.conditions(&scheme);
+            let dropped = a.filter_drop.as_ref().map(|name| position(&scheme, name)).transpose()?;
+            let filter = FilterChange { carry: a.filter_carry, latitude: a.filter_latitude, dropped };
+            let options = Options { runs: a.runs as usize, seed: a.seed, filter };
+            let bar = Bar::start(u64::from(a.runs), "Monte Carlo", a.output.target.quiet);
+            let checked = crosscheck(&scheme, &conditions, &options, &|done| {
+                bar.at(done as u64);
+                true
+            });
+            drop(bar);
+            let evidence = checked?;
+            let figures = || crosscheck_figures(&evidence).map_err(ReportError::from);
+            a.output.write_folder(&evidence, obsdeg_report::crosscheck, "evidence.json", figures)?;
+            evidence.passed
+        }
+        Input::Model(file) => {
+            let evidence = crosscheck_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
+            let none = || Ok::<_, ReportError>(vec![]);
+            a.output.write_folder(&evidence, obsdeg_report::system_evidence, "evidence.json", none)?;
+            evidence.passed
+        }
+    };
+    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::from(CHECK) })
 }
 
 fn position(scheme: &Scheme, name: &str) -> Result<usize, Failure> {

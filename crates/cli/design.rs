@@ -4,21 +4,23 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use obsdeg_core::model::angle::parse_decimal;
 use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
-use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
+use obsdeg_core::model::{Scheme, Unknowns};
 use obsdeg_design::design::answer::Found;
 use obsdeg_design::design::{Candidates, Design, DesignError, Kind, Options, design, scheme_found};
 use obsdeg_evidence::simulation::Conditions;
-use obsdeg_report::{File, Format, Layout, ReportError, design_figures, visible};
+use obsdeg_report::{File, design_figures, visible};
 
-use crate::arguments::{FolderArguments, read_scheme};
+use crate::arguments::Assumptions;
 use crate::conditions::{MeasurementArguments, within};
 use crate::failure::Failure;
+use crate::input::Source;
+use crate::interrupt;
+use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
-use crate::{interrupt, output};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -45,7 +47,7 @@ enum CriterionArgument {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = AFTER_HELP, mut_args(words), mut_args(to_a_folder))]
 pub(crate) struct Arguments {
     /// Find the best scheme of so many positions
     #[arg(long, value_name = "K", required_unless_present = "minimum")]
@@ -60,13 +62,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WHAT", default_value = "cardinal")]
     candidates: String,
 
-    /// What is carried between positions: platform (the paper), inertial or reset
-    #[arg(long, value_name = "CARRY")]
-    carry: Option<Carry>,
-
-    /// Latitude in degrees (default: 28.2)
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
-    latitude: Option<Latitude>,
+    #[command(flatten)]
+    assumptions: Assumptions,
 
     /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS
     #[arg(long, value_name = "TERMS")]
@@ -99,7 +96,7 @@ pub(crate) struct Arguments {
     measurement: MeasurementArguments,
 
     #[command(flatten)]
-    output: FolderArguments,
+    output: Output,
 }
 
 /// What a scheme must be.
@@ -149,10 +146,9 @@ fn degree_cap(text: &str) -> Result<(Option<String>, usize), String> {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
-    output::check_folder(&a.output)?;
+    a.output.target.check_folder()?;
     let (mut base, candidates) = candidates(&a.candidates)?;
-    base.carry = a.carry.unwrap_or(base.carry);
-    base.latitude = a.latitude.or(base.latitude);
+    a.assumptions.apply(&mut base);
     if let Some(terms) = &a.terms {
         base.unknowns = terms.clone();
     }
@@ -186,32 +182,22 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         front: a.front.clone(),
         seed: a.seed,
     };
-    let bar = Bar::start(1, "searching", a.output.quiet);
+    let bar = Bar::start(1, "searching", a.output.target.quiet);
     let interrupted = interrupt::flag()?;
     let designed = design(&base, &conditions, &options, &|now| {
         bar.search(&now);
         !interrupted.load(Ordering::Relaxed)
     });
     drop(bar);
-    let found = designed.map_err(failure)?;
-    let text = obsdeg_report::design(&found, a.output.format, output::terminal())
-        .map_err(|e| Failure::internal(e.to_string()))?;
-    if a.output.output.is_some() {
-        let files = files(&found, &base, &conditions)?;
-        output::write_folder(&a.output, &files)?;
-    }
-    output::print(&text)?;
+    let found = designed?;
+    let more = || files(&found, &base, &conditions);
+    a.output.write_folder(&found, obsdeg_report::design, "design.json", more)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn failure(e: DesignError) -> Failure {
-    match e {
-        DesignError::Verdict(_) => Failure::internal(e.to_string()),
-        DesignError::Filter(e) => crate::simulate::failure(e.into()),
-        DesignError::Conditions(e) => crate::simulate::failure(e),
-        DesignError::Interrupted => Failure::interrupted(),
-        _ => Failure::input(e.to_string()),
-    }
+/// What a shared option says here.
+fn words(arg: Arg) -> Arg {
+    if arg.get_id() == "latitude" { arg.help("Latitude in degrees (default: 28.2)") } else { arg }
 }
 
 /// What to choose from, and the scheme whose assumptions hold.
@@ -223,23 +209,21 @@ fn candidates(text: &str) -> Result<(Scheme, Candidates), Failure> {
         let wrong =
             || Failure::input(format!("--candidates {text}: expected a step in degrees, as in grid:45"));
         let step = parse_decimal(step.trim()).map_err(|_| wrong())?;
-        return Ok((Scheme::default(), Candidates::grid(step).map_err(failure)?));
+        return Ok((Scheme::default(), Candidates::grid(step)?));
     }
-    let scheme = read_scheme(Path::new(text))?;
-    let candidates = Candidates::of_scheme(&scheme).map_err(failure)?;
+    let scheme = Source::read(Path::new(text), "scheme")?.scheme()?;
+    let candidates = Candidates::of_scheme(&scheme)?;
     Ok((scheme, candidates))
 }
 
-/// What goes into the folder.
+/// What goes into the folder beside the JSON.
 fn files(found: &Design, base: &Scheme, conditions: &Conditions) -> Result<Vec<File>, Failure> {
-    let internal = |e: ReportError| Failure::internal(e.to_string());
-    let json = obsdeg_report::design(found, Format::Json, Layout::default()).map_err(internal)?;
-    let mut files = vec![File { name: "design.json".into(), bytes: json.into_bytes() }];
+    let mut files = Vec::new();
     if let Some(best) = found.found.first() {
-        let winner = scheme_file(found, best, base, conditions).map_err(failure)?;
-        files.push(File { name: "winner.toml".into(), bytes: winner.into_bytes() });
+        let bytes = scheme_file(found, best, base, conditions)?.into_bytes();
+        files.push(File { name: "winner.toml".into(), bytes });
     }
-    files.extend(design_figures(found).map_err(internal)?);
+    files.extend(design_figures(found)?);
     Ok(files)
 }
 

@@ -4,6 +4,7 @@ use clap::Args;
 use obsdeg_symbolic::{Worker, WorkerConfig};
 
 use crate::failure::{Failure, say};
+use crate::progress::Spinner;
 
 /// How much the engine may do.
 #[derive(Debug, Args)]
@@ -30,19 +31,31 @@ impl EngineArguments {
             waiting: if quiet { || {} } else { say_waiting },
         })))
     }
+
+    /// What `work` finds with the engine, with a sign of life; then the next process may have it.
+    pub(crate) fn lend<T>(
+        &self,
+        message: &'static str,
+        quiet: bool,
+        work: impl FnOnce(Option<&mut Worker>) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let mut worker = self.worker(quiet)?;
+        let spinner = Spinner::start(message, quiet);
+        let found = work(worker.as_mut());
+        drop(spinner);
+        if let Some(worker) = worker.as_mut() {
+            worker.rest();
+        }
+        let found = found?;
+        notice(worker.as_ref(), quiet);
+        Ok(found)
+    }
 }
 
 fn say_waiting() {
     eprintln!(
         "waiting for another obsdeg process: the symbolic engine runs once per user (--solutions off needs none; Ctrl-C ends the wait)"
     );
-}
-
-/// The engine is not needed any more: the next process may have it.
-pub(crate) fn rest(worker: Option<&mut Worker>) {
-    if let Some(worker) = worker {
-        worker.rest();
-    }
 }
 
 /// The banner of the engine is its licence notice.

@@ -4,7 +4,12 @@ use std::ops::Range;
 use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
-use obsdeg_report::visible;
+use obsdeg_core::analysis::AnalysisError;
+use obsdeg_core::solution::requested::CombinationError;
+use obsdeg_design::design::DesignError;
+use obsdeg_evidence::prediction::PredictionError;
+use obsdeg_evidence::simulation::SimulationError;
+use obsdeg_report::{ReportError, visible};
 
 /// A check failed.
 pub(crate) const CHECK: u8 = 1;
@@ -64,5 +69,54 @@ impl Failure {
     pub(crate) fn report(&self) -> ExitCode {
         say(&self.message);
         ExitCode::from(self.code)
+    }
+}
+
+/// What is wrong with the input, or with the program.
+impl From<AnalysisError> for Failure {
+    fn from(e: AnalysisError) -> Self {
+        match e {
+            AnalysisError::Combination(CombinationError { text, reason, span }) => {
+                Self::at(&format!("combination: {reason}"), "--combination", &text, span)
+            }
+            AnalysisError::Scheme(e) => Self::input(e.to_string()),
+            AnalysisError::Verdict(e) => Self::internal(e.to_string()),
+        }
+    }
+}
+
+impl From<SimulationError> for Failure {
+    fn from(e: SimulationError) -> Self {
+        match e {
+            SimulationError::Prediction(PredictionError::Analysis(e)) => e.into(),
+            // accuracy orders beyond the series
+            SimulationError::Prediction(PredictionError::Accuracy(_)) => Self::input(e.to_string()),
+            SimulationError::Filter(e) if e.is_numeric() => Self::input(format!(
+                "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
+            )),
+            SimulationError::Filter(_) => Self::internal(e.to_string()),
+            _ => Self::input(e.to_string()),
+        }
+    }
+}
+
+impl From<DesignError> for Failure {
+    fn from(e: DesignError) -> Self {
+        match e {
+            DesignError::Verdict(_) => Self::internal(e.to_string()),
+            DesignError::Filter(e) => SimulationError::from(e).into(),
+            DesignError::Conditions(e) => e.into(),
+            DesignError::Interrupted => Self::interrupted(),
+            _ => Self::input(e.to_string()),
+        }
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(e: ReportError) -> Self {
+        match e {
+            ReportError::NoPdf => Self::input(e.to_string()),
+            e => Self::internal(e.to_string()),
+        }
     }
 }

@@ -45,6 +45,11 @@ pub(crate) fn destination(path: &Path) -> Result<PathBuf> {
     }
 }
 
+/// The folder that a file is in.
+pub(crate) fn folder(file: &Path) -> &Path {
+    file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// What is there, in words.
 pub(crate) fn kind(found: fs::FileType) -> &'static str {
     #[cfg(unix)]
@@ -104,7 +109,7 @@ struct Staging {
 impl Staging {
     /// A new folder, after those that runs before this one have left there.
     fn beside(target: &Path) -> Result<Self> {
-        let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let parent = folder(target);
         let prefix = prefix(target);
         remove_left_over(parent, &prefix);
         let mut n = 0;

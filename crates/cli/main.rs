@@ -15,7 +15,6 @@ mod input;
 mod interrupt;
 #[cfg(feature = "symbolica")]
 mod lock;
-mod model;
 mod output;
 mod paper;
 mod progress;
@@ -84,7 +83,7 @@ fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
     Cli::command().mut_subcommands(move |command| {
-        command.mut_args(|a| {
+        arguments::scheme_or_model(command).mut_args(|a| {
             if takes(&a) && !a.is_allow_hyphen_values_set() { a.allow_negative_numbers(true) } else { a }
         })
     })

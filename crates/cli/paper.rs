@@ -5,9 +5,9 @@ use std::process::ExitCode;
 use clap::Args;
 use obsdeg_evidence::audit::audit;
 
-use crate::arguments::OutputArguments;
 use crate::failure::Failure;
-use crate::{interrupt, output};
+use crate::interrupt;
+use crate::output::Output;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -29,15 +29,13 @@ pub(crate) struct Arguments {
     seed: u64,
 
     #[command(flatten)]
-    output: OutputArguments,
+    output: Output,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     interrupt::ends()?;
-    output::check(&a.output)?;
+    a.output.target.check()?;
     let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
-    let text = obsdeg_report::audit(&audit, a.output.format, output::layout(&a.output))
-        .map_err(|e| Failure::internal(e.to_string()))?;
-    output::write(&a.output, &text)?;
+    a.output.write(&audit, obsdeg_report::audit)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -65,6 +65,6 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Model => schema_for!(ModelFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
-    output::print(&(text + "\n"))?;
+    output::print((text + "\n").as_bytes())?;
     Ok(ExitCode::SUCCESS)
 }

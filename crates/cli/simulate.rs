@@ -1,22 +1,18 @@
 //! `obsdeg simulate`: one run of the filter against a simulated truth.
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Args;
-use obsdeg_core::analysis::AnalysisError;
-use obsdeg_core::solution::requested::CombinationError;
-use obsdeg_evidence::prediction::PredictionError;
-use obsdeg_evidence::simulation::{SimulationError, Traces, simulate};
+use clap::{Arg, Args};
+use obsdeg_evidence::simulation::{Traces, simulate};
 use obsdeg_evidence::system::simulate_system;
-use obsdeg_report::{File, Format, Layout, ReportError, series_csv, series_parquet, simulation_figures};
+use obsdeg_report::{File, ReportError, series_csv, series_parquet, simulation_figures};
 
-use crate::arguments::{FolderArguments, SchemeArguments};
+use crate::arguments::InputArguments;
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
-use crate::model::ModelFile;
-use crate::progress::Spinner;
-use crate::{interrupt, output};
+use crate::input::Input;
+use crate::interrupt;
+use crate::output::{Output, to_a_folder};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -31,14 +27,10 @@ series.parquet and a figure per unknown as SVG and PNG.
 Exit codes: 0 done (whatever the verdict), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = AFTER_HELP, mut_args(with_numbers), mut_args(to_a_folder))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    scheme: SchemeArguments,
-
-    /// Any other system: a model file with its table of numbers for a simulation
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme", "carry", "latitude", "terms", "measured_azimuth", "combination", "dwell", "step", "noise", "azimuth_noise", "requirement", "truth", "slew_rate", "drift_noise", "propagation", "value", "prior", "estimate", "drift_scale"])]
-    model: Option<PathBuf>,
+    input: InputArguments,
 
     #[command(flatten)]
     conditions: ConditionArguments,
@@ -48,51 +40,30 @@ pub(crate) struct Arguments {
     seed: u64,
 
     #[command(flatten)]
-    output: FolderArguments,
+    output: Output,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     interrupt::ends()?;
-    output::check_folder(&a.output)?;
-    if let Some(path) = &a.model {
-        return system(a, path);
+    a.output.target.check_folder()?;
+    match a.input.read()? {
+        Input::Scheme(scheme) => {
+            a.conditions.concern(std::iter::once(&scheme))?;
+            let (summary, record) = simulate(&scheme, &a.conditions.conditions(&scheme), a.seed)?;
+            let more = || files(&record.traces);
+            a.output.write_folder(&summary, obsdeg_report::simulation, "summary.json", more)?;
+        }
+        Input::Model(file) => {
+            let (run, traces) = simulate_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
+            a.output.write_folder(&run, obsdeg_report::system_run, "summary.json", || files(&traces))?;
+        }
     }
-    let scheme = a.scheme.scheme()?;
-    a.conditions.concern(std::iter::once(&scheme))?;
-    let conditions = a.conditions.conditions(&scheme);
-    let (summary, record) = simulate(&scheme, &conditions, a.seed).map_err(failure)?;
-    let text = obsdeg_report::simulation(&summary, a.output.format, output::terminal())
-        .map_err(|e| Failure::internal(e.to_string()))?;
-    if a.output.output.is_some() {
-        let _spinner = Spinner::start("drawing figures", a.output.quiet);
-        let json = obsdeg_report::simulation(&summary, Format::Json, Layout::default());
-        let files = files(json, &record.traces).map_err(|e| Failure::internal(e.to_string()))?;
-        output::write_folder(&a.output, &files)?;
-    }
-    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// A model file.
-fn system(a: &Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let file = ModelFile::read(path)?;
-    let (run, traces) = simulate_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
-    let text = obsdeg_report::system_run(&run, a.output.format, output::terminal())
-        .map_err(|e| Failure::internal(e.to_string()))?;
-    if a.output.output.is_some() {
-        let _spinner = Spinner::start("drawing figures", a.output.quiet);
-        let json = obsdeg_report::system_run(&run, Format::Json, Layout::default());
-        let files = files(json, &traces).map_err(|e| Failure::internal(e.to_string()))?;
-        output::write_folder(&a.output, &files)?;
-    }
-    output::print(&text)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-/// What goes into the folder.
-fn files(json: Result<String, ReportError>, traces: &Traces) -> Result<Vec<File>, ReportError> {
+/// What goes into the folder beside the summary.
+fn files(traces: &Traces) -> Result<Vec<File>, ReportError> {
     let mut files = vec![
-        File { name: "summary.json".into(), bytes: json?.into_bytes() },
         File { name: "series.csv".into(), bytes: series_csv(traces)?.into_bytes() },
         File { name: "series.parquet".into(), bytes: series_parquet(traces)? },
     ];
@@ -100,19 +71,10 @@ fn files(json: Result<String, ReportError>, traces: &Traces) -> Result<Vec<File>
     Ok(files)
 }
 
-/// What is wrong with the input, or with the program.
-pub(crate) fn failure(e: SimulationError) -> Failure {
-    match e {
-        SimulationError::Prediction(PredictionError::Analysis(AnalysisError::Combination(
-            CombinationError { text, reason, span },
-        ))) => Failure::at(&format!("combination: {reason}"), "--combination", &text, span),
-        SimulationError::Filter(e) if e.is_numeric() => Failure::input(format!(
-            "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
-        )),
-        // too many unknowns, or accuracy orders beyond the series
-        SimulationError::Prediction(PredictionError::Analysis(AnalysisError::Scheme(_)))
-        | SimulationError::Prediction(PredictionError::Accuracy(_)) => Failure::input(e.to_string()),
-        SimulationError::Prediction(_) | SimulationError::Filter(_) => Failure::internal(e.to_string()),
-        _ => Failure::input(e.to_string()),
+/// What the option says where numbers are wanted too.
+pub(crate) fn with_numbers(arg: Arg) -> Arg {
+    match arg.get_id() == "model" {
+        true => arg.help("Any other system: a model file with its table of numbers for a simulation"),
+        false => arg,
     }
 }

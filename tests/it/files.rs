@@ -158,6 +158,41 @@ fn input_from_anywhere_is_limited() {
     assert!(output.status.success(), "{}", stderr(&output));
 }
 
+/// A file is a scheme or a model by what it says: JSON from a pipe has no ending, and an ending may be wrong.
+#[test]
+fn a_file_is_what_it_says() {
+    let (_folder, at) = folder();
+    let json = r#"{"name": "m", "states": ["x"], "equations": {"x": "-x"}, "outputs": {"y": "x"}}"#;
+    let toml = "name = \"m\"\n[states]\nx = \"-x\"\n[outputs]\ny = \"x\"\n";
+    for (name, text) in [("m.json", json), ("m", json), ("toml.json", toml), ("s.json", SCHEME)] {
+        fs::write(at(name), text).expect("written");
+    }
+    let analyzed = |option: &str, name: &str| {
+        let output = run(&["analyze", "--solutions", "off", option, &at(name)]);
+        assert!(output.status.success(), "{option} {name}: {}", stderr(&output));
+        output.stdout
+    };
+    let model = analyzed("--model", "m.json");
+    assert_eq!(analyzed("--model", "m"), model);
+    assert_eq!(analyzed("--model", "toml.json"), model);
+    assert_eq!(analyzed("--scheme", "s.json"), analyzed("--scheme", "scheme.toml"));
+    let piped = shell(&format!("cat {} | \"$0\" analyze --solutions off --model /dev/stdin", at("m.json")));
+    assert_eq!(piped.stdout, model, "{}", stderr(&piped));
+    let written = |name: &str| {
+        let review = at(&format!("{name}.md"));
+        let script = format!("cat {} | \"$0\" report -q --runs 2 -o {review} /dev/stdin", at(name));
+        let output = shell(&script);
+        assert!(output.status.success(), "{name}: {}", stderr(&output));
+        let given = run(&["report", &at(name), "-q", "--runs", "2", "-o", &review, "--force"]);
+        assert!(given.status.success(), "{name}: {}", stderr(&given));
+        fs::read_to_string(review).expect("written")
+    };
+    assert!(written("m.json").contains("x' = -x"));
+    assert!(written("s.json").contains("2 positions"));
+    let other = run(&["analyze", "--model", &at("s.json")]);
+    assert!(stderr(&other).contains("is a scheme file; expected a model file"), "{}", stderr(&other));
+}
+
 /// An interrupted command says nothing that it has not found: no evidence, no file, the exit code of an interrupt.
 #[test]
 fn an_interrupt_ends_with_its_code() {

@@ -186,6 +186,39 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
     assert!(codes.iter().any(|of| of.contains_key(&2)), "{codes:?}");
 }
 
+/// A folder with the files of the command lines.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL)] {
+        fs::write(folder.path().join(name), text).expect("written");
+    }
+    folder
+}
+
+/// Beside a model an option is about models too, or is refused: none is passed over.
+#[test]
+fn a_model_refuses_what_is_about_schemes() {
+    const TAKEN: [&str; 8] =
+        ["force", "format", "order", "output", "quiet", "seed", "solutions", "symbolic-limit"];
+    let folder = folder();
+    for command in ["analyze", "simulate", "crosscheck"] {
+        let mut taken = Vec::new();
+        let listed = options(command);
+        for name in listed.keys().filter(|name| !["help", "model"].contains(&name.as_str())) {
+            let value = values(name).map(|from| from[0].to_string());
+            let line = [command, "--model", "m.toml"].map(Into::into).into_iter();
+            let line: Vec<String> = line.chain([format!("--{name}")]).chain(value).collect();
+            let (code, stderr) = done(folder.path(), &line);
+            match stderr.contains("'--model <FILE>' cannot be used with") {
+                true => assert_eq!(code, Some(2), "{line:?}"),
+                false => taken.push(name.as_str()),
+            }
+        }
+        let own = TAKEN.iter().filter(|name| listed.contains_key(**name));
+        assert!(own.eq(&taken), "{command}: {taken:?}");
+    }
+}
+
 /// The exit codes of command lines of one command.
 fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let mut rng = SplitMix64::new(0x6772_616d ^ stream << 40);
@@ -194,10 +227,7 @@ fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     assert!(fair || options.len() > 4, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
     for _ in 0..if fair { 4 } else { DRAWN } {
-        let folder = tempfile::tempdir().expect("a folder");
-        for (name, text) in [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL)] {
-            fs::write(folder.path().join(name), text).expect("written");
-        }
+        let folder = folder();
         let arguments = line(command, &options, &mut rng);
         let (code, stderr) = done(folder.path(), &arguments);
         let code = code.unwrap_or(-1);

@@ -202,17 +202,6 @@ pub fn design(d: &Design, format: Format, layout: Layout) -> Result<String, Repo
     written(d, &design::document(d), format, layout)
 }
 
-/// The files of a cross-check: `evidence.json` and the figures.
-///
-/// # Errors
-/// [`ReportError`].
-pub fn crosscheck_files(c: &CrossCheck) -> Result<Vec<File>, ReportError> {
-    let json = crosscheck(c, Format::Json, Layout::default())?;
-    let mut files = vec![File { name: "evidence.json".into(), bytes: json.into_bytes() }];
-    files.extend(crosscheck_figures(c)?);
-    Ok(files)
-}
-
 /// Whether this build can write a PDF.
 pub const HAS_PDF: bool = cfg!(feature = "pdf");
 
