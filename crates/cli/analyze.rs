@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use obsdeg_core::analysis::{Options, analyze};
+use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::solution::solver::Frame;
-use obsdeg_core::system::analyze_system;
+use obsdeg_core::system::{SystemOptions, analyze_system};
 
 use crate::arguments::InputArguments;
 use crate::engine::EngineArguments;
@@ -83,15 +83,15 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     match a.input.read()? {
         Input::Scheme(scheme) => {
             let frame = if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform };
-            let options = Options { seed, solutions, formulas: a.formulas, frame };
+            let options = AnalysisOptions { seed, solutions, formulas: a.formulas, frame };
             let message = "solving symbolically (--solutions off leaves it out)";
             let analysis = a.engine.lend(message, quiet, |worker| Ok(analyze(&scheme, options, worker)?))?;
             a.output.write(&analysis, obsdeg_report::analysis)?;
         }
         Input::Model(file) => {
+            let options = SystemOptions { seed, solutions, order: a.order.map(Into::into) };
             let analysis = a.engine.lend("judging the model", quiet, |worker| {
-                let engine = solutions.then_some(worker);
-                analyze_system(&file.model, seed, a.order.map(Into::into), engine).map_err(|e| file.wrong(&e))
+                analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))
             })?;
             a.output.write(&analysis, obsdeg_report::system)?;
         }

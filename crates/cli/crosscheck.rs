@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use obsdeg_core::model::{Carry, Latitude, Scheme};
-use obsdeg_evidence::crosscheck::{FilterChange, Options, crosscheck};
+use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
 use obsdeg_evidence::system::crosscheck_system;
 use obsdeg_report::{ReportError, crosscheck_figures};
 
@@ -71,7 +71,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
             let conditions = a.conditions.conditions(&scheme);
             let dropped = a.filter_drop.as_ref().map(|name| position(&scheme, name)).transpose()?;
             let filter = FilterChange { carry: a.filter_carry, latitude: a.filter_latitude, dropped };
-            let options = Options { runs: a.runs as usize, seed: a.seed, filter };
+            let options = CrossCheckOptions { runs: a.runs as usize, seed: a.seed, filter };
             let bar = Bar::start(u64::from(a.runs), "Monte Carlo", a.output.target.quiet);
             let checked = crosscheck(&scheme, &conditions, &options, &|done| {
                 bar.at(done as u64);

@@ -10,7 +10,7 @@ use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Scheme, Unknowns};
 use obsdeg_design::design::answer::Found;
-use obsdeg_design::design::{Candidates, Design, DesignError, Kind, Options, design, scheme_found};
+use obsdeg_design::design::{Candidates, Design, DesignError, DesignOptions, Kind, design, scheme_found};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
 
@@ -161,7 +161,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     a.measurement.concern(std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
-    let options = Options {
+    let options = DesignOptions {
         candidates,
         positions: a.positions,
         required: a.wanted.observable.clone(),

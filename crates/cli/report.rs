@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Arg, Args, ValueEnum};
 use obsdeg_core::system::SystemModel;
-use obsdeg_design::review::{Options, ReviewError, review};
+use obsdeg_design::review::{ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
@@ -114,7 +114,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
     let mut worker = a.engine.worker(a.target.quiet)?;
     let bar = Bar::start(1000, "", a.target.quiet);
-    let options = Options { runs: a.runs as usize, seed: a.seed };
+    let options = ReviewOptions { runs: a.runs as usize, seed: a.seed };
     let reviewed = review(&entries, &models, options, worker.as_mut(), &|what, share| {
         bar.says(what);
         bar.at((share * 900.0) as u64);

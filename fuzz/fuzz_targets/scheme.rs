@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use obsdeg_core::analysis::{Options, analyze};
+use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::scheme_file::{read, write};
 use obsdeg_evidence::simulation::Plan;
 use obsdeg_evidence::simulation::conditions::Conditions;
@@ -16,7 +16,7 @@ fuzz_target!(|data: &[u8]| {
     assert_eq!(again, scheme, "{written}");
     // small schemes only: time is not what is looked for
     if scheme.positions.len() <= 6 {
-        let _ = analyze(&scheme, Options::default(), None);
+        let _ = analyze(&scheme, AnalysisOptions::default(), None);
         let _ = Plan::new(&scheme, &Conditions::of(&scheme));
     }
 });

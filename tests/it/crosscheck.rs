@@ -5,7 +5,7 @@ use obsdeg_core::model::{Carry, Scheme, Unknowns};
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::crosscheck::answer::CrossCheck;
 use obsdeg_evidence::crosscheck::monte_carlo::{Experiment, Prepared};
-use obsdeg_evidence::crosscheck::{FilterChange, Options, crosscheck};
+use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
 use obsdeg_evidence::simulation::batch::batch;
 use obsdeg_evidence::simulation::conditions::Conditions;
 use obsdeg_evidence::simulation::plan::Plan;
@@ -19,7 +19,8 @@ use crate::schemes::{S6, paper, scheme};
 const P1P2: [&str; 5] = ["crosscheck", "--angles", "0,0,0", "--angles", "180,0,0"];
 
 fn check(scheme: &Scheme, conditions: &Conditions, filter: FilterChange) -> CrossCheck {
-    crosscheck(scheme, conditions, &Options { runs: 200, seed: 1, filter }, &|_| true).expect("checked")
+    crosscheck(scheme, conditions, &CrossCheckOptions { runs: 200, seed: 1, filter }, &|_| true)
+        .expect("checked")
 }
 
 fn right(scheme: &Scheme) -> CrossCheck {
@@ -243,7 +244,7 @@ proptest! {
             angles.iter().map(|[a, b, c]| format!("{},{},{}", a * 10, b * 10, c * 10)).collect();
         let attitudes: Vec<&str> = attitudes.iter().map(String::as_str).collect();
         let scheme = scheme(&attitudes, carry);
-        let options = Options { runs: 8, seed: 1, filter: FilterChange::default() };
+        let options = CrossCheckOptions { runs: 8, seed: 1, filter: FilterChange::default() };
         let c = crosscheck(&scheme, &Conditions::default(), &options, &|_| true).expect("checked");
         prop_assert!(c.passed, "{attitudes:?} {carry}: {:?}", c.disagreements);
     }
@@ -262,7 +263,7 @@ fn evidence_does_not_depend_on_noise_and_steps() {
             dwell_s: dwell,
             ..Conditions::default()
         };
-        let options = Options { runs: 2, seed: 1, filter: FilterChange::default() };
+        let options = CrossCheckOptions { runs: 2, seed: 1, filter: FilterChange::default() };
         let c = crosscheck(&paper(Carry::Platform), &conditions, &options, &|_| true).expect("checked");
         for (a, b) in usual.quantities.iter().zip(&c.quantities) {
             let (slope, factor) =
@@ -290,7 +291,7 @@ fn every_valid_scheme_is_answered() {
     first.latitude = "-60".parse().ok();
     first.unknowns = "I,II".parse().expect("terms");
     first.positions[0].dwell = "500".parse().ok();
-    let options = Options { runs: 2, seed: 1, filter: FilterChange::default() };
+    let options = CrossCheckOptions { runs: 2, seed: 1, filter: FilterChange::default() };
     let answered =
         |scheme: &Scheme, conditions: &Conditions| crosscheck(scheme, conditions, &options, &|_| true);
     let c = answered(&first, &Conditions::default()).expect("an answer");
@@ -327,7 +328,7 @@ fn every_valid_scheme_is_answered() {
 #[test]
 fn the_only_position_is_not_dropped() {
     let filter = FilterChange { dropped: Some(0), ..FilterChange::default() };
-    let options = Options { runs: 2, seed: 1, filter };
+    let options = CrossCheckOptions { runs: 2, seed: 1, filter };
     let one = scheme(&["0,0,0"], Carry::Platform);
     let refused = crosscheck(&one, &Conditions::default(), &options, &|_| true).expect_err("refused");
     assert!(refused.to_string().contains("only position"), "{refused}");

@@ -3,14 +3,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use obsdeg_core::analysis::{Options, analyze};
+use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::{Carry, Scheme, Unknowns, scheme_file};
-use obsdeg_core::system::{SystemAnalysis, analyze_system, model_file};
+use obsdeg_core::system::{SystemAnalysis, SystemOptions, analyze_system, model_file};
 
 use crate::program::{run, stderr};
 
 fn table(scheme: &Scheme) -> String {
-    let options = Options { solutions: false, ..Options::default() };
+    let options = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
     let a = analyze(scheme, options, None).expect("the example is analysed");
     let profile: Vec<String> = a.rank_profile.iter().map(ToString::to_string).collect();
     let mut out = format!("{} carry: rank profile {} of {}\n", a.carry, profile.join(" "), a.unknowns.len());
@@ -90,7 +90,8 @@ fn models() {
         insta::glob!("../../examples", "*/model.toml", |path| {
             let text = std::fs::read_to_string(path).expect("readable");
             let model = model_file::read(&text).expect("a model");
-            let a = analyze_system(&model, 1, None, None).expect("judged");
+            let no_solutions = SystemOptions { solutions: false, ..SystemOptions::default() };
+            let a = analyze_system(&model, no_solutions, None).expect("judged");
             insta::assert_snapshot!(format!("model_{}", folder(path)), model_table(&a));
         });
     });

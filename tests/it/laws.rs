@@ -1,6 +1,6 @@
 //! Laws that hold for every scheme, on random ones.
 
-use obsdeg_core::analysis::{AnalysisError, Options, analyze};
+use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::ensemble::{judge, staircase};
 use obsdeg_core::degree::rows::DerivativeRows;
 use obsdeg_core::degree::staircase::{Degrees, climb};
@@ -168,7 +168,8 @@ fn nobody_aims_at_the_primes_of_a_scheme() {
         scheme
     };
     let asked = |text: &str| {
-        let answer = analyze(&with(text), Options { solutions: false, ..Options::default() }, None)?;
+        let answer =
+            analyze(&with(text), AnalysisOptions { solutions: false, ..AnalysisOptions::default() }, None)?;
         let requested = answer.combinations.into_iter().find(|c| c.requested);
         Ok::<_, AnalysisError>(requested.map(|c| (c.status, c.degree)))
     };

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use obsdeg_core::analysis::{Options, analyze};
+use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::attitude::cardinal;
 use obsdeg_core::system::rows::Unknown;
-use obsdeg_core::system::{Judgement, json, judge, model_file};
+use obsdeg_core::system::{Judgement, SystemOptions, analyze_system, json, judge, model_file};
 use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{Measurement, Process};
 use obsdeg_evidence::system::evidence::SystemEvidence;
@@ -124,7 +124,7 @@ fn the_platform_is_one_of_them() {
     );
     let model = judged(&text.expect("readable"));
     let positions = ["NUE", "NDW"].map(|n| cardinal(n).expect("an attitude"));
-    let no_solutions = Options { solutions: false, ..Options::default() };
+    let no_solutions = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
     let platform = analyze(&Scheme::of_angles(positions), no_solutions, None).expect("analysed");
     assert_eq!(model.degrees.rank_profile[..3], platform.rank_profile[..]);
     let own = degrees(&model);
@@ -492,7 +492,8 @@ fn directions_that_are_polynomials() {
         let text =
             format!("name = \"m\"\n[states]\n{states}\n[parameters]\n{parameters}\n[outputs]\ny = \"{y}\"\n");
         let model = model_file::read(&text).expect("a model");
-        let a = obsdeg_core::system::analyze_system(&model, 1, None, None).expect("judged");
+        let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+        let a = analyze_system(&model, options, None).expect("judged");
         assert!(a.other_directions.is_empty(), "{:?}", a.other_directions);
         a.symmetries.into_iter().map(|s| s.words).collect::<Vec<_>>()
     };

@@ -1,6 +1,6 @@
 //! Schemes that several tests are about.
 
-use obsdeg_core::analysis::{Analysis, Options, analyze};
+use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
 use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::{Carry, Scheme};
 
@@ -19,5 +19,6 @@ pub(crate) fn paper(carry: Carry) -> Scheme {
 
 /// Verdicts without solutions.
 pub(crate) fn judged(scheme: &Scheme) -> Analysis {
-    analyze(scheme, Options { solutions: false, ..Options::default() }, None).expect("analysed")
+    analyze(scheme, AnalysisOptions { solutions: false, ..AnalysisOptions::default() }, None)
+        .expect("analysed")
 }

@@ -7,7 +7,7 @@ use obsdeg_design::design::criterion::Criterion;
 use obsdeg_design::design::information::Evaluator;
 use obsdeg_design::design::observability::Rows;
 use obsdeg_design::design::search::{Constraints, Search};
-use obsdeg_design::design::{Candidates, Design, Kind, Options, design};
+use obsdeg_design::design::{Candidates, Design, DesignOptions, Kind, design};
 use obsdeg_evidence::simulation::conditions::Conditions;
 
 fn main() {
@@ -61,7 +61,7 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
 /// The same with the front, as the command runs it.
 #[divan::bench(sample_count = 3)]
 fn the_command_for_five_of_24() -> Design {
-    let options = Options {
+    let options = DesignOptions {
         candidates: Candidates::cardinals(),
         positions: Some(5),
         required: Vec::new(),

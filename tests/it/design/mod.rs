@@ -12,7 +12,7 @@ use obsdeg_design::design::answer::Found;
 use obsdeg_design::design::information::Evaluator;
 use obsdeg_design::design::observability::Rows;
 use obsdeg_design::design::search::Progress;
-use obsdeg_design::design::{Candidates, Design, Kind, Options, design};
+use obsdeg_design::design::{Candidates, Design, DesignOptions, Kind, design};
 use obsdeg_evidence::simulation::conditions::Conditions;
 
 fn base(carry: Carry) -> Scheme {
@@ -22,8 +22,8 @@ fn base(carry: Carry) -> Scheme {
 /// All twelve coefficients.
 const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
-fn options(positions: Option<usize>) -> Options {
-    Options {
+fn options(positions: Option<usize>) -> DesignOptions {
+    DesignOptions {
         candidates: Candidates::cardinals(),
         positions,
         required: Vec::new(),
@@ -44,7 +44,7 @@ fn on(_: Progress) -> bool {
     true
 }
 
-fn designed(carry: Carry, options: &Options) -> Design {
+fn designed(carry: Carry, options: &DesignOptions) -> Design {
     design(&base(carry), &quiet(), options, &on).expect("designed")
 }
 

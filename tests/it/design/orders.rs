@@ -7,7 +7,7 @@ use obsdeg_design::design::information::Evaluator;
 use obsdeg_design::design::observability::Rows;
 use obsdeg_design::design::search::{Constraints, Search};
 use obsdeg_design::design::ways::Stop;
-use obsdeg_design::design::{Candidates, Design, DesignError, Kind, Options, design};
+use obsdeg_design::design::{Candidates, Design, DesignError, DesignOptions, Kind, design};
 use obsdeg_evidence::compare::predicted;
 use obsdeg_evidence::simulation::conditions::Conditions;
 use obsdeg_evidence::simulation::plan::Plan;
@@ -42,7 +42,7 @@ fn candidates(rng: &mut SplitMix64) -> Candidates {
 struct Task {
     base: Scheme,
     conditions: Conditions,
-    options: Options,
+    options: DesignOptions,
 }
 
 const NAMES: [&str; 12] =
@@ -98,7 +98,7 @@ fn task(seed: u64) -> Task {
             Assignment { name: "D_FX".into(), value: sigma * between(rng, 0.2, 1.0) },
         ];
     }
-    let options = Options {
+    let options = DesignOptions {
         candidates,
         positions: Some(k),
         required: required.iter().map(ToString::to_string).collect(),
@@ -388,8 +388,12 @@ fn a_position_more_is_never_impossible_when_repeating_costs_nothing() {
     let conditions = Conditions { slew_rate_deg_s: Some(1.0), ..super::quiet() };
     let found = |k: usize| {
         let required = ["D_F", "D_O", "D_S"].map(String::from).to_vec();
-        let options =
-            Options { candidates: candidates.clone(), required, slew_s: Some(90.0), ..options(Some(k)) };
+        let options = DesignOptions {
+            candidates: candidates.clone(),
+            required,
+            slew_s: Some(90.0),
+            ..options(Some(k))
+        };
         let found = design(&super::base(Carry::Inertial), &conditions, &options, &on).expect("designed");
         (found.found[0].worst_degree, found.found[0].value)
     };

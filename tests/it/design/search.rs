@@ -1,6 +1,6 @@
 //! The search: the fewest positions, the best of them, proofs, symmetry, constraints, interruption.
 
-use obsdeg_core::analysis::{Options as AnalysisOptions, analyze};
+use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::attitude::cardinal;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme};
@@ -8,7 +8,7 @@ use obsdeg_design::design::criterion::Criterion;
 use obsdeg_design::design::observability::Rows;
 use obsdeg_design::design::search::{Constraints, Progress, Search};
 use obsdeg_design::design::symmetry::Symmetry;
-use obsdeg_design::design::{Candidates, DesignError, Kind, Options, design};
+use obsdeg_design::design::{Candidates, DesignError, DesignOptions, Kind, design};
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::simulation::batch::batch;
 use obsdeg_evidence::simulation::conditions::Conditions;
@@ -94,7 +94,7 @@ fn the_best_of_five_and_of_twelve() {
     assert!(five.search.is_some_and(|s| s.proven) && five.symmetry == 24);
     assert!(optimum <= low + 1e-9 && (0.0393..0.0394).contains(&optimum), "{optimum} {low}");
     let twelve = Conditions { dwell_s: 5000.0 / 12.0, ..quiet() };
-    let few = Options { restarts: 8, ..options(Some(12)) };
+    let few = DesignOptions { restarts: 8, ..options(Some(12)) };
     let twelve = design(&base(Carry::Inertial), &twelve, &few, &on).expect("designed");
     assert!(twelve.search.is_some_and(|s| !s.proven) && twelve.found[0].worst_sigma_dph <= 0.018);
 }
@@ -116,7 +116,7 @@ fn exhaustion_finds_the_best() {
         (Carry::Inertial, some(&sequence_of(&all, &turned)), 5),
         (Carry::Reset, some(&[0, 1, 2, 4, 7, 10, 16, 23]), 7),
     ] {
-        let options = Options { candidates: candidates.clone(), ..options(Some(k)) };
+        let options = DesignOptions { candidates: candidates.clone(), ..options(Some(k)) };
         let found = design(&base(carry), &quiet(), &options, &on);
         let (rows, evaluator) = (rows_of(carry, &candidates), evaluator_of(carry, &candidates));
         let mut best = f64::INFINITY;
@@ -186,7 +186,7 @@ fn turned_schemes_are_equally_good() {
 /// One seed, one answer, on any number of threads; an interrupted search gives the best so far.
 #[test]
 fn threads_and_interruption() {
-    let few = Options { restarts: 32, ..options(Some(8)) };
+    let few = DesignOptions { restarts: 32, ..options(Some(8)) };
     let threads = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| designed(Carry::Inertial, &few))
@@ -209,11 +209,11 @@ fn long_searches_hear_of_an_interruption() {
     let grid = |deg: i64| Candidates::grid(deg * 1_000_000_000).expect("a grid");
     let slews = Conditions { slew_rate_deg_s: Some(1.0), ..quiet() };
     for (options, conditions) in [
-        (Options { candidates: grid(30), ..options(None) }, quiet()),
-        (Options { candidates: grid(30), ..options(Some(4)) }, quiet()),
-        (Options { candidates: grid(45), criterion: Kind::E, ..options(Some(5)) }, quiet()),
-        (Options { candidates: grid(45), ..options(Some(5)) }, slews),
-        (Options { required: vec!["D_F".into()], criterion: Kind::E, ..options(Some(6)) }, quiet()),
+        (DesignOptions { candidates: grid(30), ..options(None) }, quiet()),
+        (DesignOptions { candidates: grid(30), ..options(Some(4)) }, quiet()),
+        (DesignOptions { candidates: grid(45), criterion: Kind::E, ..options(Some(5)) }, quiet()),
+        (DesignOptions { candidates: grid(45), ..options(Some(5)) }, slews),
+        (DesignOptions { required: vec!["D_F".into()], criterion: Kind::E, ..options(Some(6)) }, quiet()),
     ] {
         // the first questions come from the search for the fewest, the others from what comes behind it
         for patience in [0, 20, 200] {
@@ -236,7 +236,7 @@ fn nothing_is_proven_by_chance() {
         || obsdeg_core::model::Angle::from_nanodeg(rng.below(360_000_000_000) as i64 - 180_000_000_000);
     let mut candidates = Candidates::default();
     (0..24).for_each(|_| candidates.add(std::array::from_fn(|_| angle())));
-    let found = designed(Carry::Inertial, &Options { candidates, ..options(None) });
+    let found = designed(Carry::Inertial, &DesignOptions { candidates, ..options(None) });
     assert_eq!((found.minimum.positions, found.minimum.proven), (Some(5), true));
     assert!(found.error_bound < 1e-12 && found.primes > 2, "{found:?}");
     // each set is excluded by a rank of at most 15 rows modulo a prime that is 1 modulo 360e9; there are about 2^60 over
@@ -260,7 +260,7 @@ fn nothing_is_proven_by_chance() {
 fn constraints_are_kept() {
     let slews = Conditions { slew_rate_deg_s: Some(1.0), ..quiet() };
     let free = design(&base(Carry::Inertial), &slews, &options(Some(5)), &on).expect("designed");
-    let tight = Options { total_s: Some(5380.0), slew_s: Some(100.0), ..options(Some(5)) };
+    let tight = DesignOptions { total_s: Some(5380.0), slew_s: Some(100.0), ..options(Some(5)) };
     let kept = design(&base(Carry::Inertial), &slews, &tight, &on).expect("designed");
     assert!(kept.found.iter().all(|f| f.total_s <= 5380.0) && kept.found[0].value >= free.found[0].value);
     // times by hand: quarter turns take 90 s, and the front goes down as time goes up
@@ -270,21 +270,22 @@ fn constraints_are_kept() {
     assert!(free.front.iter().any(|f| f.total_s < 1400.0) && free.front.iter().any(|f| f.total_s > 20_000.0));
     // without the D_I everything may have degree 1 (six positions), and is found before what has a smaller sigma
     let some = ["D_F", "D_O", "D_S"].map(String::from).to_vec();
-    let six = Options { required: some.clone(), ..options(Some(6)) };
+    let six = DesignOptions { required: some.clone(), ..options(Some(6)) };
     let mut few = Candidates::default();
     for name in ["NUE", "DNE", "ENU", "USE", "ESD", "NDW", "WND"] {
         few.add(cardinal(name).expect("an attitude"));
     }
-    let ones = designed(Carry::Platform, &Options { candidates: few.clone(), ..six });
+    let ones = designed(Carry::Platform, &DesignOptions { candidates: few.clone(), ..six });
     assert!(ones.found.iter().all(|f| f.worst_degree == 1) && ones.required.len() == 9);
-    let capped = Options { candidates: few, degree_caps: vec![(Some("D_I".into()), 1)], ..options(Some(5)) };
+    let capped =
+        DesignOptions { candidates: few, degree_caps: vec![(Some("D_I".into()), 1)], ..options(Some(5)) };
     let error = design(&base(Carry::Platform), &quiet(), &capped, &on).expect_err("the lemma forbids it");
     assert!(matches!(error, DesignError::Impossible { .. }), "{error}");
     // requirements: met by what is found, and the margin says so
     let strict = |sigma: f64| {
         let required = Assignment { name: "D".into(), value: sigma };
         let conditions = Conditions { requirements: vec![required], ..quiet() };
-        let options = Options { meet: true, criterion: Kind::Margin, ..options(Some(5)) };
+        let options = DesignOptions { meet: true, criterion: Kind::Margin, ..options(Some(5)) };
         design(&base(Carry::Inertial), &conditions, &options, &on)
     };
     assert!(strict(0.0394).expect("met").found.iter().all(|f| f.value <= 1.0 && f.worst_sigma_dph <= 0.0394));
@@ -297,7 +298,7 @@ fn grids_gimbals_and_refinement() {
     let mut limited = base(Carry::Inertial);
     limited.gimbals.limit("beta=-60:60").expect("limits");
     let grid = Candidates::grid(45_000_000_000).expect("a grid");
-    let options = Options { candidates: grid, restarts: 3, refine: true, ..options(Some(5)) };
+    let options = DesignOptions { candidates: grid, restarts: 3, refine: true, ..options(Some(5)) };
     let found = design(&limited, &quiet(), &options, &on).expect("designed");
     assert_eq!((found.candidates.len(), found.beyond_gimbals.len()), (192, 16));
     let (refined, plain) = (&found.found[0], &found.found[1]);
@@ -361,8 +362,12 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
         }
         // what slews bring in beside the attitudes may leave a coefficient undetermined
         all.retain(|(_, sigma)| *sigma < 1e3);
-        let found =
-            design(&base(Carry::Inertial), &steps, &Options { required: names, ..options(Some(k)) }, &on);
+        let found = design(
+            &base(Carry::Inertial),
+            &steps,
+            &DesignOptions { required: names, ..options(Some(k)) },
+            &on,
+        );
         let Some(degree) = all.iter().map(|a| a.0).min() else {
             assert!(matches!(found, Err(DesignError::Impossible { .. })), "{k} {required:?}");
             continue;

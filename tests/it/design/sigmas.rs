@@ -4,7 +4,7 @@ use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, SlewAxis, SlewTo};
 use obsdeg_design::design::criterion::{Criterion, Limits};
 use obsdeg_design::design::information::Evaluator;
-use obsdeg_design::design::{Candidates, DesignError, Kind, Options, design};
+use obsdeg_design::design::{Candidates, DesignError, DesignOptions, Kind, design};
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::compare::predicted;
 use obsdeg_evidence::simulation::batch::batch;
@@ -19,7 +19,7 @@ use super::*;
 fn the_predicted_sigma_is_that_of_the_filter() {
     for carry in Carry::ALL {
         let k = 7;
-        let options = Options { restarts: 2, ..options(Some(k)) };
+        let options = DesignOptions { restarts: 2, ..options(Some(k)) };
         let found = designed(carry, &options);
         let best = &found.found[0];
         let prior = |name: &str| Assignment { name: name.into(), value: 1e7 };
@@ -156,8 +156,12 @@ fn requirements_on_psi_count() {
                 ],
                 ..free.clone()
             };
-            let options =
-                Options { candidates: candidates.clone(), meet, criterion: Kind::Margin, ..options(Some(k)) };
+            let options = DesignOptions {
+                candidates: candidates.clone(),
+                meet,
+                criterion: Kind::Margin,
+                ..options(Some(k))
+            };
             let found = design(&like, &conditions, &options, &on);
             if meet && factor < best {
                 assert!(matches!(found, Err(DesignError::Impossible { .. })), "{carry}: {found:?}");
@@ -174,7 +178,7 @@ fn requirements_on_psi_count() {
             assert_eq!(first.requirements.stated, count);
         }
         // asked for some coefficients, psi is not
-        let some = Options {
+        let some = DesignOptions {
             candidates: candidates.clone(),
             meet: true,
             required: vec!["D_FX".into()],
@@ -228,7 +232,7 @@ fn listed_schemes_are_what_a_comparison_says() {
     let scheme = base(Carry::Inertial);
     let mut skew = 0;
     for (required, k) in [(vec!["D_F".to_string()], 3), (Vec::new(), 5)] {
-        let options = Options { required: required.clone(), keep: 10, restarts: 2, ..options(Some(k)) };
+        let options = DesignOptions { required: required.clone(), keep: 10, restarts: 2, ..options(Some(k)) };
         let found = design(&scheme, &slews, &options, &on).expect("designed");
         assert!(found.found.len() == 10 && found.found.iter().any(|f| !f.half_turns.is_empty()));
         for f in found.found.iter().chain(&found.front) {

@@ -9,7 +9,7 @@ mod value;
 
 use std::collections::HashMap;
 
-use obsdeg_core::analysis::{Analysis, Options, Quantity, analyze};
+use obsdeg_core::analysis::{Analysis, AnalysisOptions, Quantity, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::solver::Frame;
 use obsdeg_report::{Format, Layout};
@@ -104,7 +104,7 @@ fn stations(json: &Json) -> Vec<String> {
 /// Everything that is printed about one scheme.
 fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen) {
     let (scheme, case) = (draw.scheme(), draw.case());
-    let options = Options { seed: 1, solutions: true, formulas: worker.is_some(), frame };
+    let options = AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame };
     let a: Analysis = analyze(&scheme, options, worker).expect("analysed");
     let written = |format| obsdeg_report::analysis(&a, format, Layout::default()).expect("written");
     let document = written(Format::Latex);
@@ -291,7 +291,8 @@ fn asked(mut worker: Option<&mut Worker>) {
                 continue;
             }
             check(&draw, frame, worker.as_deref_mut(), &mut seen);
-            let a = analyze(&draw.scheme(), Options { frame, ..Options::default() }, None).expect("analysed");
+            let a = analyze(&draw.scheme(), AnalysisOptions { frame, ..AnalysisOptions::default() }, None)
+                .expect("analysed");
             let verdicts: Vec<_> = a.combinations.iter().filter(|c| c.requested).map(|c| c.degree).collect();
             assert!(verdicts.len() == asked.len() && verdicts.iter().all(Option::is_some), "{verdicts:?}");
         }
@@ -313,7 +314,7 @@ fn coefficients_that_are_not_known_are_refused() {
         ("D_FX*D_FY", "expected a linear combination of unknowns"),
     ] {
         let scheme = Scheme { combinations: vec![text.into()], ..fixed(&["0,0,0", "20,0,0"], &[]).scheme() };
-        let e = analyze(&scheme, Options::default(), None).expect_err("refused").to_string();
+        let e = analyze(&scheme, AnalysisOptions::default(), None).expect_err("refused").to_string();
         assert!(e.contains(expected), "{text}: {e}");
     }
 }
@@ -323,8 +324,12 @@ fn coefficients_that_are_not_known_are_refused() {
 fn combinations_can_be_read() {
     for kind in [Angles::Decimals, Angles::Constants, Angles::Roots] {
         for draw in cases(kind, 3, 12, &[]) {
-            let a = analyze(&draw.scheme(), Options { solutions: false, ..Options::default() }, None)
-                .expect("analysed");
+            let a = analyze(
+                &draw.scheme(),
+                AnalysisOptions { solutions: false, ..AnalysisOptions::default() },
+                None,
+            )
+            .expect("analysed");
             for c in &a.combinations {
                 assert!(
                     !c.expression.contains('.') && !c.expression.contains("combination"),
@@ -412,7 +417,7 @@ fn degenerate_angles(worker: &mut Worker) {
         &["alpha,0,a1", "0,alpha,0", "a1,0,0"],
     ] {
         let draw = fixed(angles, &[]);
-        let options = Options { solutions: false, formulas: true, ..Options::default() };
+        let options = AnalysisOptions { solutions: false, formulas: true, ..AnalysisOptions::default() };
         let a = analyze(&draw.scheme(), options, Some(&mut *worker)).expect("analysed");
         let loci = a.degenerate_loci.expect("loci");
         assert!(loci.len() > 1, "{:?}", a.notes);

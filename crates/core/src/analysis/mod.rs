@@ -28,7 +28,7 @@ pub const SCHEMA: &str = "obsdeg.analysis/1";
 
 /// What is to be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
+pub struct AnalysisOptions {
     /// Seed of all random choices.
     pub seed: u64,
     /// Whether solving expressions are wanted.
@@ -39,7 +39,7 @@ pub struct Options {
     pub frame: Frame,
 }
 
-impl Default for Options {
+impl Default for AnalysisOptions {
     fn default() -> Self {
         Self { seed: 1, solutions: true, formulas: false, frame: Frame::N }
     }
@@ -65,7 +65,7 @@ pub enum AnalysisError {
 /// [`AnalysisError`].
 pub fn analyze(
     scheme: &Scheme,
-    options: Options,
+    options: AnalysisOptions,
     worker: Option<&mut Worker>,
 ) -> Result<Analysis, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
@@ -143,7 +143,7 @@ pub fn few_enough(platform: &Platform) -> Result<(), SchemeError> {
 /// Turns functionals into printed solutions and collects what could not be said.
 struct Printer<'a> {
     solver: Solver<'a>,
-    options: Options,
+    options: AnalysisOptions,
     stations: Vec<StationLabel>,
     /// The accuracy orders, if they could be computed.
     accuracy: Option<Accuracy>,

@@ -105,30 +105,49 @@ pub struct SymmetryReport {
     pub unknowns: Vec<String>,
 }
 
-/// Judges a model; `bound` overrides the highest order. Solving expressions are sought if `engine` says so, with its worker.
+/// What is to be computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SystemOptions {
+    /// Seed of all random choices.
+    pub seed: u64,
+    /// Whether solving expressions are wanted.
+    pub solutions: bool,
+    /// The highest order of derivatives to look at; left out: n for each experiment where chains end by themselves, else 2n+4.
+    pub order: Option<usize>,
+}
+
+impl Default for SystemOptions {
+    fn default() -> Self {
+        Self { seed: 1, solutions: true, order: None }
+    }
+}
+
+/// Judges a model. The worker, if given, is started only when solving expressions are wanted; without it they are noted as missing.
 ///
 /// # Errors
 /// [`ModelError`].
 pub fn analyze_system(
     model: &SystemModel,
-    seed: u64,
-    bound: Option<usize>,
-    engine: Option<Option<&mut Worker>>,
+    options: SystemOptions,
+    worker: Option<&mut Worker>,
 ) -> Result<SystemAnalysis, ModelError> {
+    let SystemOptions { seed, order, .. } = options;
     let compiled = model.compile()?;
-    let judged = judge_compiled(model, &compiled, seed, bound)?;
+    let judged = judge_compiled(model, &compiled, seed, order)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let mut out = answer(model, &judged, &symmetries, seed);
-    match engine.map(|worker| solutions(model, &compiled, &judged, seed, worker)) {
-        Some(Ok(found)) => {
+    if !options.solutions {
+        return Ok(out);
+    }
+    match solutions(model, &compiled, &judged, seed, worker) {
+        Ok(found) => {
             for (u, solution) in judged.layout.unknowns.iter().zip(found) {
                 if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
                     q.solution = solution;
                 }
             }
         }
-        Some(Err(reason)) => out.note = Some(reason),
-        None => {}
+        Err(reason) => out.note = Some(reason),
     }
     Ok(out)
 }

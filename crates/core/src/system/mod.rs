@@ -17,6 +17,6 @@ mod solutions;
 pub mod symmetry;
 pub mod taylor;
 
-pub use answer::{SystemAnalysis, analyze_system};
+pub use answer::{SystemAnalysis, SystemOptions, analyze_system};
 pub use judge::{Judgement, judge};
 pub use model::{ModelError, SystemModel};

@@ -164,7 +164,7 @@ pub enum DesignError {
 
 /// What is to be found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
+pub struct DesignOptions {
     /// What to choose from.
     pub candidates: Candidates,
     /// Number of positions; `None`: only the minimum is asked for.
@@ -217,7 +217,7 @@ pub enum Kind {
 pub fn design(
     base: &Scheme,
     conditions: &Conditions,
-    options: &Options,
+    options: &DesignOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Design, DesignError> {
     let stopped = AtomicBool::new(false);

@@ -17,7 +17,7 @@ use super::observability::Rows;
 use super::search::{Best, Constraints, Scored, Search};
 use super::symmetry::Symmetry;
 use super::ways::Stop;
-use super::{Design, DesignError, EXHAUSTIVE, Kind, Options, refine};
+use super::{Design, DesignError, DesignOptions, EXHAUSTIVE, Kind, refine};
 
 /// Most sets whose keys are held.
 const MOST_SETS: u64 = 5_000_000;
@@ -31,7 +31,7 @@ const FRONT_RESTARTS: u64 = 8;
 /// A search in preparation: names resolved, candidates ordered by orbits.
 pub(super) struct Task<'a> {
     pub(super) base: &'a Scheme,
-    pub(super) options: &'a Options,
+    pub(super) options: &'a DesignOptions,
     pub(super) candidates: Candidates,
     /// Names of the coefficients that count, and their indices.
     pub(super) required: Vec<(String, usize)>,
@@ -51,7 +51,7 @@ impl<'a> Task<'a> {
     pub(super) fn new(
         base: &'a Scheme,
         conditions: &Conditions,
-        options: &'a Options,
+        options: &'a DesignOptions,
         candidates: Candidates,
     ) -> Result<Self, DesignError> {
         conditions.validate()?;

@@ -2,12 +2,12 @@
 
 pub mod answer;
 
-use obsdeg_core::analysis::{self, AnalysisError, analyze};
+use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::status::Status;
 use obsdeg_core::model::{Dwell, Scheme};
-use obsdeg_core::system::{ModelError, SystemModel, analyze_system};
+use obsdeg_core::system::{ModelError, SystemModel, SystemOptions, analyze_system};
 use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
-use obsdeg_evidence::crosscheck::{self, crosscheck};
+use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
 use obsdeg_evidence::simulation::plan::Kind as Part;
 use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, simulate};
 use obsdeg_evidence::system::run::RunError;
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 pub use answer::{DesignReview, ModelReview, SchemeReview};
 
-use crate::design::{self, Candidates, DesignError, Kind, design};
+use crate::design::{Candidates, DesignError, DesignOptions, Kind, design};
 use answer::{Alternatives, Attitude, PositionReview, Sweep};
 
 /// Between two latitudes of the sweep, in degrees.
@@ -31,7 +31,7 @@ const SUBSETS: usize = 24;
 
 /// How much is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
+pub struct ReviewOptions {
     /// Monte Carlo runs of the evidence.
     pub runs: usize,
     /// Seed of all random choices.
@@ -77,7 +77,7 @@ pub enum ReviewError {
 pub fn review(
     entries: &[Entry],
     models: &[SystemModel],
-    options: Options,
+    options: ReviewOptions,
     mut worker: Option<&mut Worker>,
     progress: &dyn Fn(&str, f64) -> bool,
 ) -> Result<DesignReview, ReviewError> {
@@ -114,7 +114,7 @@ pub fn review(
 
 fn scheme(
     entry: &Entry,
-    options: Options,
+    options: ReviewOptions,
     mut worker: Option<&mut Worker>,
     step: &dyn Fn(f64, &str) -> Result<(), ReviewError>,
 ) -> Result<SchemeReview, ReviewError> {
@@ -123,7 +123,7 @@ fn scheme(
     // what needs numbers refuses generic angles before anything is computed
     let plan = Plan::new(scheme, conditions).map_err(failed)?;
     step(0.0, "verdicts")?;
-    let verdicts = analysis::Options { seed: options.seed, ..analysis::Options::default() };
+    let verdicts = AnalysisOptions { seed: options.seed, ..AnalysisOptions::default() };
     let analysis = analyze(scheme, verdicts, worker.as_deref_mut())
         .map_err(|error| ReviewError::Analysis { name: name.clone(), error })?;
     rest(worker);
@@ -131,7 +131,7 @@ fn scheme(
     let (simulation, record) = simulate(scheme, conditions, options.seed).map_err(failed)?;
     step(0.3, "evidence")?;
     let mut notes = Vec::new();
-    let check = crosscheck::Options { runs: options.runs, seed: options.seed, filter: Default::default() };
+    let check = CrossCheckOptions { runs: options.runs, seed: options.seed, filter: Default::default() };
     let going = |done: usize| step(0.3 + 0.4 * done as f64 / options.runs.max(1) as f64, "evidence").is_ok();
     let evidence = match crosscheck(scheme, conditions, &check, &going) {
         Ok(evidence) => Some(evidence),
@@ -268,7 +268,7 @@ fn alternatives(
         .filter(|q| q.status == Status::Observable && q.name.starts_with("D_"))
         .map(|q| q.name.clone())
         .collect();
-    let task = |candidates, positions, required: &[String]| design::Options {
+    let task = |candidates, positions, required: &[String]| DesignOptions {
         candidates,
         positions,
         required: required.to_vec(),
@@ -284,7 +284,7 @@ fn alternatives(
         seed,
     };
     let going = |_| true;
-    let mut run = |options: design::Options| match design(scheme, conditions, &options, &going) {
+    let mut run = |options: DesignOptions| match design(scheme, conditions, &options, &going) {
         Ok(found) => Some(found),
         // no coefficients, generic angles, rotations: nothing to choose from
         Err(DesignError::Drift | DesignError::Rotation { .. } | DesignError::GenericAngle { .. }) => None,
@@ -322,7 +322,8 @@ fn rest(worker: Option<&mut Worker>) {
 }
 
 fn model(model: &SystemModel, seed: u64, mut worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
-    let analysis = analyze_system(model, seed, None, Some(worker.as_deref_mut()))?;
+    let analysis =
+        analyze_system(model, SystemOptions { seed, ..SystemOptions::default() }, worker.as_deref_mut())?;
     rest(worker);
     let mut note = None;
     let run = simulate_system(model, seed);

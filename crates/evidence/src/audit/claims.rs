@@ -1,7 +1,7 @@
 //! The claims in words, judged by the engine.
 
 use obsdeg_core::accuracy::Accuracy;
-use obsdeg_core::analysis::{AnalysisError, Options, analyze};
+use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::ensemble::{EnsembleError, judge};
 use obsdeg_core::degree::platform_rows::local_chain;
 use obsdeg_core::degree::staircase::Degrees;
@@ -339,7 +339,7 @@ fn single_position(seed: u64) -> Result<Local, AnalysisError> {
         combinations: vec!["wN*psi_y^n - eps_z^n".into(), "wN*psi_z^n + eps_y^n".into()],
         ..positions(&PAPER[..1])
     };
-    let options = Options { seed, solutions: false, ..Options::default() };
+    let options = AnalysisOptions { seed, solutions: false, ..AnalysisOptions::default() };
     let local = analyze(&scheme, options, None)?;
     let unknown = |name: &str| local.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
     let mut asked = local.combinations.iter().filter(|c| c.requested).map(|c| c.degree);

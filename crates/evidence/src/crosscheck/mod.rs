@@ -77,7 +77,7 @@ impl FilterChange {
 
 /// What is to be checked, and how.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
+pub struct CrossCheckOptions {
     /// Monte Carlo runs.
     pub runs: usize,
     /// Seed of all random choices.
@@ -94,7 +94,7 @@ pub struct Options {
 pub fn crosscheck(
     scheme: &Scheme,
     conditions: &Conditions,
-    options: &Options,
+    options: &CrossCheckOptions,
     progress: &dyn Fn(usize) -> bool,
 ) -> Result<CrossCheck, SimulationError> {
     if scheme.rotates() {
