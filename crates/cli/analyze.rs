@@ -1,13 +1,11 @@
 //! `obsdeg analyze`: the degree table of one scheme.
 
-use std::process::ExitCode;
-
-use clap::{Args, ValueEnum};
+use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::solution::solver::Frame;
 use obsdeg_core::system::{SystemOptions, analyze_system};
 
-use crate::arguments::InputArguments;
+use crate::arguments::{InputArguments, one_of};
 use crate::engine::EngineArguments;
 use crate::failure::Failure;
 use crate::input::Input;
@@ -28,18 +26,6 @@ Examples:
 Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in
 rad/s and Z in g. Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Switch {
-    On,
-    Off,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum FrameArgument {
-    N,
-    Platform,
-}
-
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
@@ -51,12 +37,12 @@ pub(crate) struct Arguments {
     order: Option<u16>,
 
     /// Solving expressions; off never starts the symbolic engine
-    #[arg(long, value_name = "ON|OFF", default_value = "on", hide_possible_values = true)]
-    solutions: Switch,
+    #[arg(long, value_name = "ON|OFF", default_value = "on", hide_possible_values = true, action = ArgAction::Set, value_parser = one_of([("on", true), ("off", false)]))]
+    solutions: bool,
 
     /// Axes of Z in solutions: n (North-Up-East, as in the paper) or platform
-    #[arg(long, value_name = "FRAME", default_value = "n", hide_possible_values = true)]
-    frame: FrameArgument,
+    #[arg(long, value_name = "FRAME", default_value = "n", hide_possible_values = true, value_parser = one_of([("n", Frame::N), ("platform", Frame::Platform)]))]
+    frame: Frame,
 
     /// Print Z and its derivatives, and psi and eps at each position, as formulas
     #[arg(long)]
@@ -73,28 +59,26 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check()?;
     if a.order.is_some() && a.input.model.is_none() {
         return Err(Failure::input("--order goes with --model: a scheme has a proven end".into()));
     }
-    let (seed, solutions, quiet) = (a.seed, a.solutions == Switch::On, a.output.target.quiet);
+    let (seed, solutions, quiet) = (a.seed, a.solutions, a.output.target.quiet);
     match a.input.read()? {
         Input::Scheme(scheme) => {
-            let frame = if a.frame == FrameArgument::N { Frame::N } else { Frame::Platform };
-            let options = AnalysisOptions { seed, solutions, formulas: a.formulas, frame };
+            let options = AnalysisOptions { seed, solutions, formulas: a.formulas, frame: a.frame };
             let message = "solving symbolically (--solutions off leaves it out)";
             let analysis = a.engine.lend(message, quiet, |worker| Ok(analyze(&scheme, options, worker)?))?;
-            a.output.write(&analysis, obsdeg_report::analysis)?;
+            a.output.write(&analysis, obsdeg_report::analysis)
         }
         Input::Model(file) => {
             let options = SystemOptions { seed, solutions, order: a.order.map(Into::into) };
             let analysis = a.engine.lend("judging the model", quiet, |worker| {
                 analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))
             })?;
-            a.output.write(&analysis, obsdeg_report::system)?;
+            a.output.write(&analysis, obsdeg_report::system)
         }
     }
-    Ok(ExitCode::SUCCESS)
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Command, Id};
 use obsdeg_core::model::attitude::Euler;
 use obsdeg_core::model::rotation::Rotation;
@@ -75,6 +76,17 @@ pub(crate) fn scheme_or_model(command: Command) -> Command {
     let of_schemes: Vec<Id> =
         command.get_arguments().map(|a| a.get_id()).filter(of_schemes).cloned().collect();
     command.mut_args(|a| if a.get_id() == "model" { a.conflicts_with_all(&of_schemes) } else { a })
+}
+
+/// Reads one of several words, as what it stands for.
+pub(crate) fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
+    words: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let read = PossibleValuesParser::new(words.iter().map(|(word, _)| *word).collect::<Vec<_>>());
+    let meant = move |word: String| {
+        words.iter().find(|(w, _)| *w == word).map(|(_, t)| t.clone()).ok_or("expected one of the words")
+    };
+    read.try_map(meant)
 }
 
 /// Three Euler angles (a type of its own: clap would take a list for several values).

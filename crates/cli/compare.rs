@@ -1,7 +1,6 @@
 //! `obsdeg compare`: schemes side by side.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::{Arg, Args};
 use obsdeg_evidence::compare::{Entry, compare};
@@ -54,7 +53,7 @@ fn words(arg: Arg) -> Arg {
     }
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check()?;
     let mut entries = Vec::with_capacity(a.schemes.len());
@@ -70,6 +69,5 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     let compared = compare(&entries, a.seed);
     drop(spinner);
     let comparison = compared.map_err(|(name, e)| Failure::from(e).in_file(&name))?;
-    a.output.write(&comparison, obsdeg_report::comparison)?;
-    Ok(ExitCode::SUCCESS)
+    a.output.write(&comparison, obsdeg_report::comparison)
 }

@@ -1,7 +1,5 @@
 //! `obsdeg completions` and `obsdeg man`.
 
-use std::process::ExitCode;
-
 use clap::Args;
 use clap_complete::Shell;
 
@@ -20,15 +18,14 @@ pub(crate) struct Arguments {
     shell: Shell,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut text = Vec::new();
     clap_complete::generate(a.shell, &mut command(), "obsdeg", &mut text);
-    output::print(&text)?;
-    Ok(ExitCode::SUCCESS)
+    output::print(&text)
 }
 
 /// The manual page: the program, then every command.
-pub(crate) fn man() -> Result<ExitCode, Failure> {
+pub(crate) fn man() -> Result<(), Failure> {
     let mut text = Vec::new();
     let mut command = command();
     command.build();
@@ -39,6 +36,5 @@ pub(crate) fn man() -> Result<ExitCode, Failure> {
     for sub in command.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help") {
         render(sub.clone().name(format!("obsdeg-{}", sub.get_name())))?;
     }
-    output::print(&text)?;
-    Ok(ExitCode::SUCCESS)
+    output::print(&text)
 }

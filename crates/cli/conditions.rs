@@ -1,25 +1,14 @@
 //! The conditions of a run, shared by the commands that simulate.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth, concerns, known};
 use obsdeg_core::model::{Platform, Scheme};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_evidence::simulation::conditions::general_first;
 
+use crate::arguments::one_of;
 use crate::failure::Failure;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum TruthArgument {
-    Linear,
-    Exact,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PropagationArgument {
-    Exponential,
-    Rk4,
-}
 
 /// Reads a number of a range.
 pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
@@ -71,8 +60,8 @@ pub(crate) struct ConditionArguments {
     measurement: MeasurementArguments,
 
     /// linear: the model itself; exact: direction cosines, specific force in the true platform frame (default: linear)
-    #[arg(long, value_name = "LEVEL", hide_possible_values = true)]
-    truth: Option<TruthArgument>,
+    #[arg(long, value_name = "LEVEL", hide_possible_values = true, value_parser = one_of([("linear", Truth::Linear), ("exact", Truth::Exact)]))]
+    truth: Option<Truth>,
 
     /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
     /// 0.001 to 10000 deg/s)
@@ -85,8 +74,8 @@ pub(crate) struct ConditionArguments {
     drift_noise: Option<DriftNoise>,
 
     /// Transition matrix of the filter: exponential or rk4 (default: exponential)
-    #[arg(long, value_name = "HOW", hide_possible_values = true)]
-    propagation: Option<PropagationArgument>,
+    #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = one_of([("exponential", Propagation::Exponential), ("rk4", Propagation::Rk4)]))]
+    propagation: Option<Propagation>,
 
     /// True value of an unknown or family in deg, deg/h, deg/h/g: D_FX=11, D_I=5, psi=0.1 (the paper's;
     /// -1e6 to 1e6)
@@ -174,16 +163,10 @@ impl ConditionArguments {
     pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = self.measurement.conditions(scheme);
         out.apply(&Settings {
-            truth: self.truth.map(|t| match t {
-                TruthArgument::Linear => Truth::Linear,
-                TruthArgument::Exact => Truth::Exact,
-            }),
+            truth: self.truth,
             slew_rate_deg_s: self.slew_rate,
             drift_noise: self.drift_noise,
-            propagation: self.propagation.map(|p| match p {
-                PropagationArgument::Exponential => Propagation::Exponential,
-                PropagationArgument::Rk4 => Propagation::Rk4,
-            }),
+            propagation: self.propagation,
             drift_scale: self.drift_scale,
             ..Settings::default()
         });

@@ -1,7 +1,5 @@
 //! `obsdeg crosscheck`: the exact verdicts against a filter.
 
-use std::process::ExitCode;
-
 use clap::Args;
 use obsdeg_core::model::{Carry, Latitude, Scheme};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
@@ -10,7 +8,7 @@ use obsdeg_report::{ReportError, crosscheck_figures};
 
 use crate::arguments::InputArguments;
 use crate::conditions::ConditionArguments;
-use crate::failure::{CHECK, Failure};
+use crate::failure::Failure;
 use crate::input::Input;
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
@@ -62,7 +60,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check_folder()?;
     let passed = match a.input.read()? {
@@ -90,7 +88,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
             evidence.passed
         }
     };
-    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::from(CHECK) })
+    if passed { Ok(()) } else { Err(Failure::check()) }
 }
 
 fn position(scheme: &Scheme, name: &str) -> Result<usize, Failure> {

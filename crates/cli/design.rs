@@ -1,10 +1,9 @@
 //! `obsdeg design`: the fewest positions, and the best of a number of positions.
 
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use clap::{Arg, Args, ValueEnum};
+use clap::{Arg, Args};
 use obsdeg_core::model::angle::parse_decimal;
 use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
@@ -14,7 +13,7 @@ use obsdeg_design::design::{Candidates, Design, DesignError, DesignOptions, Kind
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
 
-use crate::arguments::Assumptions;
+use crate::arguments::{Assumptions, one_of};
 use crate::conditions::{MeasurementArguments, within};
 use crate::failure::Failure;
 use crate::input::Source;
@@ -37,14 +36,9 @@ half turns are tried in both directions: NUE (-N) NDW is the one that is right-h
 winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error, 130 interrupted before anything was found.";
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum CriterionArgument {
-    Worst,
-    A,
-    D,
-    E,
-    Margin,
-}
+/// The words of `--criterion`.
+const CRITERIA: [(&str, Kind); 5] =
+    [("worst", Kind::Worst), ("a", Kind::A), ("d", Kind::D), ("e", Kind::E), ("margin", Kind::Margin)];
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(words), mut_args(to_a_folder))]
@@ -113,8 +107,8 @@ struct WantedArguments {
 
     /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement, as for --meet);
     /// a smaller worst degree comes before it
-    #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true)]
-    criterion: CriterionArgument,
+    #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true, value_parser = one_of(CRITERIA))]
+    criterion: Kind,
 
     /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
     /// coefficients; by prediction: no prior, no drift noise, psi at the start (`simulate` the winner for the rest)
@@ -145,7 +139,7 @@ fn degree_cap(text: &str) -> Result<(Option<String>, usize), String> {
     Ok((name.map(Into::into), cap))
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.output.target.check_folder()?;
     let (mut base, candidates) = candidates(&a.candidates)?;
     a.assumptions.apply(&mut base);
@@ -169,13 +163,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         meet: a.wanted.meet,
         total_s: a.wanted.max_time,
         slew_s: a.wanted.max_slew,
-        criterion: match a.wanted.criterion {
-            CriterionArgument::Worst => Kind::Worst,
-            CriterionArgument::A => Kind::A,
-            CriterionArgument::D => Kind::D,
-            CriterionArgument::E => Kind::E,
-            CriterionArgument::Margin => Kind::Margin,
-        },
+        criterion: a.wanted.criterion,
         keep: a.keep.into(),
         restarts: a.restarts,
         refine: a.refine,
@@ -191,8 +179,7 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     drop(bar);
     let found = designed?;
     let more = || files(&found, &base, &conditions);
-    a.output.write_folder(&found, obsdeg_report::design, "design.json", more)?;
-    Ok(ExitCode::SUCCESS)
+    a.output.write_folder(&found, obsdeg_report::design, "design.json", more)
 }
 
 /// What a shared option says here.

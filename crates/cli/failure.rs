@@ -12,7 +12,7 @@ use obsdeg_evidence::simulation::SimulationError;
 use obsdeg_report::{ReportError, visible};
 
 /// A check failed.
-pub(crate) const CHECK: u8 = 1;
+const CHECK: u8 = 1;
 /// Bad input.
 pub(crate) const INPUT: u8 = 2;
 /// A defect of the program.
@@ -39,6 +39,11 @@ impl Failure {
     /// The input is wrong.
     pub(crate) fn input(message: String) -> Self {
         Self { message: format!("error: {message}"), code: INPUT }
+    }
+
+    /// A check failed: what was printed says which.
+    pub(crate) fn check() -> Self {
+        Self { message: String::new(), code: CHECK }
     }
 
     /// Interrupted before there was anything to show.

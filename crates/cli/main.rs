@@ -125,12 +125,8 @@ fn arguments() -> Result<Cli, ExitCode> {
     })
 }
 
-fn run() -> Result<ExitCode, Failure> {
-    let cli = match arguments() {
-        Ok(cli) => cli,
-        Err(code) => return Ok(code),
-    };
-    match cli.command {
+fn run() -> Result<(), ExitCode> {
+    let done = match arguments()?.command {
         Command::Analyze(a) => analyze::run(&a),
         Command::Simulate(a) => simulate::run(&a),
         Command::Crosscheck(a) => crosscheck::run(&a),
@@ -142,30 +138,29 @@ fn run() -> Result<ExitCode, Failure> {
         Command::Man => completions::man(),
         Command::Schema(a) => schema::run(&a),
         Command::SymbolicWorker => symbolic_worker(),
-    }
+    };
+    done.map_err(|failure| failure.report())
 }
 
 #[cfg(feature = "symbolica")]
-fn symbolic_worker() -> Result<ExitCode, Failure> {
+fn symbolic_worker() -> Result<(), Failure> {
     let input = std::io::BufReader::new(std::io::stdin());
     // whoever started it has left, or the time is up: at once, in the middle of whatever is computed
     #[allow(clippy::exit, reason = "nobody waits for the other thread")]
     let end = || std::process::exit(0);
     let served = obsdeg_symbolic::worker::serve(&lock::symbolic_lock_file(), input, std::io::stdout(), end);
-    served.map_err(|e| Failure::internal(format!("the symbolic worker lost its pipe: {e}")))?;
-    Ok(ExitCode::SUCCESS)
+    served.map_err(|e| Failure::internal(format!("the symbolic worker lost its pipe: {e}")))
 }
 
 #[cfg(not(feature = "symbolica"))]
-fn symbolic_worker() -> Result<ExitCode, Failure> {
+fn symbolic_worker() -> Result<(), Failure> {
     Err(Failure::input("this program was built without the symbolic engine".into()))
 }
 
 fn main() -> ExitCode {
     // a panic is a defect of the program: its message is on stderr already
     match std::panic::catch_unwind(run) {
-        Ok(Ok(code)) => code,
-        Ok(Err(failure)) => failure.report(),
+        Ok(done) => done.err().unwrap_or(ExitCode::SUCCESS),
         Err(_) => ExitCode::from(failure::INTERNAL),
     }
 }

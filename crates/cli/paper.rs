@@ -1,7 +1,5 @@
 //! `obsdeg paper`: the paper against the algebra.
 
-use std::process::ExitCode;
-
 use clap::Args;
 use obsdeg_evidence::audit::audit;
 
@@ -32,10 +30,9 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check()?;
     let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
-    a.output.write(&audit, obsdeg_report::audit)?;
-    Ok(ExitCode::SUCCESS)
+    a.output.write(&audit, obsdeg_report::audit)
 }

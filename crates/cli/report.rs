@@ -1,15 +1,14 @@
 //! `obsdeg report`: the design review of schemes and models, as one file.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-use clap::{Arg, Args, ValueEnum};
+use clap::{Arg, Args};
 use obsdeg_core::system::SystemModel;
 use obsdeg_design::review::{ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
-use crate::arguments::Assumptions;
+use crate::arguments::{Assumptions, one_of};
 use crate::conditions::ConditionArguments;
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
@@ -29,13 +28,13 @@ The format follows the ending of the file, or --format. HTML and PDF are one fil
 pictures in a folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
 Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum FormatArgument {
-    Html,
-    Pdf,
-    Markdown,
-    Latex,
-}
+/// The words of `--format`.
+const FORMATS: [(&str, ReviewFormat); 4] = [
+    ("html", ReviewFormat::Html),
+    ("pdf", ReviewFormat::Pdf),
+    ("markdown", ReviewFormat::Markdown),
+    ("latex", ReviewFormat::Latex),
+];
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(words))]
@@ -45,8 +44,8 @@ pub(crate) struct Arguments {
     files: Vec<PathBuf>,
 
     /// html, pdf, markdown or latex (default: by the ending of the file)
-    #[arg(long, value_name = "FORMAT", hide_possible_values = true)]
-    format: Option<FormatArgument>,
+    #[arg(long, value_name = "FORMAT", hide_possible_values = true, value_parser = one_of(FORMATS))]
+    format: Option<ReviewFormat>,
 
     #[command(flatten)]
     target: Target,
@@ -84,7 +83,7 @@ fn words(arg: Arg) -> Arg {
     }
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     let path = a.target.output.as_deref().unwrap_or(Path::new(""));
     let format = format(a.format, path)?;
@@ -128,26 +127,25 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
     bar.says("writing");
     let written = obsdeg_report::review(&reviewed, format, &folder)?;
     notice(worker.as_ref(), a.target.quiet);
-    if let Some((text, pictures)) = written.split_first() {
-        a.target.write(&text.bytes, pictures)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))
 }
 
-fn format(asked: Option<FormatArgument>, path: &Path) -> Result<ReviewFormat, Failure> {
+/// The format that is asked for, or that of the file's ending.
+fn format(asked: Option<ReviewFormat>, path: &Path) -> Result<ReviewFormat, Failure> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let format = match (asked, ending.as_deref()) {
-        (Some(FormatArgument::Html), _) | (None, Some("html" | "htm")) => ReviewFormat::Html,
-        (Some(FormatArgument::Pdf), _) | (None, Some("pdf")) => ReviewFormat::Pdf,
-        (Some(FormatArgument::Markdown), _) | (None, Some("md")) => ReviewFormat::Markdown,
-        (Some(FormatArgument::Latex), _) | (None, Some("tex")) => ReviewFormat::Latex,
-        (None, _) => {
-            return Err(Failure::input(format!(
-                "no format for {}; expected a file that ends in .html, .pdf, .md or .tex, or --format",
-                path.display()
-            )));
-        }
+    let by_ending = match ending.as_deref() {
+        Some("html" | "htm") => Some(ReviewFormat::Html),
+        Some("pdf") => Some(ReviewFormat::Pdf),
+        Some("md") => Some(ReviewFormat::Markdown),
+        Some("tex") => Some(ReviewFormat::Latex),
+        _ => None,
     };
+    let format = asked.or(by_ending).ok_or_else(|| {
+        Failure::input(format!(
+            "no format for {}; expected a file that ends in .html, .pdf, .md or .tex, or --format",
+            path.display()
+        ))
+    })?;
     if format == ReviewFormat::Pdf && !obsdeg_report::HAS_PDF {
         return Err(ReportError::NoPdf.into());
     }

@@ -1,7 +1,5 @@
 //! `obsdeg schema`: JSON Schemas, generated from the types.
 
-use std::process::ExitCode;
-
 use clap::{Args, ValueEnum};
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::scheme_file::SchemeFile;
@@ -50,7 +48,7 @@ pub(crate) struct Arguments {
     kind: Kind,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let schema = match a.kind {
         Kind::Analysis => schema_for!(Analysis),
         Kind::Audit => schema_for!(Audit),
@@ -65,6 +63,5 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
         Kind::Model => schema_for!(ModelFile),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
-    output::print((text + "\n").as_bytes())?;
-    Ok(ExitCode::SUCCESS)
+    output::print((text + "\n").as_bytes())
 }

@@ -1,7 +1,5 @@
 //! `obsdeg simulate`: one run of the filter against a simulated truth.
 
-use std::process::ExitCode;
-
 use clap::{Arg, Args};
 use obsdeg_evidence::simulation::{Traces, simulate};
 use obsdeg_evidence::system::simulate_system;
@@ -43,7 +41,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check_folder()?;
     match a.input.read()? {
@@ -51,14 +49,13 @@ pub(crate) fn run(a: &Arguments) -> Result<ExitCode, Failure> {
             a.conditions.concern(std::iter::once(&scheme))?;
             let (summary, record) = simulate(&scheme, &a.conditions.conditions(&scheme), a.seed)?;
             let more = || files(&record.traces);
-            a.output.write_folder(&summary, obsdeg_report::simulation, "summary.json", more)?;
+            a.output.write_folder(&summary, obsdeg_report::simulation, "summary.json", more)
         }
         Input::Model(file) => {
             let (run, traces) = simulate_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
-            a.output.write_folder(&run, obsdeg_report::system_run, "summary.json", || files(&traces))?;
+            a.output.write_folder(&run, obsdeg_report::system_run, "summary.json", || files(&traces))
         }
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// What goes into the folder beside the summary.
