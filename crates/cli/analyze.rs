@@ -2,7 +2,7 @@
 
 use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
-use obsdeg_core::solution::solver::Frame;
+use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{SystemOptions, analyze_system};
 
 use crate::arguments::{InputArguments, one_of};

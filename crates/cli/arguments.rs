@@ -4,10 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Command, Id};
-use obsdeg_core::model::attitude::Euler;
-use obsdeg_core::model::rotation::Rotation;
-use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
+use obsdeg_core::model::{Carry, Euler, Latitude, Rotation, Scheme, Unknowns, parse_attitude};
 
 use crate::failure::Failure;
 use crate::input::{Input, Source};

@@ -4,8 +4,7 @@ use clap::Args;
 use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth, concerns, known};
 use obsdeg_core::model::{Platform, Scheme};
-use obsdeg_evidence::simulation::Conditions;
-use obsdeg_evidence::simulation::conditions::general_first;
+use obsdeg_evidence::simulation::{Conditions, general_first};
 
 use crate::arguments::one_of;
 use crate::failure::Failure;

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
-use obsdeg_core::model::angle::parse_decimal;
 use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
-use obsdeg_core::model::{Scheme, Unknowns};
-use obsdeg_design::design::answer::Found;
-use obsdeg_design::design::{Candidates, Design, DesignError, DesignOptions, Kind, design, scheme_found};
+use obsdeg_core::model::{Scheme, Unknowns, parse_decimal};
+use obsdeg_design::design::{
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, design, scheme_found,
+};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
 
@@ -37,8 +37,13 @@ winner.toml (a scheme file) and the front of total time against the criterion as
 Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error, 130 interrupted before anything was found.";
 
 /// The words of `--criterion`.
-const CRITERIA: [(&str, Kind); 5] =
-    [("worst", Kind::Worst), ("a", Kind::A), ("d", Kind::D), ("e", Kind::E), ("margin", Kind::Margin)];
+const CRITERIA: [(&str, CriterionName); 5] = [
+    ("worst", CriterionName::Worst),
+    ("a", CriterionName::A),
+    ("d", CriterionName::D),
+    ("e", CriterionName::E),
+    ("margin", CriterionName::Margin),
+];
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(words), mut_args(to_a_folder))]
@@ -108,7 +113,7 @@ struct WantedArguments {
     /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement, as for --meet);
     /// a smaller worst degree comes before it
     #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true, value_parser = one_of(CRITERIA))]
-    criterion: Kind,
+    criterion: CriterionName,
 
     /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
     /// coefficients; by prediction: no prior, no drift noise, psi at the start (`simulate` the winner for the rest)

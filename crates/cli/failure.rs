@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use obsdeg_core::analysis::AnalysisError;
-use obsdeg_core::solution::requested::CombinationError;
+use obsdeg_core::solution::CombinationError;
 use obsdeg_design::design::DesignError;
 use obsdeg_evidence::prediction::PredictionError;
 use obsdeg_evidence::simulation::SimulationError;

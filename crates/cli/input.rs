@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use obsdeg_core::model::{Scheme, scheme_file};
 use obsdeg_core::system::{ModelError, SystemModel, json, model_file};
-use obsdeg_evidence::system::run::RunError;
+use obsdeg_evidence::system::RunError;
 
 use crate::failure::Failure;
 

@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use obsdeg_design::design::search::Progress;
+use obsdeg_design::design::Progress;
 use obsdeg_report::visible;
 
 /// Shows a spinner on a terminal until it is dropped, if that takes longer than a second.

@@ -4,8 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::scheme_file::{read, write};
-use obsdeg_evidence::simulation::Plan;
-use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_evidence::simulation::{Conditions, Plan};
 
 fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };

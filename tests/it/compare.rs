@@ -2,14 +2,11 @@
 
 use std::process::Output;
 
-use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_evidence::compare::answer::Review;
-use obsdeg_evidence::compare::{Entry, compare};
+use obsdeg_core::model::{Carry, Rotation, Scheme};
+use obsdeg_evidence::compare::{ComparedScheme, Entry, compare};
 use obsdeg_evidence::requirements::Miss;
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::simulate;
+use obsdeg_evidence::simulation::{Conditions, simulate};
 
 use crate::program::{json, run, stderr, stdout};
 use crate::schemes::{S6, scheme};
@@ -22,7 +19,7 @@ fn printed(arguments: &[&str]) -> String {
     stdout(&compared(arguments))
 }
 
-fn review(scheme: &Scheme) -> Review {
+fn review(scheme: &Scheme) -> ComparedScheme {
     let entry = Entry { name: "it".into(), scheme: scheme.clone(), conditions: Conditions::default() };
     compare(&[entry], 1).expect("compared").schemes.remove(0)
 }
@@ -98,7 +95,7 @@ fn sensitivity_says_what_the_assumptions_are_worth() {
 /// Every unknown with a requirement counts, psi of every position too; what is not observable misses it.
 #[test]
 fn requirements_are_those_of_all_unknowns() {
-    let missed = |r: &Review| -> Vec<(String, Miss)> {
+    let missed = |r: &ComparedScheme| -> Vec<(String, Miss)> {
         r.requirements.missed.iter().map(|m| (m.name.clone(), m.why)).collect()
     };
     let psi = |names: &[&str]| -> Vec<(String, Miss)> {
@@ -148,7 +145,7 @@ fn excitation_of_an_arc() {
         s.positions[0].rotation = Some(Rotation::new("X_p", angle).expect("a rotation"));
         review(&s)
     };
-    let at_first = |r: &Review, name: &str| {
+    let at_first = |r: &ComparedScheme, name: &str| {
         r.quantities.iter().find(|q| q.name == name).expect("a coefficient").excitation[0]
     };
     // about X_p, horizontal: g goes round in Y_p, Z_p, from -Y_p; gyro Y has I = +y, gyro Z I = +z

@@ -3,12 +3,10 @@
 use obsdeg_core::model::settings::{Assignment, Truth};
 use obsdeg_core::model::{Carry, Scheme, Unknowns};
 use obsdeg_ekf::SquareRootInformation;
-use obsdeg_evidence::crosscheck::answer::CrossCheck;
-use obsdeg_evidence::crosscheck::monte_carlo::{Experiment, Prepared};
-use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
-use obsdeg_evidence::simulation::batch::batch;
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::plan::Plan;
+use obsdeg_evidence::crosscheck::{
+    CrossCheck, CrossCheckOptions, Experiment, FilterChange, Prepared, crosscheck,
+};
+use obsdeg_evidence::simulation::{Conditions, Plan, batch};
 use obsdeg_report::{Format, Layout};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};

@@ -1,13 +1,8 @@
 //! Laws that hold for every scheme, on random ones.
 
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
-use obsdeg_core::degree::ensemble::{judge, staircase};
-use obsdeg_core::degree::rows::DerivativeRows;
-use obsdeg_core::degree::staircase::{Degrees, climb};
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::model::platform::{Platform, RandomValues};
-use obsdeg_core::model::scheme::Scheme;
-use obsdeg_core::model::{Angle, Carry};
+use obsdeg_core::degree::{Degrees, DerivativeRows, Status, climb, judge, staircase};
+use obsdeg_core::model::{Angle, Carry, Platform, RandomValues, Scheme};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 use proptest::prelude::*;
 
@@ -115,7 +110,7 @@ proptest! {
         let plain = staircase(&platform, &sample).0;
         let f = sample.roots.field;
         let scale = (0..platform.names().len()).map(|_| 1 + rng.below(f.modulus() - 1)).collect();
-        let inner = obsdeg_core::degree::platform_rows::PlatformRows::new(&platform, &sample);
+        let inner = obsdeg_core::degree::PlatformRows::new(&platform, &sample);
         let mut scaled = Scaled { inner, scale };
         let again = climb(&mut scaled, &mut Echelon::new(f, platform.names().len()), |_, _| {});
         prop_assert_eq!(plain, again);

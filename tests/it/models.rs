@@ -4,15 +4,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
-use obsdeg_core::model::Scheme;
-use obsdeg_core::model::attitude::cardinal;
-use obsdeg_core::system::rows::Unknown;
-use obsdeg_core::system::{Judgement, SystemOptions, analyze_system, json, judge, model_file};
+use obsdeg_core::model::{Scheme, cardinal};
+use obsdeg_core::system::{Judgement, SystemOptions, Unknown, analyze_system, json, judge, model_file};
 use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{Measurement, Process};
-use obsdeg_evidence::system::evidence::SystemEvidence;
-use obsdeg_evidence::system::numeric::Numeric;
-use obsdeg_evidence::system::{crosscheck_system, simulate_system};
+use obsdeg_evidence::system::{Numeric, SystemEvidence, crosscheck_system, simulate_system};
 use serde_json::Value;
 
 use crate::program;

@@ -3,10 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::model::attitude::{cardinal, cardinal_names};
-use obsdeg_core::model::scheme::Scheme;
-use obsdeg_core::model::{Carry, Unknowns};
+use obsdeg_core::degree::Status;
+use obsdeg_core::model::{Carry, Scheme, Unknowns, cardinal, cardinal_names};
 
 use crate::schemes::{S6, judged, scheme};
 

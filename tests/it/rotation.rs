@@ -1,11 +1,8 @@
 //! Rotating segments: all attitudes of an arc at once.
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::model::rotation::Rotation;
-use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::simulate;
+use obsdeg_core::model::{Carry, Rotation, Scheme, parse_attitude};
+use obsdeg_evidence::simulation::{Conditions, simulate};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 

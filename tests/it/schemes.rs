@@ -1,8 +1,7 @@
 //! Schemes that several tests are about.
 
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
-use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::model::{Carry, Scheme, parse_attitude};
 
 /// Six attitudes in general position.
 pub(crate) const S6: [&str; 6] =

@@ -3,12 +3,9 @@
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use obsdeg_core::degree::ensemble::staircase;
-use obsdeg_core::degree::rows::DerivativeRows;
-use obsdeg_core::degree::staircase::{Degrees, climb};
+use obsdeg_core::degree::{Degrees, DerivativeRows, climb, staircase};
 use obsdeg_core::model::expression::{Environment, evaluate, parse};
-use obsdeg_core::model::platform::{Platform, RandomValues};
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::model::{Carry, Platform, RandomValues, Scheme};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 type Q = BigRational;
@@ -274,8 +271,7 @@ const EPS_C: [&str; 3] = [
 
 /// The platform as text equations, in n or in platform axes.
 fn from_text(in_n: bool, attitudes: &[&str], carry: Carry, seed: u64) -> (Vec<usize>, Vec<Option<usize>>) {
-    let angles =
-        attitudes.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("an attitude"));
+    let angles = attitudes.iter().map(|a| obsdeg_core::model::parse_attitude(a).expect("an attitude"));
     let scheme = Scheme { carry, ..Scheme::of_angles(angles) };
     let platform = Platform::new(scheme).expect("valid");
     let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(seed)).expect("fits");
@@ -383,7 +379,7 @@ fn text_equations_in_both_axes_give_the_same_verdicts() {
     for attitudes in schemes {
         for carry in Carry::ALL {
             let angles =
-                attitudes.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("an attitude"));
+                attitudes.iter().map(|a| obsdeg_core::model::parse_attitude(a).expect("an attitude"));
             let platform = Platform::new(Scheme { carry, ..Scheme::of_angles(angles) }).expect("valid");
             let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(5)).expect("fits");
             let built_in = staircase(&platform, &values.sample(platform.scheme(), 1)).0;

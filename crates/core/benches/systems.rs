@@ -74,7 +74,7 @@ fn chain_of(bencher: Bencher<'_, '_>, n: usize) {
 fn to_order(bencher: Bencher<'_, '_>, order: usize) {
     let mut model = chain(8);
     // a start that is known keeps the first stagnation from being the end
-    model.states[0].start = obsdeg_core::system::model::Start::Known;
+    model.states[0].start = obsdeg_core::system::StateStart::Known;
     model.outputs[0].1 = model.states[0].equation.clone();
     bencher.bench(|| judge(black_box(&model), 1, Some(order)).expect("judged").degrees.rank());
 }

@@ -6,11 +6,8 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use obsdeg_core::degree::platform_rows::PlatformRows;
-use obsdeg_core::degree::staircase::climb;
-use obsdeg_core::model::platform::{Platform, RandomValues, Sample};
-use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::degree::{PlatformRows, climb};
+use obsdeg_core::model::{Carry, Platform, RandomValues, Sample, Scheme, parse_attitude};
 use obsdeg_exact::{Echelon, SplitMix64};
 
 fn main() {

@@ -3,12 +3,10 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_design::design::criterion::Criterion;
-use obsdeg_design::design::information::Evaluator;
-use obsdeg_design::design::observability::Rows;
-use obsdeg_design::design::search::{Constraints, Search};
-use obsdeg_design::design::{Candidates, Design, DesignOptions, Kind, design};
-use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_design::design::{
+    Candidates, Constraints, Criterion, CriterionName, Design, DesignOptions, Evaluator, Rows, Search, design,
+};
+use obsdeg_evidence::simulation::Conditions;
 
 fn main() {
     divan::main();
@@ -69,7 +67,7 @@ fn the_command_for_five_of_24() -> Design {
         meet: false,
         total_s: None,
         slew_s: None,
-        criterion: Kind::Worst,
+        criterion: CriterionName::Worst,
         keep: 10,
         restarts: 200,
         refine: false,

@@ -1,15 +1,12 @@
 //! The paper's run, 15 states and 200 steps: the whole of it, its parts, and a thousand of them.
 
 use divan::{Bencher, black_box};
-use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::settings::Truth;
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::model::{Carry, Scheme, parse_attitude};
 use obsdeg_ekf::Form;
 use obsdeg_ekf::linear::covariance_pass;
-use obsdeg_evidence::crosscheck::monte_carlo::{Experiment, Prepared};
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::plan::Plan;
-use obsdeg_evidence::simulation::record::Start;
+use obsdeg_evidence::crosscheck::{Experiment, Prepared};
+use obsdeg_evidence::simulation::{Conditions, Plan, RunStart};
 
 fn main() {
     divan::main();
@@ -40,7 +37,7 @@ fn one_run_whole(bencher: Bencher<'_, '_>) {
 #[divan::bench(args = [Form::Joseph, Form::Ud])]
 fn covariance(bencher: Bencher<'_, '_>, form: &Form) {
     let (plan, conditions) = paper(Truth::Linear);
-    let start = Start::new(&plan, &conditions).expect("a start");
+    let start = RunStart::new(&plan, &conditions).expect("a start");
     bencher.bench(|| {
         let prior = start.covariance(*form).expect("a prior");
         black_box(covariance_pass(&plan.stages, prior, |_, _| {}).expect("shapes"))

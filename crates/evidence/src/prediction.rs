@@ -2,14 +2,9 @@
 
 use obsdeg_core::accuracy::{Accuracy, AccuracyError};
 use obsdeg_core::analysis::{AnalysisError, few_enough};
-use obsdeg_core::degree::coefficient::Coefficient;
-use obsdeg_core::degree::ensemble::judge;
-use obsdeg_core::degree::staircase::partners;
-use obsdeg_core::degree::status::{Status, Verdict};
+use obsdeg_core::degree::{Coefficient, Status, Verdict, judge, partners};
 use obsdeg_core::model::Platform;
-use obsdeg_core::solution::combinations::{combinations, null_space};
-use obsdeg_core::solution::requested::requested_combinations;
-use obsdeg_core::solution::solver::{Frame, Solver, Sparse};
+use obsdeg_core::solution::{Frame, Solver, Sparse, combinations, null_space, requested_combinations};
 
 /// A linear combination of unknowns: `(unknown, coefficient)` in SI units.
 pub type Combination = Vec<(usize, f64)>;
@@ -175,7 +170,7 @@ impl Prediction {
 
 impl Prediction {
     /// The null space, if all of it is known.
-    pub fn whole_null_space(&self) -> Option<&[Combination]> {
+    pub(crate) fn whole_null_space(&self) -> Option<&[Combination]> {
         (self.null_space.len() + self.rank == self.unknowns.len()).then_some(&self.null_space)
     }
 }

@@ -1,7 +1,6 @@
 //! Schemes side by side.
 
-use obsdeg_evidence::compare::Comparison;
-use obsdeg_evidence::compare::answer::{DropOne, Quantity, Review, Worst};
+use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity, Worst};
 use obsdeg_evidence::requirements::Requirements;
 
 use crate::document::{Block, Document, number, optional};
@@ -32,8 +31,8 @@ pub(crate) fn requirements(r: &Requirements) -> String {
 }
 
 /// One row per scheme.
-fn overview(schemes: &[Review]) -> Block {
-    let row = |r: &Review| {
+fn overview(schemes: &[ComparedScheme]) -> Block {
+    let row = |r: &ComparedScheme| {
         let without = |keeps: fn(&&DropOne) -> bool| {
             let kept: Vec<String> = r.drop_one.iter().filter(keeps).map(|d| d.position.clone()).collect();
             if kept.len() > 1 && kept.len() == r.positions.len() { "any one".into() } else { list(&kept) }
@@ -69,7 +68,7 @@ fn overview(schemes: &[Review]) -> Block {
 }
 
 /// One row per unknown: degree, accuracy order and sigma in every scheme.
-fn by_unknown(schemes: &[Review]) -> Block {
+fn by_unknown(schemes: &[ComparedScheme]) -> Block {
     let mut names: Vec<&String> = Vec::new();
     for q in schemes.iter().flat_map(|r| &r.quantities) {
         if !names.contains(&&q.name) {
@@ -114,7 +113,7 @@ fn by_unknown(schemes: &[Review]) -> Block {
 }
 
 /// `; half turns to p2 about -N, to p3 about N`.
-fn half_turns(r: &Review) -> String {
+fn half_turns(r: &ComparedScheme) -> String {
     let half = r.slews.iter().filter(|s| s.turn.is_half());
     let parts: Vec<String> =
         half.map(|s| format!("to {} about {}", s.to, words::direction(&s.turn.about))).collect();
@@ -181,7 +180,7 @@ pub(crate) fn document(c: &Comparison) -> Document {
         numbers: vec![false, false, true, false],
         rows,
     });
-    let missed = |r: &Review| format!("{}: {}", r.name, words::requirements(&r.requirements));
+    let missed = |r: &ComparedScheme| format!("{}: {}", r.name, words::requirements(&r.requirements));
     blocks
         .push(Block::List { heading: "Requirements".into(), lines: c.schemes.iter().map(missed).collect() });
     let mut lines = Vec::new();

@@ -1,7 +1,6 @@
 //! The cross-check of exact verdicts and filter.
 
-use obsdeg_evidence::crosscheck::CrossCheck;
-use obsdeg_evidence::crosscheck::answer::{Check, Statistic};
+use obsdeg_evidence::crosscheck::{Check, CrossCheck, Statistic};
 
 use crate::document::{Block, Document, number, optional};
 use crate::simulation::{conditions, validity, warning};

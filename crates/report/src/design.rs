@@ -1,7 +1,6 @@
 //! Schemes that were found.
 
-use obsdeg_design::design::Design;
-use obsdeg_design::design::answer::{Found, SearchReport};
+use obsdeg_design::design::{Design, Found, SearchReport};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 

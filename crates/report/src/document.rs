@@ -23,7 +23,7 @@ pub(crate) enum Block {
     /// A paragraph.
     Text(String),
     /// Formulas, each with its left side.
-    Formulas { heading: String, lines: Vec<Formula> },
+    Formulas { heading: String, lines: Vec<Typeset> },
     /// A picture.
     Picture(Picture),
     /// What a reader must know first, a box for each scheme or model.
@@ -83,7 +83,7 @@ impl Status {
 }
 
 /// A formula in program notation and as LaTeX.
-pub(crate) struct Formula {
+pub(crate) struct Typeset {
     pub(crate) text: String,
     pub(crate) latex: String,
 }

@@ -1,13 +1,11 @@
 //! Which figures a result has.
 
-use obsdeg_evidence::simulation::Traces;
-use obsdeg_evidence::simulation::record::Series;
+use obsdeg_evidence::simulation::{Series, Traces};
 
 use crate::figure::{
     BLACK, BLUE, Band, Figure, FigureError, GREEN, GREY, Line, ORANGE, SKY, Stroke, grid, heat, png,
 };
-use obsdeg_evidence::crosscheck::CrossCheck;
-use obsdeg_evidence::crosscheck::answer::{HistoryPoint, SlopeCurve};
+use obsdeg_evidence::crosscheck::{CrossCheck, HistoryPoint, SlopeCurve};
 
 /// A file: its name and its bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
-use crate::document::{Block, Document, Drawing, Finding, Formula, Grade, Part, Picture, Status};
+use crate::document::{Block, Document, Drawing, Finding, Grade, Part, Picture, Status, Typeset};
 use crate::figure::{Figure, Line, Stroke};
 use crate::{ReportError, visible};
 
@@ -96,7 +96,7 @@ fn picture(p: &Picture) -> Json {
 }
 
 /// MathML; program notation where the LaTeX is none.
-fn formula(f: &Formula) -> Json {
+fn formula(f: &Typeset) -> Json {
     let pieces: Option<Vec<String>> = terms(&f.latex).iter().map(|piece| mathml(piece)).collect();
     json!({ "text": f.text, "mathml": pieces.map_or(Json::Null, |p| Json::from(p.join(" "))) })
 }

@@ -101,7 +101,7 @@ pub(crate) fn analysis(a: &Analysis) -> String {
             .map(|l| escape(&l))
             .collect(),
     );
-    let formula = |f: &obsdeg_core::solution::formulas::Formula| {
+    let formula = |f: &obsdeg_core::solution::Formula| {
         let at = f.position.as_ref().map(|p| format!(" @{p}")).unwrap_or_default();
         code(&format!("{}{at} = {}", f.left, f.right))
     };

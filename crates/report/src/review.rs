@@ -5,12 +5,11 @@ mod pictures;
 mod verdict;
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_design::review::answer::PositionReview;
-use obsdeg_design::review::{DesignReview, SchemeReview};
-use obsdeg_evidence::compare::answer::{Quantity, Review};
+use obsdeg_design::review::{DesignReview, PositionReview, SchemeReview};
+use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::crosscheck::CrossCheck;
 
-use crate::document::{Block, Document, Formula, optional};
+use crate::document::{Block, Document, Typeset, optional};
 use crate::{compare, crosscheck, latex, simulation, words};
 
 /// A review as one document.
@@ -74,7 +73,7 @@ fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, level: usize, id: &str) {
+fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, level: usize, id: &str) {
     let a = &s.analysis;
     let coefficients: Vec<&Quantity> =
         review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
@@ -126,7 +125,7 @@ fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usiz
     }
 }
 
-fn unknowns(a: &Analysis, review: &Review) -> Block {
+fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
         let of = |value: fn(&Quantity) -> Option<f64>| optional(predicted.and_then(value));
@@ -186,7 +185,7 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             format!("\\delta {} = {value}", latex::symbol(&c.name))
         };
         let latex = v.iter().map(component).collect::<Vec<_>>().join(",\\; ");
-        formulas.push(Formula { text: words::null_vector(v), latex });
+        formulas.push(Typeset { text: words::null_vector(v), latex });
     }
     let silent = words::not_excited(a);
     if !silent.is_empty() {
@@ -219,7 +218,7 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             Some(k) => format!("degree {k}{dwell}{asked}"),
             None => format!("{}{dwell}{asked}", c.status),
         };
-        Formula {
+        Typeset {
             text: format!("{}: {verdict}", c.expression),
             latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
         }
@@ -245,7 +244,7 @@ fn positions(
     blocks: &mut Vec<Block>,
     s: &SchemeReview,
     coefficients: &[&Quantity],
-    review: &Review,
+    review: &ComparedScheme,
     id: &str,
 ) {
     let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") };
@@ -289,7 +288,7 @@ fn positions(
 }
 
 fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
-    let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Formula {
+    let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Typeset {
         text: format!("{expression} = {}", solution.text),
         latex: format!("{left} = {}", latex::solution(solution, a.frame, &a.stations)),
     };
@@ -297,7 +296,7 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
         let solution = q.solution.as_ref()?;
         Some(formula(latex::symbol(&q.name), &q.name, solution))
     });
-    let lines: Vec<Formula> = unknowns.collect();
+    let lines: Vec<Typeset> = unknowns.collect();
     if lines.is_empty() {
         blocks.push(Block::Text("No unknown is observable by itself.".into()));
     } else {
@@ -307,7 +306,7 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
         let solution = c.solution.as_ref()?;
         Some(formula(latex::expression(&c.expression), &c.expression, solution))
     });
-    let lines: Vec<Formula> = combinations.collect();
+    let lines: Vec<Typeset> = combinations.collect();
     if !lines.is_empty() {
         blocks.push(Block::Formulas { heading: "Combinations".into(), lines });
     }
@@ -317,8 +316,8 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
     }
 }
 
-fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) {
-    let row = |c: &obsdeg_evidence::compare::answer::Sensitivity| {
+fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id: &str) {
+    let row = |c: &obsdeg_evidence::compare::Sensitivity| {
         vec![
             c.condition.clone(),
             compare::rank(c.rank, review.has_accuracy_orders),
@@ -342,7 +341,7 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &
     blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
 }
 
-fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) {
+fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id: &str) {
     let mut lines = Vec::new();
     let alternatives = &s.alternatives;
     if let Some(kept) = &alternatives.kept {
@@ -376,7 +375,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &Review, id: &str) 
         });
     }
     blocks.push(list("", lines));
-    let row = |d: &obsdeg_evidence::compare::answer::DropOne| {
+    let row = |d: &obsdeg_evidence::compare::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
         vec![
             d.position.clone(),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use obsdeg_core::model::settings::{Propagation, Truth};
-use obsdeg_evidence::simulation::answer::{ConditionsReport, Estimate, Simulation, TimelineReport, Validity};
+use obsdeg_evidence::simulation::{ConditionsReport, Estimate, Simulation, TimelineReport, Validity};
 
 use crate::document::{Block, Document, number, optional};
 use crate::words;

@@ -1,14 +1,12 @@
 //! Any system.
 
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::system::answer::{SystemAnalysis, SystemCombination, SystemQuantity};
-use obsdeg_core::system::symmetry::POLYNOMIAL_DEGREE;
-use obsdeg_evidence::crosscheck::answer::Check;
-use obsdeg_evidence::simulation::answer::Outcome;
-use obsdeg_evidence::system::evidence::{SystemEvidence, SystemQuantityEvidence};
-use obsdeg_evidence::system::run::{SystemEstimate, SystemRun};
+use obsdeg_core::degree::Status;
+use obsdeg_core::system::{POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity};
+use obsdeg_evidence::crosscheck::Check;
+use obsdeg_evidence::simulation::Outcome;
+use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
-use crate::document::{Block, Document, Formula, number};
+use crate::document::{Block, Document, Typeset, number};
 use crate::{latex, words};
 
 /// Longest solving expression that a reader is shown.
@@ -74,9 +72,9 @@ pub(crate) fn document(a: &SystemAnalysis) -> Document {
             }
         };
         let latex = format!("{} = {latex}", latex::expression(&q.name));
-        Some(Formula { text: format!("{} = {text}", q.name), latex })
+        Some(Typeset { text: format!("{} = {text}", q.name), latex })
     });
-    let lines: Vec<Formula> = solved.collect();
+    let lines: Vec<Typeset> = solved.collect();
     if !lines.is_empty() {
         blocks.push(Block::Formulas { heading: "Solved by".into(), lines });
     }

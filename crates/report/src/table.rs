@@ -2,7 +2,7 @@
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::degree::status::Status;
+use obsdeg_core::degree::Status;
 
 use crate::{Layout, visible, words};
 

@@ -3,14 +3,12 @@
 use std::collections::BTreeMap;
 
 use obsdeg_core::analysis::{Analysis, CarryReport, Quantity, Solution};
-use obsdeg_core::degree::coefficient::Form;
-use obsdeg_core::degree::status::{Difference, Status, Verdict};
+use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
-use obsdeg_core::solution::solver::{Frame, Verification};
+use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
-use obsdeg_evidence::simulation::answer::MeasurementReport;
-use obsdeg_evidence::simulation::consistency::{Consistency, Doubt};
+use obsdeg_evidence::simulation::{Consistency, Doubt, MeasurementReport};
 
 use crate::document::number;
 
@@ -278,7 +276,7 @@ pub(crate) fn null_vector(v: &[obsdeg_core::analysis::Component]) -> String {
 }
 
 /// What the list of degenerate angles holds.
-pub(crate) fn loci(loci: &[obsdeg_core::solution::loci::Locus]) -> String {
+pub(crate) fn loci(loci: &[obsdeg_core::solution::Locus]) -> String {
     let held = match loci.is_empty() {
         true => "none was found: a determinant would vanish there, and",
         false => "a determinant vanishes there, and",
@@ -290,7 +288,7 @@ pub(crate) fn loci(loci: &[obsdeg_core::solution::loci::Locus]) -> String {
 }
 
 /// A locus as `alpha = 0 deg: rank profile 2 4 5; D_FX degree 1 -> not observable`.
-pub(crate) fn locus(l: &obsdeg_core::solution::loci::Locus) -> String {
+pub(crate) fn locus(l: &obsdeg_core::solution::Locus) -> String {
     let changes: Vec<String> = l.changes.iter().map(difference).collect();
     let changes = if changes.is_empty() { String::new() } else { format!("; {}", changes.join("; ")) };
     format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))

@@ -6,14 +6,11 @@ mod orders;
 mod search;
 mod sigmas;
 
-use obsdeg_core::model::attitude::cardinal;
-use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo};
-use obsdeg_design::design::answer::Found;
-use obsdeg_design::design::information::Evaluator;
-use obsdeg_design::design::observability::Rows;
-use obsdeg_design::design::search::Progress;
-use obsdeg_design::design::{Candidates, Design, DesignOptions, Kind, design};
-use obsdeg_evidence::simulation::conditions::Conditions;
+use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo, cardinal};
+use obsdeg_design::design::{
+    Candidates, CriterionName, Design, DesignOptions, Evaluator, Found, Progress, Rows, design,
+};
+use obsdeg_evidence::simulation::Conditions;
 
 fn base(carry: Carry) -> Scheme {
     Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::default() }
@@ -31,7 +28,7 @@ fn options(positions: Option<usize>) -> DesignOptions {
         meet: false,
         total_s: None,
         slew_s: None,
-        criterion: Kind::Worst,
+        criterion: CriterionName::Worst,
         keep: 5,
         restarts: 40,
         refine: false,
@@ -73,7 +70,7 @@ fn quiet() -> Conditions {
 
 /// A scheme that was found, with its half turns as they were found.
 fn scheme_found(found: &Found, like: &Scheme) -> Scheme {
-    let angles = found.angles.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("angles"));
+    let angles = found.angles.iter().map(|a| obsdeg_core::model::parse_attitude(a).expect("angles"));
     let mut positions = Scheme::of_angles(angles).positions;
     for turn in &found.half_turns {
         let (axis, angle) = (Some(SlewAxis::Direction(turn.about)), "180".parse().ok());

@@ -2,15 +2,12 @@
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Scheme};
-use obsdeg_design::design::criterion::{Criterion, Limits};
-use obsdeg_design::design::information::Evaluator;
-use obsdeg_design::design::observability::Rows;
-use obsdeg_design::design::search::{Constraints, Search};
-use obsdeg_design::design::ways::Stop;
-use obsdeg_design::design::{Candidates, Design, DesignError, DesignOptions, Kind, design};
+use obsdeg_design::design::{
+    Candidates, Constraints, Criterion, CriterionName, Design, DesignError, DesignOptions, Evaluator, Limits,
+    Rows, Search, Stop, design,
+};
 use obsdeg_evidence::compare::predicted;
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::plan::Plan;
+use obsdeg_evidence::simulation::{Conditions, Plan};
 use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
 
@@ -90,8 +87,11 @@ fn task(seed: u64) -> Task {
         _ => Vec::new(),
     };
     let meet = some(rng);
-    let criterion = pick(rng, &[Kind::Worst, Kind::A, Kind::D, Kind::E, Kind::Margin]);
-    if meet || criterion == Kind::Margin {
+    let criterion = pick(
+        rng,
+        &[CriterionName::Worst, CriterionName::A, CriterionName::D, CriterionName::E, CriterionName::Margin],
+    );
+    if meet || criterion == CriterionName::Margin {
         let sigma = 10f64.powf(between(rng, -3.0, 1.0));
         conditions.requirements = vec![
             Assignment { name: "D".into(), value: sigma },
@@ -176,11 +176,11 @@ fn judged(t: &Task) -> Judged {
         })
         .collect();
     let criterion = match t.options.criterion {
-        Kind::Worst => Criterion::Worst,
-        Kind::A => Criterion::A,
-        Kind::D => Criterion::D,
-        Kind::E => Criterion::E,
-        Kind::Margin => Criterion::Margin(limits_of(&limits)),
+        CriterionName::Worst => Criterion::Worst,
+        CriterionName::A => Criterion::A,
+        CriterionName::D => Criterion::D,
+        CriterionName::E => Criterion::E,
+        CriterionName::Margin => Criterion::Margin(limits_of(&limits)),
     };
     let constraints = Constraints {
         total_s: t.options.total_s,
@@ -309,7 +309,7 @@ fn hold_refinement(
     seed: u64,
     t: &Task,
     all: &Judged,
-    f: &obsdeg_design::design::answer::Found,
+    f: &obsdeg_design::design::Found,
     (degree, value): (usize, f64),
 ) {
     assert!(f.worst_degree <= degree && f.value < value, "{seed}: {f:?}");
@@ -383,7 +383,7 @@ fn both_searches_order_as_brute_force() {
 fn a_position_more_is_never_impossible_when_repeating_costs_nothing() {
     let mut candidates = Candidates::default();
     for text in ["0,0,0", "30,10,5", "10,35,20", "-20,15,30", "15,-25,-30", "180,40,10"] {
-        candidates.add(obsdeg_core::model::scheme::parse_attitude(text).expect("angles"));
+        candidates.add(obsdeg_core::model::parse_attitude(text).expect("angles"));
     }
     let conditions = Conditions { slew_rate_deg_s: Some(1.0), ..super::quiet() };
     let found = |k: usize| {

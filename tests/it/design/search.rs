@@ -1,18 +1,14 @@
 //! The search: the fewest positions, the best of them, proofs, symmetry, constraints, interruption.
 
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
-use obsdeg_core::model::attitude::cardinal;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_design::design::criterion::Criterion;
-use obsdeg_design::design::observability::Rows;
-use obsdeg_design::design::search::{Constraints, Progress, Search};
-use obsdeg_design::design::symmetry::Symmetry;
-use obsdeg_design::design::{Candidates, DesignError, DesignOptions, Kind, design};
+use obsdeg_core::model::{Carry, Scheme, cardinal};
+use obsdeg_design::design::{
+    Candidates, Constraints, Criterion, CriterionName, DesignError, DesignOptions, Progress, Rows, Search,
+    Symmetry, design,
+};
 use obsdeg_ekf::SquareRootInformation;
-use obsdeg_evidence::simulation::batch::batch;
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::plan::Plan;
+use obsdeg_evidence::simulation::{Conditions, Plan, batch};
 use obsdeg_exact::SplitMix64;
 
 use super::brute::{Brute, Way};
@@ -211,9 +207,12 @@ fn long_searches_hear_of_an_interruption() {
     for (options, conditions) in [
         (DesignOptions { candidates: grid(30), ..options(None) }, quiet()),
         (DesignOptions { candidates: grid(30), ..options(Some(4)) }, quiet()),
-        (DesignOptions { candidates: grid(45), criterion: Kind::E, ..options(Some(5)) }, quiet()),
+        (DesignOptions { candidates: grid(45), criterion: CriterionName::E, ..options(Some(5)) }, quiet()),
         (DesignOptions { candidates: grid(45), ..options(Some(5)) }, slews),
-        (DesignOptions { required: vec!["D_F".into()], criterion: Kind::E, ..options(Some(6)) }, quiet()),
+        (
+            DesignOptions { required: vec!["D_F".into()], criterion: CriterionName::E, ..options(Some(6)) },
+            quiet(),
+        ),
     ] {
         // the first questions come from the search for the fewest, the others from what comes behind it
         for patience in [0, 20, 200] {
@@ -285,7 +284,7 @@ fn constraints_are_kept() {
     let strict = |sigma: f64| {
         let required = Assignment { name: "D".into(), value: sigma };
         let conditions = Conditions { requirements: vec![required], ..quiet() };
-        let options = DesignOptions { meet: true, criterion: Kind::Margin, ..options(Some(5)) };
+        let options = DesignOptions { meet: true, criterion: CriterionName::Margin, ..options(Some(5)) };
         design(&base(Carry::Inertial), &conditions, &options, &on)
     };
     assert!(strict(0.0394).expect("met").found.iter().all(|f| f.value <= 1.0 && f.worst_sigma_dph <= 0.0394));
@@ -304,8 +303,7 @@ fn grids_gimbals_and_refinement() {
     let (refined, plain) = (&found.found[0], &found.found[1]);
     assert!(refined.refined && !plain.refined && refined.value < plain.value);
     assert!(found.front.iter().any(|f| f.refined));
-    let angles =
-        refined.angles.iter().map(|a| obsdeg_core::model::scheme::parse_attitude(a).expect("angles"));
+    let angles = refined.angles.iter().map(|a| obsdeg_core::model::parse_attitude(a).expect("angles"));
     let scheme = Scheme { positions: Scheme::of_angles(angles).positions, ..limited };
     assert_eq!(scheme.validate(), Ok(()));
     let plan = Plan::new(&scheme, &quiet()).expect("a plan");

@@ -2,15 +2,12 @@
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, SlewAxis, SlewTo};
-use obsdeg_design::design::criterion::{Criterion, Limits};
-use obsdeg_design::design::information::Evaluator;
-use obsdeg_design::design::{Candidates, DesignError, DesignOptions, Kind, design};
+use obsdeg_design::design::{
+    Candidates, Criterion, CriterionName, DesignError, DesignOptions, Evaluator, Limits, design,
+};
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::compare::predicted;
-use obsdeg_evidence::simulation::batch::batch;
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::plan::Plan;
-use obsdeg_evidence::simulation::simulate;
+use obsdeg_evidence::simulation::{Conditions, Plan, batch, simulate};
 
 use super::*;
 
@@ -93,7 +90,7 @@ fn criteria_are_those_of_the_covariance() {
 fn requirements_on_psi_count() {
     let mut candidates = Candidates::default();
     for name in ["NUE", "UEN", "DNE", "20,-40,70", "110,15,-35"] {
-        candidates.add(obsdeg_core::model::scheme::parse_attitude(name).expect("an attitude"));
+        candidates.add(obsdeg_core::model::parse_attitude(name).expect("an attitude"));
     }
     let require = |name: &str, value| Assignment { name: name.into(), value };
     let base_of = |carry| Scheme { unknowns: "F".parse().expect("terms"), ..base(carry) };
@@ -159,7 +156,7 @@ fn requirements_on_psi_count() {
             let options = DesignOptions {
                 candidates: candidates.clone(),
                 meet,
-                criterion: Kind::Margin,
+                criterion: CriterionName::Margin,
                 ..options(Some(k))
             };
             let found = design(&like, &conditions, &options, &on);
@@ -215,7 +212,7 @@ fn what_is_not_required_may_be_lost() {
     let mut scheme = scheme_of(&chosen, Carry::Platform);
     scheme.positions[1].name = "p2".into();
     let plan = Plan::new(&scheme, &quiet()).expect("a plan");
-    let prior = obsdeg_evidence::simulation::batch::diffuse_prior(&plan).expect("a prior");
+    let prior = obsdeg_evidence::simulation::diffuse_prior(&plan).expect("a prior");
     let prior = SquareRootInformation::prior(&prior).expect("a prior");
     let all = batch(&plan, prior).expect("a batch").information.sigmas().expect("regular");
     for (own, c) in sigmas.iter().zip([3, 12]) {

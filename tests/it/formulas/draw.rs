@@ -2,9 +2,7 @@
 
 use std::collections::HashMap;
 
-use obsdeg_core::model::rotation::Rotation;
-use obsdeg_core::model::scheme::parse_attitude;
-use obsdeg_core::model::{self, Scheme};
+use obsdeg_core::model::{self, Rotation, Scheme, parse_attitude};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, RngSeed, TestRunner};

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, Quantity, analyze};
 use obsdeg_core::model::Scheme;
-use obsdeg_core::solution::solver::Frame;
+use obsdeg_core::solution::Frame;
 use obsdeg_report::{Format, Layout};
 use obsdeg_symbolic::Worker;
 use serde_json::Value as Json;

@@ -5,18 +5,14 @@ mod command;
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::rotation::Rotation;
 use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth};
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::model::{Carry, Rotation, Scheme};
 use obsdeg_ekf::Process;
 use obsdeg_ekf::model::central_difference;
-use obsdeg_evidence::simulation::answer::{Estimate, Outcome, Simulation};
-use obsdeg_evidence::simulation::conditions::Conditions;
-use obsdeg_evidence::simulation::consistency::Doubt;
-use obsdeg_evidence::simulation::plan::{Plan, PlatformProcess};
-use obsdeg_evidence::simulation::record::Start;
-use obsdeg_evidence::simulation::truth::{Noise, TruthModel};
-use obsdeg_evidence::simulation::{SimulationError, simulate};
+use obsdeg_evidence::simulation::{
+    Conditions, Doubt, Estimate, Noise, Outcome, Plan, PlatformProcess, RunStart, Simulation,
+    SimulationError, TruthModel, simulate,
+};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 
@@ -241,7 +237,7 @@ fn exact_truth_is_the_linear_one_for_small_angles() {
         };
         let (linear, exact) = (conditions(Truth::Linear), conditions(Truth::Exact));
         let plan = Plan::new(&scheme, &linear).expect("a plan");
-        let start = Start::new(&plan, &linear).expect("a start").truth;
+        let start = RunStart::new(&plan, &linear).expect("a start").truth;
         let mut truths = [&linear, &exact].map(|c| TruthModel::new(&plan, c, start.clone()));
         let mut largest = 0f64;
         for (i, segment) in plan.segments.iter().enumerate() {

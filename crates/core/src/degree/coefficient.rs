@@ -23,10 +23,10 @@ pub enum Number {
 }
 
 /// Longest number in a formula that is still readable.
-pub const READABLE: usize = 40;
+pub(crate) const READABLE: usize = 40;
 
 /// Coefficients as they are printed: if one of them is too long to be read, all become decimals.
-pub fn readable(coefficients: Vec<Coefficient>) -> Vec<Coefficient> {
+pub(crate) fn readable(coefficients: Vec<Coefficient>) -> Vec<Coefficient> {
     if coefficients.iter().any(Coefficient::is_unreadable) {
         return coefficients.iter().map(Coefficient::rounded).collect();
     }
@@ -55,7 +55,7 @@ pub struct Coefficient {
 }
 
 /// Exponents of `(wN, wU)`.
-pub type Rates = [i32; 2];
+pub(crate) type Rates = [i32; 2];
 
 /// The exponents that are tried, simplest first.
 fn candidate_rates() -> Vec<Rates> {
@@ -66,7 +66,7 @@ fn candidate_rates() -> Vec<Rates> {
 
 /// One value of a coefficient, with the earth rate there.
 #[derive(Debug, Clone, Copy)]
-pub struct Image {
+pub(crate) struct Image {
     /// The value.
     pub value: u64,
     /// `(wN, wU)`.
@@ -74,7 +74,7 @@ pub struct Image {
 }
 
 /// The exponents `(a, b)` with `value / (wN^a wU^b)` the same at two points of one field.
-pub fn rates_between(f: &Field, first: Image, second: Image) -> Option<Rates> {
+pub(crate) fn rates_between(f: &Field, first: Image, second: Image) -> Option<Rates> {
     if first.value == 0 && second.value == 0 {
         return Some([0, 0]);
     }
@@ -85,7 +85,7 @@ pub fn rates_between(f: &Field, first: Image, second: Image) -> Option<Rates> {
 }
 
 /// `wN^a wU^b` in a field; `None` when a rate that occurs is zero.
-pub fn power(f: &Field, values: [u64; 2], rates: Rates) -> Option<u64> {
+pub(crate) fn power(f: &Field, values: [u64; 2], rates: Rates) -> Option<u64> {
     values.into_iter().zip(rates).try_fold(f.one(), |product, (w, e)| {
         let base = match e {
             0 => return Some(product),
@@ -99,7 +99,7 @@ pub fn power(f: &Field, values: [u64; 2], rates: Rates) -> Option<u64> {
 
 /// The number whose images are `images[sample][embedding]`: recovered in the first sample, confirmed
 /// in every embedding of the second.
-pub fn recover_radical(fields: &[RootField; 2], images: &[[u64; 4]; 2]) -> Option<Radical> {
+pub(crate) fn recover_radical(fields: &[RootField; 2], images: &[[u64; 4]; 2]) -> Option<Radical> {
     let radical = Radical::recover(&fields[0], images[0])?;
     let exponents = obsdeg_exact::radical::embeddings(fields[1].order);
     let confirmed =
@@ -132,13 +132,13 @@ impl Coefficient {
     }
 
     /// Whether the number is exact and longer than [`READABLE`] as text.
-    pub fn is_unreadable(&self) -> bool {
+    pub(crate) fn is_unreadable(&self) -> bool {
         matches!(self.number, Number::Radical(_)) && self.without_rates().to_string().len() > READABLE
     }
 
     /// The number alone.
     #[must_use]
-    pub fn without_rates(&self) -> Self {
+    pub(crate) fn without_rates(&self) -> Self {
         Self { number: self.number.clone(), rates: [0, 0] }
     }
 
@@ -171,7 +171,7 @@ impl Coefficient {
     }
 
     /// The same with all digits of decimals.
-    pub fn precise_sign_and_factors(&self) -> (bool, Vec<String>) {
+    pub(crate) fn precise_sign_and_factors(&self) -> (bool, Vec<String>) {
         self.factors(self.number.sign_and_factor(|x| x.to_string()))
     }
 
@@ -259,7 +259,7 @@ fn bars(text: &str) -> (Vec<&str>, Vec<&str>) {
 
 /// Factors as one text with one bar, so that no reader takes for below what is above: `wU*w@p1/(2*wN)`. A number in front keeps its own:
 /// `1/2*wU`.
-pub fn product(factors: &[String]) -> String {
+pub(crate) fn product(factors: &[String]) -> String {
     let text = factors.join("*");
     let (mut above, below) = bars(&text);
     if below.iter().all(|b| b.bytes().all(|c| c.is_ascii_digit())) && below.len() < 2 {
@@ -275,7 +275,7 @@ pub fn product(factors: &[String]) -> String {
 
 /// Six decimals, and six significant digits of what is small, without trailing zeros: terms of a solution that nearly cancel are as
 /// certain as others.
-pub fn decimal(x: f64) -> String {
+pub(crate) fn decimal(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
     }
@@ -285,7 +285,7 @@ pub fn decimal(x: f64) -> String {
 }
 
 /// `lhs` and the terms of a sum: joins coefficients and names, as in `D_FZ - wN*psi_y`.
-pub fn linear_combination<'a>(terms: impl IntoIterator<Item = (&'a Coefficient, &'a str)>) -> String {
+pub(crate) fn linear_combination<'a>(terms: impl IntoIterator<Item = (&'a Coefficient, &'a str)>) -> String {
     let mut out = String::new();
     for (coefficient, name) in terms.into_iter().filter(|(c, _)| !c.is_zero()) {
         let (negative, mut factors) = coefficient.sign_and_factors();

@@ -52,7 +52,7 @@ pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> 
 ///
 /// # Errors
 /// [`EnsembleError`].
-pub fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, EnsembleError> {
+pub(crate) fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, EnsembleError> {
     let scheme = platform.scheme();
     if scheme.carry != Carry::Reset || scheme.unknowns == Unknowns::Drift {
         return Ok(judge(platform, seed)?.degrees);

@@ -1,10 +1,17 @@
 //! Observable degrees: derivative rows, the staircase of their spans, verdicts, sparse bases.
 
-pub mod coefficient;
-pub mod ensemble;
-pub mod platform_rows;
+pub(crate) mod coefficient;
+pub(crate) mod ensemble;
+pub(crate) mod platform_rows;
 mod reset;
-pub mod rows;
-pub mod sparse;
-pub mod staircase;
-pub mod status;
+pub(crate) mod rows;
+pub(crate) mod sparse;
+pub(crate) mod staircase;
+pub(crate) mod status;
+
+pub use coefficient::{Coefficient, Form};
+pub use ensemble::{EnsembleError, Verdicts, judge, staircase};
+pub use platform_rows::{LocalRow, PlatformRows, local_chain};
+pub use rows::DerivativeRows;
+pub use staircase::{Degrees, climb, partners};
+pub use status::{Difference, Status, Verdict};

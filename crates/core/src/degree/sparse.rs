@@ -30,13 +30,13 @@ fn reduced(field: Field, rows: &[Vec<u64>], columns: &[usize]) -> Vec<Vec<u64>> 
 }
 
 /// The columns where a vector is not zero.
-pub fn support(vector: &[u64]) -> Vec<usize> {
+pub(crate) fn support(vector: &[u64]) -> Vec<usize> {
     (0..vector.len()).filter(|&c| vector[c] != 0).collect()
 }
 
 /// Elementary vectors of the span of `rows`, shortest first, that together with what `span` already
 /// holds are independent; `span` grows by them.
-pub fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> Vec<Vec<u64>> {
+pub(crate) fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> Vec<Vec<u64>> {
     let field = span.field();
     let n = span.columns();
     let used: Vec<usize> = (0..n).filter(|&c| rows.iter().any(|r| r[c] != 0)).collect();

@@ -6,11 +6,11 @@ use std::str::FromStr;
 use obsdeg_exact::Turn;
 
 /// Decimals of a degree that are kept exactly.
-pub const MAX_DECIMALS: usize = 9;
+pub(crate) const MAX_DECIMALS: usize = 9;
 /// Largest magnitude of an angle in degrees.
-pub const MAX_DEGREES: i64 = 1_000_000;
+pub(crate) const MAX_DEGREES: i64 = 1_000_000;
 /// Most characters of the name of an angle or a position.
-pub const MAX_NAME: usize = 64;
+pub(crate) const MAX_NAME: usize = 64;
 
 /// `turn`, or `+-name + turn` for a generic angle.
 ///

@@ -29,7 +29,7 @@ pub fn elementary<R: Ring>(ring: &R, axis: usize, (c, s): &(R::Element, R::Eleme
 }
 
 /// `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19), from the cosine and sine of each angle.
-pub fn c_n_from_euler<R: Ring>(ring: &R, cs: &[(R::Element, R::Element); 3]) -> Matrix3<R::Element> {
+pub(crate) fn c_n_from_euler<R: Ring>(ring: &R, cs: &[(R::Element, R::Element); 3]) -> Matrix3<R::Element> {
     let m: [Matrix3<R::Element>; 3] = std::array::from_fn(|axis| elementary(ring, axis, &cs[axis]));
     product(ring, &product(ring, &m[0], &m[1]), &m[2])
 }
@@ -45,7 +45,7 @@ pub struct Turned {
 
 /// `C_c^n` of Euler angles, then turned: `C exp([a x] t)` about a platform axis, `exp([b x] t) C` about a geographic
 /// one; `exp([a x] t)` is the transpose of the passive elementary matrix.
-pub fn c_n<R: Ring>(
+pub(crate) fn c_n<R: Ring>(
     ring: &R,
     euler: &Euler,
     turned: Option<&Turned>,

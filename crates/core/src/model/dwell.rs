@@ -38,7 +38,7 @@ impl Dwell {
     }
 
     /// The dwell in 1e-9 s.
-    pub fn nanoseconds(self) -> u64 {
+    pub(crate) fn nanoseconds(self) -> u64 {
         self.nanoseconds
     }
 

@@ -162,7 +162,7 @@ impl Expression {
     }
 
     /// The name that an operation is, and whether it has a minus.
-    pub fn angle_at(&self, i: usize) -> Option<(&str, bool)> {
+    pub(crate) fn angle_at(&self, i: usize) -> Option<(&str, bool)> {
         match &self.nodes[i] {
             Node::Name(name) => Some((name, false)),
             Node::Negate(a) => self.angle_at(*a).map(|(name, minus)| (name, !minus)),
@@ -171,7 +171,7 @@ impl Expression {
     }
 
     /// The integer that an operation is, if it is a small one.
-    pub fn integer_at(&self, i: usize) -> Option<i32> {
+    pub(crate) fn integer_at(&self, i: usize) -> Option<i32> {
         match self.nodes[i] {
             Node::Number { mantissa, decimals: 0 } => i32::try_from(mantissa).ok(),
             Node::Negate(a) => self.integer_at(a).map(|x| -x),

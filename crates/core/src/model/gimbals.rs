@@ -122,7 +122,7 @@ impl fmt::Display for Gimbals {
 }
 
 /// Euler angles (rad) of `C_c^n`, beta in -90..90 degrees.
-pub fn euler_angles(c: &Matrix3<f64>) -> [f64; 3] {
+pub(crate) fn euler_angles(c: &Matrix3<f64>) -> [f64; 3] {
     // C = Mx My Mz: row 0 is (cb cg, cb sg, -sb), column 2 is (-sb, sa cb, ca cb)
     let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
     if c[0][2].abs() > 1.0 - 1e-12 {

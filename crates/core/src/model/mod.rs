@@ -1,29 +1,37 @@
 //! What can be judged: the platform of the paper, and how it is written down.
 
-pub mod angle;
-pub mod attitude;
+pub(crate) mod angle;
+pub(crate) mod attitude;
 mod canonical;
 pub(crate) mod combination;
-pub mod dwell;
+pub(crate) mod dwell;
 pub mod expression;
 pub(crate) mod file_error;
-pub mod geometry;
-pub mod gimbals;
+pub(crate) mod geometry;
+pub(crate) mod gimbals;
 mod parser;
-pub mod platform;
+pub(crate) mod platform;
 pub mod ranges;
-pub mod ring;
-pub mod rotation;
-pub mod scheme;
+pub(crate) mod ring;
+pub(crate) mod rotation;
+pub(crate) mod scheme;
 pub mod scheme_file;
 pub mod settings;
 pub mod slew;
-pub mod symbols;
+pub(crate) mod symbols;
 
-pub use angle::{Angle, AngleError};
-pub use dwell::Dwell;
-pub use geometry::{Geometry, Term, Unknowns};
-pub use gimbals::Gimbals;
-pub use platform::Platform;
-pub use rotation::{Rotation, SlewAxis, SlewTo};
-pub use scheme::{Carry, Latitude, Position, Scheme, SchemeError};
+pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
+pub use attitude::{
+    Euler, Matrix3, Turned, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary, product,
+};
+pub use dwell::{Dwell, DwellError};
+pub use geometry::{GYROS, Geometry, GeometryError, GyroAxes, SignedAxis, Term, TermError, Unknowns};
+pub use gimbals::{GimbalError, Gimbals};
+pub use platform::{Block, LOCAL, Platform, Point, RandomValues, Sample, local_dynamics, local_output};
+pub use ring::{Float, Ring};
+pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
+pub use scheme::{
+    Carry, CarryError, Latitude, LatitudeError, Position, PositionError, Scheme, SchemeError, Station,
+    parse_attitude,
+};
+pub use symbols::Symbols;

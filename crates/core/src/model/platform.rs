@@ -11,7 +11,8 @@ use super::scheme::{Carry, Scheme, SchemeError};
 /// The local unknowns of one position, in n: `psi^n` then `eps^n`.
 pub const LOCAL: usize = 6;
 /// Names of the local unknowns.
-pub const LOCAL_NAMES: [&str; LOCAL] = ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n"];
+pub(crate) const LOCAL_NAMES: [&str; LOCAL] =
+    ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n"];
 
 /// A scheme with its unknowns spelled out.
 #[derive(Debug, Clone)]
@@ -100,7 +101,7 @@ impl Platform {
     }
 
     /// The scheme, when the rest is no longer needed.
-    pub fn into_scheme(self) -> Scheme {
+    pub(crate) fn into_scheme(self) -> Scheme {
         self.scheme
     }
 
@@ -275,7 +276,7 @@ impl RandomValues {
     }
 
     /// Puts a generic angle at 180 degrees, where `tan(angle/2)` is infinite; false when unknown.
-    pub fn set_half_turn(&mut self, name: &str) -> bool {
+    pub(crate) fn set_half_turn(&mut self, name: &str) -> bool {
         let f = &self.roots.field;
         let minus_one = f.neg(f.one());
         self.generic.iter_mut().find(|(n, _)| n == name).map(|(_, z)| *z = minus_one).is_some()
@@ -295,7 +296,7 @@ impl RandomValues {
     }
 
     /// `(cos, sin)` of a generic angle at a sample of these values.
-    pub fn generic_cos_sin(&self, name: &str, sample: &Sample) -> Option<(u64, u64)> {
+    pub(crate) fn generic_cos_sin(&self, name: &str, sample: &Sample) -> Option<(u64, u64)> {
         let z = self.generic.iter().find(|(n, _)| n == name)?.1;
         let f = sample.roots.field;
         // see `sample`: the sine at a fixed tangent must not depend on the sign of the imaginary unit

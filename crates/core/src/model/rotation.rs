@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::angle::{Angle, parse_decimal};
 
 /// Smallest rotation in 1e-9 degrees.
-pub const MIN_ROTATION: i64 = 1_000_000;
+pub(crate) const MIN_ROTATION: i64 = 1_000_000;
 
 /// An axis to turn about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,7 +82,7 @@ impl Rotation {
 ///
 /// # Errors
 /// [`RotationError::Angle`] for anything but decimal degrees of at least 0.001 in magnitude.
-pub fn whole_angle(text: &str) -> Result<Angle, RotationError> {
+pub(crate) fn whole_angle(text: &str) -> Result<Angle, RotationError> {
     let nanodeg = parse_decimal(text.trim()).ok().filter(|n| n.abs() >= MIN_ROTATION);
     nanodeg.map(Angle::from_nanodeg).ok_or_else(|| RotationError::Angle { found: text.into() })
 }

@@ -93,12 +93,12 @@ impl Latitude {
     }
 
     /// Whether `wN = 0`.
-    pub fn is_pole(self) -> bool {
+    pub(crate) fn is_pole(self) -> bool {
         self.nanodeg.abs() == 90_000_000_000
     }
 
     /// Whether `wU = 0`.
-    pub fn is_equator(self) -> bool {
+    pub(crate) fn is_equator(self) -> bool {
         self.nanodeg == 0
     }
 }
@@ -246,7 +246,7 @@ pub fn parse_attitude(text: &str) -> Result<Euler, PositionError> {
 
 impl Position {
     /// The angles as `a,b,g`.
-    pub fn angles_text(&self) -> String {
+    pub(crate) fn angles_text(&self) -> String {
         self.angles.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")
     }
 
@@ -286,7 +286,7 @@ pub struct Scheme {
 }
 
 /// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.
-pub const MAX_UNKNOWNS: usize = 1000;
+pub(crate) const MAX_UNKNOWNS: usize = 1000;
 
 /// Why a scheme cannot be analysed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -403,9 +403,9 @@ const FULL_TURN: i64 = 360_000_000_000;
 const STATION_STEPS: i64 = 8;
 
 /// Most positions that a scheme may have.
-pub const MAX_POSITIONS: usize = 1000;
+pub(crate) const MAX_POSITIONS: usize = 1000;
 /// Most combinations that a scheme may ask for, and characters of one.
-pub const MAX_COMBINATIONS: usize = 100;
+pub(crate) const MAX_COMBINATIONS: usize = 100;
 const MAX_COMBINATION: usize = 1000;
 /// Most characters of the name and of the description of a scheme.
 const MAX_TITLE: usize = 200;

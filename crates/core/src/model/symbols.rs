@@ -64,7 +64,7 @@ impl Symbols {
     }
 
     /// The rate at which the position of this index turns, for the worker.
-    pub fn rate_of_turning(position: usize) -> String {
+    pub(crate) fn rate_of_turning(position: usize) -> String {
         format!("w_{position}")
     }
 
@@ -75,7 +75,7 @@ impl Symbols {
     }
 
     /// The names of the angles, for the worker.
-    pub fn angle_names(&self) -> Vec<String> {
+    pub(crate) fn angle_names(&self) -> Vec<String> {
         (0..self.bases.len()).map(|i| self.suffix(i)).collect()
     }
 
@@ -176,7 +176,7 @@ impl Symbols {
     }
 
     /// The value of a text in square roots and constant angles; `None` when it has another symbol.
-    pub fn float(&self, text: &str) -> Option<f64> {
+    pub(crate) fn float(&self, text: &str) -> Option<f64> {
         let at = |name: &str| -> f64 {
             let value = || -> Option<f64> {
                 let (kind, suffix) = name.split_at_checked(2)?;

@@ -135,7 +135,12 @@ impl Solver<'_> {
 
 /// (8) and (9) as text, with names for the six local unknowns and for the derivatives of the last three: `eps^n` changes while the
 /// platform turns.
-pub fn dynamics_text(w_n: &str, w_u: &str, azimuth: bool, state: impl Fn(usize) -> String) -> Dynamics {
+pub(crate) fn dynamics_text(
+    w_n: &str,
+    w_u: &str,
+    azimuth: bool,
+    state: impl Fn(usize) -> String,
+) -> Dynamics {
     let states: Vec<String> = (0..LOCAL + 3).map(state).collect();
     let row = |row: &[String; LOCAL]| Text.dot(row.iter().zip(&states));
     let mut equations: Vec<String> =

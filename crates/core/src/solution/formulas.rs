@@ -28,7 +28,7 @@ pub struct Formula {
 ///
 /// # Errors
 /// A sentence that says why there are none.
-pub fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, String> {
+pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, String> {
     let azimuth = platform.scheme().measured_azimuth;
     let zeros = solver.tables.zeros;
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };

@@ -53,7 +53,7 @@ const fn z(component: usize, order: usize, sign: i64, rates: Rates) -> ZTerm {
 /// The observables of a single position, by order: `psi_x` (13), `psi_z` (14), `eps_x` (15), then
 /// `eps_z - wN psi_y` (17) and `eps_y` (16) away from the poles; with a measured azimuth `psi_y`,
 /// `eps_z` and `eps_y` itself.
-pub fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
+pub(crate) fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
     const UNIT: Rates = [0, 0];
     let unit = |index: usize| vec![(index, 1, UNIT)];
     let mut out = vec![
@@ -102,7 +102,7 @@ pub fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalO
 }
 
 /// The rows of `observables` at every position of `platform`, at `point`.
-pub fn rows_at<R: Ring>(
+pub(crate) fn rows_at<R: Ring>(
     platform: &Platform,
     point: &Point<R>,
     observables: &[LocalObservable],

@@ -38,7 +38,7 @@ pub struct Locus {
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Found {
+pub(crate) struct Found {
     /// The loci; `None` without generic angles or worker.
     pub loci: Option<Vec<Locus>>,
     /// Why some may be missing.
@@ -71,7 +71,7 @@ const TRIES: usize = 40;
 ///
 /// # Errors
 /// A sentence that says why they were not computed.
-pub fn loci(
+pub(crate) fn loci(
     platform: &Platform,
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,

@@ -1,16 +1,26 @@
 //! How an observable quantity is solved from the derivatives of Z.
 
-pub mod ask;
-pub mod combinations;
-pub mod formulas;
+pub(crate) mod ask;
+pub(crate) mod combinations;
+pub(crate) mod formulas;
 mod half_tangent;
-pub mod local;
-pub mod loci;
-pub mod print;
-pub mod problem;
-pub mod requested;
-pub mod solver;
-pub mod substitution;
-pub mod support;
-pub mod tables;
-pub mod turning;
+pub(crate) mod local;
+pub(crate) mod loci;
+pub(crate) mod print;
+pub(crate) mod problem;
+pub(crate) mod requested;
+pub(crate) mod solver;
+pub(crate) mod substitution;
+pub(crate) mod support;
+pub(crate) mod tables;
+pub(crate) mod turning;
+
+pub use combinations::{Combination, NullVector, combinations, null_space};
+pub use formulas::Formula;
+pub use local::{LocalObservable, RateZeros, ZTerm};
+pub use loci::Locus;
+pub use print::{Group, Grouped, SolutionTerm, StationLabel, group};
+pub use problem::{Motion, Problem};
+pub use requested::{CombinationError, Requested, requested_combinations};
+pub use solver::{Frame, Functional, Solved, Solver, Sparse, Term, Verification};
+pub use tables::Tables;

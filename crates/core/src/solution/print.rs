@@ -25,14 +25,14 @@ pub struct StationLabel {
 }
 
 /// A name as a formula writes it: in quotation marks unless it is letters, digits and `_` behind a letter.
-pub fn quoted(name: &str) -> String {
+pub(crate) fn quoted(name: &str) -> String {
     let plain =
         name.starts_with(char::is_alphabetic) && name.chars().all(|c| c.is_alphanumeric() || c == '_');
     if plain { name.into() } else { format!("{name:?}") }
 }
 
 /// The stations of a scheme: its positions, and the attitudes of its rotations.
-pub fn stations(scheme: &Scheme) -> Vec<StationLabel> {
+pub(crate) fn stations(scheme: &Scheme) -> Vec<StationLabel> {
     let stations = scheme.stations();
     let label = |s: &crate::model::scheme::Station<'_>| {
         let name = quoted(&s.position.name);
@@ -139,7 +139,7 @@ fn observed(term: &Term, frame: Frame) -> String {
 }
 
 /// The name of a derivative of Z, as in `Z1''@p2`.
-pub fn z_name(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
+pub(crate) fn z_name(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
     format!("{}@{}", observed(term, frame), stations[term.station].label)
 }
 
@@ -155,7 +155,7 @@ pub struct SolutionTerm {
 }
 
 /// The terms of a solution one by one.
-pub fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<SolutionTerm> {
+pub(crate) fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<SolutionTerm> {
     let term = |t: &Term| {
         let (negative, mut factors) = t.coefficient.precise_sign_and_factors();
         let station = &stations[t.station];
@@ -188,7 +188,7 @@ fn before_a_blank(factors: &[String]) -> String {
 }
 
 /// A solution in one line, as in `1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]`.
-pub fn text(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> String {
+pub(crate) fn text(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> String {
     let grouped = group(solved, stations);
     let mut out = String::new();
     let sign = |out: &mut String, negative: bool| {

@@ -45,7 +45,7 @@ impl Right {
 }
 
 /// A place `(row, column)` in the table of observable rows.
-pub type Place = (usize, usize);
+pub(crate) type Place = (usize, usize);
 
 /// What is asked of the solution.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -129,7 +129,7 @@ impl Problem {
     }
 
     /// The outputs in a prime field; `None` when there is no solution.
-    pub fn solve_in_field(&self, f: &Field, table: &[Vec<u64>], targets: &[u64]) -> Option<Vec<u64>> {
+    pub(crate) fn solve_in_field(&self, f: &Field, table: &[Vec<u64>], targets: &[u64]) -> Option<Vec<u64>> {
         let mut columns = vec![vec![0; self.equations.len()]; self.unknowns];
         for (e, (places, _)) in self.equations.iter().enumerate() {
             for &(i, (r, c)) in places {
@@ -144,7 +144,7 @@ impl Problem {
 
     /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the
     /// right side or anything is not finite.
-    pub fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
         let m = self.equations.len();
         let mut a = DMatrix::zeros(m, self.unknowns);
         for (e, (places, _)) in self.equations.iter().enumerate() {
@@ -163,7 +163,7 @@ impl Problem {
     }
 
     /// The system as text for the symbolic worker: matrix, right side, output matrix.
-    pub fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> System {
+    pub(crate) fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> System {
         let cell = |&(r, c): &Place| table[r][c].clone();
         let row = |places: &[(usize, Place)]| {
             let mut row = vec![Text.zero(); self.unknowns];

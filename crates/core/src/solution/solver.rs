@@ -179,12 +179,12 @@ impl<'a> Solver<'a> {
     }
 
     /// Whether formulas in sines and cosines are out of question: too many different angles.
-    pub fn too_many_angles(&self) -> bool {
+    pub(crate) fn too_many_angles(&self) -> bool {
         self.symbols.angles() > MAX_SYMBOLIC_ANGLES
     }
 
     /// Whether a formula was too much work, so that no other was attempted.
-    pub fn given_up(&self) -> bool {
+    pub(crate) fn given_up(&self) -> bool {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
     }
 
@@ -259,13 +259,13 @@ impl<'a> Solver<'a> {
     }
 
     /// The functional on `support` whose coefficients are the outputs of `problem`.
-    pub fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
+    pub(crate) fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
         let (coefficients, images) = self.coefficients(problem)?;
         Some(Functional { terms: support.iter().copied().zip(coefficients).collect(), images })
     }
 
     /// The functional that is a row of a local observable.
-    pub fn functional_of_row(&self, row: usize) -> Option<Functional> {
+    pub(crate) fn functional_of_row(&self, row: usize) -> Option<Functional> {
         let first = self.tables.first();
         let names = self.platform.names();
         let mut columns: Vec<usize> = (0..names.len()).filter(|&c| first.rows[row][c] != 0).collect();

@@ -9,7 +9,7 @@ const ORDERS: usize = 12;
 /// A set of independent rows (indices into `rows`, ascending) out of `allowed` whose combination gives
 /// `target` with no coefficient zero: of the sets that different row orders lead to, the cheapest by
 /// the sum of `cost`. `None` when `target` is not in the span.
-pub fn short_support(
+pub(crate) fn short_support(
     field: Field,
     rows: &[Vec<u64>],
     allowed: &[usize],

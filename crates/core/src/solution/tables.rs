@@ -89,12 +89,12 @@ impl Tables {
     }
 
     /// The row of [`motion_rows`] of a station.
-    pub fn motion_row(&self, station: usize) -> usize {
+    pub(crate) fn motion_row(&self, station: usize) -> usize {
         self.observable_rows + station
     }
 
     /// The rows of local observables of order up to `degree`.
-    pub fn rows_up_to(&self, degree: usize) -> Vec<usize> {
+    pub(crate) fn rows_up_to(&self, degree: usize) -> Vec<usize> {
         (0..self.observable_rows).filter(|&j| self.order(j) <= degree).collect()
     }
 

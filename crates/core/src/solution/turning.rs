@@ -37,7 +37,7 @@ impl<R: Ring> Ring for Dual<'_, R> {
 
 /// The derivative of the given order of `C_c^n` by the angle of a turn about `axis`: `C' = C [a x]` about a platform axis a,
 /// `C' = [b x] C` about a geographic axis b.
-pub fn attitude_derivative<R: Ring>(
+pub(crate) fn attitude_derivative<R: Ring>(
     ring: &R,
     c: &Matrix3<R::Element>,
     axis: Axis,
@@ -53,7 +53,7 @@ pub fn attitude_derivative<R: Ring>(
 }
 
 /// `d eps^n/d angle`: three rows, one column per coefficient.
-pub fn drift_derivative<R: Ring>(
+pub(crate) fn drift_derivative<R: Ring>(
     platform: &Platform,
     ring: &R,
     c: &Matrix3<R::Element>,
@@ -67,7 +67,7 @@ pub fn drift_derivative<R: Ring>(
 
 /// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform stands. `Z1''` is the only
 /// second derivative that solutions use (16).
-pub fn motion_rows<R: Ring>(platform: &Platform, point: &Point<R>) -> Vec<Vec<R::Element>> {
+pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &Point<R>) -> Vec<Vec<R::Element>> {
     if !platform.scheme().rotates() {
         return Vec::new();
     }

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::judge::{Judgement, judge_compiled};
-use super::model::{ModelError, Role, Start, SystemModel};
+use super::model::{ModelError, Role, StateStart, SystemModel};
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::staircase::partners;
@@ -207,7 +207,7 @@ pub fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries, 
         rank: judged.degrees.rank(),
         unknowns: judged.layout.unknowns.len(),
         quantities: quantities.filter(shown).collect(),
-        known: (model.states.iter().filter(|s| s.start != Start::Unknown))
+        known: (model.states.iter().filter(|s| s.start != StateStart::Unknown))
             .map(|s| s.named.name.clone())
             .collect(),
         combinations: asked

@@ -2,7 +2,7 @@
 
 use obsdeg_exact::SplitMix64;
 
-use super::model::{Constant, Formula, KnownInput, Start, SystemModel};
+use super::model::{Constant, KnownInput, PlacedExpression, StateStart, SystemModel};
 
 impl SystemModel {
     /// The stream of `seed` for one purpose and this model ([`SplitMix64::of`]). Everything takes part but what moves no verdict: the
@@ -14,14 +14,14 @@ impl SystemModel {
     /// The parts of the input, lists with their length: the same for the same model whichever file it came from.
     fn canonical(&self) -> Vec<String> {
         let mut out: Vec<String> = vec!["model".into()];
-        let text = |f: &Formula| f.text.trim().to_string();
+        let text = |f: &PlacedExpression| f.text.trim().to_string();
         let count = |out: &mut Vec<String>, n: usize| out.push(n.to_string());
         count(&mut out, self.states.len());
         for s in &self.states {
             let start = match &s.start {
-                Start::Unknown => "unknown".into(),
-                Start::Known => "known".into(),
-                Start::Value(f) => format!("={}", text(f)),
+                StateStart::Unknown => "unknown".into(),
+                StateStart::Known => "known".into(),
+                StateStart::Value(f) => format!("={}", text(f)),
             };
             out.extend([s.named.name.clone(), text(&s.equation), start]);
         }
@@ -49,7 +49,8 @@ impl SystemModel {
             };
             out.extend([named.name.clone(), value]);
         }
-        let formulas = |out: &mut Vec<String>, list: &mut dyn Iterator<Item = (&String, &Formula)>| {
+        let formulas = |out: &mut Vec<String>,
+                        list: &mut dyn Iterator<Item = (&String, &PlacedExpression)>| {
             let pairs: Vec<[String; 2]> = list.map(|(name, f)| [name.clone(), text(f)]).collect();
             out.push(pairs.len().to_string());
             out.extend(pairs.into_iter().flatten());

@@ -32,7 +32,7 @@ pub enum Op {
     /// A function F with `dF = weight d(of)`; the weight may come later and depend on F.
     Primitive {
         /// Where it starts.
-        start: Start,
+        start: FunctionStart,
         /// Its argument.
         of: usize,
         /// Its derivative by the argument.
@@ -42,7 +42,7 @@ pub enum Op {
 
 /// The value of a function at a random point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Start {
+pub enum FunctionStart {
     /// Any value: number `k` of them.
     Free(usize),
     /// The sine of a random angle: number `k` of them.
@@ -174,7 +174,7 @@ impl Dag {
     ///
     /// # Errors
     /// [`DagError`] with the index of the operation in the expression.
-    pub fn translate(
+    pub(crate) fn translate(
         &mut self,
         e: &Expression,
         names: &dyn Fn(&str) -> Option<usize>,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::dag::{Dag, DagError, Op, Start};
+use super::dag::{Dag, DagError, FunctionStart, Op};
 use crate::model::expression::Function;
 
 /// A rational number.
@@ -156,8 +156,8 @@ impl Dag {
         }
         let k = self.angles;
         self.angles += 1;
-        let sine = self.primitive(Start::Sine(k), angle);
-        let cosine = self.primitive(Start::Cosine(k), angle);
+        let sine = self.primitive(FunctionStart::Sine(k), angle);
+        let cosine = self.primitive(FunctionStart::Cosine(k), angle);
         let minus = self.negative(sine);
         self.set_weight(sine, cosine);
         self.set_weight(cosine, minus);
@@ -166,7 +166,7 @@ impl Dag {
     }
 
     /// A function whose weight is still to come.
-    fn primitive(&mut self, start: Start, of: usize) -> usize {
+    fn primitive(&mut self, start: FunctionStart, of: usize) -> usize {
         self.ops.push(Op::Primitive { start, of, weight: usize::MAX });
         self.ops.len() - 1
     }
@@ -189,7 +189,7 @@ impl Dag {
         }
         let k = self.free;
         self.free += 1;
-        let node = self.primitive(Start::Free(k), of);
+        let node = self.primitive(FunctionStart::Free(k), of);
         let weight = weight(self, node)?;
         self.set_weight(node, weight);
         self.functions.insert((function, of), (node, node));
@@ -266,7 +266,7 @@ impl Dag {
         let root = match self.functions.get(&(Function::Sqrt, x)) {
             Some(&(known, _)) => known,
             None => {
-                let root = self.primitive(Start::Root { numerator: 1, denominator: d }, x);
+                let root = self.primitive(FunctionStart::Root { numerator: 1, denominator: d }, x);
                 let d = self.integer(d);
                 let dx = self.product(d, x);
                 let weight = self.quotient(root, dx);

@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
 use super::model::{
-    Constant, Formula, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, Segment, Start,
-    State, SystemModel,
+    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, PlacedExpression, Segment,
+    State, StateStart, SystemModel,
 };
 use crate::model::angle::excerpt;
 use crate::model::expression::{Names, parse_with};
@@ -103,7 +103,7 @@ impl File<'_> {
         (start + text.length <= self.0.len()).then_some(start..start + text.length)
     }
 
-    fn formula(&self, what: String, text: &Text) -> Result<Formula, ModelError> {
+    fn formula(&self, what: String, text: &Text) -> Result<PlacedExpression, ModelError> {
         let span = self.span(text);
         // a text without escapes stands in the file as it is
         let plain = |s: &Range<usize>| self.0.get(s.start + 1..s.end - 1) == Some(text.text.as_str());
@@ -113,7 +113,7 @@ impl File<'_> {
             error.span = error.span.or(span);
             error
         })?;
-        Ok(Formula { text: text.text.clone(), expression, place })
+        Ok(PlacedExpression { text: text.text.clone(), expression, place })
     }
 
     /// What the reader of JSON complains of: it says where it stands, behind what is wrong.
@@ -174,9 +174,9 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let text = layout.equations.get(state);
         let text = text.ok_or_else(|| refuse("equations", format!("`{state}` has none; expected one")))?;
         let start = match layout.known_initial_values.get(state) {
-            Some(value) => Start::Value(file.formula(format!("the initial value of {state}"), value)?),
-            None if known(state, &layout.known_initial_conditions) => Start::Known,
-            None => Start::Unknown,
+            Some(value) => StateStart::Value(file.formula(format!("the initial value of {state}"), value)?),
+            None if known(state, &layout.known_initial_conditions) => StateStart::Known,
+            None => StateStart::Unknown,
         };
         let equation = file.formula(format!("the equation of {state}"), text)?;
         model.states.push(State { named: named(state), equation, start });

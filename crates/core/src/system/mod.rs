@@ -4,19 +4,25 @@
 //! lane per unknown at a random point of a prime field ([`taylor`], Sedoglavic 2002, doi:10.1006/jsco.2002.0532), and its outputs' duals
 //! are the derivative rows ([`rows`]).
 
-pub mod answer;
+pub(crate) mod answer;
 mod canonical;
-pub mod dag;
+pub(crate) mod dag;
 mod functions;
 pub mod json;
-pub mod judge;
-pub mod model;
+pub(crate) mod judge;
+pub(crate) mod model;
 pub mod model_file;
-pub mod rows;
+pub(crate) mod rows;
 mod solutions;
-pub mod symmetry;
-pub mod taylor;
+pub(crate) mod symmetry;
+pub(crate) mod taylor;
 
-pub use answer::{SystemAnalysis, SystemOptions, analyze_system};
-pub use judge::{Judgement, judge};
-pub use model::{ModelError, SystemModel};
+pub use answer::*;
+pub use dag::{Dag, DagError, FunctionStart, Op};
+pub use judge::{Judgement, judge, judge_compiled};
+pub use model::{
+    Compiled, CompiledSegment, Constant, KnownInput, ModelError, Nominal, PlacedExpression, Role, Segment,
+    State, StateStart, SystemModel,
+};
+pub use rows::Unknown;
+pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};

@@ -17,7 +17,7 @@ pub struct Place {
 
 /// An expression and its place.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Formula {
+pub struct PlacedExpression {
     /// As written.
     pub text: String,
     /// What was read.
@@ -39,14 +39,14 @@ pub struct Named {
 
 /// What is known of the start of a state.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub enum Start {
+pub enum StateStart {
     /// Nothing.
     #[default]
     Unknown,
     /// It is known; its value is generic.
     Known,
     /// It is known to have this value.
-    Value(Formula),
+    Value(PlacedExpression),
 }
 
 /// A state.
@@ -55,9 +55,9 @@ pub struct State {
     /// Its name.
     pub named: Named,
     /// Its derivative.
-    pub equation: Formula,
+    pub equation: PlacedExpression,
     /// Its start.
-    pub start: Start,
+    pub start: StateStart,
 }
 
 /// A known input.
@@ -68,7 +68,7 @@ pub enum KnownInput {
     /// A polynomial in time of this degree with generic coefficients (0: a constant).
     Polynomial(usize),
     /// This function of the time `t`.
-    Function(Formula),
+    Function(PlacedExpression),
 }
 
 /// A known constant.
@@ -77,16 +77,16 @@ pub enum Constant {
     /// Of generic value.
     Generic,
     /// Of this value.
-    Value(Formula),
+    Value(PlacedExpression),
 }
 
 /// A part of the timeline with constants of its own and a map of the states at its beginning.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Segment {
     /// Constants that take another value.
-    pub constants: Vec<(String, Formula)>,
+    pub constants: Vec<(String, PlacedExpression)>,
     /// States that jump: their values behind the jump, in terms of those before.
-    pub carry: Vec<(String, Formula)>,
+    pub carry: Vec<(String, PlacedExpression)>,
 }
 
 /// Numbers for a simulation, as far as the file gives them; in the units of the model.
@@ -103,7 +103,7 @@ pub struct Nominal {
     /// Standard deviation of the noise of a sample, by output.
     pub noise: BTreeMap<String, f64>,
     /// Generic known inputs as functions of the time `t`.
-    pub inputs: BTreeMap<String, Formula>,
+    pub inputs: BTreeMap<String, PlacedExpression>,
 }
 
 /// A system.
@@ -124,15 +124,15 @@ pub struct SystemModel {
     /// Known constants.
     pub constants: Vec<(Named, Constant)>,
     /// Names for subexpressions, in order of use.
-    pub definitions: Vec<(String, Formula)>,
+    pub definitions: Vec<(String, PlacedExpression)>,
     /// Outputs.
-    pub outputs: Vec<(Named, Formula)>,
+    pub outputs: Vec<(Named, PlacedExpression)>,
     /// Runs with starts of their own (and unknown inputs of their own); parameters are shared.
     pub experiments: usize,
     /// Segments; none: one, as the model says.
     pub segments: Vec<Segment>,
     /// Combinations to be judged.
-    pub combinations: Vec<Formula>,
+    pub combinations: Vec<PlacedExpression>,
     /// Numbers for a simulation.
     pub simulation: Nominal,
 }
@@ -150,13 +150,13 @@ pub struct ModelError {
 }
 
 /// Most unknowns of a system.
-pub const MAX_UNKNOWNS: usize = 500;
+pub(crate) const MAX_UNKNOWNS: usize = 500;
 /// Most experiments.
-pub const MAX_EXPERIMENTS: usize = 20;
+pub(crate) const MAX_EXPERIMENTS: usize = 20;
 /// Highest degree of an input that is a polynomial in time.
-pub const MAX_DEGREE: usize = 50;
+pub(crate) const MAX_DEGREE: usize = 50;
 /// Most operations of a system.
-pub const MAX_NODES: usize = 200_000;
+pub(crate) const MAX_NODES: usize = 200_000;
 
 impl Place {
     /// An error in the text of this place, at a range of it.
@@ -208,7 +208,7 @@ pub struct Compiled {
 
 impl Compiled {
     /// The node of what has this role; `None` where nothing uses it.
-    pub fn node_of(&self, role: Role) -> Option<usize> {
+    pub(crate) fn node_of(&self, role: Role) -> Option<usize> {
         let slot = self.roles.iter().position(|r| *r == role)?;
         self.dag.ops.iter().position(|op| *op == Op::Slot(slot))
     }
@@ -317,7 +317,7 @@ impl SystemModel {
         }
         let role_of: HashMap<String, Role> = roles.iter().cloned().collect();
         let mut places: HashMap<usize, (Place, Range<usize>)> = HashMap::new();
-        let mut node = |dag: &mut Dag, formula: &Formula, names: &HashMap<String, usize>| {
+        let mut node = |dag: &mut Dag, formula: &PlacedExpression, names: &HashMap<String, usize>| {
             let before = dag.ops.len();
             let made = dag.translate(&formula.expression, &|name| names.get(name).copied());
             let span = |i: usize| formula.expression.spans.get(i).cloned().unwrap_or(0..0);
@@ -381,13 +381,13 @@ impl SystemModel {
         for p in &self.parameters {
             start_names.insert(p.name.clone(), names[&p.name]);
         }
-        for s in self.states.iter().filter(|s| !matches!(s.start, Start::Value(_))) {
+        for s in self.states.iter().filter(|s| !matches!(s.start, StateStart::Value(_))) {
             start_names.insert(s.named.name.clone(), names[&s.named.name]);
         }
         let mut starts = Vec::new();
         for s in &self.states {
             starts.push(match &s.start {
-                Start::Value(formula) => Some(node(&mut dag, formula, &start_names)?),
+                StateStart::Value(formula) => Some(node(&mut dag, formula, &start_names)?),
                 _ => None,
             });
         }

@@ -9,8 +9,8 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::model::{
-    Constant, Formula, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, Segment, Start,
-    State, SystemModel,
+    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, PlacedExpression, Segment,
+    State, StateStart, SystemModel,
 };
 use crate::model::expression::{Names, Node, nearest, parse_with};
 use crate::model::file_error::explain;
@@ -128,7 +128,12 @@ impl Reader<'_> {
     }
 
     /// The text of an expression: as written for a number, its contents for a string.
-    fn formula(&self, what: String, value: &Value, span: Range<usize>) -> Result<Formula, ModelError> {
+    fn formula(
+        &self,
+        what: String,
+        value: &Value,
+        span: Range<usize>,
+    ) -> Result<PlacedExpression, ModelError> {
         let within = &self.text[span.clone()];
         let source = match value {
             Value::String(s) => s.clone(),
@@ -149,7 +154,7 @@ impl Reader<'_> {
             error.span.get_or_insert(span.clone());
             error
         })?;
-        Ok(Formula { text: source, expression, place })
+        Ok(PlacedExpression { text: source, expression, place })
     }
 
     /// A table's entry, and a check that there is nothing else in it.
@@ -179,19 +184,21 @@ impl Reader<'_> {
         let (what, span) = (format!("the equation of {name}"), value.span());
         let Some(table) = value.get_ref().as_table() else {
             let equation = self.formula(what, value.get_ref(), span)?;
-            return Ok(State { named: self.named(name, None), equation, start: Start::Unknown });
+            return Ok(State { named: self.named(name, None), equation, start: StateStart::Unknown });
         };
         self.known_keys(&what, table, &span, &["equation", "initial", "unit", "description"])?;
         let equation = table
             .get("equation")
             .ok_or_else(|| self.at(span.clone(), what.clone(), "no equation; expected one".into()))?;
         let start = match table.get("initial") {
-            None => Start::Unknown,
-            Some(Value::String(s)) if s == "known" => Start::Known,
-            Some(Value::String(s)) if s == "unknown" => Start::Unknown,
-            Some(value) => {
-                Start::Value(self.formula(format!("the initial value of {name}"), value, span.clone())?)
-            }
+            None => StateStart::Unknown,
+            Some(Value::String(s)) if s == "known" => StateStart::Known,
+            Some(Value::String(s)) if s == "unknown" => StateStart::Unknown,
+            Some(value) => StateStart::Value(self.formula(
+                format!("the initial value of {name}"),
+                value,
+                span.clone(),
+            )?),
         };
         let equation = self.formula(what, equation, span)?;
         Ok(State { named: self.named(name, Some(table)), equation, start })

@@ -3,8 +3,8 @@
 use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
-use super::dag::{Op, Start as FunctionStart};
-use super::model::{Compiled, KnownInput, Role, Start, SystemModel};
+use super::dag::{FunctionStart, Op};
+use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Starts, Taylor};
 use crate::degree::rows::DerivativeRows;
 
@@ -39,7 +39,7 @@ impl Layout {
     /// The unknowns of `model`; `bound` overrides the order at which it is given up.
     pub fn new(model: &SystemModel, bound: Option<usize>) -> Self {
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
-        let starts = model.states.iter().all(|s| s.start == Start::Unknown);
+        let starts = model.states.iter().all(|s| s.start == StateStart::Unknown);
         let closed = starts && !arbitrary;
         let finite: usize = model.unknown_inputs.iter().map(|u| u.1.map_or(1, |d| d + 1)).sum();
         let n = model.states.len() + finite + model.parameters.len();
@@ -47,7 +47,7 @@ impl Layout {
         let mut unknowns = Vec::new();
         for experiment in 0..model.experiments.max(1) {
             let suffix = if model.experiments > 1 { format!("@{}", experiment + 1) } else { String::new() };
-            for (i, s) in model.states.iter().enumerate().filter(|s| s.1.start == Start::Unknown) {
+            for (i, s) in model.states.iter().enumerate().filter(|s| s.1.start == StateStart::Unknown) {
                 unknowns.push(Unknown {
                     name: format!("{}{suffix}", s.named.name),
                     role: Role::State(i),
@@ -93,7 +93,7 @@ impl Layout {
 
 /// The rows of a system at one random point of one field.
 #[derive(Debug, Clone)]
-pub struct SystemRows<'a> {
+pub(crate) struct SystemRows<'a> {
     field: Field,
     lanes: usize,
     outputs: &'a [usize],
@@ -115,7 +115,7 @@ struct Run<'a> {
 }
 
 /// A random prime `2^60 < p < 2^61` in whose field the roots of a graph can be had.
-pub fn field_for(compiled: &Compiled, rng: &mut SplitMix64) -> Field {
+pub(crate) fn field_for(compiled: &Compiled, rng: &mut SplitMix64) -> Field {
     let degrees: Vec<u64> = compiled
         .dag
         .ops
@@ -150,7 +150,7 @@ impl<'a> SystemRows<'a> {
     ///
     /// # Errors
     /// [`Singular`] when no point could be found.
-    pub fn new(
+    pub(crate) fn new(
         model: &SystemModel,
         compiled: &'a Compiled,
         layout: &Layout,
@@ -279,12 +279,12 @@ impl<'a> SystemRows<'a> {
     }
 
     /// The gradients of the combinations at the start of the first run.
-    pub fn combinations(&self) -> &[Vec<u64>] {
+    pub(crate) fn combinations(&self) -> &[Vec<u64>] {
         self.runs.first().map_or(&[], |r| &r.combinations)
     }
 
     /// The derivative of this order of a node at the start of the first run.
-    pub fn derivative(&mut self, node: usize, order: usize) -> u64 {
+    pub(crate) fn derivative(&mut self, node: usize, order: usize) -> u64 {
         let f = self.field;
         let Some(run) = self.runs.first_mut() else { return 0 };
         while run.taylor.length <= order {
@@ -294,7 +294,7 @@ impl<'a> SystemRows<'a> {
     }
 
     /// The value of every unknown at this point, then of every known constant (in the first segment).
-    pub fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<u64> {
+    pub(crate) fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<u64> {
         let segments = compiled.segments.len().max(1);
         let node_of = |role: Role| compiled.node_of(role);
         let value = |u: &Unknown| {

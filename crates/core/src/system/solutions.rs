@@ -8,7 +8,7 @@ use obsdeg_symbolic::{Job, RationalSystem, Request, Worker};
 
 use super::dag::{Dag, Op};
 use super::judge::Judgement;
-use super::model::{Compiled, KnownInput, Role, Start, SystemModel};
+use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::SystemRows;
 use crate::model::expression::{Environment, Names, evaluate, parse_with};
 
@@ -160,7 +160,7 @@ fn request(
         outputs.push((text(node)?, chain));
     }
     let mut starts = Vec::new();
-    for (i, s) in model.states.iter().enumerate().filter(|(_, s)| s.start != Start::Unknown) {
+    for (i, s) in model.states.iter().enumerate().filter(|(_, s)| s.start != StateStart::Unknown) {
         let (node, shown) = (compiled.node_of(Role::State(i)), format!("{}(0)", s.named.name));
         starts.push((i, put(&mut symbols, format!("s_{i}"), shown, node, 0)));
     }

@@ -18,7 +18,7 @@ const POLYNOMIAL_POINTS: usize = 400;
 pub const POLYNOMIAL_DEGREE: usize = 4;
 
 /// A rational coefficient of an unknown.
-pub type Term = (usize, (i64, i64));
+pub(crate) type Term = (usize, (i64, i64));
 
 /// A direction in which nothing changes: `x_i` grows by `c_i x_i + d_i`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct Invariant {
 }
 
 /// The factors of a product, and its rational coefficient.
-pub type PolynomialTerm = (Vec<usize>, (i64, i64));
+pub(crate) type PolynomialTerm = (Vec<usize>, (i64, i64));
 
 /// A direction whose components are polynomials in the unknowns and the known constants: `(unknown, [(factors, coefficient)])`; a factor
 /// is an unknown or a known constant (counted on behind the unknowns).

@@ -3,12 +3,12 @@
 
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::dag::{Dag, Op, Start};
+use super::dag::{Dag, FunctionStart, Op};
 use crate::model::expression::from_i128;
 
 /// What a slot holds in one run.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Signal {
+pub(crate) enum Signal {
     /// A state: the node of its derivative.
     State {
         /// The right-hand side.
@@ -38,11 +38,11 @@ pub enum Signal {
 }
 
 /// The start of a state: its value and its derivative by every unknown (lane, value).
-pub type Initial = (u64, Vec<(usize, u64)>);
+pub(crate) type Initial = (u64, Vec<(usize, u64)>);
 
 /// Why there is no series at this point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Singular {
+pub(crate) enum Singular {
     /// A division by zero, at this node.
     Division(usize),
     /// A root that this field does not have here, at this node.
@@ -51,7 +51,7 @@ pub enum Singular {
 
 /// The series of one run.
 #[derive(Debug, Clone)]
-pub struct Taylor<'a> {
+pub(crate) struct Taylor<'a> {
     dag: &'a Dag,
     f: Field,
     lanes: usize,
@@ -74,7 +74,7 @@ pub struct Taylor<'a> {
 
 /// Random starts of functions, shared by all runs at one point.
 #[derive(Debug, Clone, Default)]
-pub struct Starts {
+pub(crate) struct Starts {
     free: Vec<u64>,
     /// `(cos, sin)`.
     circle: Vec<(u64, u64)>,
@@ -82,7 +82,7 @@ pub struct Starts {
 
 impl Starts {
     /// Random values for all functions of a graph.
-    pub fn random(dag: &Dag, f: &Field, rng: &mut SplitMix64) -> Self {
+    pub(crate) fn random(dag: &Dag, f: &Field, rng: &mut SplitMix64) -> Self {
         let p = f.modulus();
         let free = (0..dag.free).map(|_| 1 + rng.below(p - 1)).collect();
         let circle = (0..dag.angles)
@@ -108,7 +108,7 @@ impl<'a> Taylor<'a> {
     ///
     /// # Errors
     /// [`Singular`] when the point is none.
-    pub fn new(
+    pub(crate) fn new(
         dag: &'a Dag,
         f: Field,
         lanes: usize,
@@ -180,10 +180,10 @@ impl<'a> Taylor<'a> {
                 Op::Divide(_, b) if value(b) == 0 => return Err(Singular::Division(i)),
                 Op::Divide(a, b) => f.mul(value(a), f.inv(value(b))),
                 Op::Primitive { start, of, .. } => match start {
-                    Start::Free(k) => starts.free[k],
-                    Start::Cosine(k) => starts.circle[k].0,
-                    Start::Sine(k) => starts.circle[k].1,
-                    Start::Root { denominator, .. } => {
+                    FunctionStart::Free(k) => starts.free[k],
+                    FunctionStart::Cosine(k) => starts.circle[k].0,
+                    FunctionStart::Sine(k) => starts.circle[k].1,
+                    FunctionStart::Root { denominator, .. } => {
                         root(&f, value(of), denominator).ok_or(Singular::Root(i))?
                     }
                 },
@@ -250,22 +250,22 @@ impl<'a> Taylor<'a> {
     }
 
     /// The coefficient of a node at order k; zero beyond the start of what is constant.
-    pub fn value(&self, a: usize, k: usize) -> u64 {
+    pub(crate) fn value(&self, a: usize, k: usize) -> u64 {
         self.values[a].get(k).copied().unwrap_or(0)
     }
 
     /// The derivative of a node at order k by every unknown; empty when it is zero.
-    pub fn dual(&self, a: usize, k: usize) -> &[u64] {
+    pub(crate) fn dual(&self, a: usize, k: usize) -> &[u64] {
         self.duals[a].get(k * self.lanes..(k + 1) * self.lanes).unwrap_or(&[])
     }
 
     /// The value of a node at order 0.
-    pub fn start(&self, a: usize) -> u64 {
+    pub(crate) fn start(&self, a: usize) -> u64 {
         self.values[a][0]
     }
 
     /// Computes the coefficient of the next order of all nodes.
-    pub fn advance(&mut self) {
+    pub(crate) fn advance(&mut self) {
         let k = self.length;
         self.inverse(k);
         for i in 0..self.dag.ops.len() {

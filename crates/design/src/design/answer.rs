@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_evidence::requirements::Requirements;
-use obsdeg_evidence::simulation::answer::MeasurementReport;
+use obsdeg_evidence::simulation::MeasurementReport;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.design/1";

@@ -1,7 +1,6 @@
 //! The attitudes that a design may choose from.
 
-use obsdeg_core::model::attitude::{Euler, cardinal, cardinal_name, cardinal_names};
-use obsdeg_core::model::{Angle, Gimbals, Scheme};
+use obsdeg_core::model::{Angle, Euler, Gimbals, Scheme, cardinal, cardinal_name, cardinal_names};
 
 use super::DesignError;
 
@@ -15,7 +14,7 @@ pub struct Candidates {
 }
 
 /// Most candidates.
-pub const MAX_CANDIDATES: usize = 1000;
+pub(crate) const MAX_CANDIDATES: usize = 1000;
 
 impl Candidates {
     /// The 24 attitudes with the platform axes along North, Up, East, South, Down, West.
@@ -32,7 +31,7 @@ impl Candidates {
     /// [`DesignError::Grid`] when `step` does not divide 90 degrees.
     pub fn grid(step: i64) -> Result<Self, DesignError> {
         const QUARTER: i64 = 90_000_000_000;
-        let wrong = || DesignError::Grid { found: obsdeg_core::model::angle::format_decimal(step) };
+        let wrong = || DesignError::Grid { found: obsdeg_core::model::format_decimal(step) };
         if step <= 0 || QUARTER % step != 0 {
             return Err(wrong());
         }
@@ -102,7 +101,7 @@ impl Candidates {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use obsdeg_core::model::attitude::c_n_f64;
+    use obsdeg_core::model::c_n_f64;
 
     #[test]
     fn grids_hold_every_attitude_once() {

@@ -120,7 +120,7 @@ impl Evaluator {
     }
 
     /// The state behind a whole sequence.
-    pub fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
+    pub(crate) fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
         let (mut now, mut next) = (self.start(), self.start());
         for &stop in sequence {
             self.extend(&now, stop.into(), &mut next);

@@ -1,21 +1,18 @@
 //! The information of a sequence of positions, built up position by position: what a search evaluates millions of times.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::attitude::{Euler, Matrix3, c_n_f64};
-use obsdeg_core::model::platform::{LOCAL, local_dynamics, local_output};
-use obsdeg_core::model::ring::Float;
 use obsdeg_core::model::slew::W_IE;
-use obsdeg_core::model::{Carry, Gimbals, Platform, Scheme};
+use obsdeg_core::model::{
+    Carry, Euler, Float, Gimbals, LOCAL, Matrix3, Platform, Scheme, c_n_f64, local_dynamics, local_output,
+};
 use obsdeg_ekf::integrate::van_loan;
-use obsdeg_evidence::simulation::SimulationError;
-use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of, si_per_shown};
-use obsdeg_evidence::simulation::plan::{Plan, steps};
+use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, latitude_of, si_per_shown, steps};
 
 use super::DesignError;
 use super::ways::{Stop, Way};
 
 /// Most unknowns of a search: psi and the coefficients of ten terms.
-pub const MAX: usize = 33;
+pub(crate) const MAX: usize = 33;
 
 /// One candidate: its attitude, and how coefficients become drift there.
 #[derive(Debug, Clone)]
@@ -186,7 +183,7 @@ impl Evaluator {
     }
 
     /// Whether the order of positions makes a difference.
-    pub fn ordered(&self) -> bool {
+    pub(crate) fn ordered(&self) -> bool {
         self.carry() != Carry::Reset
     }
 

@@ -4,37 +4,40 @@
 //! every order where the carry makes order matter and by both ways of half turns ([`ways`]), are then ranked ([`search`]): constraints
 //! first, then the worst degree, then a criterion of optimal design ([`information`]), up to turns of the platform axes ([`symmetry`]).
 
-pub mod answer;
-pub mod candidates;
-pub mod criterion;
-pub mod information;
-pub mod observability;
+pub(crate) mod answer;
+pub(crate) mod candidates;
+pub(crate) mod criterion;
+pub(crate) mod information;
+pub(crate) mod observability;
 mod psi;
 mod refine;
-pub mod search;
-pub mod symmetry;
+pub(crate) mod search;
+pub(crate) mod symmetry;
 mod task;
-pub mod ties;
-pub mod ways;
+pub(crate) mod ties;
+pub(crate) mod ways;
 mod winner;
+
+pub use answer::*;
+pub use candidates::Candidates;
+pub use criterion::{Criterion, Limits};
+pub use information::Evaluator;
+pub use observability::{Patience, Rows};
+pub use search::{Best, Constraints, Progress, Scored, Search, Worth};
+pub use symmetry::Symmetry;
+pub use ways::Stop;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use obsdeg_ekf::EkfError;
 
-pub use answer::Design;
-pub use candidates::Candidates;
+pub use ties::Ties;
 pub use winner::scheme as scheme_found;
 
-use answer::{Found, SCHEMA, SearchReport, TiesReport};
 use candidates::MAX_CANDIDATES;
-use information::Evaluator;
-use obsdeg_core::degree::ensemble::EnsembleError;
+use obsdeg_core::degree::EnsembleError;
 use obsdeg_core::model::{Scheme, SchemeError};
-use obsdeg_evidence::simulation::SimulationError;
-use obsdeg_evidence::simulation::answer::MeasurementReport;
-use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of};
-use search::{Progress, Search};
+use obsdeg_evidence::simulation::{Conditions, MeasurementReport, SimulationError, latitude_of};
 use task::Task;
 use ties::TIE;
 
@@ -180,7 +183,7 @@ pub struct DesignOptions {
     /// Longest turn between successive positions, in s.
     pub slew_s: Option<f64>,
     /// What makes one scheme better than another.
-    pub criterion: Kind,
+    pub criterion: CriterionName,
     /// How many schemes are listed.
     pub keep: usize,
     /// Restarts of the exchange, where the space is too large for exhaustion.
@@ -195,7 +198,7 @@ pub struct DesignOptions {
 
 /// The name of a criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Kind {
+pub enum CriterionName {
     /// The largest sigma.
     #[default]
     Worst,

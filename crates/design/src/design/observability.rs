@@ -6,11 +6,8 @@
 
 use std::collections::HashMap;
 
-use obsdeg_core::degree::ensemble::EnsembleError;
-use obsdeg_core::degree::platform_rows::local_chain;
-use obsdeg_core::model::attitude::{Euler, Matrix3};
-use obsdeg_core::model::platform::{LOCAL, RandomValues};
-use obsdeg_core::model::{Carry, Gimbals, Platform, Scheme};
+use obsdeg_core::degree::{EnsembleError, local_chain};
+use obsdeg_core::model::{Carry, Euler, Gimbals, LOCAL, Matrix3, Platform, RandomValues, Scheme};
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field};
 use rayon::prelude::*;
@@ -62,7 +59,7 @@ pub struct Patience<'a> {
 
 impl<'a> Patience<'a> {
     /// As long as `going` says so.
-    pub fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
+    pub(crate) fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { budget: u64::MAX, going }
     }
 
@@ -212,7 +209,7 @@ impl Rows {
     }
 
     /// The same in one field: a degree may be too large.
-    pub fn likely_degrees(&self, set: &[usize]) -> Vec<Option<usize>> {
+    pub(crate) fn likely_degrees(&self, set: &[usize]) -> Vec<Option<usize>> {
         self.fields[0].degrees(set, self.columns, &self.required)
     }
 
@@ -222,7 +219,7 @@ impl Rows {
     }
 
     /// The same; `None` when it takes longer than `going` says.
-    pub fn observable_sets_while(
+    pub(crate) fn observable_sets_while(
         &self,
         size: usize,
         going: &(dyn Fn() -> bool + Sync),
@@ -244,7 +241,7 @@ impl Rows {
 
     /// The first such set among those that begin with one of `firsts`, and whether all were examined otherwise: no more than `budget`
     /// prefixes and sets are looked at for each of `firsts`, and only while `going`.
-    pub fn first_observable_set(
+    pub(crate) fn first_observable_set(
         &self,
         size: usize,
         firsts: &[usize],

@@ -1,8 +1,7 @@
 //! Continuous refinement of a sequence: its Euler angles are moved to make the criterion smaller (COBYLA: M. J. D. Powell, 1994).
 
 use cobyla::{RhoBeg, StopTols, minimize};
-use obsdeg_core::model::attitude::{Euler, c_n_f64};
-use obsdeg_core::model::{Angle, Gimbals};
+use obsdeg_core::model::{Angle, Euler, Gimbals, c_n_f64};
 
 use super::criterion::Criterion;
 use super::information::Evaluator;

@@ -8,8 +8,7 @@ use std::collections::HashMap;
 
 use obsdeg_exact::{Field, SplitMix64};
 
-use obsdeg_core::model::Platform;
-use obsdeg_core::model::attitude::{Matrix3, product};
+use obsdeg_core::model::{Matrix3, Platform, product};
 
 /// The orbits of the candidates.
 #[derive(Debug, Clone, PartialEq, Eq)]

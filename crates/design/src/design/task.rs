@@ -1,12 +1,11 @@
 //! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
 
 use obsdeg_core::accuracy::Accuracy;
-use obsdeg_core::degree::ensemble::judge;
-use obsdeg_core::model::attitude::{Euler, c_n_f64};
+use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::concerns;
-use obsdeg_core::model::{Platform, Scheme, Unknowns};
+use obsdeg_core::model::{Euler, Platform, Scheme, Unknowns, c_n_f64};
 use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
-use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of, resolve};
+use obsdeg_evidence::simulation::{Conditions, latitude_of, resolve};
 use rayon::prelude::*;
 
 use super::answer::{Found, HalfTurn, Minimum};
@@ -17,7 +16,7 @@ use super::observability::Rows;
 use super::search::{Best, Constraints, Scored, Search};
 use super::symmetry::Symmetry;
 use super::ways::Stop;
-use super::{Design, DesignError, DesignOptions, EXHAUSTIVE, Kind, refine};
+use super::{CriterionName, Design, DesignError, DesignOptions, EXHAUSTIVE, refine};
 
 /// Most sets whose keys are held.
 const MOST_SETS: u64 = 5_000_000;
@@ -110,18 +109,18 @@ impl<'a> Task<'a> {
             coefficients: requirements.iter().map(|x| if x.is_nan() { f64::INFINITY } else { *x }).collect(),
             psi: [0, 1, 2].map(|k| psi(k).unwrap_or(f64::INFINITY)),
         };
-        if options.meet || options.criterion == Kind::Margin {
+        if options.meet || options.criterion == CriterionName::Margin {
             let wrong = |x: &f64| !(x.is_finite() && *x > 0.0);
             if let Some((c, found)) = required.iter().zip(&requirements).find(|(_, x)| wrong(x)) {
                 return Err(DesignError::Requirement { name: c.0.clone(), found: *found });
             }
         }
         let criterion = match options.criterion {
-            Kind::Worst => Criterion::Worst,
-            Kind::A => Criterion::A,
-            Kind::D => Criterion::D,
-            Kind::E => Criterion::E,
-            Kind::Margin => Criterion::Margin(limits.clone()),
+            CriterionName::Worst => Criterion::Worst,
+            CriterionName::A => Criterion::A,
+            CriterionName::D => Criterion::D,
+            CriterionName::E => Criterion::E,
+            CriterionName::Margin => Criterion::Margin(limits.clone()),
         };
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let rows = Rows::new(base, &candidates.attitudes, &indices, options.seed)?;
@@ -129,7 +128,7 @@ impl<'a> Task<'a> {
         let repeated = rows.repeated();
         let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
         let place = |c: usize| required.iter().position(|r| r.1 == c);
-        let uses_requirements = options.meet || options.criterion == Kind::Margin;
+        let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
         // a turn of the platform axes renames psi as well
         let turned = !uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]);
         let same = |i: usize, j: usize| match (place(i), place(j)) {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::search::Worth;
 
 /// Sequences tie when their worst degrees are equal and their criteria differ by less than this part.
-pub const TIE: f64 = 1e-6;
+pub(crate) const TIE: f64 = 1e-6;
 
 /// The sequences near the best so far: how many there are of each criterion.
 #[derive(Debug, Clone, PartialEq, Default)]

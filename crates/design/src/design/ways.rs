@@ -1,17 +1,14 @@
 //! The ways from one candidate to another, where turning takes time: the shortest, and of half turns both.
 
-use obsdeg_core::model::SlewTo;
-use obsdeg_core::model::attitude::Matrix3;
-use obsdeg_core::model::ring::Float;
-use obsdeg_core::model::slew::Slew;
-use obsdeg_core::model::slew::Turn;
+use obsdeg_core::model::slew::{Slew, Turn};
+use obsdeg_core::model::{Float, Matrix3, SlewTo};
 use rayon::prelude::*;
 
 use super::DesignError;
 use super::information::Evaluator;
 
 /// Most candidates when it takes time to turn from one to another.
-pub const MAX_TURNING: usize = 256;
+pub(crate) const MAX_TURNING: usize = 256;
 /// Largest turn of an integration step, in rad.
 const TURN_STEP: f64 = 0.05;
 

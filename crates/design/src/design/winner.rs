@@ -1,9 +1,8 @@
 //! A scheme that was found, as a scheme.
 
-use obsdeg_core::model::scheme::parse_attitude;
 use obsdeg_core::model::settings::Settings;
-use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo};
-use obsdeg_evidence::simulation::conditions::{Conditions, latitude_of};
+use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, parse_attitude};
+use obsdeg_evidence::simulation::{Conditions, latitude_of};
 
 use super::DesignError;
 use super::answer::Found;

@@ -1,24 +1,21 @@
 //! All that a design review of torquing schemes needs, gathered: verdicts, predictions, evidence, alternatives.
 
-pub mod answer;
+pub(crate) mod answer;
+
+pub use answer::*;
 
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
-use obsdeg_core::degree::status::Status;
+use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Dwell, Scheme};
 use obsdeg_core::system::{ModelError, SystemModel, SystemOptions, analyze_system};
 use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
-use obsdeg_evidence::simulation::plan::Kind as Part;
-use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, simulate};
-use obsdeg_evidence::system::run::RunError;
-use obsdeg_evidence::system::{crosscheck_system, simulate_system};
+use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, SimulationError, simulate};
+use obsdeg_evidence::system::{RunError, crosscheck_system, simulate_system};
 use obsdeg_symbolic::Worker;
 use rayon::prelude::*;
 
-pub use answer::{DesignReview, ModelReview, SchemeReview};
-
-use crate::design::{Candidates, DesignError, DesignOptions, Kind, design};
-use answer::{Alternatives, Attitude, PositionReview, Sweep};
+use crate::design::{Candidates, CriterionName, DesignError, DesignOptions, design};
 
 /// Between two latitudes of the sweep, in degrees.
 const LATITUDE_STEP: i32 = 5;
@@ -174,20 +171,20 @@ const UP: usize = 1;
 
 fn positions(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Vec<PositionReview> {
     let slew = |i: usize| {
-        let of = |p: &&obsdeg_evidence::simulation::plan::Segment| {
-            p.position == i && matches!(p.kind, Part::Slew(_))
+        let of = |p: &&obsdeg_evidence::simulation::Segment| {
+            p.position == i && matches!(p.kind, SegmentKind::Slew(_))
         };
         plan.segments.iter().find(of).map(|s| s.dt * s.steps as f64)
     };
     let start = |i: usize| {
-        let of = |p: &&obsdeg_evidence::simulation::plan::Segment| {
-            p.position == i && !matches!(p.kind, Part::Slew(_))
+        let of = |p: &&obsdeg_evidence::simulation::Segment| {
+            p.position == i && !matches!(p.kind, SegmentKind::Slew(_))
         };
         plan.segments.iter().find(of).map_or(0.0, |s| s.start_s)
     };
     let row = |(i, p): (usize, &obsdeg_core::model::Position)| {
         let g = plan.attitudes[i][UP];
-        let along = |axis: obsdeg_core::model::geometry::SignedAxis| {
+        let along = |axis: obsdeg_core::model::SignedAxis| {
             let component: f64 = axis.vector().iter().zip(&g).map(|(&a, g)| f64::from(a) * g).sum();
             // a multiple of a right angle leaves a rounding error of the sine
             if component.abs() < 1e-15 { 0.0 } else { component }
@@ -210,21 +207,21 @@ fn attitudes(plan: &Plan) -> Vec<Attitude> {
     let mut out = Vec::new();
     for s in &plan.segments {
         let duration = s.dt * s.steps as f64;
-        let mut at = |t: f64, c: &obsdeg_core::model::attitude::Matrix3<f64>| {
+        let mut at = |t: f64, c: &obsdeg_core::model::Matrix3<f64>| {
             out.push(Attitude { t_s: s.start_s + t, position: s.position, g: c[UP] });
         };
         match &s.kind {
-            Part::Dwell => {
+            SegmentKind::Dwell => {
                 at(0.0, &plan.attitudes[s.position]);
                 at(duration, &plan.attitudes[s.position]);
             }
-            Part::Slew(slew) => {
+            SegmentKind::Slew(slew) => {
                 (0..=STEPS).for_each(|k| {
                     let t = duration * k as f64 / STEPS as f64;
                     at(t, &slew.at(t));
                 });
             }
-            Part::Rotation(turn) => {
+            SegmentKind::Rotation(turn) => {
                 at(0.0, &turn.at(0.0));
                 at(duration, &turn.at(duration));
             }
@@ -276,7 +273,7 @@ fn alternatives(
         meet: false,
         total_s: None,
         slew_s: None,
-        criterion: Kind::Worst,
+        criterion: CriterionName::Worst,
         keep: 1,
         restarts: 40,
         refine: false,

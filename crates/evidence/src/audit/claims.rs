@@ -2,14 +2,10 @@
 
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
-use obsdeg_core::degree::ensemble::{EnsembleError, judge};
-use obsdeg_core::degree::platform_rows::local_chain;
-use obsdeg_core::degree::staircase::Degrees;
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::model::attitude::{cardinal, cardinal_names};
-use obsdeg_core::model::platform::{Platform, RandomValues, Sample};
-use obsdeg_core::model::scheme::{Carry, Scheme, parse_attitude};
-use obsdeg_core::model::{Angle, Unknowns};
+use obsdeg_core::degree::{Degrees, EnsembleError, Status, judge, local_chain};
+use obsdeg_core::model::{
+    Angle, Carry, Platform, RandomValues, Sample, Scheme, Unknowns, cardinal, cardinal_names, parse_attitude,
+};
 use obsdeg_exact::{Echelon, SplitMix64};
 
 use super::equations::{ANY, PSI_C, everywhere};

@@ -1,12 +1,12 @@
 //! The numbered equations from (6) on, as printed, compared with the model at random points of random prime fields.
 
 use obsdeg_core::analysis::AnalysisError;
-use obsdeg_core::degree::ensemble::EnsembleError;
-use obsdeg_core::model::attitude::Matrix3;
+use obsdeg_core::degree::EnsembleError;
 use obsdeg_core::model::expression::{Environment, ExpressionError, evaluate, parse};
-use obsdeg_core::model::platform::{LOCAL, Platform, RandomValues, local_dynamics, local_output};
-use obsdeg_core::model::scheme::{Scheme, parse_attitude};
-use obsdeg_core::solution::requested::CombinationError;
+use obsdeg_core::model::{
+    LOCAL, Matrix3, Platform, RandomValues, Scheme, local_dynamics, local_output, parse_attitude,
+};
+use obsdeg_core::solution::CombinationError;
 use obsdeg_exact::{Field, RootField, SplitMix64};
 
 use super::{Finding, Line, finding, line};

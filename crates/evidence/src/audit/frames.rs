@@ -1,8 +1,7 @@
 //! The equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random prime fields.
 
 use obsdeg_core::analysis::AnalysisError;
-use obsdeg_core::model::attitude::{Matrix3, elementary, product};
-use obsdeg_core::model::geometry::{GYROS, SignedAxis};
+use obsdeg_core::model::{GYROS, Matrix3, SignedAxis, elementary, product};
 use obsdeg_exact::Field;
 
 use super::equations::{ANY, At, G, PSI_C, everywhere, plain};

@@ -11,7 +11,7 @@ use super::claims::{Judged, PAPER, positions, segment_1, show};
 use super::{AuditError, Finding, Line, finding, line};
 use crate::prediction::Prediction;
 use crate::simulation::conditions::Conditions;
-use crate::simulation::record::{Record, Series, Start, run};
+use crate::simulation::record::{Record, RunStart, Series, run};
 use crate::simulation::{Plan, SimulationError, simulate};
 
 /// An estimate is at the truth where error and sigma are within this part of the true value at the start.
@@ -40,7 +40,7 @@ impl Mean {
     fn of(carry: Carry, seed: u64) -> Result<Self, SimulationError> {
         let conditions = conditions();
         let plan = Plan::new(&scheme(carry), &conditions)?;
-        let start = Start::new(&plan, &conditions)?;
+        let start = RunStart::new(&plan, &conditions)?;
         let prediction = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
         let noise_roots = vec![[[0.0; 3]; 3]; plan.noise_roots.len()];
         let quiet = Plan { noise_roots, ..plan };
@@ -316,7 +316,7 @@ mod tests {
         let other = Mean::of(Carry::Inertial, 1).expect("a run");
         let conditions = conditions();
         let plan = Plan::new(&scheme(Carry::Platform), &conditions).expect("a plan");
-        let start = Start::new(&plan, &conditions).expect("a start");
+        let start = RunStart::new(&plan, &conditions).expect("a start");
         let prediction =
             Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], 1).expect("predicted");
         let runs: Vec<Mean> = (0..RUNS)

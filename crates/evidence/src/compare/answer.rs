@@ -1,6 +1,6 @@
 //! Schemes side by side: plain data.
 
-use obsdeg_core::degree::status::Status;
+use obsdeg_core::degree::Status;
 use obsdeg_core::model::Carry;
 use obsdeg_core::model::slew::Turn;
 use schemars::JsonSchema;
@@ -20,7 +20,7 @@ pub struct Comparison {
     /// Version of the program.
     pub version: String,
     /// The schemes in the order given.
-    pub schemes: Vec<Review>,
+    pub schemes: Vec<ComparedScheme>,
     /// What differs between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step.
     pub differ: Vec<String>,
     /// Seed of all random choices.
@@ -29,7 +29,8 @@ pub struct Comparison {
 
 /// One scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Review {
+#[schemars(rename = "Review")]
+pub struct ComparedScheme {
     /// Its name: the file's.
     pub name: String,
     /// What is carried between positions.

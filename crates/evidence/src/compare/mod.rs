@@ -1,20 +1,17 @@
 //! Schemes side by side, for design reviews: verdicts, predicted accuracy, what each position is for, what the
 //! assumptions are worth.
 
-pub mod answer;
+pub(crate) mod answer;
+
+pub use answer::*;
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::model::attitude::Matrix3;
-use obsdeg_core::model::ring::Float;
+use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::DriftNoise;
-use obsdeg_core::model::slew;
-use obsdeg_core::model::{Carry, Platform, Position, Scheme};
+use obsdeg_core::model::{Carry, Float, Matrix3, Platform, Position, Scheme, slew};
 use obsdeg_ekf::SquareRootInformation;
 use rayon::prelude::*;
-
-pub use answer::Comparison;
 
 use crate::prediction::Prediction;
 use crate::requirements::{Basis, Requirements};
@@ -23,7 +20,6 @@ use crate::simulation::batch::batch;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::plan::MAX_UNKNOWNS;
 use crate::simulation::{Plan, SimulationError, no_prior, predict};
-use answer::{DropOne, Quantity, Review, SCHEMA, Sensitivity, Slew, Worst};
 
 /// Latitudes of the sweep, in degrees.
 const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
@@ -70,16 +66,16 @@ pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, Simu
 }
 
 /// What differs between schemes besides positions, dwells and slews.
-fn differ(schemes: &[Review]) -> Vec<String> {
+fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     let Some((first, others)) = schemes.split_first() else { return Vec::new() };
     // psi of every position counts as psi
-    let required = |r: &Review| -> BTreeMap<String, Option<f64>> {
+    let required = |r: &ComparedScheme| -> BTreeMap<String, Option<f64>> {
         let family = |name: &str| name.split('@').next().unwrap_or_default().to_string();
         r.quantities.iter().map(|q| (family(&q.name), q.requirement)).collect()
     };
     let here = required(first);
-    let other = |differs: &dyn Fn(&Review) -> bool| others.iter().any(differs);
-    let noise = |r: &Review| (r.conditions.accelerometer_noise_g, r.conditions.azimuth_noise_deg);
+    let other = |differs: &dyn Fn(&ComparedScheme) -> bool| others.iter().any(differs);
+    let noise = |r: &ComparedScheme| (r.conditions.accelerometer_noise_g, r.conditions.azimuth_noise_deg);
     let found = [
         ("carry", other(&|r| r.carry != first.carry)),
         ("latitude", other(&|r| r.conditions.latitude_deg != first.conditions.latitude_deg)),
@@ -168,7 +164,7 @@ impl Judged {
     }
 }
 
-fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
+fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
     let Entry { name, scheme, conditions } = entry;
     let judged = Judged::new(scheme, conditions, seed)?;
     conditions.concern(judged.platform())?;
@@ -177,7 +173,7 @@ fn review(entry: &Entry, seed: u64) -> Result<Review, SimulationError> {
     let requirements = required(&quantities, conditions);
     let slews = judged.plan.slews();
     let has_slews = judged.plan.slews().next().is_some();
-    Ok(Review {
+    Ok(ComparedScheme {
         name: name.clone(),
         carry: scheme.carry,
         conditions: MeasurementReport::new(scheme, conditions),

@@ -1,6 +1,6 @@
 //! The evidence for and against the exact verdicts: plain data.
 
-use obsdeg_core::degree::status::Status;
+use obsdeg_core::degree::Status;
 use obsdeg_core::model::Carry;
 use schemars::JsonSchema;
 use serde::Serialize;

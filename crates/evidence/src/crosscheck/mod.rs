@@ -5,27 +5,26 @@
 //! information; d. errors and innovations are what the filter believes; e. predicted and measured orders rank alike;
 //! f. filters that are wrong on purpose are found out.
 
-pub mod answer;
-pub mod monte_carlo;
+pub(crate) mod answer;
+pub(crate) mod monte_carlo;
 mod ranking;
-pub mod slopes;
+pub(crate) mod slopes;
 mod structure;
+
+pub use answer::*;
+pub use monte_carlo::{Experiment, Prepared, Totals};
+pub use ranking::kendall_tau_b;
 
 use obsdeg_core::model::{Carry, Latitude, Platform, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::{Form, SquareRootInformation};
 
-pub use answer::CrossCheck;
-pub use ranking::kendall_tau_b;
-
 use crate::prediction::Prediction;
 use crate::simulation::batch::batch;
 use crate::simulation::conditions::resolve;
-use crate::simulation::plan::Kind;
-use crate::simulation::record::{Start, run};
+use crate::simulation::plan::SegmentKind;
+use crate::simulation::record::{RunStart, run};
 use crate::simulation::{Conditions, Plan, SimulationError, conditions_report, timeline_report, validity};
-use answer::{Check, Control, Difference, Measured, MonteCarlo, QuantityEvidence, Ranking, SCHEMA};
-use monte_carlo::{Experiment, Prepared};
 use structure::{last_covariance, still, structure};
 
 /// Relative difference of covariances that is rounding; P itself holds half the digits of its root.
@@ -104,7 +103,7 @@ pub fn crosscheck(
         return Err(SimulationError::DroppedOnly);
     }
     let truth = Plan::new(scheme, conditions)?;
-    let slews = truth.segments.iter().any(|s| matches!(s.kind, Kind::Slew(_)));
+    let slews = truth.segments.iter().any(|s| matches!(s.kind, SegmentKind::Slew(_)));
     if slews && options.filter.dropped.is_some() {
         return Err(SimulationError::DroppedSlew);
     }
@@ -143,7 +142,7 @@ pub fn crosscheck(
         Vec::new()
     };
 
-    let start = Start::new(&truth, conditions)?;
+    let start = RunStart::new(&truth, conditions)?;
     let record = run(&truth, conditions, &start, &prediction, options.seed)?;
     let requirements = resolve("required sigma", &truth.platform, &conditions.requirements, f64::NAN)?;
     let mut out = CrossCheck {
@@ -181,7 +180,7 @@ pub fn crosscheck(
 fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Difference>, SimulationError> {
     let still = still(conditions);
     let plan = Plan::new(scheme, &still)?;
-    let start = Start::new(&plan, &still)?;
+    let start = RunStart::new(&plan, &still)?;
     let batch = batch(&plan, SquareRootInformation::prior(&start.sigma)?)?;
     let root = &batch.to_end * batch.information.inverse_root()?;
     let expected = &root * root.transpose();

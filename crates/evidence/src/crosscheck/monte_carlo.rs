@@ -11,7 +11,7 @@ use super::answer::{HistoryPoint, Statistic};
 use crate::simulation::SimulationError;
 use crate::simulation::conditions::Conditions;
 use crate::simulation::plan::Plan;
-use crate::simulation::record::{Start, first_steps};
+use crate::simulation::record::{RunStart, first_steps};
 use crate::simulation::truth::{Noise, TruthModel, check_drifts};
 
 /// Times at which NEES is taken.
@@ -80,8 +80,8 @@ impl Totals {
 pub struct Prepared<'a> {
     experiment: Experiment<'a>,
     gains: Gains,
-    start: Start,
-    truth_start: Start,
+    start: RunStart,
+    truth_start: RunStart,
     /// Numbers of the steps after which NEES is taken; the last is the end.
     checkpoints: Vec<usize>,
     nees: Vec<Nees>,
@@ -97,9 +97,9 @@ impl<'a> Prepared<'a> {
     /// [`SimulationError`].
     pub fn new(experiment: Experiment<'a>) -> Result<Self, SimulationError> {
         let (filter, conditions) = (experiment.filter, experiment.conditions);
-        let start = Start::new(filter, &conditions.within(&filter.platform))?;
+        let start = RunStart::new(filter, &conditions.within(&filter.platform))?;
         let same = filter.platform.names() == experiment.truth.platform.names();
-        let truth_start = if same { start.clone() } else { Start::new(experiment.truth, conditions)? };
+        let truth_start = if same { start.clone() } else { RunStart::new(experiment.truth, conditions)? };
         let first = truth_start.sigma.len() - experiment.truth.platform.coefficients();
         let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).skip(first);
         // six sigma

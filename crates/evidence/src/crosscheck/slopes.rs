@@ -23,7 +23,7 @@ const SAMPLES: f64 = 50.0;
 
 /// Sigma of some functionals against the dwell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Slopes {
+pub(crate) struct Slopes {
     /// The dwells of the first position, ascending, in s.
     pub dwells: Vec<f64>,
     /// Of every functional: sigma at every dwell, SI units.
@@ -39,7 +39,7 @@ pub struct Slopes {
 ///
 /// # Errors
 /// [`SimulationError`].
-pub fn slopes(
+pub(crate) fn slopes(
     scheme: &Scheme,
     conditions: &Conditions,
     functionals: &[Vec<(usize, f64)>],

@@ -12,7 +12,7 @@ use super::slopes::{self, slopes};
 use crate::prediction::{Combination, Prediction};
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{shown_unit, si_per_shown};
-use crate::simulation::record::Start;
+use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
 /// How far a measured slope may be from the predicted one.
@@ -108,7 +108,7 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let prior = diffuse_prior(plan)?;
     let end = |factor: f64| {
         let sigma = prior.iter().map(|s| s * factor).collect();
-        last_covariance(plan, &Start { truth: Vec::new(), estimate: Vec::new(), sigma }, Form::Ud)
+        last_covariance(plan, &RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }, Form::Ud)
     };
     let (small, large) = (end(1.0)?, end(10.0)?);
     let ratio = |c: &Combination| (large.variance(c) / small.variance(c)).sqrt();
@@ -122,7 +122,11 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     })
 }
 
-pub(super) fn last_covariance(plan: &Plan, start: &Start, form: Form) -> Result<Covariance, SimulationError> {
+pub(super) fn last_covariance(
+    plan: &Plan,
+    start: &RunStart,
+    form: Form,
+) -> Result<Covariance, SimulationError> {
     let prior = start.covariance(form)?;
     let mut last = prior.clone();
     let total: usize = plan.segments.iter().map(|s| s.steps).sum();

@@ -1,6 +1,6 @@
 //! The answer of one run: plain data.
 
-use obsdeg_core::degree::status::Status;
+use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Propagation, Truth};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Scheme};
@@ -111,7 +111,7 @@ pub struct TimelineReport {
     pub position: String,
     /// Whether it is a slew.
     pub slew: bool,
-    /// Start in s.
+    /// RunStart in s.
     pub start_s: f64,
     /// End in s.
     pub end_s: f64,

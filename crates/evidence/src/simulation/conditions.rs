@@ -46,7 +46,7 @@ pub struct Conditions {
 }
 
 /// The latitude of a scheme that names none, in degrees (the paper's is not given).
-pub const DEFAULT_LATITUDE: &str = "28.2";
+pub(crate) const DEFAULT_LATITUDE: &str = "28.2";
 
 fn assign(name: &str, value: f64) -> Assignment {
     Assignment { name: name.into(), value }
@@ -201,13 +201,13 @@ impl Conditions {
 }
 
 /// A true value in words.
-pub const TRUE_VALUE: &str = "true value";
+pub(crate) const TRUE_VALUE: &str = "true value";
 /// An initial estimate in words.
-pub const ESTIMATE: &str = "initial estimate";
+pub(crate) const ESTIMATE: &str = "initial estimate";
 /// A prior standard deviation in words.
-pub const PRIOR: &str = "prior sigma";
+pub(crate) const PRIOR: &str = "prior sigma";
 /// A requirement in words.
-pub const REQUIRED: &str = "required sigma";
+pub(crate) const REQUIRED: &str = "required sigma";
 
 /// The latitude of a scheme, or the default.
 pub fn latitude_of(scheme: &Scheme) -> Option<Latitude> {
@@ -247,7 +247,7 @@ pub fn resolve(
 }
 
 /// The unit in which an unknown is given and reported: degrees for psi.
-pub fn shown_unit(unit: &str) -> &str {
+pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "rad" { "deg" } else { unit }
 }
 

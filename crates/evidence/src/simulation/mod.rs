@@ -1,31 +1,32 @@
 //! A torquing scheme run through the filter: one run against one truth, and what it says.
 
-pub mod answer;
-pub mod batch;
-pub mod conditions;
-pub mod consistency;
-pub mod plan;
-pub mod record;
+pub(crate) mod answer;
+pub(crate) mod batch;
+pub(crate) mod conditions;
+pub(crate) mod consistency;
+pub(crate) mod plan;
+pub(crate) mod record;
 mod seen;
-pub mod truth;
+pub(crate) mod truth;
 
-use obsdeg_core::degree::status::Status;
+pub use answer::*;
+pub use batch::{Batch, batch, diffuse_prior};
+pub use conditions::{Conditions, general_first, latitude_of, resolve, si_per_shown};
+pub use consistency::{Consistency, Doubt};
+pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
+pub use record::{Record, RunStart, Series, Traces, run};
+pub use seen::{no_prior, predict, predict_run};
+pub use truth::{Noise, TruthModel};
+
+use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Carry, Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
 
-pub use answer::{Simulation, Validity};
-pub use conditions::Conditions;
-pub use plan::Plan;
-pub use record::{Record, Start, Traces, run};
-pub use seen::{no_prior, predict, predict_run};
-
 use crate::prediction::{Prediction, PredictionError};
 use crate::requirements::{Basis, Claim, Requirements, meets};
-use answer::{ConditionsReport, Estimate, Outcome, SCHEMA, TimelineReport};
-use conditions::{resolve, shown_unit, si_per_shown};
-use consistency::{Consistency, Outcomes};
-use plan::Kind;
+use conditions::shown_unit;
+use consistency::Outcomes;
 
 /// Why a scheme cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -143,7 +144,7 @@ pub fn simulate(
     seed: u64,
 ) -> Result<(Simulation, Record), SimulationError> {
     let plan = Plan::new(scheme, conditions)?;
-    let start = Start::new(&plan, conditions)?;
+    let start = RunStart::new(&plan, conditions)?;
     let prediction = predict_run(&plan, &start.sigma, seed)?;
     let record = run(&plan, conditions, &start, &prediction, seed)?;
     let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
@@ -217,7 +218,7 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
     let given = matches!(noise, DriftNoise::OneStep(_)).then_some(conditions.drift_noise_step_s);
     // a slew takes as many steps as a position would
     let steps = plan.segments.iter().map(|s| match s.kind {
-        Kind::Slew(_) => s.dt.min(conditions.step_s),
+        SegmentKind::Slew(_) => s.dt.min(conditions.step_s),
         _ => s.dt,
     });
     let (shortest, longest) = steps.fold((f64::MAX, 0.0f64), |(l, h), dt| (l.min(dt), h.max(dt)));
@@ -244,13 +245,13 @@ pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     let positions = &plan.platform.scheme().positions;
     let mut out: Vec<TimelineReport> = Vec::new();
     for s in &plan.segments {
-        let (slew, end_s) = (matches!(s.kind, Kind::Slew(_)), s.start_s + s.dt * s.steps as f64);
+        let (slew, end_s) = (matches!(s.kind, SegmentKind::Slew(_)), s.start_s + s.dt * s.steps as f64);
         let position = &positions[s.position].name;
         match out.last_mut() {
             // a rotation is one segment per step
             Some(last) if last.position == *position && last.slew == slew => last.end_s = end_s,
             _ => {
-                let turn = if let Kind::Slew(slew) = &s.kind { Some(slew.turn()) } else { None };
+                let turn = if let SegmentKind::Slew(slew) = &s.kind { Some(slew.turn()) } else { None };
                 out.push(TimelineReport {
                     position: position.clone(),
                     slew,

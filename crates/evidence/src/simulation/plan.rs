@@ -1,15 +1,12 @@
 //! A scheme in numbers: the timeline of positions and slews, and the linear model of each as filter stages.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::attitude::Matrix3;
-use obsdeg_core::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
-use obsdeg_core::model::ring::Float;
-use obsdeg_core::model::scheme::Station;
 use obsdeg_core::model::settings::Propagation;
-use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::slew::W_IE;
-use obsdeg_core::model::slew::{Slew, times, transpose};
-use obsdeg_core::model::{Carry, Platform, Scheme, Unknowns};
+use obsdeg_core::model::slew::{Slew, Turn, W_IE, times, transpose};
+use obsdeg_core::model::{
+    Block, Carry, Float, LOCAL, Matrix3, Platform, Point, Scheme, Station, Unknowns, local_dynamics,
+    local_output,
+};
 use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
 
@@ -17,15 +14,15 @@ use super::SimulationError;
 use super::conditions::{Conditions, latitude_of};
 
 /// Most unknowns of a run: the covariance is a full matrix.
-pub const MAX_UNKNOWNS: usize = 300;
+pub(crate) const MAX_UNKNOWNS: usize = 300;
 /// Most steps of a run.
-pub const MAX_STEPS: usize = 1_000_000;
+pub(crate) const MAX_STEPS: usize = 1_000_000;
 /// Most steps of rotating segments: each has a model of its own.
-pub const MAX_TURNING_STEPS: usize = 100_000;
+pub(crate) const MAX_TURNING_STEPS: usize = 100_000;
 /// Most numbers of a series: steps times unknowns.
-pub const MAX_NUMBERS: usize = 20_000_000;
+pub(crate) const MAX_NUMBERS: usize = 20_000_000;
 /// Most integration steps, of slews and rotations or of a true attitude.
-pub const MAX_INTEGRATION: usize = 2_000_000;
+pub(crate) const MAX_INTEGRATION: usize = 2_000_000;
 /// Largest turn of one integration step, in rad.
 const MAX_TURN: f64 = 0.02;
 
@@ -60,7 +57,7 @@ pub(super) fn integration_steps(turn: f64) -> Result<usize, SimulationError> {
 
 /// What a part of the timeline is.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum SegmentKind {
     /// A position, tracked; Z is sampled at the end of every step.
     Dwell,
     /// A turn to the position; Z is not used.
@@ -75,8 +72,8 @@ pub struct Segment {
     /// The position: where it is spent, or where the slew goes.
     pub position: usize,
     /// Position or slew.
-    pub kind: Kind,
-    /// Start in s.
+    pub kind: SegmentKind,
+    /// RunStart in s.
     pub start_s: f64,
     /// Number of steps.
     pub steps: usize,
@@ -185,13 +182,13 @@ impl Plan {
     /// The slews: the position that each leads to, and how it turns.
     pub fn slews(&self) -> impl Iterator<Item = (usize, Turn)> {
         self.segments.iter().filter_map(|s| match &s.kind {
-            Kind::Slew(slew) => Some((s.position, slew.turn())),
-            Kind::Dwell | Kind::Rotation(_) => None,
+            SegmentKind::Slew(slew) => Some((s.position, slew.turn())),
+            SegmentKind::Dwell | SegmentKind::Rotation(_) => None,
         })
     }
 
     /// The psi states of a segment: the first three columns of its block.
-    pub fn psi_columns(&self, segment: usize) -> &[usize] {
+    pub(crate) fn psi_columns(&self, segment: usize) -> &[usize] {
         &self.blocks[self.segments[segment].position].columns[..3]
     }
 
@@ -211,7 +208,7 @@ impl Plan {
     }
 
     /// The rows of Z at a position (one per component), as functionals of the unknowns.
-    pub fn output_rows(&self, position: usize) -> Vec<Vec<(usize, f64)>> {
+    pub(crate) fn output_rows(&self, position: usize) -> Vec<Vec<(usize, f64)>> {
         let block = &self.blocks[position];
         local_output(&Float, self.components.contains(&2))
             .iter()
@@ -234,7 +231,7 @@ impl Plan {
         let n = self.unknowns();
         let process = PlatformProcess { plan: self, segment };
         let (phi, q) = match &s.kind {
-            Kind::Dwell => {
+            SegmentKind::Dwell => {
                 let phi = match conditions.propagation {
                     Propagation::Exponential => self.exponential(block, s.dt)?,
                     Propagation::Rk4 => {
@@ -243,11 +240,11 @@ impl Plan {
                 };
                 (phi, self.held_noise(block, s.dt, held))
             }
-            Kind::Rotation(_) => {
+            SegmentKind::Rotation(_) => {
                 let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
                 (phi, self.held_noise(block, s.dt, held))
             }
-            Kind::Slew(_) => {
+            SegmentKind::Slew(_) => {
                 let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
                 // the noise of a slew: that of as many steps as it would have
                 let dt = conditions.step_s.min(s.dt);
@@ -264,8 +261,8 @@ impl Plan {
             }
         }
         let outputs = match s.kind {
-            Kind::Slew(_) => Vec::new(),
-            Kind::Dwell | Kind::Rotation(_) => self
+            SegmentKind::Slew(_) => Vec::new(),
+            SegmentKind::Dwell | SegmentKind::Rotation(_) => self
                 .output_rows(s.position)
                 .into_iter()
                 .zip(&self.components)
@@ -358,7 +355,7 @@ fn timeline(
                 all += 1.0;
                 integration += slew.turned(duration) / MAX_TURN;
                 counted("integration steps", integration, MAX_INTEGRATION)?;
-                push(position, Kind::Slew(slew), duration, 1);
+                push(position, SegmentKind::Slew(slew), duration, 1);
             }
         }
         let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
@@ -367,7 +364,7 @@ fn timeline(
         counted("steps", all, MAX_STEPS)?;
         counted("steps times unknowns", all * unknowns as f64, MAX_NUMBERS)?;
         match p.rotation.as_ref() {
-            None => push(position, Kind::Dwell, dwell, steps),
+            None => push(position, SegmentKind::Dwell, dwell, steps),
             Some(r) => {
                 let dt = dwell / steps as f64;
                 let whole = Slew::about(&attitudes[position], r, dwell);
@@ -377,7 +374,12 @@ fn timeline(
                 counted("integration steps", integration, MAX_INTEGRATION)?;
                 for k in 0..steps {
                     let from = whole.at(k as f64 * dt);
-                    push(position, Kind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }), dt, 1);
+                    push(
+                        position,
+                        SegmentKind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }),
+                        dt,
+                        1,
+                    );
                 }
             }
         }
@@ -421,8 +423,10 @@ impl PlatformProcess<'_> {
         let to_psi = transpose(&p);
         let turning = times(&to_psi, &times(&w, &p));
         let drift: [Vec<f64>; 3] = match &segment.kind {
-            Kind::Slew(slew) | Kind::Rotation(slew) => plan.platform.drift_rows(&Float, &slew.at(t)),
-            Kind::Dwell => std::array::from_fn(|r| block.rows[3 + r][3..].to_vec()),
+            SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => {
+                plan.platform.drift_rows(&Float, &slew.at(t))
+            }
+            SegmentKind::Dwell => std::array::from_fn(|r| block.rows[3 + r][3..].to_vec()),
         };
         let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; plan.unknowns()]);
         for (i, row) in rows.iter_mut().enumerate() {
@@ -479,8 +483,8 @@ impl Plan {
     pub(super) fn attitude(&self, segment: usize, t: f64) -> Matrix3<f64> {
         let s = &self.segments[segment];
         match &s.kind {
-            Kind::Dwell => self.attitudes[s.position],
-            Kind::Slew(slew) | Kind::Rotation(slew) => slew.at(t),
+            SegmentKind::Dwell => self.attitudes[s.position],
+            SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => slew.at(t),
         }
     }
 
@@ -488,15 +492,15 @@ impl Plan {
     pub(super) fn substeps(&self, segment: usize) -> usize {
         let s = &self.segments[segment];
         let turn = match &s.kind {
-            Kind::Dwell => W_IE * s.dt,
-            Kind::Slew(slew) | Kind::Rotation(slew) => slew.turned(s.dt),
+            SegmentKind::Dwell => W_IE * s.dt,
+            SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => slew.turned(s.dt),
         };
         // the timeline has counted them
         integration_steps(turn).unwrap_or(MAX_INTEGRATION)
     }
 
     /// Whether the unknowns are coefficients, not the drift itself.
-    pub fn has_coefficients(&self) -> bool {
+    pub(crate) fn has_coefficients(&self) -> bool {
         self.platform.scheme().unknowns != Unknowns::Drift
     }
 }

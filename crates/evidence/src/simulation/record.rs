@@ -6,15 +6,14 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form};
 
 use super::SimulationError;
-use super::conditions::{Conditions, resolve, shown_unit, si_per_shown};
-use super::conditions::{ESTIMATE, PRIOR, TRUE_VALUE};
+use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, resolve, shown_unit, si_per_shown};
 use super::plan::Plan;
 use super::truth::{Noise, TruthModel, check_drifts};
 use crate::prediction::Prediction;
 
 /// Where a run starts, in SI units (shape n each).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Start {
+pub struct RunStart {
     /// The true unknowns.
     pub truth: Vec<f64>,
     /// The initial estimate.
@@ -23,7 +22,7 @@ pub struct Start {
     pub sigma: Vec<f64>,
 }
 
-impl Start {
+impl RunStart {
     /// What the conditions say for the unknowns of `plan`.
     ///
     /// # Errors
@@ -109,7 +108,7 @@ pub struct Record {
 pub fn run(
     plan: &Plan,
     conditions: &Conditions,
-    start: &Start,
+    start: &RunStart,
     prediction: &Prediction,
     seed: u64,
 ) -> Result<Record, SimulationError> {

@@ -1,11 +1,8 @@
 //! The truth: the linear model itself, or direction cosines.
 
-use obsdeg_core::model::Carry;
-use obsdeg_core::model::attitude::Matrix3;
-use obsdeg_core::model::ring::Float;
 use obsdeg_core::model::settings::Truth;
-use obsdeg_core::model::slew::W_IE;
-use obsdeg_core::model::slew::{apply, cross, rotation, rotation_vector, times, transpose};
+use obsdeg_core::model::slew::{W_IE, apply, cross, rotation, rotation_vector, times, transpose};
+use obsdeg_core::model::{Carry, Float, Matrix3};
 use obsdeg_exact::SplitMix64;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

@@ -1,12 +1,11 @@
 //! Exact verdicts on any system against the information of its samples, linearised along the true run.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::system::answer::answer;
-use obsdeg_core::system::judge::judge_compiled;
-use obsdeg_core::system::model::{ModelError, Role, Start, SystemModel};
-use obsdeg_core::system::rows::Unknown;
-use obsdeg_core::system::symmetry::{PolynomialDirection, Symmetry, symmetries};
+use obsdeg_core::degree::Status;
+use obsdeg_core::system::{
+    ModelError, PolynomialDirection, Role, StateStart, Symmetry, SystemModel, Unknown, answer,
+    judge_compiled, symmetries,
+};
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Measurement, SquareRootInformation};
@@ -18,7 +17,7 @@ use super::run::{RunError, Setup};
 use crate::crosscheck::answer::{Check, Count, Measured};
 
 /// Name and version of the JSON layout.
-pub const SCHEMA: &str = "obsdeg.system-evidence/1";
+pub(crate) const SCHEMA: &str = "obsdeg.system-evidence/1";
 /// Samples of a horizon.
 const SAMPLES: usize = 60;
 /// Runge-Kutta steps between two samples.
@@ -193,11 +192,12 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
     let rank = judged.degrees.rank();
     // with jumps, dwell may see earlier what derivatives see late: slopes are those of accuracy orders then
-    let slopes = if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == Start::Unknown) {
-        slopes(&setup, &columns, rank)?
-    } else {
-        vec![None; columns.len()]
-    };
+    let slopes =
+        if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == StateStart::Unknown) {
+            slopes(&setup, &columns, rank)?
+        } else {
+            vec![None; columns.len()]
+        };
     let quantities: Vec<SystemQuantityEvidence> = unknowns
         .iter()
         .enumerate()

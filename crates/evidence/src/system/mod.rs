@@ -1,8 +1,9 @@
 //! Any system in floating point: a filter on it ([`run`]) and the information of its samples ([`evidence`]).
 
-pub mod evidence;
-pub mod numeric;
-pub mod run;
+pub(crate) mod evidence;
+pub(crate) mod numeric;
+pub(crate) mod run;
 
-pub use evidence::{SystemEvidence, crosscheck_system};
-pub use run::{SystemRun, simulate_system};
+pub use evidence::{SymmetryEvidence, SystemEvidence, SystemQuantityEvidence, crosscheck_system};
+pub use numeric::{FilterState, Numeric, SystemMeasurement, SystemProcess};
+pub use run::{RunError, SystemEstimate, SystemRun, simulate_system};

@@ -4,8 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Measurement, Process};
 
 use obsdeg_core::model::expression::{Expression, Function, evaluate_f64};
-use obsdeg_core::system::dag::{Op, Start as FunctionStart};
-use obsdeg_core::system::model::{Compiled, Constant, KnownInput, ModelError, Role, SystemModel};
+use obsdeg_core::system::{Compiled, Constant, FunctionStart, KnownInput, ModelError, Op, Role, SystemModel};
 
 /// A state of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -245,7 +244,7 @@ impl<'a> Numeric<'a> {
     }
 
     /// The starts of states that are given by formulas, from the other values.
-    pub fn set_known_starts(&self, x: &mut DVector<f64>) {
+    pub(crate) fn set_known_starts(&self, x: &mut DVector<f64>) {
         let values = self.values(0, 0.0, x.as_slice());
         for (state, node) in self.compiled.starts.iter().enumerate() {
             let row = self.states.iter().position(|s| *s == FilterState::State(state));

@@ -1,11 +1,10 @@
 //! One run of the extended Kalman filter on any system, against a truth from the same equations.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::degree::status::Status;
-use obsdeg_core::system::answer::{SystemAnalysis, answer};
-use obsdeg_core::system::judge::judge_compiled;
-use obsdeg_core::system::model::{Compiled, ModelError, Start, SystemModel};
-use obsdeg_core::system::symmetry::Symmetries;
+use obsdeg_core::degree::Status;
+use obsdeg_core::system::{
+    Compiled, ModelError, StateStart, Symmetries, SystemAnalysis, SystemModel, answer, judge_compiled,
+};
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
 use schemars::JsonSchema;
@@ -19,7 +18,7 @@ use crate::simulation::record::Series;
 use crate::simulation::truth::Noise;
 
 /// Name and version of the JSON layout.
-pub const SCHEMA: &str = "obsdeg.system-run/1";
+pub(crate) const SCHEMA: &str = "obsdeg.system-run/1";
 /// Most samples of a run.
 const MAX_SAMPLES: f64 = 1e6;
 /// Runge-Kutta steps between two samples.
@@ -120,10 +119,10 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
     let (mut truth, mut sigmas) = (DVector::zeros(n), vec![1.0; n]);
     let start = |state: &FilterState| match *state {
         FilterState::State(i) => &model.states[i].start,
-        _ => &Start::Unknown,
+        _ => &StateStart::Unknown,
     };
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
-        if !matches!(start(state), Start::Value(_)) {
+        if !matches!(start(state), StateStart::Value(_)) {
             truth[c] = *nominal.values.get(name).ok_or_else(|| {
                 missing(&format!("`{name}`"), "no true value; expected one under [simulation.values]")
             })?;
@@ -133,8 +132,8 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
         let size = if truth[c] == 0.0 { 1.0 } else { truth[c].abs() };
         sigmas[c] = match start(state) {
-            Start::Unknown => nominal.priors.get(name).copied().unwrap_or(size),
-            Start::Known | Start::Value(_) => KNOWN * size,
+            StateStart::Unknown => nominal.priors.get(name).copied().unwrap_or(size),
+            StateStart::Known | StateStart::Value(_) => KNOWN * size,
         };
     }
     Ok((truth, sigmas))

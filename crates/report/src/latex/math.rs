@@ -1,8 +1,7 @@
 //! Formulas as LaTeX: names, expressions in program notation, solutions.
 
 use obsdeg_core::analysis::Solution;
-use obsdeg_core::solution::print::{Group, StationLabel, group};
-use obsdeg_core::solution::solver::{Frame, Term};
+use obsdeg_core::solution::{Frame, Group, StationLabel, Term, group};
 
 use super::escape;
 

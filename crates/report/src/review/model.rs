@@ -1,8 +1,8 @@
 //! The part of a model in a review.
 
-use obsdeg_core::degree::status::Status as Exact;
+use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::ModelReview;
-use obsdeg_evidence::simulation::answer::Outcome;
+use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, is_list, pictures, section};
 use crate::document::{Block, Finding, Grade, Status};

@@ -2,11 +2,9 @@
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::system::SystemAnalysis;
-use obsdeg_design::review::SchemeReview;
-use obsdeg_design::review::answer::Sweep;
-use obsdeg_evidence::compare::answer::{Quantity, Review};
-use obsdeg_evidence::crosscheck::CrossCheck;
-use obsdeg_evidence::crosscheck::answer::SlopeCurve;
+use obsdeg_design::review::{SchemeReview, Sweep};
+use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::crosscheck::{CrossCheck, SlopeCurve};
 use obsdeg_evidence::simulation::Traces;
 
 use crate::document::{Block, Drawing, Picture};
@@ -148,7 +146,7 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
-pub(super) fn dwells(s: &SchemeReview, review: &Review, name: &str) -> Option<Block> {
+pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> Option<Block> {
     let total = review.total_s;
     let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
     let mut lines = sweep(&s.dwells, &drifts(&s.dwells), |factor| (total - slews) * factor + slews);

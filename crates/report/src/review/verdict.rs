@@ -1,9 +1,9 @@
 //! The verdict on a scheme in words, led by what limits it, and its status at a glance.
 
-use obsdeg_core::degree::status::Status as Exact;
+use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::SchemeReview;
-use obsdeg_evidence::compare::answer::{Quantity, Review};
-use obsdeg_evidence::simulation::answer::Outcome;
+use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};
@@ -107,7 +107,7 @@ fn dwell_or_slews(s: &SchemeReview) -> &'static str {
 }
 
 /// Requirements by prediction and in the run, what is missed first.
-fn requirements(s: &SchemeReview, review: &Review) -> (Grade, String) {
+fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
     let mut both = [&review.requirements, &s.simulation.requirements];
     if both.iter().all(|r| r.stated == 0) {
         return (Grade::Open, words::requirements(both[0]));
@@ -118,7 +118,7 @@ fn requirements(s: &SchemeReview, review: &Review) -> (Grade, String) {
 }
 
 /// The verdict: what is missed, what limits it, what is determined, and how well.
-pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quantity]) -> String {
+pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) -> String {
     let a = &s.analysis;
     let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
     let seen: Vec<&&Quantity> = of(Exact::Observable).collect();
@@ -182,7 +182,7 @@ pub(super) fn sentences(s: &SchemeReview, review: &Review, coefficients: &[&Quan
 }
 
 /// The box of a scheme.
-pub(super) fn status(s: &SchemeReview, review: &Review) -> Status {
+pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
     let count = |psi: bool, seen: fn(&&Quantity) -> bool| {
         format!("{} of {}", of(psi).filter(seen).count(), of(psi).count())

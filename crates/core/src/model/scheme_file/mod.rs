@@ -17,9 +17,8 @@ use super::file_error::explain;
 use super::geometry::Unknowns;
 use super::platform::Platform;
 use super::scheme::{Latitude, Scheme};
-use crate::model::combination;
-use crate::model::settings;
 use crate::model::settings::Settings;
+use crate::model::{combination, settings};
 use layout::{GimbalEntry, Numbers, SimulationEntry};
 
 /// Longest scheme file, in bytes: a thousand positions with all their keys.
