@@ -1,9 +1,33 @@
-//! The exact engine of obsdeg: models, observable degrees and solving expressions.
+//! The exact engine of obsdeg: which unknowns a model's output determines, with how many derivatives, and by which expressions.
 //!
-//! The way of the data: a model turns into derivative rows ([`degree::rows`]), these into a staircase
-//! ([`degree::staircase`]), the staircase into verdicts ([`degree::status`]), these into sparse combinations
-//! ([`solution::combinations`]) and solutions ([`solution`]), and all of it into one plain [`analysis::Analysis`]. Every module
-//! imports only from those below it.
+//! A torquing scheme:
+//!
+//! ```
+//! use obsdeg_core::analysis::{AnalysisOptions, analyze};
+//! use obsdeg_core::model::{Angle, Scheme};
+//!
+//! let positions = [[0, 0, 0], [180, 0, 0]].map(|p| p.map(Angle::from_degrees));
+//! let answer = analyze(&Scheme::of_angles(positions), AnalysisOptions::default(), None)?;
+//! let degree = |name| answer.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
+//! assert_eq!((answer.rank, answer.unknowns.len()), (8, 15));
+//! assert_eq!((degree("D_FX"), degree("D_FZ")), (Some(1), None));
+//! # Ok::<(), obsdeg_core::analysis::AnalysisError>(())
+//! ```
+//!
+//! Any system, read from a file's text:
+//!
+//! ```
+//! use obsdeg_core::system::{SystemOptions, analyze_system, model_file};
+//!
+//! let model = model_file::read("name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz = \"x\"")?;
+//! let answer = analyze_system(&model, SystemOptions::default(), None)?;
+//! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
+//! # Ok::<(), obsdeg_core::system::ModelError>(())
+//! ```
+//!
+//! The way of the data: a model ([`model`], [`system`]) turns into derivative rows, these into a staircase and verdicts ([`degree`]), these
+//! into sparse combinations, a null space and solutions ([`solution`]), and all of it into one plain [`analysis::Analysis`]. With
+//! dwells there are accuracy orders ([`accuracy`]). Every module imports only from those before it in this sentence.
 
 pub mod accuracy;
 pub mod analysis;

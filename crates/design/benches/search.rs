@@ -4,7 +4,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_design::design::{
-    Candidates, Constraints, Criterion, CriterionName, Design, DesignOptions, Evaluator, Rows, Search, design,
+    Candidates, Constraints, Criterion, Design, DesignOptions, Evaluator, Rows, Search, design,
 };
 use obsdeg_evidence::simulation::Conditions;
 
@@ -59,20 +59,6 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
 /// The same with the front, as the command runs it.
 #[divan::bench(sample_count = 3)]
 fn the_command_for_five_of_24() -> Design {
-    let options = DesignOptions {
-        candidates: Candidates::cardinals(),
-        positions: Some(5),
-        required: Vec::new(),
-        degree_caps: Vec::new(),
-        meet: false,
-        total_s: None,
-        slew_s: None,
-        criterion: CriterionName::Worst,
-        keep: 10,
-        restarts: 200,
-        refine: false,
-        front: Vec::new(),
-        seed: 1,
-    };
+    let options = DesignOptions { positions: Some(5), ..DesignOptions::default() };
     design(&base(Carry::Inertial), &Conditions::default(), &options, &|_| true).expect("designed")
 }

@@ -1,4 +1,18 @@
 //! The search for torquing schemes, and all that a review of them needs.
+//!
+//! ```
+//! use obsdeg_core::model::Scheme;
+//! use obsdeg_design::design::{DesignOptions, design};
+//! use obsdeg_evidence::simulation::Conditions;
+//!
+//! let options = DesignOptions { positions: Some(3), required: vec!["D_F".into()], ..DesignOptions::default() };
+//! let found = design(&Scheme::default(), &Conditions::default(), &options, &|_| true)?;
+//! assert!(found.found.iter().all(|s| s.positions.len() == 3));
+//! # Ok::<(), obsdeg_design::design::DesignError>(())
+//! ```
+//!
+//! [`design`] chooses positions from candidates: sets are judged exactly, sequences ranked by the information of their samples.
+//! [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
 
 pub mod design;
 pub mod review;

@@ -1,4 +1,21 @@
 //! Evidence for exact verdicts: what a filter makes of the same scheme or system.
+//!
+//! ```
+//! use obsdeg_core::model::{Angle, Scheme};
+//! use obsdeg_evidence::simulation::{Conditions, simulate};
+//!
+//! let positions = [[0, 0, 0], [180, 0, 0]].map(|p| p.map(Angle::from_degrees));
+//! let scheme = Scheme::of_angles(positions);
+//! let (run, _traces) = simulate(&scheme, &Conditions::default(), 1)?;
+//! let d_fx = run.quantities.iter().find(|e| e.name == "D_FX").expect("an unknown of every scheme");
+//! assert!(d_fx.error.abs() < 4.0 * d_fx.sigma);
+//! # Ok::<(), obsdeg_evidence::simulation::SimulationError>(())
+//! ```
+//!
+//! A scheme and the conditions of a run ([`simulation`]) become a timeline and a linear model in SI units; the exact verdicts reach it as numbers
+//! ([`prediction`]) and are held against the information of all samples, slopes over the dwell and Monte Carlo runs ([`crosscheck`]), any
+//! system's likewise ([`system`]). [`requirements`] is the one decision on sigmas; [`compare`] holds schemes side by side; [`audit`] is the
+//! paper, equation by equation.
 
 pub mod audit;
 pub mod compare;

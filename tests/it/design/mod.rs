@@ -7,9 +7,7 @@ mod search;
 mod sigmas;
 
 use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo, cardinal};
-use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignOptions, Evaluator, Found, Progress, Rows, design,
-};
+use obsdeg_design::design::{Candidates, Design, DesignOptions, Evaluator, Found, Progress, Rows, design};
 use obsdeg_evidence::simulation::Conditions;
 
 fn base(carry: Carry) -> Scheme {
@@ -20,21 +18,7 @@ fn base(carry: Carry) -> Scheme {
 const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
 fn options(positions: Option<usize>) -> DesignOptions {
-    DesignOptions {
-        candidates: Candidates::cardinals(),
-        positions,
-        required: Vec::new(),
-        degree_caps: Vec::new(),
-        meet: false,
-        total_s: None,
-        slew_s: None,
-        criterion: CriterionName::Worst,
-        keep: 5,
-        restarts: 40,
-        refine: false,
-        front: Vec::new(),
-        seed: 1,
-    }
+    DesignOptions { positions, keep: 5, restarts: 40, ..DesignOptions::default() }
 }
 
 fn on(_: Progress) -> bool {

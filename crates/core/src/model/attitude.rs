@@ -125,7 +125,7 @@ fn euler_of(q: [usize; 3]) -> Euler {
 /// those with the fewest rotations are taken. `None` for anything else.
 ///
 /// ```
-/// use obsdeg_core::model::attitude::cardinal;
+/// use obsdeg_core::model::cardinal;
 /// let angles = cardinal("NDW").expect("an attitude").map(|a| a.to_string());
 /// assert_eq!(angles, ["180", "0", "0"]);
 /// assert!(cardinal("NUW").is_none()); // left-handed

@@ -12,7 +12,7 @@ use crate::model::ranges::DWELL_S;
 /// use obsdeg_core::model::Dwell;
 /// assert_eq!("12.5".parse::<Dwell>()?.seconds(), 12.5);
 /// assert!("0".parse::<Dwell>().is_err());
-/// # Ok::<(), obsdeg_core::model::dwell::DwellError>(())
+/// # Ok::<(), obsdeg_core::model::DwellError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Dwell {

@@ -1,8 +1,8 @@
 //! Finding schemes: the fewest positions, and the best of a number of positions.
 //!
-//! Sets of candidates are first judged exactly ([`observability`]). Sequences of those that make the required coefficients observable, in
-//! every order where the carry makes order matter and by both ways of half turns ([`ways`]), are then ranked ([`search`]): constraints
-//! first, then the worst degree, then a criterion of optimal design ([`information`]), up to turns of the platform axes ([`symmetry`]).
+//! Sets of candidates are first judged exactly (`observability`). Sequences of those that make the required coefficients observable, in
+//! every order where the carry makes order matter and by both ways of half turns (`ways`), are then ranked (`search`): constraints
+//! first, then the worst degree, then a criterion of optimal design (`information`), up to turns of the platform axes (`symmetry`).
 
 pub(crate) mod answer;
 pub(crate) mod candidates;
@@ -194,6 +194,27 @@ pub struct DesignOptions {
     pub front: Vec<usize>,
     /// Seed of all random choices.
     pub seed: u64,
+}
+
+impl Default for DesignOptions {
+    /// The minimum, of the cardinal attitudes.
+    fn default() -> Self {
+        Self {
+            candidates: Candidates::cardinals(),
+            positions: None,
+            required: Vec::new(),
+            degree_caps: Vec::new(),
+            meet: false,
+            total_s: None,
+            slew_s: None,
+            criterion: CriterionName::default(),
+            keep: 10,
+            restarts: 200,
+            refine: false,
+            front: Vec::new(),
+            seed: 1,
+        }
+    }
 }
 
 /// The name of a criterion.

@@ -15,7 +15,7 @@ use obsdeg_evidence::system::{RunError, crosscheck_system, simulate_system};
 use obsdeg_symbolic::Worker;
 use rayon::prelude::*;
 
-use crate::design::{Candidates, CriterionName, DesignError, DesignOptions, design};
+use crate::design::{Candidates, DesignError, DesignOptions, design};
 
 /// Between two latitudes of the sweep, in degrees.
 const LATITUDE_STEP: i32 = 5;
@@ -269,16 +269,10 @@ fn alternatives(
         candidates,
         positions,
         required: required.to_vec(),
-        degree_caps: Vec::new(),
-        meet: false,
-        total_s: None,
-        slew_s: None,
-        criterion: CriterionName::Worst,
         keep: 1,
         restarts: 40,
-        refine: false,
-        front: Vec::new(),
         seed,
+        ..DesignOptions::default()
     };
     let going = |_| true;
     let mut run = |options: DesignOptions| match design(scheme, conditions, &options, &going) {

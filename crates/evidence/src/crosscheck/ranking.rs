@@ -4,7 +4,7 @@
 /// are tied in one of them.
 ///
 /// ```
-/// use obsdeg_core::crosscheck::kendall_tau_b;
+/// use obsdeg_evidence::crosscheck::kendall_tau_b;
 /// assert_eq!(kendall_tau_b(&[1, 1, 2, 3], &[5, 5, 6, 9]), Some(1.0));
 /// assert_eq!(kendall_tau_b(&[1, 2, 3], &[3, 2, 1]), Some(-1.0));
 /// assert_eq!(kendall_tau_b(&[1, 1], &[1, 2]), None);

@@ -111,7 +111,7 @@ pub struct TimelineReport {
     pub position: String,
     /// Whether it is a slew.
     pub slew: bool,
-    /// RunStart in s.
+    /// Start in s.
     pub start_s: f64,
     /// End in s.
     pub end_s: f64,

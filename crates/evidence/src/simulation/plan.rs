@@ -73,7 +73,7 @@ pub struct Segment {
     pub position: usize,
     /// Position or slew.
     pub kind: SegmentKind,
-    /// RunStart in s.
+    /// Start in s.
     pub start_s: f64,
     /// Number of steps.
     pub steps: usize,

@@ -1,4 +1,4 @@
-//! Any system in floating point: a filter on it ([`run`]) and the information of its samples ([`evidence`]).
+//! Any system in floating point: a filter on it (`run`) and the information of its samples (`evidence`).
 
 pub(crate) mod evidence;
 pub(crate) mod numeric;
