@@ -1,9 +1,10 @@
 //! Published systems with known verdicts: the engine for any system against all of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
+use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::model::{Scheme, cardinal};
 use obsdeg_core::system::{Judgement, SystemOptions, Unknown, analyze_system, json, judge, model_file};
 use obsdeg_ekf::model::central_difference;
@@ -35,7 +36,7 @@ fn names(value: &Value) -> Vec<String> {
 /// Degrees by name; of an unknown input that of the signal itself.
 fn degrees(j: &Judgement) -> BTreeMap<String, Option<usize>> {
     let of = |(u, d): (&Unknown, &Option<usize>)| (u.derivative == 0).then(|| (u.name.clone(), *d));
-    j.layout.unknowns.iter().zip(&j.degrees.degree).filter_map(of).collect()
+    j.layout.unknowns.iter().zip(&j.findings.degrees.degree).filter_map(of).collect()
 }
 
 /// What differs from the reference.
@@ -72,7 +73,7 @@ fn mismatches(reference: &Value, text: &str) -> Vec<String> {
     }
     if let Some(ranks) = reference["rank_by_order"].as_array() {
         let ranks: Vec<usize> = ranks.iter().filter_map(|r| Some(r.as_u64()? as usize)).collect();
-        let profile = &judged.degrees.rank_profile;
+        let profile = &judged.findings.degrees.rank_profile;
         for (k, rank) in ranks.iter().enumerate() {
             let own = profile.get(k).or(profile.last()).copied().unwrap_or(0);
             if own != *rank {
@@ -80,13 +81,13 @@ fn mismatches(reference: &Value, text: &str) -> Vec<String> {
             }
         }
     }
-    for (text, degree) in names(&reference["observable_combinations"]).iter().zip(&judged.combinations) {
-        if degree.is_none() {
+    for (text, verdict) in names(&reference["observable_combinations"]).iter().zip(&judged.findings.asked) {
+        if verdict.status != Status::Observable {
             out.push(format!("{text} is not observable"));
         }
     }
-    if judged.error_bound > 1e-12 {
-        out.push(format!("error bound {:e}", judged.error_bound));
+    if judged.findings.error_bound > 1e-12 {
+        out.push(format!("error bound {:e}", judged.findings.error_bound));
     }
     out
 }
@@ -122,12 +123,34 @@ fn the_platform_is_one_of_them() {
     let positions = ["NUE", "NDW"].map(|n| cardinal(n).expect("an attitude"));
     let no_solutions = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
     let platform = analyze(&Scheme::of_angles(positions), no_solutions, None).expect("analysed");
-    assert_eq!(model.degrees.rank_profile[..3], platform.rank_profile[..]);
-    let own = degrees(&model);
+    assert_eq!(model.findings.degrees.rank_profile[..3], platform.rank_profile[..]);
+    let unknowns = &model.layout.unknowns;
     for q in &platform.quantities {
-        assert_eq!(own[&q.name], q.degree, "{}", q.name);
+        let c = unknowns.iter().position(|u| u.name == q.name).expect("the same unknowns");
+        let Verdict { status, degree } = model.findings.verdict(c);
+        assert_eq!((status, degree), (q.status, q.degree), "{}", q.name);
+        let partners: BTreeSet<&str> =
+            model.findings.partners[c].iter().map(|&d| unknowns[d].name.as_str()).collect();
+        assert_eq!(partners, q.partners.iter().map(String::as_str).collect(), "{}", q.name);
     }
-    assert_eq!(model.combinations, [Some(1)]);
+    assert_eq!(model.findings.asked, [Verdict { status: Status::Observable, degree: Some(1) }]);
+}
+
+/// A reader of JSON that holds numbers as doubles keeps 53 bits of them: primes are text, of a scheme and of a model.
+#[test]
+fn primes_are_text() {
+    let text = "name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz = \"x\"\n";
+    let model = model_file::read(text).expect("a model");
+    let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+    let system =
+        serde_json::to_value(analyze_system(&model, options, None).expect("analysed")).expect("JSON");
+    let scheme = Scheme::of_angles([cardinal("NUE").expect("an attitude")]);
+    let options = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
+    let platform = serde_json::to_value(analyze(&scheme, options, None).expect("analysed")).expect("JSON");
+    for primes in [&system["primes"], &platform["certainty"]["primes"]] {
+        let of = |i: usize| primes[i].as_str().and_then(|p| p.parse::<u64>().ok()).expect("text of a number");
+        assert!(of(0) != of(1) && (0..2).all(|i| of(i) >> 53 > 0), "{primes}");
+    }
 }
 
 /// A known start is a special point: rank may grow after it has stood still.
@@ -140,13 +163,13 @@ fn stagnation_is_no_end_at_a_known_start() {
     };
     let found = trap(2);
     assert_eq!((degree_of(&found, "a"), found.layout.closed, found.rests_on_bound), (Some(3), false, false));
-    assert_eq!(found.degrees.rank_profile, [0, 0, 0, 1]);
+    assert_eq!(found.findings.degrees.rank_profile, [0, 0, 0, 1]);
     // beyond the bound nothing is claimed
     let late = trap(20);
     assert!(degree_of(&late, "a").is_none() && late.rests_on_bound);
     // with a generic start the first stagnation is the end
     let open = judged("name='open'\nparameters=['a']\n[states]\nx='1+a*x^2'\n[outputs]\ny='x'");
-    assert_eq!((open.layout.closed, open.degrees.rank_profile), (true, vec![1, 2]));
+    assert_eq!((open.layout.closed, open.findings.degrees.rank_profile), (true, vec![1, 2]));
 }
 
 /// Identities between functions hold exactly, at every order: what cancels moves no output.
@@ -185,14 +208,14 @@ fn identities_of_functions_cancel() {
         );
         let found = judged(&text);
         assert_eq!(degree_of(&found, "z"), Some(0), "{identity}");
-        assert_eq!(found.degrees.rank(), 1, "{identity}: {:?}", found.degrees);
+        assert_eq!(found.findings.degrees.rank(), 1, "{identity}: {:?}", found.findings.degrees);
     }
     // and what does not cancel is seen
     for different in ["sin(x)^2 - cos(x)^2", "exp(x) - x", "sqrt(x) + x", "asin(x) - acos(x)", "x^q"] {
         let text = format!(
             "name='no identity'\n[states]\nx='w*x + q'\nq='x - w'\nw='0'\nz='-z'\n[outputs]\ny='z + ({different})'"
         );
-        assert_eq!(judged(&text).degrees.rank(), 4, "{different}");
+        assert_eq!(judged(&text).findings.degrees.rank(), 4, "{different}");
     }
 }
 
@@ -228,7 +251,7 @@ fn inputs_constants_and_experiments() {
     let generic = with("known_inputs={u='generic'}", "a + b*u");
     assert_eq!((degree_of(&generic, "a"), degree_of(&generic, "b")), (Some(2), Some(2)));
     let constant = with("known_inputs={u='constant'}", "a + b*u");
-    assert_eq!((degree_of(&constant, "a"), constant.degrees.rank()), (None, 2));
+    assert_eq!((degree_of(&constant, "a"), constant.findings.degrees.rank()), (None, 2));
     let ramp = with("known_inputs={u={polynomial=1}}", "a + b*u");
     assert_eq!(degree_of(&ramp, "b"), Some(2));
     let known = with("known_inputs={u={function='exp(-t)'}}", "a + b*u");
@@ -246,7 +269,7 @@ fn inputs_constants_and_experiments() {
     let jump = judged(
         "name='jump'\nparameters=['a']\n[states]\nx='0'\nz='0'\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + a*z'}",
     );
-    assert_eq!((degree_of(&jump, "a"), jump.degrees.rank()), (None, 2));
+    assert_eq!((degree_of(&jump, "a"), jump.findings.degrees.rank()), (None, 2));
 }
 
 /// The same system from JSON and from TOML.
@@ -257,7 +280,7 @@ fn both_layouts_say_the_same() {
         "equations": {"x1": "-p1*x1 + u", "x2": "p2*x1 - x2"}, "outputs": {"y": "x2"}}"#;
     let of_json = judge(&json::read(json).expect("a model"), 7, None).expect("judged");
     let of_toml = judged(toml);
-    assert_eq!((of_json.layout, of_json.degrees), (of_toml.layout, of_toml.degrees));
+    assert_eq!((of_json.layout, of_json.findings.degrees), (of_toml.layout, of_toml.findings.degrees));
 }
 
 /// Ten megabytes of anything are refused, or read, in order.
@@ -275,7 +298,7 @@ fn monsters_do_no_harm() {
     let error = model_file::read(&long).and_then(|m| judge(&m, 1, None)).expect_err("too many operations");
     assert!(error.to_string().contains("operations"), "{error}");
     let sum = model(&format!("{}x", "a*x + ".repeat(20_000)));
-    assert_eq!(judged(&sum).degrees.rank(), 2);
+    assert_eq!(judged(&sum).findings.degrees.rank(), 2);
     for fraction in ["x^(a + 1/6666666666666)", "exp(x/99999)", "x^0.1234567", "cos(0.00001*x)", "x^123456"] {
         let error = model_file::read(&model(fraction)).and_then(|m| judge(&m, 1, None)).expect_err(fraction);
         assert!(error.to_string().contains("above 1000"), "{fraction}: {error}");
@@ -508,7 +531,7 @@ fn nobody_aims_at_the_primes() {
     for _ in 0..4 {
         let text = format!("name='aimed'\n[states]\nx='-x'\n[outputs]\nz='x*{product}'");
         let judged = judge(&model_file::read(&text).expect("a model"), 1, None).expect("judged");
-        assert_eq!((judged.degrees.rank(), degree_of(&judged, "x")), (1, Some(0)), "{product}");
+        assert_eq!((judged.findings.degrees.rank(), degree_of(&judged, "x")), (1, Some(0)), "{product}");
         let [p, q] = judged.fields.map(|f| f.modulus());
         seen.extend([p, q]);
         product = format!("{product}*{p}*{q}");

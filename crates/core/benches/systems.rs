@@ -30,7 +30,7 @@ fn all_references(bencher: Bencher<'_, '_>) {
     bencher.counter(ItemsCount::new(texts.len())).bench(|| {
         for text in &texts {
             let judged = json::read(text).and_then(|m| judge(&m, 1, None));
-            black_box(judged.expect("judged").degrees.rank());
+            black_box(judged.expect("judged").findings.degrees.rank());
         }
     });
 }
@@ -40,7 +40,7 @@ fn all_references(bencher: Bencher<'_, '_>) {
 fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
     let text = std::fs::read_to_string(folder().join(format!("{name}.json"))).expect("readable");
     let model = json::read(&text).expect("a model");
-    bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").degrees.rank());
+    bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").findings.degrees.rank());
 }
 
 /// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank needs order 2n-1.
@@ -66,7 +66,7 @@ fn chain(n: usize) -> SystemModel {
 #[divan::bench(args = [4, 8, 16, 32])]
 fn chain_of(bencher: Bencher<'_, '_>, n: usize) {
     let model = chain(n);
-    bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").degrees.rank());
+    bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").findings.degrees.rank());
 }
 
 /// Eight states and rates, observed to a given order whatever the rank.
@@ -76,5 +76,5 @@ fn to_order(bencher: Bencher<'_, '_>, order: usize) {
     // a start that is known keeps the first stagnation from being the end
     model.states[0].start = obsdeg_core::system::StateStart::Known;
     model.outputs[0].1 = model.states[0].equation.clone();
-    bencher.bench(|| judge(black_box(&model), 1, Some(order)).expect("judged").degrees.rank());
+    bencher.bench(|| judge(black_box(&model), 1, Some(order)).expect("judged").findings.degrees.rank());
 }

@@ -26,12 +26,13 @@
 //! ```
 //!
 //! The way of the data: a model ([`model`], [`system`]) turns into derivative rows, these into a staircase and verdicts ([`degree`]), these
-//! into sparse combinations, a null space and solutions ([`solution`]), and all of it into one plain [`analysis::Analysis`]. With
-//! dwells there are accuracy orders ([`accuracy`]). Every module imports only from those before it in this sentence.
+//! into sparse combinations, a null space and solutions ([`solution`]), with dwells into accuracy orders ([`accuracy`]); all that is found stands
+//! in one exact value ([`findings`]), of which an [`analysis::Analysis`] is the view in words. No module imports from one that comes after it here.
 
 pub mod accuracy;
 pub mod analysis;
 pub mod degree;
+pub mod findings;
 pub mod model;
 pub mod solution;
 pub mod system;

@@ -1,10 +1,10 @@
 //! What the exact engine says of a scheme, as numbers that a filter can be held against.
 
 use obsdeg_core::accuracy::{Accuracy, AccuracyError};
-use obsdeg_core::analysis::{AnalysisError, few_enough};
-use obsdeg_core::degree::{Coefficient, Status, Verdict, judge, partners};
+use obsdeg_core::degree::{Coefficient, Findings, Status, Verdict};
+use obsdeg_core::findings::{AnalysisError, CombinationFinding, Judged};
 use obsdeg_core::model::Platform;
-use obsdeg_core::solution::{Frame, Solver, Sparse, combinations, null_space, requested_combinations};
+use obsdeg_core::solution::{Frame, Sparse};
 
 /// A linear combination of unknowns: `(unknown, coefficient)` in SI units.
 pub type Combination = Vec<(usize, f64)>;
@@ -82,88 +82,63 @@ impl Prediction {
     /// # Errors
     /// [`PredictionError`].
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
-        few_enough(platform).map_err(AnalysisError::from)?;
-        let verdicts = judge(platform, seed).map_err(AnalysisError::from)?;
-        let requested = requested_combinations(platform, &verdicts, seed).map_err(AnalysisError::from)?;
-        let accuracy = match Accuracy::new(platform, &verdicts, seed) {
+        let judged = Judged::new(platform, seed)?;
+        let mut solver = judged.solver(Frame::N, None);
+        let found = judged.findings(&mut solver);
+        let accuracy = match found.accuracy.as_ref() {
             Err(AccuracyError::Rotation) => None,
-            other => Some(other?),
+            other => Some(other.map_err(Clone::clone)?),
         };
-        let mut solver = Solver::new(platform, &verdicts, seed, Frame::N, None);
-        let null = null_space(platform, &verdicts, &mut solver);
-        let n = platform.names().len();
         let determined = |order: Option<usize>, degree: Option<usize>| {
             if accuracy.is_some() { order.is_some() } else { degree.is_some() }
         };
-        let unknowns: Vec<PredictedUnknown> = partners(n, &verdicts.stairs)
-            .into_iter()
-            .enumerate()
-            .map(|(c, partners)| {
-                let v = Verdict::of(&verdicts.degrees, c);
-                let accuracy_order = accuracy.as_ref().and_then(|a| a.order[c]);
-                let order_at_end = accuracy.as_ref().and_then(|a| a.order_at_end[c]);
+        let n = platform.names().len();
+        let unknowns: Vec<PredictedUnknown> = (0..n)
+            .map(|c| {
+                let (Verdict { status, degree }, orders) = (found.verdicts.verdict(c), found.orders(c));
                 PredictedUnknown {
-                    status: v.status,
-                    degree: v.degree,
-                    accuracy_order,
-                    determined: determined(accuracy_order, v.degree),
-                    order_at_end,
-                    determined_at_end: determined(order_at_end, v.degree),
-                    partners,
+                    status,
+                    degree,
+                    accuracy_order: orders.start,
+                    determined: determined(orders.start, degree),
+                    order_at_end: orders.end,
+                    determined_at_end: determined(orders.end, degree),
+                    partners: found.verdicts.partners[c].clone(),
                 }
             })
             .collect();
-        let combined = combinations(platform, &verdicts, &mut solver);
         let numbers = |terms: &Sparse| -> Option<Combination> {
             let rate = |k: &Coefficient| rates[0].powi(k.rates[0]) * rates[1].powi(k.rates[1]);
             terms.iter().map(|(c, k)| Some((*c, solver.number(k)? * rate(k)))).collect()
         };
-        let of_functional =
-            |row: &[u64], degree| accuracy.as_ref().and_then(|a| a.of_functional(row, degree));
-        let at_end =
-            |row: &[u64], degree| accuracy.as_ref().and_then(|a| a.of_functional_at_end(row, degree));
-        let asked = requested.into_iter().filter_map(|r| {
-            let order_at_end = at_end(&r.row, r.verdict.degree);
+        let predicted = |c: &CombinationFinding| {
+            let Verdict { status, degree } = c.verdict;
             Some(PredictedCombination {
-                terms: numbers(&r.terms).filter(|t| !t.is_empty())?,
-                status: r.verdict.status,
-                degree: r.verdict.degree,
-                accuracy_order: of_functional(&r.row, r.verdict.degree),
-                order_at_end,
-                determined_at_end: determined(order_at_end, r.verdict.degree),
-                expression: r.text,
+                expression: c.name.clone(),
+                terms: numbers(&c.functional.as_ref()?.terms).filter(|t| !t.is_empty())?,
+                status,
+                degree,
+                accuracy_order: c.orders.start,
+                order_at_end: c.orders.end,
+                determined_at_end: determined(c.orders.end, degree),
             })
-        });
-        let combinations = combined
-            .into_iter()
-            .filter_map(|c| {
-                let order_at_end = at_end(&c.vector, Some(c.degree));
-                Some(PredictedCombination {
-                    terms: numbers(&c.functional.as_ref()?.terms)?,
-                    expression: c.name,
-                    status: Status::Observable,
-                    degree: Some(c.degree),
-                    accuracy_order: of_functional(&c.vector, Some(c.degree)),
-                    order_at_end,
-                    determined_at_end: determined(order_at_end, Some(c.degree)),
-                })
-            })
-            .chain(asked)
-            .collect();
+        };
+        let combinations = found.combinations.iter().filter_map(predicted).collect();
         // with dwells, a direction may be seen that derivatives do not see (at a pole)
-        let unseen = |v: &[u64]| !accuracy.as_ref().is_some_and(|a| a.sees(v));
+        let unseen = |v: &[u64]| !accuracy.is_some_and(|a| a.sees(v));
         let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).filter(|&c| {
             let mut unit = vec![0; n];
             unit[c] = 1;
             unseen(&unit)
         });
-        let null_space = (null.iter().filter(|v| unseen(&v.vector)))
+        let null_space = (found.null_space.iter().filter(|v| unseen(&v.vector)))
             .filter_map(|v| numbers(v.components.as_ref()?))
             .chain(silent.map(|c| vec![(c, 1.0)]))
             .collect();
-        let rank = accuracy.as_ref().and_then(Accuracy::rank).unwrap_or_else(|| verdicts.degrees.rank());
+        let Findings { degrees, error_bound, .. } = &found.verdicts;
+        let rank = accuracy.and_then(Accuracy::rank).unwrap_or_else(|| degrees.rank());
+        let error_bound = accuracy.map_or(*error_bound, |a| error_bound.max(a.error_bound));
         let has_accuracy_orders = accuracy.is_some();
-        let error_bound = accuracy.map_or(verdicts.error_bound, |a| verdicts.error_bound.max(a.error_bound));
         Ok(Self { unknowns, combinations, null_space, rank, has_accuracy_orders, error_bound })
     }
 }

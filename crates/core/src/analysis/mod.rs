@@ -6,21 +6,21 @@ use obsdeg_symbolic::{Worker, WorkerError};
 
 pub use answer::*;
 
-use crate::accuracy::Accuracy;
+pub use crate::findings::AnalysisError;
+
 use crate::degree::coefficient::{Coefficient, readable};
-use crate::degree::ensemble::{EnsembleError, Verdicts, degrees, judge};
-use crate::degree::staircase::partners;
-use crate::degree::status::{Difference, Status, Verdict};
+use crate::degree::ensemble::degrees;
+use crate::degree::findings::Findings;
+use crate::degree::status::{Difference, Verdict};
+use crate::findings::{CombinationFinding, Judged, SchemeFindings};
 use crate::model::attitude::c_n_from_euler;
 use crate::model::platform::Platform;
 use crate::model::ring::Float;
-use crate::model::scheme::MAX_UNKNOWNS;
-use crate::model::{Angle, Carry, Scheme, SchemeError, Unknowns};
-use crate::solution::combinations::{Combination, NullVector, combinations, null_space};
+use crate::model::{Angle, Carry, Scheme, Unknowns};
+use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
 use crate::solution::print::{StationLabel, stations, terms, text};
-use crate::solution::requested::{CombinationError, Requested, requested_combinations};
 use crate::solution::solver::{Frame, Functional, Solver};
 
 /// Name and version of the JSON layout.
@@ -45,20 +45,6 @@ impl Default for AnalysisOptions {
     }
 }
 
-/// Why there is no analysis.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum AnalysisError {
-    /// The scheme cannot be analysed.
-    #[error(transparent)]
-    Scheme(#[from] SchemeError),
-    /// No verdict.
-    #[error(transparent)]
-    Verdict(#[from] EnsembleError),
-    /// A combination is no linear combination of the unknowns.
-    #[error(transparent)]
-    Combination(#[from] CombinationError),
-}
-
 /// Analyses `scheme`. The worker, if given, is started only when formulas are wanted.
 ///
 /// # Errors
@@ -69,24 +55,18 @@ pub fn analyze(
     worker: Option<&mut Worker>,
 ) -> Result<Analysis, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
-    few_enough(&platform)?;
-    let verdicts = judge(&platform, options.seed)?;
-    let requested = requested_combinations(&platform, &verdicts, options.seed)?;
+    let judged = Judged::new(&platform, options.seed)?;
+    let verdicts = &judged.verdicts;
     let built = worker.is_some();
     let worker = worker.filter(|_| options.solutions || options.formulas);
-    let mut solver = Solver::new(&platform, &verdicts, options.seed, options.frame, worker);
-    let basis = combinations(&platform, &verdicts, &mut solver);
-    let null = null_space(&platform, &verdicts, &mut solver);
+    let mut solver = judged.solver(options.frame, worker);
+    let findings = judged.findings(&mut solver);
 
-    let mut printer =
-        Printer { solver, options, stations: stations(scheme), accuracy: None, notes: Vec::new() };
-    let accuracy = Accuracy::new(&platform, &verdicts, options.seed);
-    printer.accuracy = printer.noted(accuracy.map_err(|e| e.to_string()));
-    let quantities = quantities(&platform, &verdicts, &mut printer)?;
-    let mut combinations: Vec<CombinationReport> =
-        basis.into_iter().map(|c| basis_report(c, &mut printer)).collect();
-    combinations.extend(requested.into_iter().map(|r| requested_report(r, &mut printer)));
-    let found = loci(&platform, &verdicts, &mut printer.solver, options.seed);
+    let mut printer = Printer { solver, options, stations: stations(scheme), notes: Vec::new() };
+    printer.notes.extend(findings.accuracy.as_ref().err().map(ToString::to_string));
+    let quantities = quantities(&platform, &findings, &mut printer)?;
+    let combinations = findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
+    let found = loci(&platform, verdicts, &mut printer.solver, options.seed);
     let found = printer.noted(found).unwrap_or_default();
     printer.notes.extend(found.incomplete);
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
@@ -113,31 +93,25 @@ pub fn analyze(
         terms: scheme.unknowns.to_string(),
         measured_azimuth: scheme.measured_azimuth,
         positions: position_reports(scheme),
-        rank_profile: verdicts.degrees.rank_profile.clone(),
-        rank: verdicts.degrees.rank(),
+        rank_profile: findings.verdicts.degrees.rank_profile.clone(),
+        rank: findings.verdicts.degrees.rank(),
         unknowns: platform.names().to_vec(),
-        has_accuracy_orders: printer.accuracy.is_some(),
+        has_accuracy_orders: findings.accuracy.is_ok(),
         quantities,
         combinations,
-        null_space: null.iter().map(|v| null_report(&platform, v)).collect(),
-        carries: carry_reports(&platform, &verdicts, options.seed)?,
+        null_space: findings.null_space.iter().map(|v| null_report(&platform, v)).collect(),
+        carries: carry_reports(&platform, &findings.verdicts)?,
         degenerate_loci: found.loci,
         formulas,
         frame: options.frame,
         certainty: Certainty {
             method: "exact ranks modulo two random 61-bit primes that agree".into(),
-            error_bound: verdicts.error_bound,
-            primes: [0, 1].map(|i| verdicts.values[i].roots().field.modulus().to_string()),
-            seed: options.seed,
+            error_bound: findings.verdicts.error_bound,
+            primes: findings.verdicts.primes_as_text(),
+            seed: findings.verdicts.seed,
         },
         notes: printer.notes,
     })
-}
-
-/// Refuses more unknowns than an analysis takes, before anything grows.
-pub fn few_enough(platform: &Platform) -> Result<(), SchemeError> {
-    let found = platform.names().len();
-    if found <= MAX_UNKNOWNS { Ok(()) } else { Err(SchemeError::TooManyUnknowns { found }) }
 }
 
 /// Turns functionals into printed solutions and collects what could not be said.
@@ -145,8 +119,6 @@ struct Printer<'a> {
     solver: Solver<'a>,
     options: AnalysisOptions,
     stations: Vec<StationLabel>,
-    /// The accuracy orders, if they could be computed.
-    accuracy: Option<Accuracy>,
     notes: Vec<String>,
 }
 
@@ -172,11 +144,6 @@ impl Printer<'_> {
         }
     }
 
-    /// The accuracy order of a functional in the first field of the verdicts.
-    fn accuracy_order(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
-        self.accuracy.as_ref()?.of_functional(row, degree)
-    }
-
     /// The value, or a note.
     fn noted<T>(&mut self, result: Result<T, String>) -> Option<T> {
         result.map_err(|reason| self.notes.push(reason)).ok()
@@ -186,21 +153,21 @@ impl Printer<'_> {
 /// The verdicts on all unknowns, best first.
 fn quantities(
     platform: &Platform,
-    verdicts: &Verdicts,
+    findings: &SchemeFindings,
     printer: &mut Printer<'_>,
 ) -> Result<Vec<Quantity>, AnalysisError> {
-    let (scheme, seed) = (platform.scheme(), printer.options.seed);
+    let SchemeFindings { verdicts, .. } = findings;
+    let (scheme, seed) = (platform.scheme(), verdicts.seed);
     let special = scheme.latitude.is_some_and(|l| l.is_pole() || l.is_equator());
     let other_latitudes =
         if special { Some(degrees_of(&Scheme { latitude: None, ..scheme.clone() }, seed)?) } else { None };
     let defect = verdicts.degrees.rank() < platform.names().len();
     let generic = generic_angles(scheme).filter(|_| defect);
     let other_angles = generic.map(|s| degrees_of(&s, seed)).transpose()?;
-    let partners = partners(platform.names().len(), &verdicts.stairs);
 
     let mut out = Vec::new();
     for (c, name) in platform.names().iter().enumerate() {
-        let Verdict { status, degree } = Verdict::of(&verdicts.degrees, c);
+        let Verdict { status, degree } = verdicts.verdict(c);
         let unit = printer.solver.functional(vec![(c, Coefficient::one())]);
         let solution = degree.and_then(|k| printer.solution(unit.as_ref()?, k, name));
         let elsewhere = Elsewhere {
@@ -213,8 +180,8 @@ fn quantities(
             unit: platform.units()[c].into(),
             status,
             degree,
-            accuracy_order: printer.accuracy.as_ref().and_then(|a| a.order[c]),
-            partners: partners[c].iter().map(|&d| platform.names()[d].clone()).collect(),
+            accuracy_order: findings.orders(c).start,
+            partners: verdicts.partners[c].iter().map(|&d| platform.names()[d].clone()).collect(),
             solution,
             elsewhere: (degree.is_none() && somewhere).then_some(elsewhere),
         });
@@ -223,30 +190,15 @@ fn quantities(
     Ok(out)
 }
 
-fn basis_report(c: Combination, printer: &mut Printer<'_>) -> CombinationReport {
-    let Combination { name: expression, vector, functional, degree } = c;
-    let solution = functional.and_then(|f| printer.solution(&f, degree, &expression));
+fn combination_report(c: &CombinationFinding, printer: &mut Printer<'_>) -> CombinationReport {
+    let Verdict { status, degree } = c.verdict;
     CombinationReport {
-        expression,
-        requested: false,
-        status: Status::Observable,
-        degree: Some(degree),
-        accuracy_order: printer.accuracy_order(&vector, Some(degree)),
-        solution,
-    }
-}
-
-fn requested_report(r: Requested, printer: &mut Printer<'_>) -> CombinationReport {
-    let Requested { text, row, terms, verdict } = r;
-    let functional = printer.solver.functional(terms);
-    let solution = verdict.degree.and_then(|k| printer.solution(functional.as_ref()?, k, &text));
-    CombinationReport {
-        expression: text,
-        requested: true,
-        status: verdict.status,
-        degree: verdict.degree,
-        accuracy_order: printer.accuracy_order(&row, verdict.degree),
-        solution,
+        expression: c.name.clone(),
+        requested: c.requested,
+        status,
+        degree,
+        accuracy_order: c.orders.start,
+        solution: degree.and_then(|k| printer.solution(c.functional.as_ref()?, k, &c.name)),
     }
 }
 
@@ -326,11 +278,7 @@ fn position_reports(scheme: &Scheme) -> Vec<PositionReport> {
         .collect()
 }
 
-fn carry_reports(
-    platform: &Platform,
-    verdicts: &Verdicts,
-    seed: u64,
-) -> Result<Vec<CarryReport>, AnalysisError> {
+fn carry_reports(platform: &Platform, verdicts: &Findings) -> Result<Vec<CarryReport>, AnalysisError> {
     let scheme = platform.scheme();
     if scheme.unknowns == Unknowns::Drift {
         return Ok(Vec::new());
@@ -338,7 +286,7 @@ fn carry_reports(
     let mut out = Vec::new();
     for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
         let other = Platform::new(Scheme { carry, ..scheme.clone() })?;
-        let there = degrees(&other, seed)?;
+        let there = degrees(&other, verdicts.seed)?;
         // under reset carry every position has a psi of its own: each is held against the psi of the other carry
         let reset = [scheme.carry, carry].contains(&Carry::Reset);
         let one = |name: &str| name.split('@').next().unwrap_or(name).to_string();
@@ -346,7 +294,7 @@ fn carry_reports(
         let differs = pairs.filter_map(|(c, d)| {
             let (name, of) = (&platform.names()[c], &other.names()[d]);
             let same = name == of || reset && one(name) == one(of);
-            let (here, there) = (Verdict::of(&verdicts.degrees, c), Verdict::of(&there, d));
+            let (here, there) = (verdicts.verdict(c), Verdict::of(&there, d));
             let longer = if name.len() < of.len() { of } else { name };
             (same && here != there).then(|| Difference { name: longer.clone(), here, there })
         });

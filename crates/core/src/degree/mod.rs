@@ -2,6 +2,7 @@
 
 pub(crate) mod coefficient;
 pub(crate) mod ensemble;
+pub(crate) mod findings;
 pub(crate) mod platform_rows;
 mod reset;
 pub(crate) mod rows;
@@ -9,8 +10,9 @@ pub(crate) mod sparse;
 pub(crate) mod staircase;
 pub(crate) mod status;
 
-pub use coefficient::{Coefficient, Form};
+pub use coefficient::{Coefficient, Form, Number};
 pub use ensemble::{EnsembleError, Verdicts, judge, staircase};
+pub use findings::Findings;
 pub use platform_rows::{LocalRow, PlatformRows, local_chain};
 pub use rows::DerivativeRows;
 pub use staircase::{Degrees, climb, partners};

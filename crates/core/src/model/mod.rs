@@ -28,7 +28,7 @@ pub use dwell::{Dwell, DwellError};
 pub use geometry::{GYROS, Geometry, GeometryError, GyroAxes, SignedAxis, Term, TermError, Unknowns};
 pub use gimbals::{GimbalError, Gimbals};
 pub use platform::{Block, LOCAL, Platform, Point, RandomValues, Sample, local_dynamics, local_output};
-pub use ring::{Float, Ring};
+pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
 pub use scheme::{
     Carry, CarryError, Latitude, LatitudeError, Position, PositionError, Scheme, SchemeError, Station,

@@ -14,7 +14,7 @@ use crate::solution::support::short_support;
 
 /// A named observable combination.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Combination {
+pub(crate) struct Combination {
     /// What it is, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`.
     pub name: String,
     /// Its coefficients in the first field of the verdicts (up to a factor).
@@ -68,7 +68,11 @@ fn lead(platform: &Platform, support: &[usize]) -> usize {
 /// A basis of the staircase beyond single unknowns: for every degree k, combinations that together with the unknowns of degree up
 /// to k and the combinations before span `V_k`. Sparse combinations of unknowns with coefficients that a person can read come first;
 /// what these leave is spanned by `psi^n` and `eps^n` at single positions.
-pub fn combinations(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<'_>) -> Vec<Combination> {
+pub(crate) fn combinations(
+    platform: &Platform,
+    verdicts: &Verdicts,
+    solver: &mut Solver<'_>,
+) -> Vec<Combination> {
     let field = verdicts.values[0].roots().field;
     let n = platform.names().len();
     let mut chosen: Vec<(Vec<u64>, usize)> = Vec::new();
@@ -145,7 +149,11 @@ fn combination_coefficients(
 }
 
 /// A sparse basis of the null space, without the unknowns that are not excited.
-pub fn null_space(platform: &Platform, verdicts: &Verdicts, solver: &mut Solver<'_>) -> Vec<NullVector> {
+pub(crate) fn null_space(
+    platform: &Platform,
+    verdicts: &Verdicts,
+    solver: &mut Solver<'_>,
+) -> Vec<NullVector> {
     let Some(last) = verdicts.stairs.last() else { return Vec::new() };
     let field = verdicts.values[0].roots().field;
     let excited = &verdicts.degrees.excited;

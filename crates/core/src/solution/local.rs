@@ -7,7 +7,7 @@ use crate::model::ring::Ring;
 
 /// `sign * wN^a wU^b * Z_component^(order)`, Z in n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ZTerm {
+pub(crate) struct ZTerm {
     /// Component of Z: 1, 2, 3 in n-axes.
     pub component: usize,
     /// Derivative order.
@@ -20,7 +20,7 @@ pub struct ZTerm {
 
 /// An observable of one position: a functional of `(psi^n, eps^n)` and its solution in Z.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LocalObservable {
+pub(crate) struct LocalObservable {
     /// The derivative order that it needs.
     pub order: usize,
     /// `(local unknown, sign, exponents of (wN, wU))`.
@@ -31,7 +31,7 @@ pub struct LocalObservable {
 
 /// Whether the components of the earth rate are zero at the latitude of a scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RateZeros {
+pub(crate) struct RateZeros {
     /// `wN = 0`: a pole.
     pub w_n: bool,
     /// `wU = 0`: the equator.
@@ -40,7 +40,7 @@ pub struct RateZeros {
 
 impl RateZeros {
     /// Of the latitude of `platform`.
-    pub fn of(platform: &Platform) -> Self {
+    pub(crate) fn of(platform: &Platform) -> Self {
         let latitude = platform.scheme().latitude;
         Self { w_n: latitude.is_some_and(|l| l.is_pole()), w_u: latitude.is_some_and(|l| l.is_equator()) }
     }

@@ -15,12 +15,9 @@ pub(crate) mod support;
 pub(crate) mod tables;
 pub(crate) mod turning;
 
-pub use combinations::{Combination, NullVector, combinations, null_space};
+pub use combinations::NullVector;
 pub use formulas::Formula;
-pub use local::{LocalObservable, RateZeros, ZTerm};
 pub use loci::Locus;
 pub use print::{Group, Grouped, SolutionTerm, StationLabel, group};
-pub use problem::{Motion, Problem};
-pub use requested::{CombinationError, Requested, requested_combinations};
+pub use requested::CombinationError;
 pub use solver::{Frame, Functional, Solved, Solver, Sparse, Term, Verification};
-pub use tables::Tables;

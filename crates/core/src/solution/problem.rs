@@ -11,7 +11,7 @@ use crate::model::ring::{Float, Ring, Text};
 /// Every entry is a place `(row, column)` of that table, so one problem is posed once and solved in
 /// any ring.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub(crate) struct Problem {
     /// Number of unknowns.
     pub unknowns: usize,
     /// One equation per row: the unknowns that occur with the places of their coefficients, and its right side.
@@ -22,7 +22,7 @@ pub struct Problem {
 
 /// The right side of an equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Right {
+pub(crate) enum Right {
     /// Zero.
     Zero,
     /// One.
@@ -49,7 +49,7 @@ pub(crate) type Place = (usize, usize);
 
 /// What is asked of the solution.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Outputs {
+pub(crate) enum Outputs {
     /// The unknowns.
     Unknowns,
     /// `sum_i place_i x_i`, one per row.
@@ -59,7 +59,7 @@ pub enum Outputs {
 /// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with `sum_i z_i rows[i] = sum_j y_j motion_j`
 /// over some unknowns `y_j` of the solution, given with their rows of minus the motion.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Motion {
+pub(crate) struct Motion {
     /// Independent rows that span it.
     pub rows: Vec<usize>,
     /// `(j, row of minus motion_j)`.
@@ -74,7 +74,7 @@ fn numbered(places: impl Iterator<Item = Place>) -> Vec<(usize, Place)> {
 impl Problem {
     /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique).
     /// The right sides are the target's entries, column by column. Behind `y` stand the unknowns of every motion.
-    pub fn solution(rows: &[usize], columns: usize, motions: &[Motion]) -> Self {
+    pub(crate) fn solution(rows: &[usize], columns: usize, motions: &[Motion]) -> Self {
         let equation = |c: usize| (numbered(rows.iter().map(|&j| (j, c))), Right::Target(c));
         let mut equations: Vec<_> = (0..columns).map(equation).collect();
         let mut unknowns = rows.len();
@@ -91,7 +91,7 @@ impl Problem {
 
     /// The combination of the given rows that vanishes outside `support` and is one at `lead`.
     /// Outputs: its entries on `support`.
-    pub fn combination(rows: &[usize], columns: usize, support: &[usize], lead: usize) -> Self {
+    pub(crate) fn combination(rows: &[usize], columns: usize, support: &[usize], lead: usize) -> Self {
         let places = |c: usize| -> Vec<Place> { rows.iter().map(|&j| (j, c)).collect() };
         let equations = (0..columns)
             .filter(|c| *c == lead || !support.contains(c))
@@ -103,7 +103,7 @@ impl Problem {
 
     /// The vector on `support` that all the given rows annihilate, without its lead entry, which is
     /// one: `sum_c row[c] v_c = -row[lead]`.
-    pub fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
+    pub(crate) fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
         let others: Vec<usize> = support.iter().copied().filter(|&c| c != lead).collect();
         let equation = |&j: &usize| (numbered(others.iter().map(|&c| (j, c))), Right::Minus((j, lead)));
         Self {

@@ -27,7 +27,7 @@ pub struct CombinationError {
 }
 
 /// A combination that was asked for.
-pub struct Requested {
+pub(crate) struct Requested {
     /// As written.
     pub text: String,
     /// Its coefficients in the first field of the verdicts.
@@ -39,7 +39,7 @@ pub struct Requested {
 }
 
 /// Reads and judges the combinations that a scheme asks for; the seed chooses the points at which they are looked at.
-pub fn requested_combinations(
+pub(crate) fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
     seed: u64,

@@ -137,7 +137,7 @@ pub struct Solver<'a> {
     pub(super) platform: &'a Platform,
     pub(super) verdicts: &'a Verdicts,
     /// The tables in the fields.
-    pub tables: Tables,
+    pub(crate) tables: Tables,
     pub(super) symbols: Symbols,
     pub(super) text: Vec<Vec<String>>,
     pub(super) text_point: Point<Text>,
@@ -150,7 +150,7 @@ pub struct Solver<'a> {
 
 impl<'a> Solver<'a> {
     /// A solver for `platform`; without a worker nothing symbolic is started.
-    pub fn new(
+    pub(crate) fn new(
         platform: &'a Platform,
         verdicts: &'a Verdicts,
         seed: u64,
@@ -189,12 +189,12 @@ impl<'a> Solver<'a> {
     }
 
     /// The symbols of the formulas.
-    pub fn symbols(&self) -> &Symbols {
+    pub(crate) fn symbols(&self) -> &Symbols {
         &self.symbols
     }
 
     /// The worker, if there is one.
-    pub fn worker(&mut self) -> Option<&mut Worker> {
+    pub(crate) fn worker(&mut self) -> Option<&mut Worker> {
         self.worker.as_deref_mut()
     }
 
@@ -212,7 +212,7 @@ impl<'a> Solver<'a> {
     }
 
     /// The functional with the given exact coefficients; `None` when one of them is a decimal.
-    pub fn functional(&self, terms: Sparse) -> Option<Functional> {
+    pub(crate) fn functional(&self, terms: Sparse) -> Option<Functional> {
         let images = |(field, table): (usize, &Table)| {
             terms.iter().map(|(_, c)| self.image(c, field, table)).collect::<Option<Vec<u64>>>()
         };
@@ -346,7 +346,7 @@ impl<'a> Solver<'a> {
     /// The outputs of a problem without targets, as coefficients and as their images in all tables:
     /// roots where possible, then readable formulas in sines and cosines, then decimals. `None` when
     /// nothing of these is at hand.
-    pub fn coefficients(&mut self, problem: &Problem) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
+    pub(crate) fn coefficients(&mut self, problem: &Problem) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
         let solve = |(_, t): (usize, &Table)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
         let values: Vec<Vec<u64>> = self.all_tables().map(solve).collect::<Option<_>>()?;
         let split = self.split_rates(&values)?;

@@ -11,7 +11,7 @@ use crate::model::platform::{RandomValues, Sample};
 
 /// The rows of the local observables of every position, in one field and embedding.
 #[derive(Debug, Clone)]
-pub struct Table {
+pub(crate) struct Table {
     /// Field and embedding.
     pub sample: Sample,
     /// One row per station and local observable, station by station; then, if the scheme rotates, one per station of
@@ -21,7 +21,7 @@ pub struct Table {
 
 impl Table {
     /// The values of `(wN, wU)`.
-    pub fn rates(&self) -> [u64; 2] {
+    pub(crate) fn rates(&self) -> [u64; 2] {
         [self.sample.point.w_n, self.sample.point.w_u]
     }
 }
@@ -29,7 +29,7 @@ impl Table {
 /// The observable rows of a scheme in two fields, four embeddings each, with random rates: a formula in
 /// `wN` and `wU` that holds there holds at every latitude with the same zeros.
 #[derive(Debug, Clone)]
-pub struct Tables {
+pub(crate) struct Tables {
     /// The observables of one position.
     pub observables: Vec<LocalObservable>,
     /// How many rows are those of local observables.
@@ -44,7 +44,7 @@ pub struct Tables {
 
 impl Tables {
     /// The tables of `platform` in the fields of `verdicts`.
-    pub fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Self {
+    pub(crate) fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Self {
         let scheme = platform.scheme();
         let zeros = RateZeros::of(platform);
         let observables = local_observables(zeros, scheme.measured_azimuth);
@@ -74,17 +74,17 @@ impl Tables {
     }
 
     /// The two fields.
-    pub fn fields(&self) -> [RootField; 2] {
+    pub(crate) fn fields(&self) -> [RootField; 2] {
         [self.tables[0][0].sample.roots, self.tables[1][0].sample.roots]
     }
 
     /// The derivative order of a row.
-    pub fn order(&self, row: usize) -> usize {
+    pub(crate) fn order(&self, row: usize) -> usize {
         self.observables[row % self.observables.len()].order
     }
 
     /// The station of a row.
-    pub fn station(&self, row: usize) -> usize {
+    pub(crate) fn station(&self, row: usize) -> usize {
         row / self.observables.len()
     }
 
@@ -99,7 +99,7 @@ impl Tables {
     }
 
     /// The first field and embedding.
-    pub fn first(&self) -> &Table {
+    pub(crate) fn first(&self) -> &Table {
         &self.tables[0][0]
     }
 }

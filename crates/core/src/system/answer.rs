@@ -8,8 +8,7 @@ use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, StateStart, SystemModel};
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
-use crate::degree::staircase::partners;
-use crate::degree::status::Status;
+use crate::degree::status::{Status, Verdict};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
@@ -57,8 +56,8 @@ pub struct SystemAnalysis {
     pub rests_on_bound: bool,
     /// Why there are no solving expressions, if there are none.
     pub note: Option<String>,
-    /// The two random primes.
-    pub primes: [u64; 2],
+    /// The two random primes, as text (61 bits).
+    pub primes: [String; 2],
     /// Bound on the probability that a verdict is wrong.
     pub error_bound: f64,
     /// Seed of all random choices.
@@ -135,7 +134,7 @@ pub fn analyze_system(
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, order)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
-    let mut out = answer(model, &judged, &symmetries, seed);
+    let mut out = answer(model, &judged, &symmetries);
     if !options.solutions {
         return Ok(out);
     }
@@ -153,14 +152,11 @@ pub fn analyze_system(
 }
 
 /// The answer for a model that was judged.
-pub fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries, seed: u64) -> SystemAnalysis {
-    let partners = partners(judged.layout.unknowns.len(), &judged.stairs);
-    // known constants are counted on behind the unknowns
-    let name = |c: usize| match judged.layout.unknowns.get(c) {
-        Some(u) => u.name.clone(),
-        None => model.constants[c - judged.layout.unknowns.len()].0.name.clone(),
-    };
-    let quantities = judged.layout.unknowns.iter().enumerate().map(|(c, u)| {
+fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> SystemAnalysis {
+    let findings = &judged.findings;
+    let name = |c: usize| name_of(model, judged, c);
+    let shown = judged.layout.unknowns.iter().enumerate().filter(|&(c, _)| judged.shown(model, c));
+    let quantities = shown.map(|(c, u)| {
         let (kind, named) = match u.role {
             Role::State(i) => ("state", &model.states[i].named),
             Role::Parameter(i) => ("parameter", &model.parameters[i]),
@@ -168,8 +164,7 @@ pub fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries, 
             // no unknowns
             Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
         };
-        let degree = judged.degrees.degree[c];
-        let status = Status::of(degree, judged.degrees.excited[c]);
+        let Verdict { status, degree } = findings.verdict(c);
         SystemQuantity {
             name: u.name.clone(),
             kind: kind.into(),
@@ -177,54 +172,51 @@ pub fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries, 
             description: named.description.clone(),
             status,
             degree,
-            partners: partners[c].iter().map(|&p| name(p)).collect(),
+            partners: findings.partners[c].iter().map(|&p| name(p)).collect(),
             solution: None,
         }
     });
-    // of arbitrary inputs only the signal itself is of interest
-    let shown = |q: &SystemQuantity| {
-        let place = judged.layout.unknowns.iter().position(|u| u.name == q.name);
-        place.is_none_or(|c| {
-            let u = &judged.layout.unknowns[c];
-            match u.role {
-                Role::UnknownInput(i) => u.derivative == 0 || model.unknown_inputs[i].1.is_some(),
-                _ => true,
-            }
-        })
-    };
     let equation = |name: &str, sign: &str, text: &str| format!("{name}{sign} = {text}");
     let equations = (model.definitions.iter().map(|(n, e)| equation(n, "", &e.text)))
         .chain(model.states.iter().map(|s| equation(&s.named.name, "'", &s.equation.text)))
         .chain(model.outputs.iter().map(|(n, e)| equation(&n.name, "", &e.text)));
-    let asked = model.combinations.iter().zip(&judged.combinations);
+    let asked = model.combinations.iter().zip(&findings.asked);
     SystemAnalysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         name: model.name.clone(),
         description: model.description.clone(),
         equations: equations.collect(),
-        rank_profile: judged.degrees.rank_profile.clone(),
-        rank: judged.degrees.rank(),
+        rank_profile: findings.degrees.rank_profile.clone(),
+        rank: findings.degrees.rank(),
         unknowns: judged.layout.unknowns.len(),
-        quantities: quantities.filter(shown).collect(),
+        quantities: quantities.collect(),
         known: (model.states.iter().filter(|s| s.start != StateStart::Unknown))
             .map(|s| s.named.name.clone())
             .collect(),
         combinations: asked
-            .map(|(c, degree)| SystemCombination { expression: c.text.clone(), degree: *degree })
+            .map(|(c, verdict)| SystemCombination { expression: c.text.clone(), degree: verdict.degree })
             .collect(),
-        unobservable_directions: judged.layout.unknowns.len() - judged.degrees.rank(),
+        unobservable_directions: judged.layout.unknowns.len() - findings.degrees.rank(),
         other_directions: named(&symmetries.unexplained, &name),
         invariants: invariant_reports(symmetries, &name),
-        symmetries: symmetry_reports(symmetries, judged, &name),
-        last_order: judged.degrees.rank_profile.len().saturating_sub(1),
+        symmetries: symmetry_reports(model, judged, symmetries),
+        last_order: findings.degrees.rank_profile.len().saturating_sub(1),
         bound: judged.layout.bound,
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
         note: None,
-        primes: judged.fields.map(|f| f.modulus()),
-        error_bound: judged.error_bound,
-        seed,
+        primes: findings.primes_as_text(),
+        error_bound: findings.error_bound,
+        seed: findings.seed,
+    }
+}
+
+/// The name of an unknown; known constants are counted on behind the unknowns.
+fn name_of(model: &SystemModel, judged: &Judgement, c: usize) -> String {
+    match judged.layout.unknowns.get(c) {
+        Some(u) => u.name.clone(),
+        None => model.constants[c - judged.layout.unknowns.len()].0.name.clone(),
     }
 }
 
@@ -238,12 +230,14 @@ fn free_name(judged: &Judgement) -> String {
     ["c", "s", "k", "factor"].into_iter().find(|n| !taken(n)).unwrap_or("factor_").into()
 }
 
-fn symmetry_reports(
-    symmetries: &Symmetries,
+/// The symmetries of a judged model in words: scalings and translations, then polynomial directions.
+pub fn symmetry_reports(
+    model: &SystemModel,
     judged: &Judgement,
-    name: &dyn Fn(usize) -> String,
+    symmetries: &Symmetries,
 ) -> Vec<SymmetryReport> {
     let c = free_name(judged);
+    let name = &|c: usize| name_of(model, judged, c);
     let plain = symmetries.found.iter().map(|s| SymmetryReport {
         words: words(s, &c, name),
         unknowns: s.scaling.iter().chain(&s.translation).map(|t| name(t.0)).collect(),

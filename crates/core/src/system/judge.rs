@@ -4,10 +4,12 @@ use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::dag::{Dag, Op};
-use super::model::{Compiled, MAX_UNKNOWNS, ModelError, SystemModel};
+use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
 use super::rows::{Layout, SystemRows, field_for};
 use super::taylor::Singular;
+use crate::degree::findings::Findings;
 use crate::degree::staircase::{Degrees, climb};
+use crate::degree::status::{Status, Verdict};
 
 /// Pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
@@ -17,24 +19,37 @@ const ATTEMPTS: usize = 5;
 pub struct Judgement {
     /// The unknowns and the bound.
     pub layout: Layout,
-    /// Ranks and degrees.
-    pub degrees: Degrees,
-    /// The degree of every combination that was asked for.
-    pub combinations: Vec<Option<usize>>,
+    /// The verdicts.
+    pub findings: Findings,
     /// The bases of `V_0, V_1, ...` in the first field.
     pub stairs: Vec<Echelon>,
     /// The two fields.
     pub fields: [Field; 2],
-    /// Bound on the probability that any of it is wrong.
-    pub error_bound: f64,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
+}
+
+impl Judgement {
+    /// Whether an unknown is spoken of: of arbitrary inputs only the signal itself is of interest.
+    pub fn shown(&self, model: &SystemModel, unknown: usize) -> bool {
+        let u = &self.layout.unknowns[unknown];
+        match u.role {
+            Role::UnknownInput(i) => u.derivative == 0 || model.unknown_inputs[i].1.is_some(),
+            _ => true,
+        }
+    }
+
+    /// The verdict on the unknown of a name, where it is spoken of.
+    pub fn verdict(&self, model: &SystemModel, name: &str) -> Option<Verdict> {
+        let unknown = self.layout.unknowns.iter().position(|u| u.name == name)?;
+        self.shown(model, unknown).then(|| self.findings.verdict(unknown))
+    }
 }
 
 /// Degrees at one random point.
 pub(crate) struct At {
     pub(crate) degrees: Degrees,
-    pub(crate) combinations: Vec<Option<usize>>,
+    pub(crate) combinations: Vec<Verdict>,
     pub(crate) stairs: Vec<Echelon>,
     /// The value of every unknown there, then of every known constant.
     pub(crate) values: Vec<u64>,
@@ -50,17 +65,25 @@ pub(crate) fn climb_at(
 ) -> Result<At, ModelError> {
     let mut rows = SystemRows::new(model, compiled, layout, field, rng).map_err(|s| singular(compiled, s))?;
     let gradients = rows.combinations().to_vec();
-    let mut combinations = vec![None; gradients.len()];
+    let mut found = vec![None; gradients.len()];
     let mut basis = Echelon::new(field, layout.unknowns.len());
     let mut stairs = Vec::new();
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
-        for (degree, gradient) in combinations.iter_mut().zip(&gradients) {
+        for (degree, gradient) in found.iter_mut().zip(&gradients) {
             if degree.is_none() && basis.contains(gradient) {
                 *degree = Some(order);
             }
         }
         stairs.push(basis.clone());
     });
+    let combinations = found
+        .into_iter()
+        .zip(&gradients)
+        .map(|(degree, gradient)| {
+            let moves = gradient.iter().zip(&degrees.excited).any(|(x, excited)| *x != 0 && *excited);
+            Verdict { status: Status::of(degree, moves), degree }
+        })
+        .collect();
     let values = rows.values(compiled, layout, model.constants.len());
     Ok(At { degrees, combinations, stairs, values })
 }
@@ -116,11 +139,14 @@ pub fn judge_compiled(
             return Ok(Judgement {
                 rests_on_bound: !layout.closed && !full,
                 layout,
-                degrees: first.degrees,
-                combinations: first.combinations,
+                findings: Findings::of(
+                    first.degrees,
+                    &first.stairs,
+                    first.combinations,
+                    ([p, q].map(|f| f.modulus()), error_bound, seed),
+                ),
                 stairs: first.stairs,
                 fields: [p, q],
-                error_bound,
             });
         }
     }

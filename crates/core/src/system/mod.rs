@@ -21,8 +21,8 @@ pub use answer::*;
 pub use dag::{Dag, DagError, FunctionStart, Op};
 pub use judge::{Judgement, judge, judge_compiled};
 pub use model::{
-    Compiled, CompiledSegment, Constant, KnownInput, ModelError, Nominal, PlacedExpression, Role, Segment,
-    State, StateStart, SystemModel,
+    Compiled, CompiledSegment, Constant, KnownInput, ModelError, Named, Nominal, Place, PlacedExpression,
+    Role, Segment, State, StateStart, SystemModel,
 };
-pub use rows::Unknown;
+pub use rows::{Layout, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};

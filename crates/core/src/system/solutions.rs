@@ -44,7 +44,7 @@ pub(super) fn solutions(
     seed: u64,
     worker: Option<&mut Worker>,
 ) -> Result<Vec<Option<String>>, String> {
-    let highest = judged.degrees.degree.iter().flatten().copied().max();
+    let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
     let n = judged.layout.unknowns.len();
     let Some(highest) = highest else { return Ok(vec![None; n]) };
     let worker = worker.ok_or("this build has no symbolic engine: no solving expressions")?;
@@ -167,7 +167,7 @@ fn request(
     let roles = (0..states.len()).map(Role::State).chain(roles_of_parameters(model));
     let degree = |role: Role| {
         let lane = judged.layout.unknowns.iter().position(|u| u.role == role)?;
-        judged.degrees.degree[lane]
+        judged.findings.degrees.degree[lane]
     };
     let role_is_free = |role: Role| {
         let lane = judged.layout.unknowns.iter().position(|u| u.role == role);

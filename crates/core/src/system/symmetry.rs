@@ -96,9 +96,9 @@ pub fn symmetries(
     seed: u64,
 ) -> Result<Symmetries, ModelError> {
     let n = judged.layout.unknowns.len();
-    let excited = &judged.degrees.excited;
+    let excited = &judged.findings.degrees.excited;
     let silent = excited.iter().filter(|e| !**e).count();
-    let defect = n - judged.degrees.rank() - silent;
+    let defect = n - judged.findings.degrees.rank() - silent;
     if defect == 0 {
         return Ok(Symmetries::default());
     }
@@ -106,7 +106,7 @@ pub fn symmetries(
     let mut rng = model.random(seed, "symmetries");
     let mut basis = Echelon::new(f, 2 * n);
     // an unknown that no output sees is said so by itself; an observable one never moves
-    for c in (0..n).filter(|&c| !excited[c] || judged.degrees.degree[c].is_some()) {
+    for c in (0..n).filter(|&c| !excited[c] || judged.findings.degrees.degree[c].is_some()) {
         for column in [c, n + c] {
             let unit: Vec<u64> = (0..2 * n).map(|j| if j == column { f.one() } else { 0 }).collect();
             basis.insert(&unit);
@@ -144,7 +144,7 @@ pub fn symmetries(
     }
     if out.found.len() < defect {
         let moved: Vec<usize> =
-            (0..n).filter(|&c| excited[c] && judged.degrees.degree[c].is_none()).collect();
+            (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
         let mut draw = || climb_at(model, compiled, &judged.layout, f, &mut rng);
         // constants that every segment shares may be factors too
         let shared = |name: &String| {

@@ -21,7 +21,7 @@ mod winner;
 pub use answer::*;
 pub use candidates::Candidates;
 pub use criterion::{Criterion, Limits};
-pub use information::Evaluator;
+pub use information::{Evaluator, State};
 pub use observability::{Patience, Rows};
 pub use search::{Best, Constraints, Progress, Scored, Search, Worth};
 pub use symmetry::Symmetry;

@@ -8,6 +8,7 @@
 pub(crate) mod answer;
 pub(crate) mod monte_carlo;
 mod ranking;
+pub(crate) mod rules;
 pub(crate) mod slopes;
 mod structure;
 

@@ -8,6 +8,7 @@ use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 
 use super::answer::{Check, Correlation, Count, NullEvidence, QuantityEvidence, SlopeCurve};
+use super::rules;
 use super::slopes::{self, slopes};
 use crate::prediction::{Combination, Prediction};
 use crate::simulation::batch::{batch, diffuse_prior};
@@ -15,10 +16,6 @@ use crate::simulation::conditions::{shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
-/// How far a measured slope may be from the predicted one.
-const SLOPE_TOLERANCE: f64 = 0.1;
-/// How far the factor of an observable unknown may be from 1.
-const INFLATION_TOLERANCE: f64 = 0.01;
 /// Parts of a null vector that are smaller, beside its largest and by what Z shows of each alone, show no correlation where other directions are hardly seen.
 const SMALL_PART: f64 = 0.01;
 /// What counts as not seen, relative to the best seen direction.
@@ -39,9 +36,7 @@ impl Structure {
         let missing = self.quantities.iter().filter(|q| !q.modelled).map(|_| false);
         let measured = self.quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
         let null = self.null_space.iter().flat_map(|v| [v.seen.pass, v.correlation.and_then(|c| c.pass)]);
-        let all: Vec<bool> =
-            measured.chain(null).flatten().chain(missing).chain([self.defect.pass]).collect();
-        (all.iter().filter(|pass| !**pass).count(), all.len())
+        rules::failures(measured.chain(null).chain(missing.map(Some)).chain([Some(self.defect.pass)]))
     }
 }
 
@@ -157,17 +152,9 @@ fn quantities(
         .map(|((name, (status, degree, accuracy_order, at_end)), functional)| {
             let found = functional.as_ref().and_then(|_| measured.next());
             let (slope, ratio) = (found.map(|f| *f.0.0), found.map(|f| *f.1));
-            let predicted = accuracy_order.map_or(0.0, |d| -(d as f64 + 0.5));
             // the slope is that of the start, the inflation that of the end
-            let (expected, tolerance) = if at_end { (1.0, INFLATION_TOLERANCE) } else { (10.0, 1.0) };
-            let near = |x: f64, y: f64, tolerance: f64| (x - y).abs() <= tolerance;
-            let slope_agrees = |x: f64| match accuracy_order {
-                Some(_) => near(x, predicted, SLOPE_TOLERANCE),
-                // nothing is learnt: sigma stays, or grows as drift that nobody sees turns psi
-                None => x >= -SLOPE_TOLERANCE,
-            };
-            let inflation = Check::new(expected, ratio, |x| near(x, expected, tolerance));
-            let mut slope = Check::new(predicted, slope, slope_agrees);
+            let inflation = rules::LINEAR.check(at_end, ratio);
+            let mut slope = rules::slope(accuracy_order, slope);
             // what no slope shows is no evidence against an order where the measurements determine it all the same, nor are slopes of
             // what they do not determine, which rounding makes under so wide a prior
             let bent = found.is_some_and(|f| !f.0.1);
@@ -202,8 +189,7 @@ fn null_evidence(
     let scaled = DMatrix::from_fn(n, n, |i, j| root.root()[(i, j)] / norms[j]);
     let (values, _) = singular_values(&scaled)?;
     let largest = values.first().copied().unwrap_or(1.0);
-    let measured = values.iter().filter(|s| **s <= UNSEEN * largest).count();
-    let predicted = truth.unknowns() - prediction.rank;
+    let defect = rules::defect(truth.unknowns() - prediction.rank, &values, UNSEEN);
     let mut evidence = Vec::new();
     for (k, vector) in prediction.null_space.iter().enumerate() {
         let names = truth.platform.names();
@@ -242,7 +228,7 @@ fn null_evidence(
             correlation,
         });
     }
-    Ok((evidence, Count { predicted, measured, pass: predicted == measured }))
+    Ok((evidence, defect))
 }
 
 /// A number in few digits.

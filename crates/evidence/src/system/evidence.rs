@@ -1,10 +1,10 @@
 //! Exact verdicts on any system against the information of its samples, linearised along the true run.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::degree::Status;
+use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::system::{
-    ModelError, PolynomialDirection, Role, StateStart, Symmetry, SystemModel, Unknown, answer,
-    judge_compiled, symmetries,
+    ModelError, PolynomialDirection, Role, StateStart, Symmetry, SystemModel, Unknown, judge_compiled,
+    symmetries, symmetry_reports,
 };
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::integrate::runge_kutta;
@@ -15,6 +15,7 @@ use serde::Serialize;
 use super::numeric::{FilterState, Numeric};
 use super::run::{RunError, Setup};
 use crate::crosscheck::answer::{Check, Count, Measured};
+use crate::crosscheck::rules::{self, SLOPE_TOLERANCE};
 
 /// Name and version of the JSON layout.
 pub(crate) const SCHEMA: &str = "obsdeg.system-evidence/1";
@@ -31,14 +32,9 @@ const HORIZONS: i32 = 45;
 /// Singular values (columns of unit length) above this are seen, below the next are not.
 const SEEN: f64 = 1e-9;
 const UNSEEN: f64 = 1e-12;
-/// How far a measured slope may be from the predicted one, and from the slope at the next horizon.
-const TOLERANCE: f64 = 0.1;
 /// How many slopes in a row must settle, and how much rounding changes them.
 const SETTLED: usize = 4;
 const JITTER: f64 = 0.005;
-/// The factor of an observable unknown is below, that of another above.
-const OBSERVABLE_FACTOR: f64 = 1.5;
-const UNOBSERVABLE_FACTOR: f64 = 5.0;
 
 /// The evidence for one system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -179,7 +175,6 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
     let found = symmetries(model, &compiled, &judged, seed)?;
-    let analysis = answer(model, &judged, &found, seed);
     let setup = Setup::new(model, &compiled)?;
     let unknowns = &judged.layout.unknowns;
     let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();
@@ -190,7 +185,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let filter = |error| RunError::Filter { time: setup.duration, duration: setup.duration, error };
     let whole = rows(&setup, setup.duration)?;
     let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
-    let rank = judged.degrees.rank();
+    let rank = judged.findings.degrees.rank();
     // with jumps, dwell may see earlier what derivatives see late: slopes are those of accuracy orders then
     let slopes =
         if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == StateStart::Unknown) {
@@ -202,52 +197,41 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         .iter()
         .enumerate()
         .map(|(c, u)| {
-            let degree = judged.degrees.degree[c];
-            let status = Status::of(degree, judged.degrees.excited[c]);
-            let predicted = degree.map_or(0.0, |k| -(k as f64 + 0.5));
+            let Verdict { status, degree } = judged.findings.verdict(c);
+            // of what has no degree nothing is measured that could be learnt
             let measured = slopes[c].filter(|_| degree.is_some());
-            let factor = inflated[c];
-            let kept =
-                |x: f64| if degree.is_some() { x < OBSERVABLE_FACTOR } else { x > UNOBSERVABLE_FACTOR };
             SystemQuantityEvidence {
                 name: u.name.clone(),
                 status,
                 degree,
-                slope: Check::new(predicted, measured, |x| (x - predicted).abs() <= TOLERANCE),
-                inflation: Check::new(if degree.is_some() { 1.0 } else { 10.0 }, Some(factor), kept),
+                slope: rules::slope(degree, measured),
+                inflation: rules::LINEARISED.check(degree.is_some(), Some(inflated[c])),
             }
         })
         .collect();
     let (m, norms) = scaled(&whole, &columns);
     let (values, _) = singular_values(&m.clone().qr().r()).map_err(filter)?;
     let largest = values.first().copied().unwrap_or(1.0);
-    let measured = values.iter().filter(|s| **s <= SEEN * largest).count();
-    let predicted = unknowns.len() - rank;
-    let defect = Count { predicted, measured, pass: predicted == measured };
+    let defect = rules::defect(unknowns.len() - rank, &values, SEEN);
     let directions = found
         .found
         .iter()
         .map(|s| direction(s, &setup.truth, &columns))
         .chain(found.polynomial.iter().map(|d| polynomial_direction(d, &setup, &columns)));
     let symmetries: Vec<SymmetryEvidence> = directions
-        .zip(&analysis.symmetries)
+        .zip(symmetry_reports(model, &judged, &found))
         .map(|(mut v, report)| {
             for (x, norm) in v.iter_mut().zip(&norms) {
                 *x *= norm;
             }
             let seen = (&m * &v).norm() / (v.norm() * largest);
             // the derivatives are integrated by Runge-Kutta: what a symmetry leaves alone, its error does not
-            SymmetryEvidence { words: report.words.clone(), seen: Check::new(0.0, Some(seen), |x| x <= 1e-6) }
+            SymmetryEvidence { words: report.words, seen: Check::new(0.0, Some(seen), |x| x <= 1e-6) }
         })
         .collect();
-    let checks: Vec<bool> = quantities
-        .iter()
-        .flat_map(|q| [q.slope.pass, q.inflation.pass])
-        .chain(symmetries.iter().map(|s| s.seen.pass))
-        .flatten()
-        .chain([defect.pass])
-        .collect();
-    let failures = checks.iter().filter(|pass| !**pass).count();
+    let measured = quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
+    let moved = symmetries.iter().map(|s| s.seen.pass);
+    let (failures, checks) = rules::failures(measured.chain(moved).chain([Some(defect.pass)]));
     Ok(SystemEvidence {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -257,10 +241,10 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         symmetries,
         defect,
         failures,
-        checks: checks.len(),
+        checks,
         passed: failures == 0,
         duration: setup.duration,
-        error_bound: analysis.error_bound,
+        error_bound: judged.findings.error_bound,
         seed,
     })
 }
@@ -313,8 +297,8 @@ fn settled(slopes: &[f64]) -> Option<f64> {
     let last = slopes.last_chunk::<SETTLED>()?;
     let changes: Vec<f64> = last.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let less = changes.windows(2).all(|w| w[1] <= w[0].max(JITTER));
-    let little =
-        changes.iter().all(|x| *x <= TOLERANCE) && changes.last().is_some_and(|x| *x <= TOLERANCE / 4.0);
+    let little = changes.iter().all(|x| *x <= SLOPE_TOLERANCE)
+        && changes.last().is_some_and(|x| *x <= SLOPE_TOLERANCE / 4.0);
     (less && little).then_some(last[SETTLED - 1])
 }
 

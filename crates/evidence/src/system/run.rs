@@ -2,9 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
-use obsdeg_core::system::{
-    Compiled, ModelError, StateStart, Symmetries, SystemAnalysis, SystemModel, answer, judge_compiled,
-};
+use obsdeg_core::system::{Compiled, Judgement, ModelError, StateStart, SystemModel, judge_compiled};
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
 use schemars::JsonSchema;
@@ -177,7 +175,6 @@ impl<'a> Setup<'a> {
 pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
-    let analysis = answer(model, &judged, &Symmetries::default(), seed);
     let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
     let segments = numeric.segments();
     let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
@@ -238,7 +235,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             record(t + dt, segment, &truth, &filter);
         }
     }
-    let estimates = estimates(model, &analysis, &numeric, &traces);
+    let estimates = estimates(model, &judged, &numeric, &traces);
     traces.determined = estimates.iter().map(SystemEstimate::is_determined).collect();
     let consistency = Consistency::of(Outcomes {
         whitened: &whitened,
@@ -257,7 +254,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             duration,
             step: dt,
             noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
-            error_bound: analysis.error_bound,
+            error_bound: judged.findings.error_bound,
             seed,
         },
         traces,
@@ -275,7 +272,7 @@ fn unit(model: &SystemModel, state: &FilterState) -> String {
 
 fn estimates(
     model: &SystemModel,
-    analysis: &SystemAnalysis,
+    judged: &Judgement,
     numeric: &Numeric<'_>,
     traces: &Traces,
 ) -> Vec<SystemEstimate> {
@@ -283,17 +280,17 @@ fn estimates(
         let series = &traces.series[c];
         let last = |v: &Vec<f64>| v.last().copied().unwrap_or(f64::NAN);
         let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
-        let verdict = analysis.quantities.iter().find(|q| q.name == *name);
+        let verdict = judged.verdict(model, name);
         let prior_sigma = series.sigma.first().copied().unwrap_or(f64::NAN);
         let error = estimate - truth;
         let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
-        let status = verdict.map(|q| q.status);
+        let status = verdict.map(|v| v.status);
         let determined = is_determined(status);
         SystemEstimate {
             name: name.clone(),
             unit: unit(model, &numeric.states[c]),
             status,
-            degree: verdict.and_then(|q| q.degree),
+            degree: verdict.and_then(|v| v.degree),
             truth,
             estimate,
             error,
