@@ -71,14 +71,14 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             let options = AnalysisOptions { seed, solutions, formulas: a.formulas, frame: a.frame };
             let message = "solving symbolically (--solutions off leaves it out)";
             let analysis = a.engine.lend(message, quiet, |worker| Ok(analyze(&scheme, options, worker)?))?;
-            a.output.write(&analysis, obsdeg_report::analysis)
+            a.output.write(&analysis)
         }
         Input::Model(file) => {
             let options = SystemOptions { seed, solutions, order: a.order.map(Into::into) };
             let analysis = a.engine.lend("judging the model", quiet, |worker| {
                 analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))
             })?;
-            a.output.write(&analysis, obsdeg_report::system)
+            a.output.write(&analysis)
         }
     }
 }

@@ -69,5 +69,5 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let compared = compare(&entries, a.seed);
     drop(spinner);
     let comparison = compared.map_err(|(name, e)| Failure::from(e).in_file(&name))?;
-    a.output.write(&comparison, obsdeg_report::comparison)
+    a.output.write(&comparison)
 }

@@ -78,13 +78,13 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             drop(bar);
             let evidence = checked?;
             let figures = || crosscheck_figures(&evidence).map_err(ReportError::from);
-            a.output.write_folder(&evidence, obsdeg_report::crosscheck, "evidence.json", figures)?;
+            a.output.write_folder(&evidence, "evidence.json", figures)?;
             evidence.passed
         }
         Input::Model(file) => {
             let evidence = crosscheck_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
             let none = || Ok::<_, ReportError>(vec![]);
-            a.output.write_folder(&evidence, obsdeg_report::system_evidence, "evidence.json", none)?;
+            a.output.write_folder(&evidence, "evidence.json", none)?;
             evidence.passed
         }
     };

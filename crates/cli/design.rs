@@ -184,7 +184,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     drop(bar);
     let found = designed?;
     let more = || files(&found, &base, &conditions);
-    a.output.write_folder(&found, obsdeg_report::design, "design.json", more)
+    a.output.write_folder(&found, "design.json", more)
 }
 
 /// What a shared option says here.

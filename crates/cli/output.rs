@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use obsdeg_report::{File, Format, Layout, ReportError};
+use obsdeg_report::{Answer, File, Format, Layout, written};
 
 use crate::failure::Failure;
 use crate::files;
@@ -12,9 +12,6 @@ use crate::progress::Spinner;
 
 /// Columns of a table that does not go to a terminal.
 const PIPE: Layout = Layout { width: Some(120), color: false };
-
-/// A result as text.
-type Render<T> = fn(&T, Format, Layout) -> Result<String, ReportError>;
 
 /// In which format and where results are written.
 #[derive(Debug, Args)]
@@ -57,26 +54,25 @@ pub(crate) fn to_a_folder(arg: Arg) -> Arg {
 
 impl Output {
     /// Writes a result to the file or to stdout.
-    pub(crate) fn write<T>(&self, result: &T, render: Render<T>) -> Result<(), Failure> {
+    pub(crate) fn write(&self, result: &impl Answer) -> Result<(), Failure> {
         let layout = if self.target.output.is_some() { PIPE } else { terminal() };
-        self.target.write(render(result, self.format, layout)?.as_bytes(), &[])
+        self.target.write(written(result, self.format, layout)?.as_bytes(), &[])
     }
 
     /// Writes a result to stdout and, if there is a folder, its JSON and `more` into that.
-    pub(crate) fn write_folder<T, E>(
+    pub(crate) fn write_folder<E>(
         &self,
-        result: &T,
-        render: Render<T>,
+        result: &impl Answer,
         json: &str,
         more: impl FnOnce() -> Result<Vec<File>, E>,
     ) -> Result<(), Failure>
     where
         Failure: From<E>,
     {
-        let text = render(result, self.format, terminal())?;
+        let text = written(result, self.format, terminal())?;
         if let Some(folder) = &self.target.output {
             let _spinner = Spinner::start("drawing figures", self.target.quiet);
-            let bytes = render(result, Format::Json, Layout::default())?.into_bytes();
+            let bytes = written(result, Format::Json, Layout::default())?.into_bytes();
             let mut files = vec![File { name: json.into(), bytes }];
             files.extend(more()?);
             self.target.check_folder()?;

@@ -34,5 +34,5 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check()?;
     let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
-    a.output.write(&audit, obsdeg_report::audit)
+    a.output.write(&audit)
 }

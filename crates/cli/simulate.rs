@@ -49,11 +49,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             a.conditions.concern(std::iter::once(&scheme))?;
             let (summary, record) = simulate(&scheme, &a.conditions.conditions(&scheme), a.seed)?;
             let more = || files(&record.traces);
-            a.output.write_folder(&summary, obsdeg_report::simulation, "summary.json", more)
+            a.output.write_folder(&summary, "summary.json", more)
         }
         Input::Model(file) => {
             let (run, traces) = simulate_system(&file.model, a.seed).map_err(|e| file.wrong_run(&e))?;
-            a.output.write_folder(&run, obsdeg_report::system_run, "summary.json", || files(&traces))
+            a.output.write_folder(&run, "summary.json", || files(&traces))
         }
     }
 }

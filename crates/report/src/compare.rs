@@ -3,8 +3,8 @@
 use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity, Worst};
 use obsdeg_evidence::requirements::Requirements;
 
-use crate::document::{Block, Document, number, optional};
-use crate::words;
+use crate::document::{Block, Document, left, number, optional, right};
+use crate::{Answer, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -49,22 +49,21 @@ fn overview(schemes: &[ComparedScheme]) -> Block {
             without(|d| d.requirements.stated > 0 && d.requirements.all_met()),
         ]
     };
-    Block::Table {
-        heading: format!("Side by side ({})", words::PREDICTED),
-        header: vec![
-            "scheme",
-            "carry",
-            "positions",
-            "total [s]",
-            "rank with dwell",
-            "worst sigma(D)",
-            "requirements; worst margin",
-            "observable without",
-            "met without",
+    Block::table(
+        format!("Side by side ({})", words::PREDICTED),
+        [
+            left("scheme"),
+            left("carry"),
+            right("positions"),
+            right("total [s]"),
+            right("rank with dwell"),
+            left("worst sigma(D)"),
+            left("requirements; worst margin"),
+            left("observable without"),
+            left("met without"),
         ],
-        numbers: vec![false, false, true, true, true, false, false, false, false],
-        rows: schemes.iter().map(row).collect(),
-    }
+        schemes.iter().map(row),
+    )
 }
 
 /// One row per unknown: degree, accuracy order and sigma in every scheme.
@@ -93,23 +92,22 @@ fn by_unknown(schemes: &[ComparedScheme]) -> Block {
             ]);
         }
     }
-    Block::Table {
-        heading: format!("By unknown ({}; margin: required over sigma)", words::PREDICTED),
-        header: vec![
-            "unknown",
-            "scheme",
-            "degree",
-            "accuracy",
-            "sigma",
-            "unit",
-            "required",
-            "margin",
-            "excitation per position",
-            "only by",
+    Block::table(
+        format!("By unknown ({}; margin: required over sigma)", words::PREDICTED),
+        [
+            left("unknown"),
+            left("scheme"),
+            right("degree"),
+            right("accuracy"),
+            right("sigma"),
+            left("unit"),
+            right("required"),
+            right("margin"),
+            left("excitation per position"),
+            left("only by"),
         ],
-        numbers: vec![false, false, true, true, true, false, true, true, false, false],
         rows,
-    }
+    )
 }
 
 /// `; half turns to p2 about -N, to p3 about N`.
@@ -129,73 +127,71 @@ fn excitation(q: &Quantity) -> String {
     q.excitation.iter().map(short).collect::<Vec<_>>().join(" ")
 }
 
-pub(crate) fn document(c: &Comparison) -> Document {
-    let mut blocks = vec![overview(&c.schemes), by_unknown(&c.schemes)];
-    let drop_rows = c.schemes.iter().flat_map(|r| {
-        r.drop_one.iter().map(|d| {
-            vec![
-                r.name.clone(),
-                d.position.clone(),
-                list(&d.lost),
-                worst(d.worst.as_ref()),
-                requirements(&d.requirements),
-            ]
-        })
-    });
-    blocks.push(Block::Table {
-        heading: "Without one position".into(),
-        header: vec![
-            "scheme",
-            "without",
-            "not observable any more",
-            "worst sigma(D)",
-            "requirements; worst margin",
-        ],
-        numbers: vec![false; 5],
-        rows: drop_rows.collect(),
-    });
-    let conditions = c.schemes.first().map_or(&[][..], |r| &r.sensitivity);
-    let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
-    for s in c.schemes.iter().flat_map(|r| &r.sensitivity) {
-        if !names.contains(&&s.condition) {
-            names.push(&s.condition);
-        }
-    }
-    let mut rows = Vec::new();
-    for name in names {
-        for r in &c.schemes {
-            if let Some(s) = r.sensitivity.iter().find(|s| s.condition == *name) {
-                rows.push(vec![
-                    name.clone(),
+impl Answer for Comparison {
+    fn document(&self) -> Document {
+        let mut blocks = vec![overview(&self.schemes), by_unknown(&self.schemes)];
+        let drop_rows = self.schemes.iter().flat_map(|r| {
+            r.drop_one.iter().map(|d| {
+                vec![
                     r.name.clone(),
-                    rank(s.rank, r.has_accuracy_orders),
-                    worst(s.worst.as_ref()),
-                ]);
+                    d.position.clone(),
+                    list(&d.lost),
+                    worst(d.worst.as_ref()),
+                    requirements(&d.requirements),
+                ]
+            })
+        });
+        blocks.push(Block::table(
+            "Without one position",
+            [
+                left("scheme"),
+                left("without"),
+                left("not observable any more"),
+                left("worst sigma(D)"),
+                left("requirements; worst margin"),
+            ],
+            drop_rows,
+        ));
+        let conditions = self.schemes.first().map_or(&[][..], |r| &r.sensitivity);
+        let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
+        for s in self.schemes.iter().flat_map(|r| &r.sensitivity) {
+            if !names.contains(&&s.condition) {
+                names.push(&s.condition);
             }
         }
-    }
-    blocks.push(Block::Table {
-        heading: "Sensitivity of the worst sigma(D)".into(),
-        header: vec!["condition", "scheme", "rank with dwell", "worst sigma(D)"],
-        numbers: vec![false, false, true, false],
-        rows,
-    });
-    let missed = |r: &ComparedScheme| format!("{}: {}", r.name, words::requirements(&r.requirements));
-    blocks
-        .push(Block::List { heading: "Requirements".into(), lines: c.schemes.iter().map(missed).collect() });
-    let mut lines = Vec::new();
-    for r in &c.schemes {
-        // what all schemes share is said once
-        let own = words::measurement(&r.conditions).into_iter().filter(|l| l != words::PREDICTED);
-        lines.push(format!(
-            "{}: {}; positions {}{}",
-            r.name,
-            own.collect::<Vec<_>>().join("; "),
-            r.positions.join(", "),
-            half_turns(r)
+        let mut rows = Vec::new();
+        for name in names {
+            for r in &self.schemes {
+                if let Some(s) = r.sensitivity.iter().find(|s| s.condition == *name) {
+                    rows.push(vec![
+                        name.clone(),
+                        r.name.clone(),
+                        rank(s.rank, r.has_accuracy_orders),
+                        worst(s.worst.as_ref()),
+                    ]);
+                }
+            }
+        }
+        blocks.push(Block::table(
+            "Sensitivity of the worst sigma(D)",
+            [left("condition"), left("scheme"), right("rank with dwell"), left("worst sigma(D)")],
+            rows,
         ));
-    }
-    lines.extend([
+        let missed = |r: &ComparedScheme| format!("{}: {}", r.name, words::requirements(&r.requirements));
+        blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
+        let mut lines = Vec::new();
+        for r in &self.schemes {
+            // what all schemes share is said once
+            let own = words::measurement(&r.conditions).into_iter().filter(|l| l != words::PREDICTED);
+            lines.push(format!(
+                "{}: {}; positions {}{}",
+                r.name,
+                own.collect::<Vec<_>>().join("; "),
+                r.positions.join(", "),
+                half_turns(r)
+            ));
+        }
+        lines.extend([
         words::PREDICTED.into(),
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
@@ -203,22 +199,23 @@ pub(crate) fn document(c: &Comparison) -> Document {
         "observable without, met without: positions that can go, one at a time, so that what is observable stays so, and so \
          that every requirement is met; only by: positions without which the unknown is not observable"
             .into(),
-        format!("seed {}", c.seed),
+        format!("seed {}", self.seed),
     ]);
-    if c.schemes.iter().any(|r| !r.slews.is_empty()) {
-        lines.push(
-            "no slews: slews need inertial carry, so other carries are taken with repositioning at once"
-                .into(),
-        );
-    }
-    blocks.push(Block::List { heading: "Assumed".into(), lines });
-    let n = c.schemes.len();
-    Document {
-        title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
-        lead: (!c.differ.is_empty())
-            .then(|| format!("not like with like: the schemes differ in {}", c.differ.join(", ")))
-            .into_iter()
-            .collect(),
-        blocks,
+        if self.schemes.iter().any(|r| !r.slews.is_empty()) {
+            lines.push(
+                "no slews: slews need inertial carry, so other carries are taken with repositioning at once"
+                    .into(),
+            );
+        }
+        blocks.push(Block::list("Assumed", lines));
+        let n = self.schemes.len();
+        Document {
+            title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
+            lead: (!self.differ.is_empty())
+                .then(|| format!("not like with like: the schemes differ in {}", self.differ.join(", ")))
+                .into_iter()
+                .collect(),
+            blocks,
+        }
     }
 }

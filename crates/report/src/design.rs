@@ -4,10 +4,10 @@ use obsdeg_design::design::{Design, Found, SearchReport};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
-use crate::document::{Block, Document, number};
+use crate::document::{Block, Document, left, number, right};
 use crate::figure::{BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
-use crate::words;
+use crate::{Answer, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -63,22 +63,21 @@ fn table(heading: &str, found: &[Found]) -> Block {
             format!("{} of {}", f.rank[0], f.rank[1]),
         ]
     };
-    Block::Table {
-        heading: heading.into(),
-        header: vec![
-            "",
-            "positions in order",
-            "total [s]",
-            "degree",
-            "accuracy",
-            "criterion",
-            "worst sigma [deg/h, /g]",
-            "worst margin",
-            "rank by derivatives",
+    Block::table(
+        heading,
+        [
+            right(""),
+            left("positions in order"),
+            right("total [s]"),
+            right("degree"),
+            right("accuracy"),
+            right("criterion"),
+            left("worst sigma [deg/h, /g]"),
+            left("worst margin"),
+            right("rank by derivatives"),
         ],
-        numbers: vec![true, false, true, true, true, true, false, false, true],
-        rows: found.iter().enumerate().map(row).collect(),
-    }
+        found.iter().enumerate().map(row),
+    )
 }
 
 fn how(d: &Design, s: &SearchReport) -> Vec<String> {
@@ -208,46 +207,46 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     ]
 }
 
-pub(crate) fn document(d: &Design) -> Document {
-    let mut blocks = Vec::new();
-    if let Some(s) = &d.search {
-        blocks.push(table(&format!("Best schemes ({})", words::PREDICTED), &d.found));
-        blocks.extend(d.found.first().map(|f| Block::List {
-            heading: "Requirements of the first".into(),
-            lines: requirements(&f.requirements),
-        }));
-        blocks.push(Block::List { heading: "How".into(), lines: how(d, s) });
-        blocks.push(table(
-            "Front of total time against the criterion (other dwells by exchange, not proven)",
-            &d.front,
+impl Answer for Design {
+    fn document(&self) -> Document {
+        let mut blocks = Vec::new();
+        if let Some(s) = &self.search {
+            blocks.push(table(&format!("Best schemes ({})", words::PREDICTED), &self.found));
+            let first = self.found.first().map(|f| requirements(&f.requirements));
+            blocks.extend(first.map(|lines| Block::list("Requirements of the first", lines)));
+            blocks.push(Block::list("How", how(self, s)));
+            blocks.push(table(
+                "Front of total time against the criterion (other dwells by exchange, not proven)",
+                &self.front,
+            ));
+        }
+        blocks.push(Block::list(
+            "Fewest positions that make every required coefficient observable",
+            minimum(self),
         ));
-    }
-    blocks.push(Block::List {
-        heading: "Fewest positions that make every required coefficient observable".into(),
-        lines: minimum(d),
-    });
-    let by = if d.latitude_by_default { " (chosen here: nothing names one)" } else { "" };
-    let mut assumed =
-        vec![format!("{} carry, latitude {} deg{by}; seed {}", d.carry, d.latitude_deg, d.seed)];
-    match &d.search {
-        Some(s) => assumed.extend(conditions(d, s)),
-        None => assumed.push(format!("terms {}; {}", d.terms, words::gyros(&d.geometry))),
-    }
-    assumed.push(format!("required: {}", d.required.join(", ")));
-    assumed.push(candidates(&d.candidates));
-    if !d.beyond_gimbals.is_empty() {
-        assumed.push(format!("beyond the gimbal limits: {}", shortened(&d.beyond_gimbals)));
-    }
-    assumed.push(format!(
+        let by = if self.latitude_by_default { " (chosen here: nothing names one)" } else { "" };
+        let mut assumed =
+            vec![format!("{} carry, latitude {} deg{by}; seed {}", self.carry, self.latitude_deg, self.seed)];
+        match &self.search {
+            Some(s) => assumed.extend(conditions(self, s)),
+            None => assumed.push(format!("terms {}; {}", self.terms, words::gyros(&self.geometry))),
+        }
+        assumed.push(format!("required: {}", self.required.join(", ")));
+        assumed.push(candidates(&self.candidates));
+        if !self.beyond_gimbals.is_empty() {
+            assumed.push(format!("beyond the gimbal limits: {}", shortened(&self.beyond_gimbals)));
+        }
+        assumed.push(format!(
         "ranks of sets modulo {} random 61-bit primes: an observable set is overlooked with probability below {:.0e}",
-        d.primes, d.error_bound
+        self.primes, self.error_bound
     ));
-    blocks.push(Block::List { heading: "Assumed".into(), lines: assumed });
-    let what = d.search.as_ref().map_or_else(
-        || "fewest positions".into(),
-        |s| format!("{} of {} positions", s.positions, d.candidates.len()),
-    );
-    Document { title: format!("Design: {what}, {} carry", d.carry), lead: Vec::new(), blocks }
+        blocks.push(Block::list("Assumed", assumed));
+        let what = self.search.as_ref().map_or_else(
+            || "fewest positions".into(),
+            |s| format!("{} of {} positions", s.positions, self.candidates.len()),
+        );
+        Document { title: format!("Design: {what}, {} carry", self.carry), lead: Vec::new(), blocks }
+    }
 }
 
 fn candidates(names: &[String]) -> String {

@@ -1,22 +1,14 @@
-//! Headings, tables and lists, in every text format. Text from files is escaped where it is written.
+//! What a result says, in no format: headings, tables, lists, formulas, pictures. Text from files is escaped where it is written.
 
-use comfy_table::CellAlignment;
+use serde_json::{Value, json};
 
 use crate::figure::Figure;
-use crate::table::{cell, heading, paragraph, table as new_table};
-use crate::{Layout, ReportError, csv_text, latex, markdown};
 
 /// A part of a document.
 pub(crate) enum Block {
-    /// A table; columns of numbers are set flush right.
-    Table {
-        heading: String,
-        header: Vec<&'static str>,
-        /// Whether a column holds numbers.
-        numbers: Vec<bool>,
-        rows: Vec<Vec<String>>,
-    },
-    /// Lines, wrapped.
+    /// A table; an empty heading is none.
+    Table { heading: String, columns: Vec<Column>, rows: Vec<Vec<Cell>> },
+    /// Lines, wrapped; an empty heading is none.
     List { heading: String, lines: Vec<String> },
     /// The heading of a part (level 1) or of a section of it (level 2).
     Section { level: usize, title: String },
@@ -28,6 +20,85 @@ pub(crate) enum Block {
     Picture(Picture),
     /// What a reader must know first, a box for each scheme or model.
     Status(Vec<Status>),
+}
+
+impl Block {
+    pub(crate) fn table<C: Into<Cell>>(
+        heading: impl Into<String>,
+        columns: impl Into<Vec<Column>>,
+        rows: impl IntoIterator<Item = Vec<C>>,
+    ) -> Self {
+        let rows = rows.into_iter().map(|row| row.into_iter().map(Into::into).collect());
+        Self::Table { heading: heading.into(), columns: columns.into(), rows: rows.collect() }
+    }
+
+    pub(crate) fn list(heading: impl Into<String>, lines: Vec<String>) -> Self {
+        Self::List { heading: heading.into(), lines }
+    }
+
+    /// A list, if it has lines.
+    pub(crate) fn list_if_any(heading: impl Into<String>, lines: Vec<String>) -> Option<Self> {
+        (!lines.is_empty()).then(|| Self::list(heading, lines))
+    }
+
+    /// Formulas, if there are any.
+    pub(crate) fn formulas(
+        heading: impl Into<String>,
+        lines: impl IntoIterator<Item = Typeset>,
+    ) -> Option<Self> {
+        let lines: Vec<Typeset> = lines.into_iter().collect();
+        (!lines.is_empty()).then(|| Self::Formulas { heading: heading.into(), lines })
+    }
+}
+
+/// A column of a table.
+#[derive(Clone, Copy)]
+pub(crate) struct Column {
+    pub(crate) name: &'static str,
+    /// Numbers are set flush right.
+    pub(crate) number: bool,
+}
+
+/// A column of text.
+pub(crate) fn left(name: &'static str) -> Column {
+    Column { name, number: false }
+}
+
+/// A column of numbers.
+pub(crate) fn right(name: &'static str) -> Column {
+    Column { name, number: true }
+}
+
+/// A cell of a table.
+#[derive(Clone)]
+pub(crate) struct Cell {
+    pub(crate) text: String,
+    /// The same as LaTeX, if it is a formula.
+    pub(crate) latex: Option<String>,
+}
+
+impl Cell {
+    pub(crate) fn formula(text: impl Into<String>, latex: String) -> Self {
+        Self { text: text.into(), latex: Some(latex) }
+    }
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self { text: text.into(), latex: None }
+    }
+}
+
+/// A table for the templates of pages.
+pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>]) -> Value {
+    let texts = |row: &Vec<Cell>| row.iter().map(|c| c.text.clone()).collect::<Vec<_>>();
+    json!({
+        "kind": "table",
+        "heading": heading,
+        "header": columns.iter().map(|c| c.name).collect::<Vec<_>>(),
+        "numbers": columns.iter().map(|c| c.number).collect::<Vec<_>>(),
+        "rows": rows.iter().map(texts).collect::<Vec<_>>(),
+    })
 }
 
 /// The state of one scheme or model at a glance.
@@ -72,13 +143,9 @@ impl Grade {
 impl Status {
     /// The box as a table, for formats that have no boxes.
     fn table(&self) -> Block {
-        let row = |f: &Finding| vec![f.what.into(), f.grade.mark().into(), f.text.clone()];
-        Block::Table {
-            heading: format!("Status: {}", self.title),
-            header: vec!["question", "status", "finding"],
-            numbers: vec![false; 3],
-            rows: self.rows.iter().map(row).collect(),
-        }
+        let row = |f: &Finding| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
+        let columns = [left("question"), left("status"), left("finding")];
+        Block::table(format!("Status: {}", self.title), columns, self.rows.iter().map(row))
     }
 }
 
@@ -112,8 +179,8 @@ impl Picture {
     }
 }
 
-/// A title and its parts.
-pub(crate) struct Document {
+/// What a result says, in no format: a title and its parts.
+pub struct Document {
     pub(crate) title: String,
     pub(crate) lead: Vec<String>,
     pub(crate) blocks: Vec<Block>,
@@ -183,167 +250,56 @@ impl Document {
             _ => None,
         })
     }
-
-    pub(crate) fn table(&self, layout: Layout) -> String {
-        let mut out = String::new();
-        heading(&mut out, &self.title, layout);
-        for line in &self.lead {
-            paragraph(&mut out, line, layout);
-        }
-        for block in &self.blocks {
-            match block {
-                Block::Table { heading: title, header, numbers, rows } => {
-                    heading(&mut out, title, layout);
-                    let mut table = new_table(header, layout);
-                    for row in rows {
-                        let aligned = |(text, &right): (&String, &bool)| {
-                            let side = if right { CellAlignment::Right } else { CellAlignment::Left };
-                            cell(text).set_alignment(side)
-                        };
-                        table.add_row(row.iter().zip(numbers).map(aligned).collect::<Vec<_>>());
-                    }
-                    let text = table.to_string();
-                    out.extend(text.lines().flat_map(|l| [l.trim_end(), "\n"]));
-                }
-                Block::List { heading: title, lines } => {
-                    heading(&mut out, title, layout);
-                    for line in lines {
-                        paragraph(&mut out, line, layout);
-                    }
-                }
-                Block::Section { title, .. } => heading(&mut out, title, layout),
-                Block::Text(text) => paragraph(&mut out, text, layout),
-                Block::Formulas { heading: title, lines } => {
-                    heading(&mut out, title, layout);
-                    for line in lines {
-                        paragraph(&mut out, &line.text, layout);
-                    }
-                }
-                // a status is a table by now
-                Block::Picture(_) | Block::Status(_) => {}
-            }
-        }
-        out
-    }
-
-    pub(crate) fn markdown(&self) -> String {
-        let mut out = format!("# {}\n\n", markdown::escape(&self.title));
-        for line in &self.lead {
-            out.push_str(&format!("{}\n\n", markdown::escape(line)));
-        }
-        let sections = self.blocks.iter().any(|b| matches!(b, Block::Section { .. }));
-        let hashes = if sections { "####" } else { "##" };
-        for (i, block) in self.blocks.iter().enumerate() {
-            let gap = if i == 0 { "" } else { "\n" };
-            match block {
-                Block::Table { heading, header, rows, .. } => {
-                    let cells = rows.iter().map(|r| r.iter().map(|c| markdown::escape(c)).collect());
-                    let table = markdown::table(header, cells);
-                    out.push_str(&format!("{gap}{hashes} {}\n\n{table}", markdown::escape(heading)));
-                }
-                Block::List { heading, lines } => {
-                    if heading.is_empty() {
-                        out.push_str(gap);
-                    } else {
-                        out.push_str(&format!("{gap}{hashes} {}\n\n", markdown::escape(heading)));
-                    }
-                    for line in lines {
-                        out.push_str(&format!("- {}\n", markdown::escape(line)));
-                    }
-                }
-                Block::Section { level, title } => {
-                    out.push_str(&format!("{gap}{} {}\n", "#".repeat(level + 1), markdown::escape(title)));
-                }
-                Block::Text(text) => out.push_str(&format!("{gap}{}\n", markdown::escape(text))),
-                Block::Formulas { heading, lines } => {
-                    out.push_str(&format!("{gap}{hashes} {}\n\n", markdown::escape(heading)));
-                    for line in lines {
-                        out.push_str(&format!("- ${}$\n", line.latex));
-                    }
-                }
-                Block::Picture(p) => {
-                    let caption = markdown::escape(&p.caption);
-                    out.push_str(&format!("{gap}![{caption}]({}.svg)\n", p.name));
-                }
-                Block::Status(_) => {}
-            }
-        }
-        out
-    }
-
-    pub(crate) fn latex(&self) -> String {
-        let mut out = format!("% {}\n", latex::escape(&self.title));
-        let item = |lines: &[String]| {
-            let items: String = lines.iter().map(|l| format!("\\item {}\n", latex::escape(l))).collect();
-            format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n")
-        };
-        if !self.lead.is_empty() {
-            out.push_str(&item(&self.lead));
-        }
-        for block in &self.blocks {
-            match block {
-                Block::Table { heading, header, numbers, rows } => {
-                    // a column of sentences is wrapped
-                    const LONG: usize = 70;
-                    let long = |k: usize| rows.iter().any(|r| r[k].chars().count() > LONG);
-                    let column = |(k, &number): (usize, &bool)| match number {
-                        true => "r",
-                        false if long(k) => "p{.5\\linewidth}",
-                        false => "l",
-                    };
-                    let columns: String = numbers.iter().enumerate().map(column).collect();
-                    let cells = rows.iter().map(|r| r.iter().map(|c| latex::escape(c)).collect::<Vec<_>>());
-                    out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
-                    let header: Vec<String> = header.iter().map(|h| latex::escape(h)).collect();
-                    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-                    out.push_str(&latex::table(&columns, &header, cells));
-                }
-                Block::List { heading, lines } => {
-                    if !heading.is_empty() {
-                        out.push_str(&format!("\\paragraph{{{}}}\n", latex::escape(heading)));
-                    }
-                    if !lines.is_empty() {
-                        out.push_str(&item(lines));
-                    }
-                }
-                Block::Section { level, title } => {
-                    let command = if *level == 1 { "section" } else { "subsection" };
-                    out.push_str(&format!("\\{command}*{{{}}}\n", latex::escape(title)));
-                }
-                Block::Text(text) => out.push_str(&format!("{}\n\n", latex::escape(text))),
-                Block::Formulas { heading, lines } => {
-                    let items: String = lines.iter().map(|l| format!("\\item ${}$\n", l.latex)).collect();
-                    out.push_str(&format!(
-                        "\\paragraph{{{}}}\n\\begin{{itemize}}\n{items}\\end{{itemize}}\n",
-                        latex::escape(heading)
-                    ));
-                }
-                Block::Picture(p) => out.push_str(&format!(
-                    "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{}.png}}\\\\{}\\end{{center}}\n",
-                    p.name,
-                    latex::escape(&p.caption)
-                )),
-                Block::Status(_) => {}
-            }
-        }
-        out
-    }
-
-    /// The first table.
-    pub(crate) fn csv(&self) -> Result<String, ReportError> {
-        let first = self.blocks.iter().find_map(|b| match b {
-            Block::Table { header, rows, .. } => Some((header, rows)),
-            _ => None,
-        });
-        let Some((header, rows)) = first else { return Ok(String::new()) };
-        let header = header.iter().map(ToString::to_string).collect();
-        csv_text::write(std::iter::once(header).chain(rows.iter().cloned()))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One document in every format: a formula is code in Markdown, math in LaTeX and text elsewhere, a heading that is empty is none, and
+    /// columns of sentences share the line.
+    #[test]
+    fn a_formula_in_every_format() {
+        let columns = [left("what"), right("how many")];
+        let row = vec![Cell::formula("D_FX", "D_{FX}".into()), "a_1".into()];
+        let formula = Typeset { text: "x_1 = 2".into(), latex: "x_{1} = 2".into() };
+        let blocks = [Some(Block::table("", columns, [row])), Block::formulas("Where", [formula])];
+        assert!(Block::formulas("Nowhere", []).is_none() && Block::list_if_any("Nothing", vec![]).is_none());
+        let d = Document {
+            title: "T".into(),
+            lead: vec!["so".into()],
+            blocks: blocks.into_iter().flatten().collect(),
+        };
+        assert_eq!(
+            crate::markdown::document(&d),
+            "# T\n\nso\n\n| what | how many |\n| --- | --- |\n| `D_FX` | a\\_1 |\n\n## Where\n\n- $x_{1} = 2$\n"
+        );
+        assert_eq!(
+            crate::latex::document(&d),
+            "% T\n\\begin{itemize}\n\\item so\n\\end{itemize}\n\\begin{longtable}{lr}\n\\toprule\nwhat & how many \\\\\n\\midrule\n\\endhead\n\
+             $D_{FX}$ & a\\_1 \\\\\n\\bottomrule\n\\end{longtable}\n\\paragraph{Where}\n\\begin{itemize}\n\\item $x_{1} = 2$\n\\end{itemize}\n"
+        );
+        assert_eq!(crate::csv_text::document(&d).expect("CSV"), "what,how many\nD_FX,a_1\n");
+        let table = crate::table::document(&d, crate::Layout::default());
+        let lines: Vec<&str> = table.lines().collect();
+        assert_eq!(lines[..3], ["T", "  so", " what   how many"]);
+        assert_eq!(lines[4..], [" D_FX        a_1", "", "Where", "  x_1 = 2"]);
+    }
+
+    #[test]
+    fn wide_columns_share_the_line() {
+        let sentence = "so ".repeat(30);
+        for (sentences, columns) in [
+            (1, "p{.5\\linewidth}ll"),
+            (2, "p{.37\\linewidth}p{.37\\linewidth}l"),
+            (3, "p{.25\\linewidth}p{.25\\linewidth}p{.25\\linewidth}"),
+        ] {
+            let row: Vec<&str> = (0..3).map(|k| if k < sentences { &sentence } else { "short" }).collect();
+            let blocks = vec![Block::table("", [left("a"), left("b"), left("c")], [row])];
+            let latex = crate::latex::document(&Document { title: "T".into(), lead: vec![], blocks });
+            assert!(latex.contains(&format!("longtable}}{{{columns}}}\n")), "{latex}");
+        }
+    }
 
     #[test]
     fn four_digits() {

@@ -8,7 +8,9 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
-use crate::document::{Block, Document, Drawing, Finding, Grade, Part, Picture, Status, Typeset};
+use crate::document::{
+    Block, Document, Drawing, Finding, Grade, Part, Picture, Status, Typeset, table_of_page,
+};
 use crate::figure::{Figure, Line, Stroke};
 use crate::{ReportError, visible};
 
@@ -61,9 +63,7 @@ fn block(i: usize, part: &Part<'_>) -> Json {
         }
         Block::Text(text) => json!({ "kind": "text", "text": text }),
         Block::List { heading, lines } => json!({ "kind": "list", "heading": heading, "lines": lines }),
-        Block::Table { heading, header, numbers, rows } => {
-            json!({ "kind": "table", "heading": heading, "header": header, "numbers": numbers, "rows": rows })
-        }
+        Block::Table { heading, columns, rows } => table_of_page(heading, columns, rows),
         Block::Formulas { heading, lines } => {
             let lines: Vec<Json> = lines.iter().map(formula).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })

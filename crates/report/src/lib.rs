@@ -1,5 +1,6 @@
 //! Results as text: tables, JSON, Markdown, CSV, LaTeX. Pure formatting: nothing is computed here.
 
+mod analysis;
 mod audit;
 mod compare;
 mod crosscheck;
@@ -21,6 +22,7 @@ mod table;
 mod visible;
 mod words;
 
+pub use document::Document;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use series::{series_csv, series_parquet};
@@ -29,15 +31,8 @@ pub use visible::visible;
 use std::fmt;
 use std::str::FromStr;
 
-use obsdeg_core::analysis::Analysis;
-use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::design::Design;
 use obsdeg_design::review::DesignReview;
-use obsdeg_evidence::audit::Audit;
-use obsdeg_evidence::compare::Comparison;
-use obsdeg_evidence::crosscheck::CrossCheck;
-use obsdeg_evidence::simulation::Simulation;
-use obsdeg_evidence::system::{SystemEvidence, SystemRun};
 
 /// A text format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -124,42 +119,32 @@ pub enum ReportError {
     Page(#[from] minijinja::Error),
 }
 
-/// An analysis in the given format, ending in a newline.
+/// A result that can be written in every text format.
+pub trait Answer: serde::Serialize {
+    /// What it says, in no format.
+    fn document(&self) -> Document;
+
+    /// Its rows in CSV, names first, where they are not those of the first table.
+    fn records(&self) -> Option<Vec<Vec<String>>> {
+        None
+    }
+}
+
+/// A result in the given format, ending in a newline.
 ///
 /// # Errors
 /// [`ReportError`] when a serializer fails.
-pub fn analysis(a: &Analysis, format: Format, layout: Layout) -> Result<String, ReportError> {
+pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<String, ReportError> {
     Ok(match format {
-        Format::Table => table::analysis(a, layout),
-        Format::Json => visible::json(a)?,
-        Format::Markdown => markdown::analysis(a),
-        Format::Csv => csv_text::analysis(a)?,
-        Format::Latex => latex::analysis(a),
+        Format::Table => table::document(&answer.document(), layout),
+        Format::Json => visible::json(answer)?,
+        Format::Markdown => markdown::document(&answer.document()),
+        Format::Csv => match answer.records() {
+            Some(rows) => csv_text::write(rows)?,
+            None => csv_text::document(&answer.document())?,
+        },
+        Format::Latex => latex::document(&answer.document()),
     })
-}
-
-/// A run of the filter in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a serializer fails.
-pub fn simulation(s: &Simulation, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(s, &simulation::document(s), format, layout)
-}
-
-/// A cross-check in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a serializer fails.
-pub fn crosscheck(c: &CrossCheck, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(c, &crosscheck::document(c), format, layout)
-}
-
-/// A comparison in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a serializer fails.
-pub fn comparison(c: &Comparison, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(c, &compare::document(c), format, layout)
 }
 
 /// The front of a design as SVG and PNG.
@@ -168,38 +153,6 @@ pub fn comparison(c: &Comparison, format: Format, layout: Layout) -> Result<Stri
 /// [`ReportError`] when it cannot be drawn.
 pub fn design_figures(d: &Design) -> Result<Vec<File>, ReportError> {
     Ok(design::figures(d)?)
-}
-
-/// The answer for any system in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a value cannot be serialised.
-pub fn system(a: &SystemAnalysis, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(a, &system::document(a), format, layout)
-}
-
-/// A run of any system in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a value cannot be serialised.
-pub fn system_run(r: &SystemRun, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(r, &system::run(r), format, layout)
-}
-
-/// The evidence for any system in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a value cannot be serialised.
-pub fn system_evidence(e: &SystemEvidence, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(e, &system::evidence(e), format, layout)
-}
-
-/// A design in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a serializer fails.
-pub fn design(d: &Design, format: Format, layout: Layout) -> Result<String, ReportError> {
-    written(d, &design::document(d), format, layout)
 }
 
 /// Whether this build can write a PDF.
@@ -236,14 +189,14 @@ pub fn review(r: &DesignReview, format: ReviewFormat, folder: &str) -> Result<Ve
         ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),
         ReviewFormat::Markdown => {
             let document = document.with_pictures_in(folder);
-            let mut files = vec![File::new("review.md", document.markdown())];
+            let mut files = vec![File::new("review.md", markdown::document(&document))];
             let svg = |p: &document::Picture| File::new(format!("{}.svg", p.name), p.svg());
             files.extend(document.pictures().map(svg));
             Ok(files)
         }
         ReviewFormat::Latex => {
             let document = document.with_pictures_in(folder);
-            let mut files = vec![File::new("review.tex", latex::document(&document))];
+            let mut files = vec![File::new("review.tex", latex::alone(&document))];
             for p in document.pictures() {
                 files.push(File::new(format!("{}.png", p.name), png(&p.svg())?));
             }
@@ -254,33 +207,4 @@ pub fn review(r: &DesignReview, format: ReviewFormat, folder: &str) -> Result<Ve
         #[cfg(not(feature = "pdf"))]
         ReviewFormat::Pdf => Err(ReportError::NoPdf),
     }
-}
-
-fn written(
-    answer: &impl serde::Serialize,
-    document: &document::Document,
-    format: Format,
-    layout: Layout,
-) -> Result<String, ReportError> {
-    Ok(match format {
-        Format::Table => document.table(layout),
-        Format::Json => visible::json(answer)?,
-        Format::Markdown => document.markdown(),
-        Format::Csv => document.csv()?,
-        Format::Latex => document.latex(),
-    })
-}
-
-/// An audit in the given format, ending in a newline.
-///
-/// # Errors
-/// [`ReportError`] when a serializer fails.
-pub fn audit(a: &Audit, format: Format, layout: Layout) -> Result<String, ReportError> {
-    Ok(match format {
-        Format::Table => audit::table(a, layout),
-        Format::Json => visible::json(a)?,
-        Format::Markdown => audit::markdown(a),
-        Format::Csv => audit::csv(a)?,
-        Format::Latex => audit::latex(a),
-    })
 }

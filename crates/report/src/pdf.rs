@@ -17,7 +17,7 @@ use typst::{Library, LibraryExt, World};
 use typst_layout::PagedDocument;
 use typst_pdf::PdfOptions;
 
-use crate::document::{Block, Document, Part};
+use crate::document::{Block, Document, Part, table_of_page};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
@@ -127,9 +127,7 @@ fn part(part: Part<'_>) -> Json {
         Block::Section { level, title } => json!({ "kind": "section", "level": level, "title": title }),
         Block::Text(text) => json!({ "kind": "text", "text": text }),
         Block::List { heading, lines } => json!({ "kind": "list", "heading": heading, "lines": lines }),
-        Block::Table { heading, header, numbers, rows } => {
-            json!({ "kind": "table", "heading": heading, "header": header, "numbers": numbers, "rows": rows })
-        }
+        Block::Table { heading, columns, rows } => table_of_page(heading, columns, rows),
         Block::Formulas { heading, lines } => {
             let lines: Vec<String> = lines.iter().map(|l| math::typst(&l.latex)).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })

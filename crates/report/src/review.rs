@@ -9,8 +9,9 @@ use obsdeg_design::review::{DesignReview, PositionReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::crosscheck::CrossCheck;
 
-use crate::document::{Block, Document, Typeset, optional};
-use crate::{compare, crosscheck, latex, simulation, words};
+use crate::analysis::null_vector;
+use crate::document::{Block, Document, Typeset, left, optional, right};
+use crate::{Answer, compare, latex, simulation, words};
 
 /// A review as one document.
 pub(crate) fn document(r: &DesignReview) -> Document {
@@ -26,7 +27,7 @@ pub(crate) fn document(r: &DesignReview) -> Document {
     }
     if r.schemes.len() > 1 {
         blocks.push(section(1, "Comparison of the schemes"));
-        let comparison = compare::document(&r.comparison);
+        let comparison = r.comparison.document();
         blocks.extend(comparison.lead.into_iter().map(Block::Text));
         blocks.extend(comparison.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
         blocks.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
@@ -38,7 +39,7 @@ pub(crate) fn document(r: &DesignReview) -> Document {
         model::part(&mut blocks, m, level, &format!("m{}", i + 1));
     }
     blocks.push(section(1, "About this report"));
-    blocks.push(list(
+    blocks.push(Block::list(
         "",
         vec![
             format!("obsdeg {}; seed {}; {} Monte Carlo runs", r.version, r.seed, r.runs),
@@ -59,10 +60,6 @@ pub(crate) fn document(r: &DesignReview) -> Document {
 
 fn section(level: usize, title: impl Into<String>) -> Block {
     Block::Section { level, title: title.into() }
-}
-
-fn list(heading: &str, lines: Vec<String>) -> Block {
-    Block::List { heading: heading.into(), lines }
 }
 
 fn is_list(block: &Block, name: &str) -> bool {
@@ -103,7 +100,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.push(section(level, "Evidence by a filter"));
     evidence(blocks, s, id);
     blocks.push(section(level, "Validity of the small-angle model"));
-    blocks.push(list("", simulation::validity(&s.simulation.validity)));
+    blocks.push(Block::list("", simulation::validity(&s.simulation.validity)));
     blocks.push(section(level, "Assumptions and certainty"));
     let mut assumed = words::assumptions(a);
     // carry, latitude and observation are said above
@@ -111,7 +108,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
     assumed.push(words::certainty(a));
     assumed.extend(a.notes.iter().chain(&s.notes).map(|n| format!("note: {n}")));
-    blocks.push(list("", assumed));
+    blocks.push(Block::list("", assumed));
 }
 
 /// `with derivatives up to order 2 (D_FY, D_IY)`: names where only some need as many.
@@ -146,28 +143,26 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
             if excited.is_empty() { "-".into() } else { excited.join(" ") },
         ]
     };
-    Block::Table {
-        heading: format!("Every unknown, best first (- where it is not determined; {})", words::PREDICTED),
-        header: vec![
-            "unknown",
-            "unit",
-            "verdict",
-            "degree",
-            "accuracy order",
-            "not told from",
-            "predicted sigma",
-            "required",
-            "margin",
-            "excited at",
+    Block::table(
+        format!("Every unknown, best first (- where it is not determined; {})", words::PREDICTED),
+        [
+            left("unknown"),
+            left("unit"),
+            left("verdict"),
+            right("degree"),
+            right("accuracy order"),
+            left("not told from"),
+            right("predicted sigma"),
+            right("required"),
+            right("margin"),
+            left("excited at"),
         ],
-        numbers: vec![false, false, false, true, true, false, true, true, true, false],
-        rows: a.quantities.iter().map(row).collect(),
-    }
+        a.quantities.iter().map(row),
+    )
 }
 
 fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
     let mut lines = Vec::new();
-    let mut formulas = Vec::new();
     for v in &a.null_space {
         let names = joined(v.iter().map(|c| c.name.as_str()));
         let parts: Vec<String> = (v.iter())
@@ -180,12 +175,6 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             1 => format!("no derivative of Z changes with {names}"),
             _ => format!("no derivative of Z changes when these change together: {}", parts.join(", ")),
         });
-        let component = |c: &obsdeg_core::analysis::Component| {
-            let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| latex::expression(k));
-            format!("\\delta {} = {value}", latex::symbol(&c.name))
-        };
-        let latex = v.iter().map(component).collect::<Vec<_>>().join(",\\; ");
-        formulas.push(Typeset { text: words::null_vector(v), latex });
     }
     let silent = words::not_excited(a);
     if !silent.is_empty() {
@@ -204,10 +193,8 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             seen.join(", ")
         ));
     }
-    blocks.push(list("", lines));
-    if !formulas.is_empty() {
-        blocks.push(Block::Formulas { heading: words::UNSEEN.into(), lines: formulas });
-    }
+    blocks.push(Block::list("", lines));
+    blocks.extend(Block::formulas(words::UNSEEN, a.null_space.iter().map(|v| null_vector(v))));
     let combination = |c: &obsdeg_core::analysis::CombinationReport| {
         let asked = if c.requested { ", asked for" } else { "" };
         let dwell = match words::with_dwell(a, c.degree, c.accuracy_order) {
@@ -223,10 +210,7 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
         }
     };
-    if !a.combinations.is_empty() {
-        let lines = a.combinations.iter().map(combination).collect();
-        blocks.push(Block::Formulas { heading: "Observable combinations".into(), lines });
-    }
+    blocks.extend(Block::formulas("Observable combinations", a.combinations.iter().map(combination)));
 }
 
 /// A time in s, to a tenth.
@@ -250,10 +234,9 @@ fn positions(
     let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") };
     let g = |g: [f64; 3]| g.map(component).join(", ");
     let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
-        let angles: Vec<String> = p.angles_deg.iter().map(ToString::to_string).collect();
         vec![
             p.name.clone(),
-            words::turned(&angles.join(", "), p.rotation.as_deref()),
+            words::angles(p),
             p.attitude.clone().unwrap_or_else(|| "-".into()),
             seconds(numbers.start_s),
             seconds(numbers.dwell_s),
@@ -263,24 +246,21 @@ fn positions(
             g(numbers.g[2]),
         ]
     });
-    blocks.push(Block::Table {
-        heading:
-            "Positions, with the components of g along the axes I, O, S of each gyro (in g, at the start)"
-                .into(),
-        header: vec![
-            "position",
-            "alpha, beta, gamma [deg]",
-            "X_p Y_p Z_p",
-            "start [s]",
-            "dwell [s]",
-            "slew to it [s]",
-            "gyro X: I O S",
-            "gyro Y: I O S",
-            "gyro Z: I O S",
+    blocks.push(Block::table(
+        "Positions, with the components of g along the axes I, O, S of each gyro (in g, at the start)",
+        [
+            left("position"),
+            left("alpha, beta, gamma [deg]"),
+            left("X_p Y_p Z_p"),
+            right("start [s]"),
+            right("dwell [s]"),
+            right("slew to it [s]"),
+            right("gyro X: I O S"),
+            right("gyro Y: I O S"),
+            right("gyro Z: I O S"),
         ],
-        numbers: vec![false, false, false, true, true, true, true, true, true],
-        rows: rows.collect(),
-    });
+        rows,
+    ));
     blocks.push(pictures::attitudes(s, &format!("{id}_attitude")));
     if coefficients.iter().any(|q| !q.excitation.is_empty()) {
         blocks.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));
@@ -296,24 +276,14 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
         let solution = q.solution.as_ref()?;
         Some(formula(latex::symbol(&q.name), &q.name, solution))
     });
-    let lines: Vec<Typeset> = unknowns.collect();
-    if lines.is_empty() {
-        blocks.push(Block::Text("No unknown is observable by itself.".into()));
-    } else {
-        blocks.push(Block::Formulas { heading: "Unknowns".into(), lines });
-    }
+    let none = || Block::Text("No unknown is observable by itself.".into());
+    blocks.push(Block::formulas("Unknowns", unknowns).unwrap_or_else(none));
     let combinations = a.combinations.iter().filter_map(|c| {
         let solution = c.solution.as_ref()?;
         Some(formula(latex::expression(&c.expression), &c.expression, solution))
     });
-    let lines: Vec<Typeset> = combinations.collect();
-    if !lines.is_empty() {
-        blocks.push(Block::Formulas { heading: "Combinations".into(), lines });
-    }
-    let accuracy = words::accuracy(a);
-    if !accuracy.is_empty() {
-        blocks.push(list(words::ACCURACY, accuracy));
-    }
+    blocks.extend(Block::formulas("Combinations", combinations));
+    blocks.extend(Block::list_if_any(words::ACCURACY, words::accuracy(a)));
 }
 
 fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id: &str) {
@@ -325,18 +295,8 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedSchem
             compare::worst(c.worst_determined.as_ref()),
         ]
     };
-    blocks.push(Block::Table {
-        heading: "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where one is not observable)".into(),
-        header: vec!["condition", "rank with dwell", "of all", "of those determined"],
-        numbers: vec![false, true, false, false],
-        rows: review.sensitivity.iter().map(row).collect(),
-    });
-    let carries = s.analysis.carries.iter();
-    let lines: Vec<String> =
-        carries.map(|c| format!("{}: {}", words::carry(c), words::differences(c))).collect();
-    if !lines.is_empty() {
-        blocks.push(list("Verdicts under the other carries", lines));
-    }
+    blocks.push(Block::table("Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where one is not observable)", [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")], review.sensitivity.iter().map(row)));
+    blocks.extend(Block::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
     blocks.extend(pictures::latitudes(s, &format!("{id}_latitude")));
     blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
 }
@@ -374,7 +334,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
             ),
         });
     }
-    blocks.push(list("", lines));
+    blocks.push(Block::list("", lines));
     let row = |d: &obsdeg_evidence::compare::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
         vec![
@@ -385,17 +345,16 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
         ]
     };
     if !review.drop_one.is_empty() {
-        blocks.push(Block::Table {
-            heading: "Without one position".into(),
-            header: vec![
-                "without",
-                "not observable any more",
-                "worst sigma(D) [deg/h, /g]",
-                "requirements; worst margin",
+        blocks.push(Block::table(
+            "Without one position",
+            [
+                left("without"),
+                left("not observable any more"),
+                left("worst sigma(D) [deg/h, /g]"),
+                left("requirements; worst margin"),
             ],
-            numbers: vec![false; 4],
-            rows: review.drop_one.iter().map(row).collect(),
-        });
+            review.drop_one.iter().map(row),
+        ));
     }
     if !alternatives.front.is_empty() {
         blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
@@ -419,7 +378,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
             blocks.push(Block::Text(format!(
                 "Exact verdicts and a Kalman filter are two independent paths: they {outcome}{run}."
             )));
-            let document = crosscheck::document(c);
+            let document = c.document();
             blocks.extend(document.lead.into_iter().map(Block::Text));
             let kept = |b: &Block| !is_list(b, "Assumed") && !is_list(b, "Validity of the small-angle model");
             blocks.extend(document.blocks.into_iter().filter(kept));
@@ -427,7 +386,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
         }
         None => blocks.extend(s.notes.first().map(|n| Block::Text(format!("None: {n}.")))),
     }
-    let run = simulation::document(&s.simulation);
+    let run = s.simulation.document();
     blocks.push(Block::Text("One run against a simulated truth, with its errors and bands:".into()));
     let kept = |b: &Block| {
         matches!(b, Block::Table { .. } | Block::List { .. })

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use obsdeg_core::model::settings::{Propagation, Truth};
 use obsdeg_evidence::simulation::{ConditionsReport, Estimate, Simulation, TimelineReport, Validity};
 
-use crate::document::{Block, Document, number, optional};
-use crate::words;
+use crate::document::{Block, Document, left, number, optional, right};
+use crate::{Answer, words};
 
 /// What a run assumes, a sentence each.
 pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> Vec<String> {
@@ -161,51 +161,47 @@ fn requirements_met(s: &Simulation) -> Vec<String> {
     out
 }
 
-pub(crate) fn document(s: &Simulation) -> Document {
-    let header = vec![
-        "unknown", "unit", "degree", "truth", "estimate", "error", "sigma", "in sigma", "at [s]", "verdict",
-    ];
-    let numbers = vec![false, false, true, true, true, true, true, true, true, false];
-    let table = |heading: &str, rows: &[Estimate]| Block::Table {
-        heading: heading.into(),
-        header: header.clone(),
-        numbers: numbers.clone(),
-        rows: rows.iter().map(row).collect(),
-    };
-    let list = |heading: &str, lines: Vec<String>| Block::List { heading: heading.into(), lines };
-    let end = s.timeline.last().map_or(0.0, |t| t.end_s);
-    let degree = if s.timeline.iter().any(|t| t.slew) {
-        "exact verdict of repositioning at once, - not observable; verdict: with the slews"
-    } else {
-        "exact verdict, - not observable"
-    };
-    let mut blocks = vec![table(
-        &format!("Estimates at the end (degree: {degree}; at: when sigma met the requirement)"),
-        &s.quantities,
-    )];
-    if !s.combinations.is_empty() {
-        blocks.push(table("Combinations (psi: of the end)", &s.combinations));
-    }
-    let priors = priors(&s.quantities);
-    if !priors.is_empty() {
-        blocks.push(list("Known from the prior only: whose", priors));
-    }
-    blocks.push(list("Requirements (sigma of the filter at the end of the run)", requirements_met(s)));
-    blocks.push(list("Consistency", words::consistency(&s.consistency)));
-    blocks.push(list("Validity of the small-angle model", validity(&s.validity)));
-    let mut assumed = conditions(&s.conditions, &s.timeline);
-    assumed.push(format!("carry {}; seed {}", s.carry, s.seed));
-    assumed.push(format!("required sigma {}", requirements(&s.quantities).join(", ")));
-    blocks.push(list("Assumed", assumed));
-    let positions = s.timeline.iter().filter(|t| !t.slew).count();
-    Document {
-        title: format!(
-            "Simulation: {positions} position{}, {} carry, {} s",
-            if positions == 1 { "" } else { "s" },
-            s.carry,
-            number_short(end)
-        ),
-        lead: warning(&s.conditions).into_iter().collect(),
-        blocks,
+impl Answer for Simulation {
+    fn document(&self) -> Document {
+        let mut columns = vec![left("unknown"), left("unit")];
+        columns.extend(["degree", "truth", "estimate", "error", "sigma", "in sigma", "at [s]"].map(right));
+        columns.push(left("verdict"));
+        let table =
+            |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
+        let end = self.timeline.last().map_or(0.0, |t| t.end_s);
+        let degree = if self.timeline.iter().any(|t| t.slew) {
+            "exact verdict of repositioning at once, - not observable; verdict: with the slews"
+        } else {
+            "exact verdict, - not observable"
+        };
+        let mut blocks = vec![table(
+            &format!("Estimates at the end (degree: {degree}; at: when sigma met the requirement)"),
+            &self.quantities,
+        )];
+        if !self.combinations.is_empty() {
+            blocks.push(table("Combinations (psi: of the end)", &self.combinations));
+        }
+        blocks.extend(Block::list_if_any("Known from the prior only: whose", priors(&self.quantities)));
+        blocks.push(Block::list(
+            "Requirements (sigma of the filter at the end of the run)",
+            requirements_met(self),
+        ));
+        blocks.push(Block::list("Consistency", words::consistency(&self.consistency)));
+        blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
+        let mut assumed = conditions(&self.conditions, &self.timeline);
+        assumed.push(format!("carry {}; seed {}", self.carry, self.seed));
+        assumed.push(format!("required sigma {}", requirements(&self.quantities).join(", ")));
+        blocks.push(Block::list("Assumed", assumed));
+        let positions = self.timeline.iter().filter(|t| !t.slew).count();
+        Document {
+            title: format!(
+                "Simulation: {positions} position{}, {} carry, {} s",
+                if positions == 1 { "" } else { "s" },
+                self.carry,
+                number_short(end)
+            ),
+            lead: warning(&self.conditions).into_iter().collect(),
+            blocks,
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::analysis::{Analysis, CarryReport, Quantity, Solution};
+use obsdeg_core::analysis::{Analysis, CarryReport, Component, PositionReport, Quantity, Solution};
 use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
@@ -42,9 +42,6 @@ pub(crate) fn dwell_matters(a: &Analysis) -> bool {
     let combinations = a.combinations.iter().map(|c| (c.degree, c.accuracy_order));
     unknowns.chain(combinations).any(|(degree, order)| !with_dwell(a, degree, order).is_empty())
 }
-
-/// The column for it.
-pub(crate) const WITH_DWELL: &str = "with dwell";
 
 pub(crate) fn list(items: &[usize]) -> String {
     items.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
@@ -111,17 +108,14 @@ pub(crate) fn difference(d: &Difference) -> String {
     format!("{} {} -> {}", d.name, verdict(&d.here), verdict(&d.there))
 }
 
-/// `inertial (rank profile 2 6 8 of 15)`.
-pub(crate) fn carry(c: &CarryReport) -> String {
-    format!("{} (rank profile {} of {})", c.carry, list(&c.rank_profile), c.unknowns)
-}
-
-/// The differences under another carry, or that there are none.
-pub(crate) fn differences(c: &CarryReport) -> String {
-    if c.differs.is_empty() {
-        return "no verdict differs".into();
-    }
-    c.differs.iter().map(difference).collect::<Vec<_>>().join("; ")
+/// `inertial (rank profile 2 6 8 of 15): no verdict differs`, a line for each of the other carries.
+pub(crate) fn carries(a: &Analysis) -> Vec<String> {
+    let line = |c: &CarryReport| {
+        let differs: Vec<String> = c.differs.iter().map(difference).collect();
+        let differs = if differs.is_empty() { "no verdict differs".into() } else { differs.join("; ") };
+        format!("{} (rank profile {} of {}): {differs}", c.carry, list(&c.rank_profile), c.unknowns)
+    };
+    a.carries.iter().map(line).collect()
 }
 
 /// `gyros X: I=+x O=-z S=+y, Y: ...`.
@@ -195,10 +189,11 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
 }
 
 /// The angles of a position, with the rotation that starts there.
-pub(crate) fn turned(angles: &str, rotation: Option<&str>) -> String {
-    match rotation.and_then(|r| r.split_once(':')) {
+pub(crate) fn angles(p: &PositionReport) -> String {
+    let angles = p.angles_deg.each_ref().map(ToString::to_string).join(", ");
+    match p.rotation.as_deref().and_then(|r| r.split_once(':')) {
         Some((about, angle)) => format!("{angles}, turned by {angle} about {about}"),
-        None => angles.into(),
+        None => angles,
     }
 }
 
@@ -267,8 +262,8 @@ pub(crate) fn not_excited(a: &Analysis) -> Vec<&str> {
 }
 
 /// A null vector as `psi_y = 1, D_FZ = wN`.
-pub(crate) fn null_vector(v: &[obsdeg_core::analysis::Component]) -> String {
-    let part = |c: &obsdeg_core::analysis::Component| match &c.coefficient {
+pub(crate) fn null_vector(v: &[Component]) -> String {
+    let part = |c: &Component| match &c.coefficient {
         Some(k) => format!("{} = {k}", c.name),
         None => c.name.clone(),
     };

@@ -78,7 +78,7 @@ impl Check<'_> {
     }
 }
 
-/// The rows of the tables in a LaTeX document whose first cell is a formula, and its lines of null vectors.
+/// The rows of the tables in a LaTeX document whose first cell is a formula.
 fn latex_rows(document: &str) -> Vec<Vec<String>> {
     let rows = document.lines().filter(|l| l.starts_with('$') && l.ends_with("\\\\"));
     rows.map(|l| {
@@ -86,6 +86,13 @@ fn latex_rows(document: &str) -> Vec<Vec<String>> {
         cells.map(|c| c.trim().trim_matches('$').to_string()).collect()
     })
     .collect()
+}
+
+/// The formulas under a heading of a LaTeX document.
+fn items<'a>(document: &'a str, heading: &str) -> Vec<&'a str> {
+    let under = document.lines().skip_while(|l| !l.starts_with(&format!("\\paragraph{{{heading}"))).skip(1);
+    let lines = under.take_while(|l| !l.starts_with("\\end")).filter_map(|l| l.strip_prefix("\\item $"));
+    lines.map(|l| l.strip_suffix('$').expect("a formula")).collect()
 }
 
 fn list_of(json: &Json, key: &str) -> Vec<Json> {
@@ -106,7 +113,7 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
     let (scheme, case) = (draw.scheme(), draw.case());
     let options = AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame };
     let a: Analysis = analyze(&scheme, options, worker).expect("analysed");
-    let written = |format| obsdeg_report::analysis(&a, format, Layout::default()).expect("written");
+    let written = |format| obsdeg_report::written(&a, format, Layout::default()).expect("written");
     let document = written(Format::Latex);
     let latex = latex_rows(&document);
     let json: Json = serde_json::from_str(&written(Format::Json)).expect("JSON");
@@ -189,8 +196,7 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
 
 /// The directions that Z is said not to see move no derivative of it.
 fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
-    let lines: Vec<&str> =
-        latex.lines().filter_map(|l| l.strip_prefix("\\item not seen by derivatives of $Z$: ")).collect();
+    let lines = items(latex, "Directions that derivatives of Z do not see");
     let vectors = json["null_space"].as_array().expect("a list");
     assert_eq!(lines.len(), vectors.len());
     if draw.terms == "drift" {
@@ -199,7 +205,7 @@ fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut S
     let c = Check { case, about: format!("{vectors:#?} of {draw:?}") };
     for (vector, line) in vectors.iter().zip(lines) {
         let mut moved = case.clone();
-        let mut parts = line.split("$, $").map(|part| part.trim_matches('$'));
+        let mut parts = line.split(",\\; ").filter_map(|part| part.strip_prefix("\\delta "));
         let mut decimals = false;
         for component in vector.as_array().expect("a list") {
             let text = |key: &str| component[key].as_str().expect("a text");
@@ -224,8 +230,9 @@ fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut S
 /// The formulas of Z, and of psi and eps at each position.
 fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
     let formulas = json["formulas"].as_array().expect("formulas");
-    let lines = latex.lines().filter_map(|l| l.strip_prefix("\\item $")).filter_map(|l| l.split_once(" = "));
-    let lines: Vec<(&str, &str)> = lines.collect();
+    let lines = items(latex, "Z in n, and psi, eps in n at each position");
+    assert_eq!(lines.len(), formulas.len());
+    let lines: Vec<(&str, &str)> = lines.iter().filter_map(|l| l.split_once(" = ")).collect();
     for (i, f) in formulas.iter().enumerate() {
         let text = |key: &str| f[key].as_str().expect("a text");
         let labels = list_of(json, "stations");
@@ -253,8 +260,7 @@ fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &
                     text::evaluate(text("right"), blank, &at).unwrap_or_else(|e| panic!("{e}\n{}", c.about));
                 c.equal("formula", v, expected, EXACT);
             }
-            let right = lines[i].1.strip_suffix('$').expect("a formula");
-            let v = tex::evaluate(right, &at).unwrap_or_else(|e| panic!("{e}\n{}", c.about));
+            let v = tex::evaluate(lines[i].1, &at).unwrap_or_else(|e| panic!("{e}\n{}", c.about));
             c.equal("LaTeX", v, expected, EXACT);
             let left = own.map_or(text("left").into(), |_| format!("{}@{station}", text("left")));
             assert_eq!(tex::name(lines[i].0), Ok(left));

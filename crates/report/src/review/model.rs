@@ -6,7 +6,7 @@ use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, is_list, pictures, section};
 use crate::document::{Block, Finding, Grade, Status};
-use crate::{system, words};
+use crate::{Answer, words};
 
 /// The verdict on a model: what limits it, and what is determined.
 fn verdict(m: &ModelReview) -> String {
@@ -111,7 +111,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
 /// Verdict, unknowns, equations and evidence.
 pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &str) {
     let a = &m.analysis;
-    let document = system::document(a);
+    let document = a.document();
     blocks.push(section(level, "Verdict"));
     blocks.extend((!a.description.is_empty()).then(|| Block::Text(a.description.clone())));
     blocks.push(Block::Text(verdict(m)));
@@ -121,12 +121,12 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
     blocks.push(section(level, "Evidence by a filter"));
     blocks.extend(m.note.iter().map(|n| Block::Text(format!("{n}."))));
     if let Some(e) = &m.evidence {
-        let document = system::evidence(e);
+        let document = e.document();
         blocks.extend(document.lead.into_iter().map(Block::Text));
         blocks.extend(document.blocks);
     }
     if let Some((run, traces)) = &m.run {
-        let document = system::run(run);
+        let document = run.document();
         blocks.extend(document.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
         blocks.extend(pictures::errors(traces, id));
     }

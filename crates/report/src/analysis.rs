@@ -1,0 +1,168 @@
+//! The verdicts on a scheme.
+
+use obsdeg_core::analysis::{Analysis, Component, PositionReport, Solution};
+use obsdeg_core::degree::Status;
+use obsdeg_core::solution::Formula;
+
+use crate::document::{Block, Cell, Column, Document, Typeset, left, right};
+use crate::{Answer, latex, words};
+
+/// Three decimals, without trailing zeros.
+fn short(x: f64) -> String {
+    let text = format!("{x:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+fn positions(positions: &[PositionReport]) -> Block {
+    let row = |p: &PositionReport| {
+        vec![
+            p.name.clone(),
+            words::angles(p),
+            p.attitude.clone().unwrap_or_default(),
+            p.g_c.map_or_else(String::new, |g| g.map(short).join(", ")),
+        ]
+    };
+    let columns =
+        [left("position"), left("alpha, beta, gamma [deg]"), left("X_p Y_p Z_p"), left("g in x, y, z [g]")];
+    Block::table("", columns, positions.iter().map(row))
+}
+
+/// A name or an expression in program notation.
+fn expression(text: &str) -> Cell {
+    Cell::formula(text, latex::expression(text))
+}
+
+/// The unknowns, then the combinations: what each is, its verdict, and how it is solved.
+fn verdicts(a: &Analysis) -> [Block; 2] {
+    let dwell = words::dwell_matters(a).then(|| left("with dwell"));
+    let columns = |first: &[Column], last| {
+        [first, &[left("verdict"), right("degree")], dwell.as_slice(), &[left(last)]].concat()
+    };
+    let row = |first: Vec<Cell>, status: Status, degree, order, last: Cell| {
+        let dwell = dwell.map(|_| words::with_dwell(a, degree, order).into());
+        [
+            first,
+            vec![status.to_string().into(), words::degree(degree).into()],
+            Vec::from_iter(dwell),
+            vec![last],
+        ]
+        .concat()
+    };
+    let solved = |s: &Option<Solution>, otherwise: String| match s {
+        Some(s) => Cell::formula(&s.text, latex::solution(s, a.frame, &a.stations)),
+        None => otherwise.into(),
+    };
+    let unknowns = a.quantities.iter().map(|q| {
+        let how = solved(&q.solution, words::explanation(q));
+        row(vec![expression(&q.name), q.unit.as_str().into()], q.status, q.degree, q.accuracy_order, how)
+    });
+    let combinations = a.combinations.iter().map(|c| {
+        let asked = if c.requested { " (asked for)" } else { "" };
+        let name = expression(&c.expression);
+        let name = Cell { text: format!("{}{asked}", c.expression), ..name };
+        row(vec![name], c.status, c.degree, c.accuracy_order, solved(&c.solution, String::new()))
+    });
+    [
+        Block::table(
+            "Unknowns",
+            columns(&[left("unknown"), left("unit")], "solution, or why there is none"),
+            unknowns,
+        ),
+        Block::table(
+            "Observable combinations (and those asked for)",
+            columns(&[left("combination")], "solution"),
+            combinations,
+        ),
+    ]
+}
+
+/// A direction that Z does not see.
+pub(crate) fn null_vector(v: &[Component]) -> Typeset {
+    let component = |c: &Component| {
+        let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| latex::expression(k));
+        format!("\\delta {} = {value}", latex::symbol(&c.name))
+    };
+    Typeset { text: words::null_vector(v), latex: v.iter().map(component).collect::<Vec<_>>().join(",\\; ") }
+}
+
+fn formula(f: &Formula) -> Typeset {
+    let at = f.position.as_ref().map(|p| format!(" @{p}")).unwrap_or_default();
+    let left = latex::left(&f.left, f.position.as_deref());
+    Typeset {
+        text: format!("{}{at} = {}", f.left, f.right),
+        latex: format!("{left} = {}", latex::expression(&f.right)),
+    }
+}
+
+impl Answer for Analysis {
+    fn document(&self) -> Document {
+        let [unknowns, combinations] = verdicts(self);
+        let mut blocks = vec![positions(&self.positions), unknowns];
+        blocks.extend((!self.combinations.is_empty()).then_some(combinations));
+        blocks.extend(Block::list_if_any(words::ACCURACY, words::accuracy(self)));
+        blocks.extend(Block::formulas(
+            format!("{} (a change along one leaves them as they are)", words::UNSEEN),
+            self.null_space.iter().map(|v| null_vector(v)),
+        ));
+        let silent = words::not_excited(self);
+        let silent = (!silent.is_empty()).then(|| silent.join(", "));
+        blocks.extend(Block::list_if_any("Not excited (never moves Z)", Vec::from_iter(silent)));
+        if let Some(loci) = &self.degenerate_loci {
+            let lines = loci.iter().map(words::locus).chain([words::loci(loci)]);
+            blocks.push(Block::list("Degenerate angles", lines.collect()));
+        }
+        blocks.extend(Block::formulas(
+            "Z in n, and psi, eps in n at each position",
+            self.formulas.iter().flatten().map(formula),
+        ));
+        blocks.extend(Block::list_if_any("Under the other carries", words::carries(self)));
+        blocks.push(Block::list("Assumed", words::assumptions(self)));
+        let notes = self.notes.iter().map(|n| format!("note: {n}"));
+        blocks.push(Block::list("Certainty", std::iter::once(words::certainty(self)).chain(notes).collect()));
+        Document {
+            title: format!("Observable degrees: {}", words::headline(self)),
+            lead: vec![words::rank(self)],
+            blocks,
+        }
+    }
+
+    /// One row per unknown, then one per combination, with all partners.
+    fn records(&self) -> Option<Vec<Vec<String>>> {
+        let header = [
+            "kind",
+            "name",
+            "unit",
+            "status",
+            "degree",
+            "accuracy_order",
+            "with_dwell",
+            "partners",
+            "solution",
+        ];
+        let order = |k: Option<usize>| k.map_or_else(String::new, |k| k.to_string());
+        let row = |first: [&str; 3],
+                   status: Status,
+                   degrees: [Option<usize>; 2],
+                   partners,
+                   s: &Option<Solution>| {
+            let [degree, accuracy] = degrees;
+            let mut row = first.map(String::from).to_vec();
+            row.extend([status.to_string().replace(' ', "_"), order(degree), order(accuracy)]);
+            row.extend([words::with_dwell(self, degree, accuracy), partners]);
+            row.push(s.as_ref().map_or_else(String::new, |s| s.text.clone()));
+            row
+        };
+        let unknowns = self.quantities.iter().map(|q| {
+            let degrees = [q.degree, q.accuracy_order];
+            row(["unknown", &q.name, &q.unit], q.status, degrees, q.partners.join(" "), &q.solution)
+        });
+        let combinations = self.combinations.iter().map(|c| {
+            let kind = if c.requested { "requested" } else { "combination" };
+            let degrees = [c.degree, c.accuracy_order];
+            row([kind, &c.expression, ""], c.status, degrees, String::new(), &c.solution)
+        });
+        let header = header.map(String::from).to_vec();
+        Some(std::iter::once(header).chain(unknowns).chain(combinations).collect())
+    }
+}
