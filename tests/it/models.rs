@@ -12,8 +12,6 @@ use obsdeg_ekf::{Measurement, Process};
 use obsdeg_evidence::system::{Numeric, SystemEvidence, crosscheck_system, simulate_system};
 use serde_json::Value;
 
-use crate::program;
-
 /// The reference models: name, JSON, text.
 fn models() -> Vec<(String, Value, String)> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
@@ -457,7 +455,7 @@ fn filters_of_models() {
 fn solving_expressions() {
     use obsdeg_core::model::expression::{Names, evaluate_f64, parse_with};
     let solved = |file: &str| -> (BTreeMap<String, String>, Value) {
-        let answer = program::json(&["analyze", "--format", "json", "--model", file]);
+        let answer = crate::program::json(&["analyze", "--format", "json", "--model", file]);
         let of = |q: &Value| Some((q["name"].as_str()?.to_string(), q["solution"].as_str()?.to_string()));
         (
             answer["quantities"].as_array().into_iter().flatten().filter_map(of).collect(),

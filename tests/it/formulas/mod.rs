@@ -7,8 +7,6 @@ mod tex;
 mod text;
 mod value;
 
-use std::collections::HashMap;
-
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, Quantity, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
@@ -433,7 +431,7 @@ fn degenerate_angles(worker: &mut Worker) {
             for point in &l.points_deg {
                 let profile_at = |offset: f64| -> Vec<usize> {
                     let names = point.iter().map(|(n, deg)| (n.clone(), deg.to_radians() + offset));
-                    let mut values: HashMap<String, f64> =
+                    let mut values: std::collections::HashMap<String, f64> =
                         [("alpha".to_string(), 0.77), ("a1".into(), -1.31)].into();
                     values.extend(names);
                     let case = draw.case_at(&values);
