@@ -2,7 +2,9 @@
 
 use clap::Args;
 use obsdeg_core::model::ranges::{self, Range};
-use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth, concerns, known};
+use obsdeg_core::model::settings::{
+    Assignment, AssignmentError, DriftNoise, Propagation, Settings, Truth, concerns, known,
+};
 use obsdeg_core::model::{Platform, Scheme};
 use obsdeg_evidence::simulation::{Conditions, general_first};
 
@@ -20,7 +22,7 @@ pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clo
 /// Reads `NAME=X` with a number of a range.
 fn assigned(range: Range) -> impl Fn(&str) -> Result<Assignment, String> + Clone + Send + Sync + 'static {
     move |text| {
-        let a: Assignment = text.parse()?;
+        let a: Assignment = text.parse().map_err(|e: AssignmentError| e.to_string())?;
         if range.admits(a.value) { Ok(a) } else { Err(format!("expected {range}")) }
     }
 }

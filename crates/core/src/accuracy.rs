@@ -9,7 +9,7 @@
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::series::{SeriesEchelon, SeriesRing};
-use obsdeg_exact::{Echelon, Field, SplitMix64};
+use obsdeg_exact::{Echelon, Field, SplitMix64, gcd};
 
 use crate::degree::ensemble::Verdicts;
 use crate::degree::platform_rows::{LocalRow, local_chain};
@@ -142,14 +142,8 @@ impl Accuracy {
 fn dwell_ratios(scheme: &Scheme) -> Vec<u64> {
     let given: Vec<u64> =
         scheme.positions.iter().map(|p| p.dwell.unwrap_or(Dwell::PAPER).nanoseconds()).collect();
-    let gcd = given.iter().fold(0, |mut a, &b| {
-        let mut b = b;
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    });
-    given.iter().map(|d| d / gcd).collect()
+    let unit = given.iter().fold(0, |a, &b| gcd(a, b));
+    given.iter().map(|d| d / unit).collect()
 }
 
 /// The module L at one sample, with enough precision for every order.

@@ -18,6 +18,7 @@
 pub mod certainty;
 pub mod echelon;
 pub mod field;
+mod gcd;
 pub mod polynomial;
 pub mod prime;
 pub mod radical;
@@ -27,6 +28,7 @@ pub mod turn;
 
 pub use echelon::Echelon;
 pub use field::Field;
+pub use gcd::gcd;
 pub use prime::{PrimeError, RootField};
 pub use radical::{Radical, Ratio};
 pub use rng::SplitMix64;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{Field, RootField};
+use crate::{Field, RootField, gcd};
 
 /// Largest numerator and denominator that [`Radical::recover`] believes in.
 const BOUND: u64 = 1 << 20;
@@ -19,11 +19,7 @@ pub struct Ratio {
 impl Ratio {
     /// The same number in lowest terms.
     fn reduced(self) -> Self {
-        let (mut a, mut b) = (self.num.unsigned_abs(), self.den.unsigned_abs());
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        let g = a.max(1) as i64;
+        let g = gcd(self.num.unsigned_abs(), self.den.unsigned_abs()).max(1) as i64;
         Self { num: self.num / g, den: self.den / g }
     }
 
@@ -206,12 +202,6 @@ mod tests {
 
     #[test]
     fn embeddings_are_units_that_move_the_square_roots_in_all_four_ways() {
-        let gcd = |mut a: u64, mut b: u64| {
-            while b != 0 {
-                (a, b) = (b, a % b);
-            }
-            a
-        };
         for order in [24, 72, 120, 360, 600, 3600, 1_800_000, 360_000_000_000] {
             let all = embeddings(order);
             // sqrt 2 = 2 cos 45 and sqrt 3 = 2 cos 30 go by the residue modulo 8 and 12, so modulo 24

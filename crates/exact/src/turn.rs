@@ -1,6 +1,6 @@
 //! Decimal degrees as exact parts of a full turn, and their cosines and sines in a field.
 
-use crate::RootField;
+use crate::{RootField, gcd};
 
 /// A full turn in units of 1e-9 degrees.
 const FULL_NANODEG: i64 = 360_000_000_000;
@@ -51,14 +51,8 @@ impl Turn {
 
 /// The least order `n`, a multiple of 24, for which the n-th roots of unity hold every angle given.
 pub fn common_order(angles: impl IntoIterator<Item = Turn>) -> u64 {
-    let gcd = |mut a: i64, mut b: i64| {
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    };
-    let unit = angles.into_iter().fold(FULL_NANODEG / 24, |u, a| gcd(u, a.0));
-    (FULL_NANODEG / unit) as u64
+    let unit = angles.into_iter().fold(FULL_NANODEG as u64 / 24, |u, a| gcd(u, a.0.unsigned_abs()));
+    FULL_NANODEG as u64 / unit
 }
 
 impl RootField {

@@ -10,7 +10,8 @@ use crate::model::geometry::Geometry;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
-use crate::solution::solver::{Frame, Solved, Verification};
+use crate::solution::solve::{Solved, Verification};
+use crate::solution::solver::Frame;
 
 /// The answer for one scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

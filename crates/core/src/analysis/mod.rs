@@ -145,8 +145,8 @@ impl Printer<'_> {
     }
 
     /// The value, or a note.
-    fn noted<T>(&mut self, result: Result<T, String>) -> Option<T> {
-        result.map_err(|reason| self.notes.push(reason)).ok()
+    fn noted<T>(&mut self, result: Result<T, impl std::error::Error>) -> Option<T> {
+        result.map_err(|reason| self.notes.push(reason.to_string())).ok()
     }
 }
 

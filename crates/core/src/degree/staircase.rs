@@ -11,7 +11,7 @@ pub struct Degrees {
     pub rank_profile: Vec<usize>,
     /// Per unknown: the smallest k with `e_c` in `V_k`, or `None`.
     pub degree: Vec<Option<usize>>,
-    /// Per unknown: whether its column is zero in every row.
+    /// Per unknown: whether it moves Z at all: its column is not zero in every row.
     pub excited: Vec<bool>,
 }
 

@@ -287,12 +287,13 @@ impl RandomValues {
     pub fn angle_cos_sin(&self, roots: &RootField, angle: &Angle) -> (u64, u64) {
         let f = roots.field;
         let flip = roots.imaginary_unit() != self.roots.imaginary_unit();
-        let constant = roots.unit_circle(angle.turn()).unwrap_or(f.one());
-        let generic = angle.generic().and_then(|(name, minus)| {
-            let z = self.generic.iter().find(|(n, _)| n == name)?.1;
-            Some(if minus != flip { f.inv(z) } else { z })
+        let constant = unit(roots, angle.turn());
+        let generic = angle.generic().map_or(f.one(), |(name, minus)| {
+            let drawn = self.generic.iter().find(|(n, _)| n == name);
+            let z = drawn.expect("a value is drawn for every generic angle of the scheme").1;
+            if minus != flip { f.inv(z) } else { z }
         });
-        roots.cos_sin(f.mul(constant, generic.unwrap_or(f.one())))
+        roots.cos_sin(f.mul(constant, generic))
     }
 
     /// `(cos, sin)` of a generic angle at a sample of these values.
@@ -312,7 +313,7 @@ impl RandomValues {
             None => self.rates,
             Some(latitude) => {
                 let turn = obsdeg_exact::Turn::from_nanodeg(latitude.nanodeg());
-                let (c, s) = roots.cos_sin(roots.unit_circle(turn).unwrap_or(f.one()));
+                let (c, s) = roots.cos_sin(unit(&roots, turn));
                 (f.mul(self.rates.0, c), f.mul(self.rates.0, s))
             }
         };
@@ -323,4 +324,9 @@ impl RandomValues {
             .collect();
         Sample { roots, point: Point { ring: f, w_n, w_u, attitudes } }
     }
+}
+
+/// The image of `exp(i angle)` for an angle of the scheme whose field this is.
+fn unit(roots: &RootField, angle: obsdeg_exact::Turn) -> u64 {
+    roots.unit_circle(angle).expect("fields are drawn with the roots of unity of every angle of the scheme")
 }

@@ -76,14 +76,33 @@ impl DriftNoise {
     }
 }
 
+/// A text that is no random drift.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DriftNoiseError {
+    /// No number with a unit.
+    #[error(
+        "`{found}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of one step) or \"0.001 deg/sqrt(h)\""
+    )]
+    Form {
+        /// What was found.
+        found: String,
+    },
+    /// A number out of its range.
+    #[error("`{found}`: expected 0, or {expected} {unit}")]
+    Value {
+        /// What was found.
+        found: String,
+        /// The range.
+        expected: String,
+        /// Of what.
+        unit: String,
+    },
+}
+
 impl FromStr for DriftNoise {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!(
-                "`{text}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of one step) or \"0.001 deg/sqrt(h)\""
-            )
-        };
+    type Err = DriftNoiseError;
+    fn from_str(text: &str) -> Result<Self, DriftNoiseError> {
+        let wrong = || DriftNoiseError::Form { found: text.into() };
         let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
         // none needs no unit
         if compact.contains('0') && matches!(compact.trim_matches('0'), "" | ".") {
@@ -96,16 +115,18 @@ impl FromStr for DriftNoise {
             "deg/sqrt(h)" => Self::RandomWalk(value),
             _ => return Err(wrong()),
         };
-        noise
-            .check("")
-            .map_err(|e| format!("`{text}`: expected 0, or {} {}", e.expected, &compact[split..]))?;
+        noise.check("").map_err(|e| DriftNoiseError::Value {
+            found: text.into(),
+            expected: e.expected,
+            unit: compact[split..].into(),
+        })?;
         Ok(noise)
     }
 }
 
 impl TryFrom<String> for DriftNoise {
-    type Error = String;
-    fn try_from(text: String) -> Result<Self, String> {
+    type Error = DriftNoiseError;
+    fn try_from(text: String) -> Result<Self, DriftNoiseError> {
         text.parse()
     }
 }
@@ -134,10 +155,18 @@ pub struct Assignment {
     pub value: f64,
 }
 
+/// A text that is no assignment.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{found}` is no assignment; expected NAME=NUMBER, as in D_FX=11 or psi=0.1")]
+pub struct AssignmentError {
+    /// What was found.
+    pub found: String,
+}
+
 impl FromStr for Assignment {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no assignment; expected NAME=NUMBER, as in D_FX=11 or psi=0.1");
+    type Err = AssignmentError;
+    fn from_str(text: &str) -> Result<Self, AssignmentError> {
+        let wrong = || AssignmentError { found: text.into() };
         let (name, value) = text.split_once('=').ok_or_else(wrong)?;
         let value: f64 = value.trim().parse().map_err(|_| wrong())?;
         if !value.is_finite() || name.trim().is_empty() {

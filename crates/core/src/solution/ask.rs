@@ -5,7 +5,8 @@ use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protoc
 
 use super::local::ZTerm;
 use super::problem::{Outputs, Problem};
-use super::solver::{Contribution, Functional, Key, Solver, Used};
+use super::solve::{Contribution, Key, Used};
+use super::solver::{Functional, Solver};
 use super::turning::drift_derivative;
 use crate::degree::coefficient::{Number, Rates};
 use crate::model::platform::{LOCAL, local_dynamics, local_output};

@@ -1,6 +1,6 @@
 //! Z and its derivatives at each position, printed as formulas: (9), (10), (12), and the drift there.
 
-use obsdeg_symbolic::{Job, Request};
+use obsdeg_symbolic::{Job, Request, WorkerError};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -23,12 +23,23 @@ pub struct Formula {
     pub right: String,
 }
 
+/// Why there are no formulas.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum FormulasError {
+    /// Nobody derives them.
+    #[error("formulas of Z need the symbolic engine")]
+    NoEngine,
+    /// It gave up.
+    #[error("no formulas of Z: {0}")]
+    Engine(WorkerError),
+}
+
 /// The formulas of Z, Z', Z'' in n, which every position shares, then `psi^n` and `eps^n` of every position in the unknowns; where
 /// the platform turns `eps^n'` too.
 ///
 /// # Errors
-/// A sentence that says why there are none.
-pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, String> {
+/// [`FormulasError`].
+pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, FormulasError> {
     let azimuth = platform.scheme().measured_azimuth;
     let zeros = solver.tables.zeros;
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
@@ -56,14 +67,14 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
         })
         .collect();
     let columns: Vec<Vec<usize>> = platform.blocks(&text_point).into_iter().map(|b| b.columns).collect();
-    let worker = solver.worker().ok_or("formulas of Z need the symbolic engine")?;
+    let worker = solver.worker().ok_or(FormulasError::NoEngine)?;
     let request = Request {
         symbols: vec!["wN".into(), "wU".into()],
         generators: vec![],
         angles: vec![],
         job: Job::Derive { dynamics, order: ORDER },
     };
-    let (texts, _) = worker.ask(&request).map_err(|e| format!("no formulas of Z: {e}"))?;
+    let (texts, _) = worker.ask(&request).map_err(FormulasError::Engine)?;
     let mut out = Vec::new();
     for (i, (component, _)) in local_output(&Text, azimuth).iter().enumerate() {
         let name = if *component == 2 { "Za".to_string() } else { format!("Z{component}") };

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
+use obsdeg_exact::{Echelon, Field, PrimeError, SplitMix64, polynomial};
 use obsdeg_symbolic::{Job, Request};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,7 +15,7 @@ use crate::degree::ensemble::{Verdicts, staircase};
 use crate::degree::staircase::Degrees;
 use crate::degree::status::{Difference, Verdict};
 use crate::model::Platform;
-use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
+use crate::model::expression::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 use crate::model::platform::{Point, RandomValues};
 use crate::model::ring::{Ring, Text};
 use crate::model::scheme::Station;
@@ -63,6 +63,25 @@ const EXAMPLES: usize = 48;
 /// 1 - 1/e.
 const TRIES: usize = 40;
 
+/// Why degenerate loci were not computed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum LociError {
+    /// Their sines and cosines are no numbers of the factors.
+    #[error("degenerate loci are computed when all other angles and offsets are multiples of 90 deg")]
+    OtherAngles,
+    /// The engine's answer could not be read.
+    #[error("factor `{text}`: {error}")]
+    Factor {
+        /// As it came.
+        text: String,
+        /// What is wrong.
+        error: ExpressionError,
+    },
+    /// No field fits the angles.
+    #[error(transparent)]
+    Prime(#[from] PrimeError),
+}
+
 /// The degenerate loci of a scheme with generic angles.
 ///
 /// Wherever a rank of `V_k`, or of `V_k` without the column of an unknown outside `V_k`, drops, every
@@ -70,22 +89,20 @@ const TRIES: usize = 40;
 /// when the verdict at a random point of it differs.
 ///
 /// # Errors
-/// A sentence that says why they were not computed.
+/// [`LociError`].
 pub(crate) fn loci(
     platform: &Platform,
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
     seed: u64,
-) -> Result<Found, String> {
+) -> Result<Found, LociError> {
     let names = platform.scheme().generic_names();
     if names.is_empty() {
         return Ok(Found::default());
     }
     let stations = platform.scheme().stations();
     if !stations.iter().flat_map(Station::angles).all(|a| a.turn().is_multiple_of_deg(90)) {
-        return Err(
-            "degenerate loci are computed when all other angles and offsets are multiples of 90 deg".into()
-        );
+        return Err(LociError::OtherAngles);
     }
     let requests = candidate_requests(platform, verdicts, solver, &names);
     let Some(worker) = solver.worker() else { return Ok(Found::default()) };
@@ -247,14 +264,16 @@ fn degrees_on(
     condition: &Condition,
     names: &[String],
     rng: &mut SplitMix64,
-) -> Result<Option<Degrees>, String> {
+) -> Result<Option<Degrees>, LociError> {
     let parsed = match condition {
         Condition::HalfTurn(_) => None,
-        Condition::Factor(text) => Some(parse(text).map_err(|e| format!("factor `{text}`: {e}"))?),
+        Condition::Factor(text) => {
+            Some(parse(text).map_err(|error| LociError::Factor { text: text.clone(), error })?)
+        }
     };
     let mut found: Vec<Degrees> = Vec::new();
     for _ in 0..TRIES {
-        let mut values = RandomValues::draw(platform.scheme(), rng).map_err(|e| e.to_string())?;
+        let mut values = RandomValues::draw(platform.scheme(), rng)?;
         let placed = match (condition, &parsed) {
             (Condition::HalfTurn(name), _) => values.set_half_turn(name),
             (_, Some(e)) => place(&mut values, e, names, rng),

@@ -4,7 +4,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::solver::{Frame, Solved, Term};
+use super::solve::{Solved, Term};
+use super::solver::Frame;
 use crate::degree::coefficient::{Coefficient, product};
 use crate::model::Scheme;
 
@@ -233,7 +234,7 @@ pub(crate) fn text(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> 
 mod tests {
     use super::*;
     use crate::degree::coefficient::Number;
-    use crate::solution::solver::Verification;
+    use crate::solution::solve::Verification;
     use obsdeg_exact::Radical;
 
     #[test]

@@ -1,38 +1,30 @@
 //! Coefficients and solutions: recovered from the fields, solved and verified by the symbolic worker,
 //! or as decimals.
 
-use std::collections::BTreeMap;
-
-use obsdeg_exact::{Radical, SplitMix64};
+use obsdeg_exact::Radical;
 use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::problem::{Motion, Problem};
-use super::substitution::{Substitution, binomial};
-use super::support::short_support;
-use super::turning::{attitude_derivative, motion_rows};
+use super::problem::Problem;
+use super::turning::motion_rows;
 use crate::degree::coefficient::{
-    Coefficient, Form, Image, Number, READABLE, Rates, power, rates_between, readable, recover_radical,
+    Coefficient, Image, Number, READABLE, Rates, power, rates_between, recover_radical,
 };
 use crate::degree::ensemble::Verdicts;
 use crate::model::platform::{Platform, Point};
-use crate::model::ring::{Float, Ring, Text};
+use crate::model::ring::{Float, Text};
 use crate::model::rotation::Axis;
 use crate::model::symbols::Symbols;
 use crate::solution::local::rows_at;
 use crate::solution::tables::{Table, Tables};
 
 /// Most angles with symbols of their own for which formulas are attempted.
-const MAX_SYMBOLIC_ANGLES: usize = 4;
+pub(super) const MAX_SYMBOLIC_ANGLES: usize = 4;
 /// Longest number that is printed when there are no decimals to fall back to.
-const PRINTABLE: usize = 1000;
+pub(super) const PRINTABLE: usize = 1000;
 /// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
 const FLOAT_RATES: (f64, f64) = (1.0, 1.0);
-/// Values of `(wN, wU)` and of every rate of turning at which decimals are checked.
-const OTHER_RATES: (f64, f64, f64) = (0.8, 0.5, 1.3);
-/// How far the sum of terms with decimals may be from its target, relative to the sum of their magnitudes.
-const RESIDUAL: f64 = 1e-9;
 
 /// The axes in which Z is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
@@ -45,51 +37,6 @@ pub enum Frame {
     Platform,
 }
 
-/// How a solution was checked before it was printed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Verification {
-    /// By exact substitution of the derivatives of Z, and by substitution in two prime fields.
-    Symbolic,
-    /// By substitution in two prime fields.
-    Modular,
-    /// By substitution in floating point: residual below 1e-9 of the sum of magnitudes.
-    Numeric,
-}
-
-/// `coefficient * w^turns * Z_component^(order) @ station`, w being the rate at which the platform turns there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Term {
-    /// Index of the station.
-    pub station: usize,
-    /// 1, 2, 3: component in n (2 is a measured azimuth) or platform axis.
-    pub component: usize,
-    /// Whether this is the measured azimuth.
-    pub azimuth: bool,
-    /// Derivative order; at a rotation, of the platform that turns.
-    pub order: usize,
-    /// The power of the rate of turning.
-    pub turns: usize,
-    /// The coefficient, without it.
-    pub coefficient: Coefficient,
-}
-
-/// An observable quantity as a sum of derivatives of Z.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solved {
-    /// The terms, by power of the rate of turning, order, component and station.
-    pub terms: Vec<Term>,
-    /// How it was checked.
-    pub verification: Verification,
-}
-
-impl Solved {
-    /// The least exact form among the coefficients.
-    pub fn form(&self) -> Form {
-        self.terms.iter().map(|t| t.coefficient.form()).max().unwrap_or(Form::Exact)
-    }
-}
-
 /// Columns and their coefficients.
 pub type Sparse = Vec<(usize, Coefficient)>;
 
@@ -99,37 +46,7 @@ pub struct Functional {
     /// Columns and coefficients, as printed.
     pub terms: Sparse,
     /// The exact images of the coefficients, one vector per table in the order of the tables.
-    images: Vec<Vec<u64>>,
-}
-
-/// Place of a term in a solution, in the order of printing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
-    pub(super) turns: usize,
-    pub(super) order: usize,
-    pub(super) component: usize,
-    pub(super) azimuth: bool,
-    pub(super) rates: Rates,
-    pub(super) station: usize,
-}
-
-/// What enters a term: an unknown of the problem, times a factor, times an entry of a derivative of `C_c^n` by the angle of the turn.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Contribution {
-    pub(super) unknown: usize,
-    pub(super) factor: i64,
-    /// The component of Z in n.
-    in_n: usize,
-    /// The order of the derivative of `C_c^n`.
-    derivative: usize,
-}
-
-/// An unknown of the problem: a row of the tables, with the rates that its amount is multiplied with.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Used {
-    pub(super) row: usize,
-    pub(super) rates: Rates,
-    pub(super) turns: usize,
+    pub(super) images: Vec<Vec<u64>>,
 }
 
 /// Everything that coefficients are computed from.
@@ -199,7 +116,7 @@ impl<'a> Solver<'a> {
     }
 
     /// The image of a coefficient; `None` for a decimal.
-    fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
+    pub(super) fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
         let k = &table.sample.roots;
         let number = match &c.number {
             Number::Radical(r) => r.image(k),
@@ -218,44 +135,6 @@ impl<'a> Solver<'a> {
         };
         let images = self.all_tables().map(images).collect::<Option<_>>()?;
         Some(Functional { terms, images })
-    }
-
-    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is replaced by its row, at
-    /// rest or turning, in all tables; terms with decimals in floating point.
-    fn holds(&self, terms: &[Term], functional: &Functional, targets: &[Vec<u64>]) -> bool {
-        if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
-            return self.holds_in_floats(terms, functional).unwrap_or(false);
-        }
-        self.all_tables().zip(targets).all(|((field, table), target)| {
-            let f = table.sample.roots.field;
-            // a rate of turning of its own for every position
-            let turning = |i: usize| f.from_u64(SplitMix64::new(f.modulus() ^ i as u64).next_u64());
-            let coefficient = |t: &Term| {
-                let image = self.image(&t.coefficient, field, table)?;
-                Some(f.mul(image, f.pow(turning(self.stations[t.station].0), t.turns as u64)))
-            };
-            let coefficients: Option<Vec<u64>> = terms.iter().map(coefficient).collect();
-            let substitution = Substitution::new(self.platform, &table.sample.point, self.frame);
-            coefficients.is_some_and(|c| substitution.sum(terms, &c, turning) == *target)
-        })
-    }
-
-    /// The same at rates of its own in floating point; `None` without numbers.
-    fn holds_in_floats(&self, terms: &[Term], functional: &Functional) -> Option<bool> {
-        let (w_n, w_u, turning) = OTHER_RATES;
-        let point = float_point(self.platform, &self.tables, (w_n, w_u));
-        let number = |c: &Coefficient| Some(self.number(c)? * w_n.powi(c.rates[0]) * w_u.powi(c.rates[1]));
-        let coefficient = |t: &Term| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
-        let coefficients: Vec<f64> = terms.iter().map(coefficient).collect::<Option<_>>()?;
-        let mut rest =
-            Substitution::new(self.platform, &point, self.frame).sum(terms, &coefficients, |_| turning);
-        let mut size: f64 = coefficients.iter().map(|c| c.abs()).sum();
-        for (column, c) in &functional.terms {
-            let target = number(c)?;
-            rest[*column] -= target;
-            size += target.abs();
-        }
-        Some(rest.iter().all(|x| x.abs() <= RESIDUAL * size))
     }
 
     /// The functional on `support` whose coefficients are the outputs of `problem`.
@@ -299,22 +178,26 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// All nine tables with the index of their field.
-    fn all_tables(&self) -> impl Iterator<Item = (usize, &Table)> {
-        let main =
-            self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)));
-        main.chain([(0, &self.tables.other_rates)])
+    /// The tables of both fields, embedding by embedding, with the index of the field.
+    pub(super) fn tables_at_the_rates(&self) -> impl Iterator<Item = (usize, &Table)> {
+        self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)))
     }
 
-    /// The exponents of the rates and the nine images of the numbers of some values, given as nine
-    /// vectors in the order of `all_tables`.
-    fn split_rates(&self, values: &[Vec<u64>]) -> Option<Vec<(Rates, Vec<u64>)>> {
+    /// The same, then the table at other rates.
+    pub(super) fn all_tables(&self) -> impl Iterator<Item = (usize, &Table)> {
+        self.tables_at_the_rates().chain([(0, &self.tables.other_rates)])
+    }
+
+    /// The exponents of the rates and the images of the numbers of some values, given as vectors in the order of `all_tables`, as
+    /// the images are.
+    pub(super) fn split_rates(&self, values: &[Vec<u64>]) -> Option<Vec<(Rates, Vec<u64>)>> {
         let first = self.tables.first();
         let f = first.sample.roots.field;
-        (0..values[0].len())
+        let [at_first, .., at_other] = values else { return None };
+        (0..at_first.len())
             .map(|i| {
-                let a = Image { value: values[0][i], rates: first.rates() };
-                let b = Image { value: values[8][i], rates: self.tables.other_rates.rates() };
+                let a = Image { value: at_first[i], rates: first.rates() };
+                let b = Image { value: at_other[i], rates: self.tables.other_rates.rates() };
                 let rates = rates_between(&f, a, b)?;
                 let numbers = self.all_tables().zip(values).map(|((_, t), v)| {
                     let f = t.sample.roots.field;
@@ -325,21 +208,20 @@ impl<'a> Solver<'a> {
             .collect()
     }
 
-    fn recover(&self, numbers: &[u64]) -> Option<Radical> {
-        let four = |i: usize| -> Option<[u64; 4]> { numbers[4 * i..4 * i + 4].try_into().ok() };
-        recover_radical(&self.tables.fields(), &[four(0)?, four(1)?])
+    pub(super) fn recover(&self, numbers: &[u64]) -> Option<Radical> {
+        let [first, second, ..] = numbers.as_chunks().0 else { return None };
+        recover_radical(&self.tables.fields(), &[*first, *second])
     }
 
     /// Whether the text solves the system in the prime fields too: it must have the images of the
-    /// solution there (in the order of `all_tables`, without the last).
-    fn agrees(&self, text: &str, numbers: &[u64]) -> bool {
-        self.all_tables()
+    /// solution there (in the order of `all_tables`, other rates apart).
+    pub(super) fn agrees(&self, text: &str, numbers: &[u64]) -> bool {
+        self.tables_at_the_rates()
             .zip(numbers)
-            .take(8)
             .all(|((i, t), &n)| self.symbols.value(text, &self.verdicts.values[i], &t.sample) == Some(n))
     }
 
-    fn text_number(&self, raw: String) -> Number {
+    pub(super) fn text_number(&self, raw: String) -> Number {
         Number::Text { shown: self.symbols.display(&raw), raw }
     }
 
@@ -379,243 +261,9 @@ impl<'a> Solver<'a> {
     fn simplest(&self, raw: String, numbers: &[u64]) -> Number {
         self.recover(numbers).map_or_else(|| self.text_number(raw), Number::Radical)
     }
-
-    /// A functional that is observable with the given degree, as a short sum of derivatives of Z.
-    /// `Err` says why there is none to print.
-    pub fn solve(&mut self, functional: &Functional, degree: usize) -> Result<Solved, String> {
-        const LOST: &str = "its coefficients have no short exact form";
-        let scatter = |values: &Vec<u64>| {
-            let mut row = vec![0; self.platform.names().len()];
-            for ((column, _), &value) in functional.terms.iter().zip(values) {
-                row[*column] = value;
-            }
-            row
-        };
-        let targets: Vec<Vec<u64>> = functional.images.iter().map(scatter).collect();
-        let first = self.tables.first();
-        let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-        let allowed = self.tables.rows_up_to(degree);
-        // what is a row is solved by it
-        let support = match allowed.iter().find(|&&j| first.rows[j] == targets[0]) {
-            Some(&j) => vec![j],
-            None => short_support(first.sample.roots.field, &first.rows, &allowed, &targets[0], cost)
-                .ok_or("the rows of its order do not span it")?,
-        };
-        let columns = self.platform.names().len();
-        let solve = |problem: &Problem| -> Option<Vec<(Rates, Vec<u64>)>> {
-            let tables = self.all_tables().zip(&targets);
-            let y =
-                tables.map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target));
-            self.split_rates(&y.collect::<Option<Vec<_>>>()?)
-        };
-        let mut problem = Problem::solution(&support, columns, &[]);
-        let mut split = solve(&problem).ok_or(LOST)?;
-        let motions = self
-            .motions(&support, &split)
-            .ok_or("the motion of the platform is not in the span of its stations")?;
-        if !motions.is_empty() {
-            problem = Problem::solution(&support, columns, &motions);
-            split = solve(&problem).ok_or(LOST)?;
-        }
-        let rows = support.iter().map(|&row| (row, [0, 0], 0));
-        // the motion enters (16) with w/wN
-        let moved = motions.iter().flat_map(|m| m.rows.iter().map(|&row| (row, [-1, 0], 1)));
-        let used: Vec<Used> = (rows.chain(moved).zip(&split))
-            .map(|((row, by, turns), (r, _))| Used { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
-            .collect();
-        let plan = self.plan(&used);
-        // numbers of the printed terms in every field
-        let numbers: Vec<Vec<u64>> = self
-            .all_tables()
-            .enumerate()
-            .map(|(s, (_, t))| {
-                let x: Vec<u64> = split.iter().map(|(_, numbers)| numbers[s]).collect();
-                self.term_numbers(&t.sample.point, &plan, &x)
-            })
-            .collect();
-        let of_term = |i: usize| -> Vec<u64> { numbers.iter().map(|v| v[i]).collect() };
-        let exact: Option<Vec<Number>> =
-            (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
-        let symbolic = self.ask_for_solution(functional, &problem, &used, &plan);
-        let (numbers, verification) = match (symbolic, exact) {
-            (Some(texts), exact) => {
-                if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
-                    return Err(
-                        "its coefficients do not solve the system in the prime fields: please report this scheme".into(),
-                    );
-                }
-                let longest = texts.iter().map(|t| self.symbols.display(t).len()).max().unwrap_or(0);
-                let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
-                if let Some(exact) = exact {
-                    (exact, Verification::Symbolic)
-                } else if longest <= limit {
-                    (texts.into_iter().map(|t| self.text_number(t)).collect(), Verification::Symbolic)
-                } else {
-                    let decimals = self.decimals(functional, &problem, &plan);
-                    let numbers = decimals
-                        .ok_or_else(|| format!("its longest coefficient has {longest} characters"))?;
-                    (numbers, Verification::Numeric)
-                }
-            }
-            (None, Some(exact)) => (exact, Verification::Modular),
-            (None, None) => {
-                let numbers = self.decimals(functional, &problem, &plan);
-                let missing = match &self.worker {
-                    None => "formulas in generic angles need the symbolic engine".into(),
-                    Some(_) if self.too_many_angles() => {
-                        format!(
-                            "formulas in more than {MAX_SYMBOLIC_ANGLES} different angles are not attempted"
-                        )
-                    }
-                    Some(_) => "the symbolic engine gave no formula for it".into(),
-                };
-                (numbers.ok_or(missing)?, Verification::Numeric)
-            }
-        };
-        let mut terms: Vec<Term> = plan
-            .iter()
-            .zip(numbers)
-            .map(|((key, _), number)| Term {
-                station: key.station,
-                component: key.component,
-                azimuth: key.azimuth,
-                order: key.order,
-                turns: key.turns,
-                coefficient: Coefficient { number, rates: key.rates },
-            })
-            .collect();
-        terms.retain(|t| !t.coefficient.is_zero());
-        if !self.holds(&terms, functional, &targets) {
-            return Err("it did not survive its substitution: please report this scheme".into());
-        }
-        let printed = readable(terms.iter().map(|t| t.coefficient.clone()).collect());
-        for (term, coefficient) in terms.iter_mut().zip(printed) {
-            term.coefficient = coefficient;
-        }
-        Ok(Solved { terms, verification })
-    }
-
-    /// What the turning of the platform adds to a solution by the rows `support`: one motion per rotation and rates of the amounts, in
-    /// rows of the rotation itself up to order one. `None` when these do not span it, which they always do.
-    fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<Motion>> {
-        let first = self.tables.first();
-        let f = first.sample.roots.field;
-        let mut groups: BTreeMap<(usize, Rates), Vec<usize>> = BTreeMap::new();
-        for (j, (&row, (rates, _))) in support.iter().zip(split).enumerate() {
-            let (position, axis) = self.stations[self.tables.station(row)];
-            if axis.is_some() && self.tables.order(row) == 2 {
-                groups.entry((position, *rates)).or_default().push(j);
-            }
-        }
-        let mut out = Vec::new();
-        for ((position, rates), members) in groups {
-            let of: Vec<(usize, usize)> = members
-                .iter()
-                .map(|&j| (j, self.tables.motion_row(self.tables.station(support[j]))))
-                .collect();
-            let factor = power(&f, first.rates(), rates)?;
-            let mut target = vec![0; self.platform.names().len()];
-            for &(j, row) in &of {
-                let amount = f.neg(f.mul(split[j].1[0], factor));
-                for (slot, &x) in target.iter_mut().zip(&first.rows[row]) {
-                    *slot = f.add(*slot, f.mul(amount, x));
-                }
-            }
-            if target.iter().all(|&x| x == 0) {
-                continue;
-            }
-            let mut own = self.tables.rows_up_to(1);
-            own.retain(|&row| self.stations[self.tables.station(row)].0 == position);
-            let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-            out.push(Motion { rows: short_support(f, &first.rows, &own, &target, cost)?, of });
-        }
-        Some(out)
-    }
-
-    /// The printed terms of a solution that uses the rows `used`.
-    fn plan(&self, used: &[Used]) -> Vec<(Key, Vec<Contribution>)> {
-        let mut plan: BTreeMap<Key, Vec<Contribution>> = BTreeMap::new();
-        for (j, u) in used.iter().enumerate() {
-            let station = self.tables.station(u.row);
-            let turns = self.stations[station].1.is_some();
-            for z in &self.tables.observables[u.row % self.tables.observables.len()].solution {
-                let azimuth = z.component == 2;
-                let in_platform = self.frame == Frame::Platform && !azimuth;
-                // Z^n = C_c^n Z^c, and C_c^n changes where the platform turns
-                for derivative in 0..=if in_platform && turns { z.order } else { 0 } {
-                    for component in if in_platform { 1..=3 } else { z.component..=z.component } {
-                        let key = Key {
-                            turns: u.turns + derivative,
-                            order: z.order - derivative,
-                            component,
-                            azimuth,
-                            rates: [u.rates[0] + z.rates[0], u.rates[1] + z.rates[1]],
-                            station,
-                        };
-                        plan.entry(key).or_default().push(Contribution {
-                            unknown: j,
-                            factor: z.sign * binomial(z.order, derivative) as i64,
-                            in_n: z.component,
-                            derivative,
-                        });
-                    }
-                }
-            }
-        }
-        plan.into_iter().collect()
-    }
-
-    /// `sum factor * x_j * (axis factor)` for every printed term.
-    fn term_numbers<R: Ring>(
-        &self,
-        point: &Point<R>,
-        plan: &[(Key, Vec<Contribution>)],
-        x: &[R::Element],
-    ) -> Vec<R::Element> {
-        let ring = &point.ring;
-        plan.iter()
-            .map(|(key, contributions)| {
-                contributions.iter().fold(ring.zero(), |sum, c| {
-                    ring.add(&sum, &ring.mul(&self.weight(point, key, c), &x[c.unknown]))
-                })
-            })
-            .collect()
-    }
-
-    /// What the amount of a row is multiplied with in a printed term.
-    pub(super) fn weight<R: Ring>(&self, point: &Point<R>, key: &Key, c: &Contribution) -> R::Element {
-        let ring = &point.ring;
-        let axis = match (self.frame, self.stations[key.station].1) {
-            (Frame::Platform, Some(axis)) if !key.azimuth => {
-                let slope = attitude_derivative(ring, &point.attitudes[key.station], axis, c.derivative);
-                slope[c.in_n - 1][key.component - 1].clone()
-            }
-            (Frame::Platform, None) if !key.azimuth => {
-                point.attitudes[key.station][c.in_n - 1][key.component - 1].clone()
-            }
-            _ => ring.one(),
-        };
-        let times = (1..c.factor.unsigned_abs()).fold(axis.clone(), |sum, _| ring.add(&sum, &axis));
-        if c.factor < 0 { ring.neg(&times) } else { times }
-    }
-
-    fn decimals(
-        &self,
-        functional: &Functional,
-        problem: &Problem,
-        plan: &[(Key, Vec<Contribution>)],
-    ) -> Option<Vec<Number>> {
-        let (point, rows) = self.floats.as_ref()?;
-        let mut target = vec![0.0; self.platform.names().len()];
-        for (column, c) in &functional.terms {
-            target[*column] = self.number(c)?;
-        }
-        let x = problem.solve_in_floats(rows, &target)?;
-        Some(self.term_numbers(point, plan, &x).into_iter().map(|v| Number::Decimal(tidy(v))).collect())
-    }
 }
 
-fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point<Float> {
+pub(super) fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point<Float> {
     let attitudes =
         platform.scheme().stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
     let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
@@ -624,51 +272,6 @@ fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point
 }
 
 /// Zero for what rounding left over.
-fn tidy(x: f64) -> f64 {
+pub(super) fn tidy(x: f64) -> f64 {
     if x.abs() < 1e-12 { 0.0 } else { x }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::degree::ensemble::judge;
-    use crate::model::scheme::{Scheme, parse_attitude};
-
-    /// In both frames the printed solutions of a scheme survive their substitution, and a wrong sign, a
-    /// wrong position or a wrong order does not.
-    #[test]
-    fn substitution_tells_right_from_wrong() {
-        for (frame, measured_azimuth) in
-            [(Frame::N, false), (Frame::Platform, false), (Frame::Platform, true)]
-        {
-            let angles = ["0,0,0", "180,0,0", "30,45,0"].map(|a| parse_attitude(a).expect("an attitude"));
-            let scheme = Scheme { measured_azimuth, ..Scheme::of_angles(angles) };
-            let platform = Platform::new(scheme).expect("valid");
-            let verdicts = judge(&platform, 1).expect("judged");
-            let mut solver = Solver::new(&platform, &verdicts, 1, frame, None);
-            let d_fx = platform.names().iter().position(|n| n == "D_FX").expect("known");
-            let degree = verdicts.degrees.degree[0].expect("psi_x is observable");
-            let psi_x = solver.functional(vec![(0, Coefficient::one())]).expect("exact");
-            assert!(solver.solve(&psi_x, degree).is_ok());
-            let functional = solver.functional(vec![(d_fx, Coefficient::one())]).expect("exact");
-            let degree = verdicts.degrees.degree[d_fx].expect("D_FX is observable");
-            let solved = solver.solve(&functional, degree).expect("solved");
-            let mut row = vec![0; platform.names().len()];
-            let targets: Vec<Vec<u64>> = functional
-                .images
-                .iter()
-                .map(|v| {
-                    row[d_fx] = v[0];
-                    row.clone()
-                })
-                .collect();
-            assert!(solver.holds(&solved.terms, &functional, &targets));
-            let mut wrong = solved.terms.clone();
-            wrong[0].coefficient = wrong[0].coefficient.negated();
-            assert!(!solver.holds(&wrong, &functional, &targets));
-            let mut wrong = solved.terms.clone();
-            wrong[0].order += 1;
-            assert!(!solver.holds(&wrong, &functional, &targets));
-        }
-    }
 }

@@ -146,7 +146,7 @@ pub fn analyze_system(
                 }
             }
         }
-        Err(reason) => out.note = Some(reason),
+        Err(reason) => out.note = Some(reason.to_string()),
     }
     Ok(out)
 }

@@ -334,8 +334,9 @@ impl Dag {
     }
 }
 
-fn gcd(a: i64, b: i64) -> i64 {
-    if b == 0 { a.abs() } else { gcd(b, a % b) }
+/// The greatest common divisor, not negative.
+pub(super) fn gcd(a: i64, b: i64) -> i64 {
+    obsdeg_exact::gcd(a.unsigned_abs(), b.unsigned_abs()) as i64
 }
 
 fn reduced(p: i64, q: i64) -> Option<Ratio> {

@@ -1,7 +1,7 @@
 //! Any system as a source of derivative rows: the duals of the Taylor coefficients of its outputs.
 
 use obsdeg_exact::prime::is_prime;
-use obsdeg_exact::{Echelon, Field, SplitMix64};
+use obsdeg_exact::{Echelon, Field, SplitMix64, gcd};
 
 use super::dag::{FunctionStart, Op};
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
@@ -131,12 +131,6 @@ pub(crate) fn field_for(compiled: &Compiled, rng: &mut SplitMix64) -> Field {
             _ => None,
         })
         .collect();
-    let gcd = |mut a: u64, mut b: u64| {
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    };
     loop {
         let p = (1 << 60) + rng.below(1 << 60) / 4 * 4 + 3;
         if p < 1 << 61 && degrees.iter().all(|&q| q <= 1 || gcd(q, p - 1) == 1) && is_prime(p) {

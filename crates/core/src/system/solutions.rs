@@ -4,7 +4,7 @@
 //! unknown's value, and only what holds is shown.
 
 use obsdeg_exact::{Field, SplitMix64};
-use obsdeg_symbolic::{Job, RationalSystem, Request, Worker};
+use obsdeg_symbolic::{Job, RationalSystem, Request, Worker, WorkerError};
 
 use super::dag::{Dag, Op};
 use super::judge::Judgement;
@@ -33,6 +33,32 @@ struct Symbol {
     order: usize,
 }
 
+/// Why there are no solving expressions.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum NoExpressions {
+    /// Nobody solves.
+    #[error("this build has no symbolic engine: no solving expressions")]
+    NoEngine,
+    /// Experiments or segments.
+    #[error("no solving expressions: they are sought for a single experiment without segments")]
+    Parts,
+    /// An input is unknown.
+    #[error("no solving expressions: they are not sought where an input is unknown")]
+    UnknownInput,
+    /// Too large a system.
+    #[error("no solving expressions: more than {UNKNOWNS} unknowns, or a degree above {ORDER}")]
+    TooMany,
+    /// A function in an equation.
+    #[error("no solving expressions: the system is not rational in its unknowns")]
+    NotRational,
+    /// Too long an equation.
+    #[error("no solving expressions: the equations are too long")]
+    TooLong,
+    /// The engine gave up.
+    #[error("no solving expressions: {0}")]
+    Engine(WorkerError),
+}
+
 /// Expressions for the unknowns, in the order of the layout, or why there are none.
 ///
 /// # Errors
@@ -43,14 +69,13 @@ pub(super) fn solutions(
     judged: &Judgement,
     seed: u64,
     worker: Option<&mut Worker>,
-) -> Result<Vec<Option<String>>, String> {
+) -> Result<Vec<Option<String>>, NoExpressions> {
     let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
     let n = judged.layout.unknowns.len();
     let Some(highest) = highest else { return Ok(vec![None; n]) };
-    let worker = worker.ok_or("this build has no symbolic engine: no solving expressions")?;
-    let (request, symbols) = request(model, compiled, judged, highest)
-        .map_err(|reason| format!("no solving expressions: {reason}"))?;
-    let (texts, _) = worker.ask(&request).map_err(|e| format!("no solving expressions: {e}"))?;
+    let worker = worker.ok_or(NoExpressions::NoEngine)?;
+    let (request, symbols) = request(model, compiled, judged, highest)?;
+    let (texts, _) = worker.ask(&request).map_err(NoExpressions::Engine)?;
     let mut out = vec![None; n];
     let Job::Unknowns { system } = &request.job else { return Ok(out) };
     let roles = (0..system.states.len()).map(Role::State).chain(roles_of_parameters(model));
@@ -84,15 +109,15 @@ fn request(
     compiled: &Compiled,
     judged: &Judgement,
     highest: usize,
-) -> Result<(Request, Vec<Symbol>), String> {
+) -> Result<(Request, Vec<Symbol>), NoExpressions> {
     if model.experiments > 1 || !model.segments.is_empty() {
-        return Err("they are sought for a single experiment without segments".into());
+        return Err(NoExpressions::Parts);
     }
     if model.unknown_inputs.iter().any(|u| u.1 != Some(0)) {
-        return Err("they are not sought where an input is unknown".into());
+        return Err(NoExpressions::UnknownInput);
     }
     if judged.layout.unknowns.len() > UNKNOWNS || highest > ORDER {
-        return Err(format!("more than {UNKNOWNS} unknowns, or a degree above {ORDER}"));
+        return Err(NoExpressions::TooMany);
     }
     let mut symbols: Vec<Symbol> = Vec::new();
     let mut names: Vec<String> = Vec::new();
@@ -149,8 +174,7 @@ fn request(
     }
     // a constant that is given by a formula is no symbol of its own: its value is
     let texts = texts(&compiled.dag, &names)?;
-    let text =
-        |node: usize| texts[node].clone().ok_or("the system is not rational in its unknowns".to_string());
+    let text = |node: usize| texts[node].clone().ok_or(NoExpressions::NotRational);
     let mut outputs = Vec::new();
     for (j, &node) in compiled.outputs.iter().enumerate() {
         let name = &model.outputs[j].0.name;
@@ -204,7 +228,7 @@ fn derivative(name: &str, order: usize) -> String {
 }
 
 /// Every node as text, in the names of the slots; `None` for what is not rational.
-fn texts(dag: &Dag, names: &[String]) -> Result<Vec<Option<String>>, String> {
+fn texts(dag: &Dag, names: &[String]) -> Result<Vec<Option<String>>, NoExpressions> {
     let mut out: Vec<Option<String>> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
         let two = |a: usize, b: usize, sign: &str| {
@@ -222,7 +246,7 @@ fn texts(dag: &Dag, names: &[String]) -> Result<Vec<Option<String>>, String> {
             Op::Primitive { .. } => None,
         };
         if text.as_ref().is_some_and(|t| t.len() > LENGTH) {
-            return Err("the equations are too long".into());
+            return Err(NoExpressions::TooLong);
         }
         out.push(text);
     }

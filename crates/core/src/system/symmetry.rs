@@ -2,6 +2,7 @@
 
 use obsdeg_exact::{Echelon, Field, Ratio};
 
+use super::functions::gcd;
 use super::judge::{At, Judgement, climb_at};
 use super::model::{Compiled, ModelError, SystemModel};
 use crate::degree::sparse::{extend_by_short_vectors, support};
@@ -73,12 +74,6 @@ fn rationals(f: &Field, v: &[u64]) -> Option<Vec<(i64, i64)>> {
 
 /// Rationals times their common denominator.
 fn integers(v: &[(i64, i64)]) -> Vec<i64> {
-    let gcd = |mut a: i64, mut b: i64| {
-        while b != 0 {
-            (a, b) = (b, a % b);
-        }
-        a.abs()
-    };
     let common = v.iter().filter(|x| x.0 != 0).fold(1, |l, x| l / gcd(l, x.1) * x.1);
     let scaled: Vec<i64> = v.iter().map(|x| x.0 * (common / x.1)).collect();
     let divisor = scaled.iter().fold(0, |g, x| gcd(g, *x)).max(1);

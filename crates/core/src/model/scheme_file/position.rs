@@ -115,7 +115,8 @@ impl Reader<'_> {
         if let (Some(angle), None) = (angle_deg, about) {
             return Err(self.at(angle.span(), "an angle without an axis; expected `about` too"));
         }
-        let axis = about.as_ref().map(|a| slew_axis(a.get_ref()).map_err(|e| self.at(a.span(), e)));
+        let axis =
+            about.as_ref().map(|a| slew_axis(a.get_ref()).map_err(|e| self.at(a.span(), e.to_string())));
         let angle = angle_deg
             .as_ref()
             .map(|a| whole_angle(&self.number(a)?).map_err(|e| self.at(a.span(), e.to_string())));
@@ -125,20 +126,25 @@ impl Reader<'_> {
     }
 }
 
+/// What a slew cannot turn about.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum SlewAxisError {
+    #[error("{0}, or a direction [North, Up, East] such as [1, 1, 0]")]
+    Name(AxisError),
+    #[error("expected X_p, Y_p, Z_p, N, U, E, or a direction [North, Up, East] such as [1, 1, 0]")]
+    Direction,
+}
+
 /// What a slew turns about: a name, or three numbers.
-fn slew_axis(about: &toml::Value) -> Result<SlewAxis, String> {
+fn slew_axis(about: &toml::Value) -> Result<SlewAxis, SlewAxisError> {
     let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
     let direction = |list: &Vec<toml::Value>| {
         let components: Option<Vec<f64>> = list.iter().map(number).collect();
         components.and_then(|c| SlewAxis::direction(&c))
     };
     match about {
-        toml::Value::String(name) => name
-            .parse()
-            .map_err(|e: AxisError| format!("{e}, or a direction [North, Up, East] such as [1, 1, 0]")),
-        other => other.as_array().and_then(direction).ok_or_else(|| {
-            "expected X_p, Y_p, Z_p, N, U, E, or a direction [North, Up, East] such as [1, 1, 0]".into()
-        }),
+        toml::Value::String(name) => name.parse().map_err(SlewAxisError::Name),
+        other => other.as_array().and_then(direction).ok_or(SlewAxisError::Direction),
     }
 }
 
