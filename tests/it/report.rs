@@ -293,7 +293,24 @@ fn a_verdict_leads_with_what_limits_it() {
         verdict.contains("not taken: ") && verdict.contains("accuracy orders are not computed"),
         "{verdict}"
     );
-    assert_eq!(row(&page, "Filter and exact verdicts")[0], "open");
+    let why = "this scheme has a rotating segment, and the evidence by a filter takes positions";
+    assert_eq!(
+        row(&page, "Filter and exact verdicts"),
+        ["open".to_string(), format!("open not taken: {why}")]
+    );
+    let main = texts(&page, "main").concat();
+    for sentence in [format!("None: {why}."), format!("note: {why}")] {
+        assert!(main.contains(&sentence), "{sentence}: {main}");
+    }
+    // a model without numbers has no run, and says why
+    let bare =
+        file("bare.toml", "name = 'bare'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n");
+    let alone = Html::parse_document(&report(folder.path(), "bare.html", &[&bare]).1);
+    let main = texts(&alone, "main").concat();
+    assert!(
+        main.contains("no run or no evidence: ") && main.contains("expected one under [simulation"),
+        "{main}"
+    );
     // D_SZ is not excited at the start of the turn, nor at the second position
     let excited: Vec<[String; 2]> = (table(&page, "Every unknown").iter())
         .filter(|r| r[0].starts_with("D_"))

@@ -107,7 +107,10 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     assumed.extend(words::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
     assumed.push(words::certainty(a));
-    assumed.extend(a.notes.iter().chain(&s.notes).map(|n| format!("note: {n}")));
+    let evidence = s.evidence.as_ref().err().map(words::no_evidence);
+    let alternatives = s.alternatives.refused.iter().map(|e| format!("no alternatives: {e}"));
+    let notes = a.notes.iter().cloned().chain(evidence).chain(alternatives);
+    assumed.extend(notes.map(|n| format!("note: {n}")));
     blocks.push(Block::list("", assumed));
 }
 
@@ -363,7 +366,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
 
 fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
     match &s.evidence {
-        Some(c) => {
+        Ok(c) => {
             let outcome = match (c.passed, c.verdicts_agree) {
                 (true, _) => "agree in every check",
                 (false, true) => "agree, but the Monte Carlo runs do NOT fit the filter, as listed below",
@@ -384,7 +387,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
             blocks.extend(document.blocks.into_iter().filter(kept));
             checks(blocks, c, id);
         }
-        None => blocks.extend(s.notes.first().map(|n| Block::Text(format!("None: {n}.")))),
+        Err(e) => blocks.push(Block::Text(format!("None: {}.", words::no_evidence(e)))),
     }
     let run = s.simulation.document();
     blocks.push(Block::Text("One run against a simulated truth, with its errors and bands:".into()));

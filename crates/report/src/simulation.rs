@@ -108,18 +108,10 @@ pub(crate) fn validity(v: &Validity) -> Vec<String> {
 }
 
 fn row(e: &Estimate) -> Vec<String> {
-    vec![
-        e.name.clone(),
-        e.unit.clone(),
-        words::degree(e.degree),
-        number(e.truth),
-        number(e.estimate),
-        number(e.error),
-        number(e.sigma),
-        format!("{:.2}", e.error_over_sigma),
-        optional(e.time_to_requirement_s),
-        e.verdict.to_string(),
-    ]
+    let mut out = vec![e.name.clone(), e.unit.clone()];
+    out.extend(words::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
+    out.extend([optional(e.time_to_requirement_s), words::outcome(e.verdict).into()]);
+    out
 }
 
 /// `0.1 deg/h`, one for every unit, or by name where they differ.
@@ -164,8 +156,8 @@ fn requirements_met(s: &Simulation) -> Vec<String> {
 impl Answer for Simulation {
     fn document(&self) -> Document {
         let mut columns = vec![left("unknown"), left("unit")];
-        columns.extend(["degree", "truth", "estimate", "error", "sigma", "in sigma", "at [s]"].map(right));
-        columns.push(left("verdict"));
+        columns.extend(words::ESTIMATE.map(right));
+        columns.extend([right("at [s]"), left("verdict")]);
         let table =
             |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
         let end = self.timeline.last().map_or(0.0, |t| t.end_s);

@@ -127,35 +127,20 @@ impl Answer for SystemRun {
             let exact = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
             let verdict = match e.verdict {
                 Outcome::Reached | Outcome::Converging => exact,
-                other => format!("{exact}, {other}"),
+                other => format!("{exact}, {}", words::outcome(other)),
             };
-            vec![
-                e.name.clone(),
-                e.unit.clone(),
-                verdict,
-                words::degree(e.degree),
-                number(e.truth),
-                number(e.estimate),
-                number(e.error),
-                number(e.sigma),
-                format!("{:.2}", e.error_over_sigma),
-                number(e.prior_sigma),
-            ]
+            let mut out = vec![e.name.clone(), e.unit.clone(), verdict];
+            let values = [e.truth, e.estimate, e.error, e.sigma];
+            out.extend(words::estimate(e.degree, values, e.error_over_sigma));
+            out.push(number(e.prior_sigma));
+            out
         };
+        let mut columns = vec![left("unknown"), left("unit"), left("verdict")];
+        columns.extend(words::ESTIMATE.map(right));
+        columns.push(right("prior sigma"));
         let table = Block::table(
             "Estimates at the end (verdict and degree: exact, and what the run makes of it)",
-            [
-                left("unknown"),
-                left("unit"),
-                left("verdict"),
-                right("degree"),
-                right("truth"),
-                right("estimate"),
-                right("error"),
-                right("sigma"),
-                right("in sigma"),
-                right("prior sigma"),
-            ],
+            columns,
             self.estimates.iter().map(row),
         );
         let mut consistency = words::consistency(&self.consistency);

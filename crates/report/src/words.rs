@@ -8,7 +8,7 @@ use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
-use obsdeg_evidence::simulation::{Consistency, Doubt, MeasurementReport};
+use obsdeg_evidence::simulation::{Consistency, Doubt, MeasurementReport, Outcome, SimulationError};
 
 use crate::document::number;
 
@@ -356,6 +356,37 @@ pub(crate) fn requirements(r: &Requirements) -> String {
         r.stated,
         missed(r)
     )
+}
+
+/// What a run makes of an unknown.
+pub(crate) fn outcome(o: Outcome) -> &'static str {
+    match o {
+        Outcome::Reached => "reached",
+        Outcome::Converging => "converging",
+        Outcome::RestsOnPrior => "rests on the prior",
+        Outcome::PriorOnly => "known from the prior only",
+        Outcome::Inconsistent => "inconsistent",
+        Outcome::NoNumber => "no number",
+    }
+}
+
+/// The columns of [`estimate`].
+pub(crate) const ESTIMATE: [&str; 6] = ["degree", "truth", "estimate", "error", "sigma", "in sigma"];
+
+/// The degree of an unknown, its true value, its estimate, the error and sigma of that, and the error in sigma.
+pub(crate) fn estimate(d: Option<usize>, values: [f64; 4], in_sigma: f64) -> [String; 6] {
+    let [truth, estimate, error, sigma] = values.map(number);
+    [degree(d), truth, estimate, error, sigma, format!("{in_sigma:.2}")]
+}
+
+/// Why a review has no evidence by a filter.
+pub(crate) fn no_evidence(e: &SimulationError) -> String {
+    match e {
+        SimulationError::CrosscheckRotation => {
+            "this scheme has a rotating segment, and the evidence by a filter takes positions".into()
+        }
+        e => format!("no evidence by a filter: {e}"),
+    }
 }
 
 /// What speaks against a run.

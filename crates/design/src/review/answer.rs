@@ -5,9 +5,10 @@ use obsdeg_core::model::slew::Turn;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
-use obsdeg_evidence::simulation::{Simulation, Traces};
-use obsdeg_evidence::system::{SystemEvidence, SystemRun};
+use obsdeg_evidence::simulation::{Simulation, SimulationError, Traces};
+use obsdeg_evidence::system::{RunError, SystemEvidence, SystemRun};
 
+use crate::design::DesignError;
 use crate::design::answer::{Found, Minimum};
 
 /// A review of schemes and models.
@@ -44,16 +45,14 @@ pub struct SchemeReview {
     pub simulation: Simulation,
     /// The same, sample by sample.
     pub traces: Traces,
-    /// Verdicts against the filter; `None` where notes say why.
-    pub evidence: Option<CrossCheck>,
+    /// Verdicts against the filter, or why they cannot be held against it.
+    pub evidence: Result<CrossCheck, SimulationError>,
     /// Predicted sigma against the latitude in degrees.
     pub latitudes: Sweep,
     /// Predicted sigma against the factor on all dwells.
     pub dwells: Sweep,
     /// Smaller and other schemes.
     pub alternatives: Alternatives,
-    /// What could not be done, and why.
-    pub notes: Vec<String>,
 }
 
 /// One position in numbers.
@@ -134,6 +133,8 @@ pub struct Alternatives {
     pub front: Vec<Found>,
     /// Their number of positions.
     pub front_positions: usize,
+    /// Why some of these were not searched for.
+    pub refused: Vec<DesignError>,
 }
 
 /// One model.
@@ -146,5 +147,5 @@ pub struct ModelReview {
     /// Verdicts against the information of the samples.
     pub evidence: Option<SystemEvidence>,
     /// Why there is no run, or no evidence.
-    pub note: Option<String>,
+    pub refused: Option<RunError>,
 }

@@ -127,29 +127,18 @@ fn scheme(
     step(0.2, "a run of the filter")?;
     let (simulation, record) = simulate(scheme, conditions, options.seed).map_err(failed)?;
     step(0.3, "evidence")?;
-    let mut notes = Vec::new();
     let check = CrossCheckOptions { runs: options.runs, seed: options.seed, filter: Default::default() };
     let going = |done: usize| step(0.3 + 0.4 * done as f64 / options.runs.max(1) as f64, "evidence").is_ok();
     let evidence = match crosscheck(scheme, conditions, &check, &going) {
-        Ok(evidence) => Some(evidence),
         Err(SimulationError::Interrupted) => return Err(ReviewError::Interrupted),
-        Err(SimulationError::CrosscheckRotation) => {
-            notes.push(
-                "this scheme has a rotating segment, and the evidence by a filter takes positions".into(),
-            );
-            None
-        }
-        Err(error) if error.is_numeric() => {
-            notes.push(format!("no evidence by a filter: {error}"));
-            None
-        }
-        Err(error) => return Err(failed(error)),
+        Err(e) if e != SimulationError::CrosscheckRotation && !e.is_numeric() => return Err(failed(e)),
+        evidence => evidence,
     };
     step(0.7, "sweeps")?;
     let latitudes = latitudes(scheme, conditions, options.seed).map_err(failed)?;
     let dwells = dwells(scheme, conditions, options.seed).map_err(failed)?;
     step(0.8, "alternatives")?;
-    let alternatives = alternatives(scheme, conditions, &analysis, options.seed, &mut notes);
+    let alternatives = alternatives(scheme, conditions, &analysis, options.seed);
     Ok(SchemeReview {
         name: name.clone(),
         description: scheme.description.clone(),
@@ -162,7 +151,6 @@ fn scheme(
         latitudes,
         dwells,
         alternatives,
-        notes,
     })
 }
 
@@ -258,9 +246,9 @@ fn alternatives(
     conditions: &Conditions,
     analysis: &obsdeg_core::analysis::Analysis,
     seed: u64,
-    notes: &mut Vec<String>,
 ) -> Alternatives {
     let mut out = Alternatives::default();
+    let mut refused = Vec::new();
     let seen: Vec<String> = (analysis.quantities.iter())
         .filter(|q| q.status == Status::Observable && q.name.starts_with("D_"))
         .map(|q| q.name.clone())
@@ -280,7 +268,7 @@ fn alternatives(
         // no coefficients, generic angles, rotations: nothing to choose from
         Err(DesignError::Drift | DesignError::Rotation { .. } | DesignError::GenericAngle { .. }) => None,
         Err(e) => {
-            notes.push(format!("no alternatives: {e}"));
+            refused.push(e);
             None
         }
     };
@@ -301,10 +289,10 @@ fn alternatives(
         out.front_positions = positions;
     }
     out.required = seen;
+    out.refused = refused;
     out
 }
 
-/// A model with its run and its evidence, where it has the numbers for them.
 /// What follows needs no formulas, and may take long: another process may have the engine.
 fn rest(worker: Option<&mut Worker>) {
     if let Some(worker) = worker {
@@ -312,17 +300,18 @@ fn rest(worker: Option<&mut Worker>) {
     }
 }
 
+/// A model with its run and its evidence, where it has the numbers for them.
 fn model(model: &SystemModel, seed: u64, mut worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
     let analysis =
         analyze_system(model, SystemOptions { seed, ..SystemOptions::default() }, worker.as_deref_mut())?;
     rest(worker);
-    let mut note = None;
+    let mut refused = None;
     let run = simulate_system(model, seed);
     let evidence = run.as_ref().ok().map(|_| crosscheck_system(model, seed));
     let mut unless_wrong = |e: RunError| match e {
         RunError::Model(error) if model.simulation.duration.is_some() => Err(error),
         e => {
-            note = Some(format!("no run or no evidence: {e}"));
+            refused = Some(e);
             Ok(())
         }
     };
@@ -335,5 +324,5 @@ fn model(model: &SystemModel, seed: u64, mut worker: Option<&mut Worker>) -> Res
         Some(Err(e)) => unless_wrong(e).map(|()| None)?,
         None => None,
     };
-    Ok(ModelReview { analysis, run, evidence, note })
+    Ok(ModelReview { analysis, run, evidence, refused })
 }

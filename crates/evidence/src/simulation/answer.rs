@@ -207,19 +207,6 @@ impl Outcome {
     }
 }
 
-impl std::fmt::Display for Outcome {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Reached => "reached",
-            Self::Converging => "converging",
-            Self::RestsOnPrior => "rests on the prior",
-            Self::PriorOnly => "known from the prior only",
-            Self::Inconsistent => "inconsistent",
-            Self::NoNumber => "no number",
-        })
-    }
-}
-
 /// Whether the small-angle model holds for the drifts of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Validity {

@@ -119,7 +119,8 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
     blocks.extend(document.blocks);
     blocks.push(pictures::model_staircase(a, &format!("{id}_staircase")));
     blocks.push(section(level, "Evidence by a filter"));
-    blocks.extend(m.note.iter().map(|n| Block::Text(format!("{n}."))));
+    let refused = |e| Block::Text(format!("no run or no evidence: {e}."));
+    blocks.extend(m.refused.as_ref().map(refused));
     if let Some(e) = &m.evidence {
         let document = e.document();
         blocks.extend(document.lead.into_iter().map(Block::Text));

@@ -53,10 +53,10 @@ fn lost_with_dwell(s: &SchemeReview) -> Vec<&str> {
 /// The evidence: whether the checks of a filter agree.
 fn evidence(s: &SchemeReview) -> (Grade, String) {
     match &s.evidence {
-        Some(e) if e.passed => {
+        Ok(e) if e.passed => {
             (Grade::Good, format!("agree in every check, {} Monte Carlo runs", e.monte_carlo.runs))
         }
-        Some(e) => {
+        Ok(e) => {
             let n = e.disagreements.len();
             let checks = format!("{n} check{}", if n == 1 { "" } else { "s" });
             let what = match e.verdicts_agree {
@@ -65,7 +65,7 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
             };
             (Grade::Limited, what)
         }
-        None => (Grade::Open, format!("not taken: {}", s.notes.first().map_or("unknown", String::as_str))),
+        Err(e) => (Grade::Open, format!("not taken: {}", words::no_evidence(e))),
     }
 }
 
@@ -168,8 +168,8 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     );
     let limits = limits(s);
     let filter = match (&s.evidence, limits.is_empty()) {
-        (Some(e), true) if e.passed => ", and the filter confirms the verdicts",
-        (Some(e), false) if e.passed => "; within these limits a filter agrees with the exact verdicts",
+        (Ok(e), true) if e.passed => ", and the filter confirms the verdicts",
+        (Ok(e), false) if e.passed => "; within these limits a filter agrees with the exact verdicts",
         _ => "",
     };
     let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
