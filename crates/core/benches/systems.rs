@@ -43,7 +43,8 @@ fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
     bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").findings.degrees.rank());
 }
 
-/// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank needs order 2n-1.
+/// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank needs
+/// order 2n-1.
 fn chain(n: usize) -> SystemModel {
     let states: Vec<String> = (0..n).map(|i| format!("\"x{i}\"")).collect();
     let rates: Vec<String> = (0..n).map(|i| format!("\"a{i}\"")).collect();

@@ -123,7 +123,8 @@ impl Accuracy {
         self.module.as_ref().map_or(degree, |m| m.series.order(row))
     }
 
-    /// Whether samples over the dwells see a direction (shape n, in the first field of the verdicts) that derivatives do not see.
+    /// Whether samples over the dwells see a direction (shape n, in the first field of the verdicts) that derivatives
+    /// do not see.
     pub fn sees(&self, direction: &[u64]) -> bool {
         self.module.as_ref().is_some_and(|m| {
             let (span, field) = (&m.at_a_dwell, m.ring.field);
@@ -132,7 +133,8 @@ impl Accuracy {
         })
     }
 
-    /// The accuracy order of a functional (shape n, in the first field of the verdicts) of a known degree whose psi is that of the end.
+    /// The accuracy order of a functional (shape n, in the first field of the verdicts) of a known degree whose psi is
+    /// that of the end.
     pub fn of_functional_at_end(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
         self.module.as_ref().map_or(degree, |m| m.order_at_end(row))
     }

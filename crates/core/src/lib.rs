@@ -1,4 +1,5 @@
-//! The exact engine of obsdeg: which unknowns a model's output determines, with how many derivatives, and by which expressions.
+//! The exact engine of obsdeg: which unknowns a model's output determines, with how many derivatives, and by which
+//! expressions.
 //!
 //! A torquing scheme:
 //!
@@ -19,15 +20,16 @@
 //! ```
 //! use obsdeg_core::system::{SystemOptions, analyze_system, model_file};
 //!
-//! let model = model_file::read("name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz = \"x\"")?;
-//! let answer = analyze_system(&model, SystemOptions::default(), None)?;
+//! let model = model_file::read("name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz =
+//! \"x\"")?; let answer = analyze_system(&model, SystemOptions::default(), None)?;
 //! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
 //! # Ok::<(), obsdeg_core::system::ModelError>(())
 //! ```
 //!
-//! The way of the data: a model ([`model`], [`system`]) turns into derivative rows, these into a staircase and verdicts ([`degree`]), these
-//! into sparse combinations, a null space and solutions ([`solution`]), with dwells into accuracy orders ([`accuracy`]); all that is found stands
-//! in one exact value ([`findings`]), of which an [`analysis::Analysis`] is the view in words. No module imports from one that comes after it here.
+//! The way of the data: a model ([`model`], [`system`]) turns into derivative rows, these into a staircase and verdicts
+//! ([`degree`]), these into sparse combinations, a null space and solutions ([`solution`]), with dwells into accuracy
+//! orders ([`accuracy`]); all that is found stands in one exact value ([`findings`]), of which an
+//! [`analysis::Analysis`] is the view in words. No module imports from one that comes after it here.
 
 pub mod accuracy;
 pub mod analysis;

@@ -18,7 +18,8 @@ pub struct PredictedUnknown {
     pub degree: Option<usize>,
     /// The accuracy order: `None` when no dwell makes it observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
-    /// Whether samples over the dwells determine it (psi: of the start): by the accuracy order, or by the degree where the orders are not computed.
+    /// Whether samples over the dwells determine it (psi: of the start): by the accuracy order, or by the degree where
+    /// the orders are not computed.
     pub determined: bool,
     /// The accuracy order of its value at the end, which is what a filter shows.
     pub order_at_end: Option<usize>,
@@ -54,8 +55,8 @@ pub struct Prediction {
     pub unknowns: Vec<PredictedUnknown>,
     /// Observable combinations beyond single unknowns, and those that the scheme asks for.
     pub combinations: Vec<PredictedCombination>,
-    /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis, except at a pole, where others
-    /// move psi as well.
+    /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis, except at a
+    /// pole, where others move psi as well.
     pub null_space: Vec<Combination>,
     /// The rank with dwells: unknowns minus this is the defect of a filter.
     pub rank: usize,

@@ -26,8 +26,8 @@ pub struct Claim {
 ///   `unknowns * row_bits / 60` over the number of primes `p = 1 mod n` of 61 bits, taken by their
 ///   density `2^60 / (phi(n) ln 2^61)`.
 ///
-/// Primes and points are random to whoever wrote the input, since a hash of the input chooses them ([`crate::SplitMix64::of`]); every
-/// field has a stream of its own.
+/// Primes and points are random to whoever wrote the input, since a hash of the input chooses them
+/// ([`crate::SplitMix64::of`]); every field has a stream of its own.
 ///
 /// ```
 /// use obsdeg_exact::certainty::{Claim, error_bound};
@@ -64,7 +64,8 @@ mod tests {
         let point = Claim { row_degree: 5, ..nothing };
         close(error_bound(&point, 1), 105.0 / TWO60);
         close(error_bound(&point, 2), (105.0 / TWO60) * (105.0 / TWO60));
-        // minors of 3 * 40 bits have at most two prime factors of 60 bits, out of 2^60 / (phi ln 2^61) primes; ln 2^61 = 42.281978...
+        // minors of 3 * 40 bits have at most two prime factors of 60 bits, out of 2^60 / (phi ln 2^61) primes; ln 2^61
+        // = 42.281978...
         let ln = 42.281_978_014_156_64;
         for (order, phi) in [(4, 2.0), (24, 8.0), (360, 96.0), (1000, 400.0), (7_200, 1920.0)] {
             let prime = Claim { row_bits: 40.0, order, ..nothing };

@@ -213,9 +213,10 @@ impl Echelon {
             .collect()
     }
 
-    /// Per column: the others that occur with it in some null vector of minimal support (a circuit of the matroid of the columns), in
-    /// column order. They are its connected component of that matroid, whose parts are those of the graph that joins a pivot to the
-    /// free columns where its row is not zero: whatever the pivots are, the parts are the same.
+    /// Per column: the others that occur with it in some null vector of minimal support (a circuit of the matroid of
+    /// the columns), in column order. They are its connected component of that matroid, whose parts are those of the
+    /// graph that joins a pivot to the free columns where its row is not zero: whatever the pivots are, the parts are
+    /// the same.
     pub fn companions(&self) -> Vec<Vec<usize>> {
         let mut part: Vec<usize> = (0..self.columns).collect();
         for (i, pivot) in self.pivots().enumerate() {
@@ -350,7 +351,8 @@ mod tests {
         rank
     }
 
-    /// Per column the others of all circuits through it: sets of columns that are dependent while every smaller one is not.
+    /// Per column the others of all circuits through it: sets of columns that are dependent while every smaller one is
+    /// not.
     fn companions_by_subsets(rows: &[Vec<i64>]) -> Vec<Vec<usize>> {
         let n = rows[0].len();
         let columns = |set: usize| (0..n).filter(move |c| set >> c & 1 == 1);

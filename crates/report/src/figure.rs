@@ -154,7 +154,8 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
     SvgBackend::new().render_scene(&scene)
 }
 
-/// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange, others white to blue.
+/// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange, others
+/// white to blue.
 pub(crate) fn heat(
     title: &str,
     rows: &[String],

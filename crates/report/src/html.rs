@@ -1,4 +1,5 @@
-//! One self-contained HTML page: tables and formulas that read without scripts, pictures that answer the pointer with them.
+//! One self-contained HTML page: tables and formulas that read without scripts, pictures that answer the pointer with
+//! them.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -94,8 +94,9 @@ impl Drop for Running {
     }
 }
 
-/// A worker that starts with the first request; from then on no other has its turn until this one rests. After work beyond its limit it starts afresh with the next one;
-/// after any other failure of the process it stays down and repeats the reason.
+/// A worker that starts with the first request; from then on no other has its turn until this one rests. After work
+/// beyond its limit it starts afresh with the next one; after any other failure of the process it stays down and
+/// repeats the reason.
 pub struct Worker {
     config: WorkerConfig,
     running: Option<Running>,

@@ -53,8 +53,8 @@ pub enum Job {
         /// Highest order.
         order: usize,
     },
-    /// Solve a rational system for its unknowns, one after the other; answer with one expression per state, then one per
-    /// parameter, empty where there is none.
+    /// Solve a rational system for its unknowns, one after the other; answer with one expression per state, then one
+    /// per parameter, empty where there is none.
     Unknowns {
         /// The system.
         system: RationalSystem,
@@ -107,7 +107,8 @@ pub struct RationalSystem {
     pub starts: Vec<(usize, String)>,
     /// The degree of every state, then of every parameter; what has a lower one may stand in its expression.
     pub degrees: Vec<Option<usize>>,
-    /// Parameters that may take any value, since a symmetry moves them: no expression of an observable unknown depends on it.
+    /// Parameters that may take any value, since a symmetry moves them: no expression of an observable unknown depends
+    /// on it.
     pub free: Vec<usize>,
 }
 

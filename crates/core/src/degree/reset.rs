@@ -1,5 +1,6 @@
-//! The degrees of a scheme under reset carry, position by position: psi of a position occurs in its rows alone, so it is eliminated
-//! there, and what is left concerns the coefficients. The whole staircase holds a matrix of all unknowns by all unknowns instead.
+//! The degrees of a scheme under reset carry, position by position: psi of a position occurs in its rows alone, so it
+//! is eliminated there, and what is left concerns the coefficients. The whole staircase holds a matrix of all unknowns
+//! by all unknowns instead.
 
 use obsdeg_exact::Echelon;
 

@@ -11,7 +11,7 @@ pub trait DerivativeRows {
     /// The number of unknowns: the length of a row.
     fn columns(&self) -> usize;
 
-    /// Hands every row of order `order` to `sink`, which says whether it raised the rank. False when no segment has rows of this or a higher
-    /// order that could add anything: each segment's own chain has stalled.
+    /// Hands every row of order `order` to `sink`, which says whether it raised the rank. False when no segment has
+    /// rows of this or a higher order that could add anything: each segment's own chain has stalled.
     fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64]) -> bool) -> bool;
 }

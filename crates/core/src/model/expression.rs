@@ -180,12 +180,12 @@ impl Expression {
     }
 }
 
-/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots of integers, exponents
-/// integers.
+/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots of
+/// integers, exponents integers.
 ///
 /// # Errors
-/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for other functions and
-/// exponents.
+/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for other
+/// functions and exponents.
 pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Result<u64, ExpressionError> {
     let syntax = |i: usize, expected| ExpressionError::Syntax {
         expected,
@@ -320,7 +320,8 @@ pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     values.last().copied().unwrap_or(f64::NAN)
 }
 
-/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends: `latitude`, `latitude_deg`.
+/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends: `latitude`,
+/// `latitude_deg`.
 pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
     let distance = |a: &str, b: &str| {
         let b: Vec<char> = b.chars().collect();

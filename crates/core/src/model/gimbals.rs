@@ -16,8 +16,8 @@ const ROUNDING: i64 = 100_000;
 
 /// Limits on alpha, beta, gamma as `[low, high]` in 1e-9 degrees; `None`: the gimbal turns freely.
 ///
-/// An attitude has two sets of Euler angles, `(a, b, g)` and `(a+180, 180-b, g+180)`, and at `b = +-90` infinitely many: it is
-/// reached when one of them lies within the limits, whole turns left out of account.
+/// An attitude has two sets of Euler angles, `(a, b, g)` and `(a+180, 180-b, g+180)`, and at `b = +-90` infinitely
+/// many: it is reached when one of them lies within the limits, whole turns left out of account.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gimbals {
     /// Of alpha, beta and gamma.
@@ -84,8 +84,8 @@ impl Gimbals {
             .any(|angles| (0..3).all(|k| within(angles[k], limit(k))))
     }
 
-    /// The name and attitude of a position, or of a point of a rotating segment (every degree of it is looked at), that the gimbals
-    /// do not reach.
+    /// The name and attitude of a position, or of a point of a rotating segment (every degree of it is looked at), that
+    /// the gimbals do not reach.
     pub fn beyond(&self, position: &Position) -> Option<(String, String)> {
         let name = || position.name.clone();
         if !self.reach(&position.angles) {

@@ -134,8 +134,8 @@ impl Solver<'_> {
     }
 }
 
-/// (8) and (9) as text, with names for the six local unknowns and for the derivatives of the last three: `eps^n` changes while the
-/// platform turns.
+/// (8) and (9) as text, with names for the six local unknowns and for the derivatives of the last three: `eps^n`
+/// changes while the platform turns.
 pub(crate) fn dynamics_text(
     w_n: &str,
     w_u: &str,

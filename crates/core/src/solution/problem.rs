@@ -56,8 +56,8 @@ pub(crate) enum Outputs {
     Sums(Vec<Vec<Place>>),
 }
 
-/// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with `sum_i z_i rows[i] = sum_j y_j motion_j`
-/// over some unknowns `y_j` of the solution, given with their rows of minus the motion.
+/// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with `sum_i z_i rows[i] = sum_j
+/// y_j motion_j` over some unknowns `y_j` of the solution, given with their rows of minus the motion.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Motion {
     /// Independent rows that span it.

@@ -49,8 +49,8 @@ impl<'a, R: Ring> Substitution<'a, R> {
         }
     }
 
-    /// The sum of the terms as a functional of the unknowns; `coefficients` hold the rates of the earth and of turning, and `turning`
-    /// is the rate at which a position turns.
+    /// The sum of the terms as a functional of the unknowns; `coefficients` hold the rates of the earth and of turning,
+    /// and `turning` is the rate at which a position turns.
     pub(super) fn sum(
         &self,
         terms: &[Term],

@@ -5,8 +5,8 @@ use obsdeg_exact::SplitMix64;
 use super::model::{Constant, KnownInput, PlacedExpression, StateStart, SystemModel};
 
 impl SystemModel {
-    /// The stream of `seed` for one purpose and this model ([`SplitMix64::of`]). Everything takes part but what moves no verdict: the
-    /// name of the model, units, descriptions, the numbers of a simulation.
+    /// The stream of `seed` for one purpose and this model ([`SplitMix64::of`]). Everything takes part but what moves
+    /// no verdict: the name of the model, units, descriptions, the numbers of a simulation.
     pub fn random(&self, seed: u64, purpose: &str) -> SplitMix64 {
         SplitMix64::of(seed, purpose, &self.canonical())
     }

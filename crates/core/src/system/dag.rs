@@ -1,7 +1,8 @@
 //! Expressions as a graph of operations that are shared and never expanded.
 //!
-//! Transcendental functions are held by their differential equations: `dF = weight d(of)`. Before that, sums inside them are taken
-//! apart (`sin(a + b)`, `exp(2 a)`, `log(a b)`), so that what is left is algebraically independent and may take random values.
+//! Transcendental functions are held by their differential equations: `dF = weight d(of)`. Before that, sums inside
+//! them are taken apart (`sin(a + b)`, `exp(2 a)`, `log(a b)`), so that what is left is algebraically independent and
+//! may take random values.
 
 use std::collections::HashMap;
 

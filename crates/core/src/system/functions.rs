@@ -1,4 +1,5 @@
-//! Functions in the graph: sums inside them are taken apart, multiples and fractions of one argument become powers of one function.
+//! Functions in the graph: sums inside them are taken apart, multiples and fractions of one argument become powers of
+//! one function.
 
 use std::collections::BTreeMap;
 

@@ -101,7 +101,8 @@ fn singular(compiled: &Compiled, singular: Singular) -> ModelError {
     }
 }
 
-/// Judges a model in two random fields, each of a stream of its own of `seed` and the model; `bound` overrides the highest order.
+/// Judges a model in two random fields, each of a stream of its own of `seed` and the model; `bound` overrides the
+/// highest order.
 ///
 /// # Errors
 /// [`ModelError`].

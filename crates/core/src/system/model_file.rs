@@ -211,6 +211,139 @@ impl Reader<'_> {
             self.at(span.clone(), what.into(), format!("expected polynomial = a degree of 0 to {MAX_DEGREE}"))
         })
     }
+
+    /// The parameters, in the order of the file.
+    fn parameters(&self, entry: &Spanned<Value>) -> Result<Vec<Named>, ModelError> {
+        let span = entry.span();
+        match entry.get_ref() {
+            Value::Array(list) => {
+                let name = |value: &Value| {
+                    let text = value.as_str().ok_or_else(|| {
+                        self.at(span.clone(), "parameters".into(), "expected names in quotes".into())
+                    })?;
+                    Ok(self.named(text, None))
+                };
+                list.iter().map(name).collect()
+            }
+            Value::Table(table) => {
+                // the line that the key begins, or its place in an inline table
+                let begins = |line: &str, name: &str| {
+                    let rest = line.trim_start().strip_prefix(name);
+                    rest.is_some_and(|r| r.trim_start().starts_with(['=', '.']))
+                };
+                let place = |name: &str| {
+                    let lines = self.text[span.start..].lines().position(|line| begins(line, name));
+                    (lines, self.text[span.clone()].find(name))
+                };
+                let mut names: Vec<&String> = table.keys().collect();
+                names.sort_by_key(|n| place(n));
+                let parameter = |name: &String| {
+                    let what = format!("the parameter {name}");
+                    let Some(entry) = table.get(name).and_then(Value::as_table) else {
+                        let message = "expected a table, as in { unit = \"1/h\" }".into();
+                        return Err(self.at(span.clone(), what, message));
+                    };
+                    self.known_keys(&what, entry, &span, &["unit", "description"])?;
+                    Ok(self.named(name, Some(entry)))
+                };
+                names.into_iter().map(parameter).collect()
+            }
+            _ => {
+                let message = "expected a list of names, or a table".into();
+                Err(self.at(span, "parameters".into(), message))
+            }
+        }
+    }
+
+    fn known_input(&self, name: &str, value: &Spanned<Value>) -> Result<(Named, KnownInput), ModelError> {
+        let (what, span) = (format!("the known input {name}"), value.span());
+        let kind = match value.get_ref() {
+            Value::String(s) if s == "generic" => KnownInput::Generic,
+            Value::String(s) if s == "constant" => KnownInput::Polynomial(0),
+            Value::Table(t) if t.contains_key("function") => {
+                self.known_keys(&what, t, &span, &["function", "unit", "description"])?;
+                KnownInput::Function(self.formula(what, &t["function"], span)?)
+            }
+            Value::Table(t) => {
+                self.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
+                KnownInput::Polynomial(self.polynomial(&what, t, &span)?)
+            }
+            _ => {
+                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \"sin(t)\" }";
+                return Err(self.at(span, what, message.into()));
+            }
+        };
+        Ok((self.named(name, value.get_ref().as_table()), kind))
+    }
+
+    fn unknown_input(
+        &self,
+        name: &str,
+        value: &Spanned<Value>,
+    ) -> Result<(Named, Option<usize>), ModelError> {
+        let (what, span) = (format!("the unknown input {name}"), value.span());
+        let degree = match value.get_ref() {
+            Value::String(s) if s == "arbitrary" => None,
+            Value::String(s) if s == "constant" => Some(0),
+            Value::Table(t) => {
+                self.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
+                Some(self.polynomial(&what, t, &span)?)
+            }
+            _ => {
+                let message = "expected \"arbitrary\", \"constant\" or { polynomial = degree }";
+                return Err(self.at(span, what, message.into()));
+            }
+        };
+        Ok((self.named(name, value.get_ref().as_table()), degree))
+    }
+
+    fn constant(&self, name: &str, value: &Spanned<Value>) -> Result<(Named, Constant), ModelError> {
+        let what = format!("the constant {name}");
+        let table = value.get_ref().as_table();
+        let kind = match (value.get_ref(), table) {
+            (Value::String(s), _) if s == "generic" => Constant::Generic,
+            (_, Some(t)) => {
+                self.known_keys(&what, t, &value.span(), &["value", "unit", "description"])?;
+                match t.get("value") {
+                    None => Constant::Generic,
+                    Some(inner) => Constant::Value(self.formula(what, inner, value.span())?),
+                }
+            }
+            (other, None) => Constant::Value(self.formula(what, other, value.span())?),
+        };
+        Ok((self.named(name, table), kind))
+    }
+
+    fn output(&self, name: &str, value: &Spanned<Value>) -> Result<(Named, PlacedExpression), ModelError> {
+        let (what, span) = (format!("the output {name}"), value.span());
+        let table = value.get_ref().as_table();
+        let formula = match table {
+            None => self.formula(what, value.get_ref(), span)?,
+            Some(t) => {
+                self.known_keys(&what, t, &span, &["expression", "unit", "description"])?;
+                let inner = t.get("expression").ok_or_else(|| {
+                    self.at(span.clone(), what.clone(), "no expression; expected one".into())
+                })?;
+                self.formula(what, inner, span)?
+            }
+        };
+        Ok((self.named(name, table), formula))
+    }
+
+    /// Segment `i`, counted from 0.
+    fn segment(&self, i: usize, segment: &SegmentEntry) -> Result<Segment, ModelError> {
+        let mut out = Segment::default();
+        for (list, map, kind) in [
+            (&mut out.constants, &segment.constants, "the constant"),
+            (&mut out.carry, &segment.carry, "the carried state"),
+        ] {
+            for (name, value) in in_order(map) {
+                let what = format!("{kind} {name} of segment {}", i + 1);
+                list.push((name.clone(), self.formula(what, value.get_ref(), value.span())?));
+            }
+        }
+        Ok(out)
+    }
 }
 
 /// Whether a text is meant as a model, not a scheme.
@@ -244,126 +377,27 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     for (name, value) in in_order(&file.states) {
         model.states.push(r.state(name, value)?);
     }
-    match file.parameters.as_ref().map(|p| (p.get_ref(), p.span())) {
-        None => {}
-        Some((Value::Array(list), span)) => {
-            for value in list {
-                let name = value.as_str().ok_or_else(|| {
-                    r.at(span.clone(), "parameters".into(), "expected names in quotes".into())
-                })?;
-                model.parameters.push(r.named(name, None));
-            }
-        }
-        Some((Value::Table(table), span)) => {
-            // the order of the file: the line that the key begins, or its place in an inline table
-            let begins = |line: &str, name: &str| {
-                let rest = line.trim_start().strip_prefix(name);
-                rest.is_some_and(|r| r.trim_start().starts_with(['=', '.']))
-            };
-            let place = |name: &str| {
-                let lines = text[span.start..].lines().position(|line| begins(line, name));
-                (lines, text[span.clone()].find(name))
-            };
-            let mut names: Vec<&String> = table.keys().collect();
-            names.sort_by_key(|n| place(n));
-            for name in names {
-                let entry = table.get(name).and_then(Value::as_table);
-                let what = format!("the parameter {name}");
-                let Some(entry) = entry else {
-                    return Err(r.at(span, what, "expected a table, as in { unit = \"1/h\" }".into()));
-                };
-                r.known_keys(&what, entry, &span, &["unit", "description"])?;
-                model.parameters.push(r.named(name, Some(entry)));
-            }
-        }
-        Some((_, span)) => {
-            let message = "expected a list of names, or a table".into();
-            return Err(r.at(span, "parameters".into(), message));
-        }
+    if let Some(parameters) = &file.parameters {
+        model.parameters = r.parameters(parameters)?;
     }
     for (name, value) in in_order(&file.known_inputs) {
-        let (what, span) = (format!("the known input {name}"), value.span());
-        let kind = match value.get_ref() {
-            Value::String(s) if s == "generic" => KnownInput::Generic,
-            Value::String(s) if s == "constant" => KnownInput::Polynomial(0),
-            Value::Table(t) if t.contains_key("function") => {
-                r.known_keys(&what, t, &span, &["function", "unit", "description"])?;
-                KnownInput::Function(r.formula(what, &t["function"], span)?)
-            }
-            Value::Table(t) => {
-                r.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
-                KnownInput::Polynomial(r.polynomial(&what, t, &span)?)
-            }
-            _ => {
-                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \"sin(t)\" }";
-                return Err(r.at(span, what, message.into()));
-            }
-        };
-        model.known_inputs.push((r.named(name, value.get_ref().as_table()), kind));
+        model.known_inputs.push(r.known_input(name, value)?);
     }
     for (name, value) in in_order(&file.unknown_inputs) {
-        let (what, span) = (format!("the unknown input {name}"), value.span());
-        let degree = match value.get_ref() {
-            Value::String(s) if s == "arbitrary" => None,
-            Value::String(s) if s == "constant" => Some(0),
-            Value::Table(t) => {
-                r.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
-                Some(r.polynomial(&what, t, &span)?)
-            }
-            _ => {
-                let message = "expected \"arbitrary\", \"constant\" or { polynomial = degree }";
-                return Err(r.at(span, what, message.into()));
-            }
-        };
-        model.unknown_inputs.push((r.named(name, value.get_ref().as_table()), degree));
+        model.unknown_inputs.push(r.unknown_input(name, value)?);
     }
     for (name, value) in in_order(&file.constants) {
-        let what = format!("the constant {name}");
-        let table = value.get_ref().as_table();
-        let kind = match (value.get_ref(), table) {
-            (Value::String(s), _) if s == "generic" => Constant::Generic,
-            (_, Some(t)) => {
-                r.known_keys(&what, t, &value.span(), &["value", "unit", "description"])?;
-                match t.get("value") {
-                    None => Constant::Generic,
-                    Some(inner) => Constant::Value(r.formula(what, inner, value.span())?),
-                }
-            }
-            (other, None) => Constant::Value(r.formula(what, other, value.span())?),
-        };
-        model.constants.push((r.named(name, table), kind));
+        model.constants.push(r.constant(name, value)?);
     }
     for (name, value) in in_order(&file.definitions) {
         let formula = r.formula(format!("the definition of {name}"), value.get_ref(), value.span())?;
         model.definitions.push((name.clone(), formula));
     }
     for (name, value) in in_order(&file.outputs) {
-        let (what, span) = (format!("the output {name}"), value.span());
-        let table = value.get_ref().as_table();
-        let formula = match table {
-            None => r.formula(what, value.get_ref(), span)?,
-            Some(t) => {
-                r.known_keys(&what, t, &span, &["expression", "unit", "description"])?;
-                let inner = t
-                    .get("expression")
-                    .ok_or_else(|| r.at(span.clone(), what.clone(), "no expression; expected one".into()))?;
-                r.formula(what, inner, span)?
-            }
-        };
-        model.outputs.push((r.named(name, table), formula));
+        model.outputs.push(r.output(name, value)?);
     }
     for (i, segment) in file.segments.iter().enumerate() {
-        let mut out = Segment::default();
-        for (list, map, kind) in [
-            (&mut out.constants, &segment.constants, "the constant"),
-            (&mut out.carry, &segment.carry, "the carried state"),
-        ] {
-            for (name, value) in in_order(map) {
-                let what = format!("{kind} {name} of segment {}", i + 1);
-                list.push((name.clone(), r.formula(what, value.get_ref(), value.span())?));
-            }
-        }
-        model.segments.push(out);
+        model.segments.push(r.segment(i, segment)?);
     }
     for c in &file.combinations {
         let what = format!("the combination {}", c.get_ref());

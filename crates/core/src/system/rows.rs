@@ -31,7 +31,8 @@ pub struct Layout {
     pub unknowns: Vec<Unknown>,
     /// The highest order that is looked at.
     pub bound: usize,
-    /// The point is generic and every input is, so that an order that adds nothing is the end. Otherwise only the bound ends it.
+    /// The point is generic and every input is, so that an order that adds nothing is the end. Otherwise only the bound
+    /// ends it.
     pub closed: bool,
 }
 

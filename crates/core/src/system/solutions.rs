@@ -1,7 +1,8 @@
-//! Solving expressions: what an unknown is in terms of outputs, inputs, their derivatives, and unknowns that are solved with fewer.
+//! Solving expressions: what an unknown is in terms of outputs, inputs, their derivatives, and unknowns that are solved
+//! with fewer.
 //!
-//! The symbolic worker eliminates; every expression is then evaluated at random points of both prime fields, where it must give the
-//! unknown's value, and only what holds is shown.
+//! The symbolic worker eliminates; every expression is then evaluated at random points of both prime fields, where it
+//! must give the unknown's value, and only what holds is shown.
 
 use obsdeg_exact::{Field, SplitMix64};
 use obsdeg_symbolic::{Job, RationalSystem, Request, Worker, WorkerError};

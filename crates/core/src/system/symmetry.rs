@@ -1,4 +1,5 @@
-//! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output sees, at any point.
+//! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output sees, at
+//! any point.
 
 use obsdeg_exact::{Echelon, Field, Ratio};
 
@@ -44,8 +45,8 @@ pub struct Invariant {
 /// The factors of a product, and its rational coefficient.
 pub(crate) type PolynomialTerm = (Vec<usize>, (i64, i64));
 
-/// A direction whose components are polynomials in the unknowns and the known constants: `(unknown, [(factors, coefficient)])`; a factor
-/// is an unknown or a known constant (counted on behind the unknowns).
+/// A direction whose components are polynomials in the unknowns and the known constants: `(unknown, [(factors,
+/// coefficient)])`; a factor is an unknown or a known constant (counted on behind the unknowns).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PolynomialDirection {
     /// Of every unknown that it moves.
@@ -187,8 +188,8 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
     out
 }
 
-/// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a linear system for the
-/// a_ij from rows at several points.
+/// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a
+/// linear system for the a_ij from rows at several points.
 fn directions(
     f: &Field,
     moved: &[usize],
@@ -239,7 +240,8 @@ fn directions(
     Ok(out)
 }
 
-/// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they are observable.
+/// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they are
+/// observable.
 fn invariants(f: &Field, n: usize, found: &[Symmetry], at: &At) -> Vec<Invariant> {
     let mut out = Vec::new();
     let scalings: Vec<&Symmetry> = found.iter().filter(|s| s.translation.is_empty()).collect();

@@ -1,5 +1,5 @@
-//! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a dual lane each), in a
-//! prime field.
+//! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a dual lane
+//! each), in a prime field.
 
 use obsdeg_exact::{Field, SplitMix64};
 
@@ -407,8 +407,8 @@ impl<'a> Taylor<'a> {
     }
 }
 
-/// A q-th root of `x`; in a field with p = 3 mod 4 whose p - 1 has no odd factor of q: unique up to sign, and of a square for
-/// every factor of two.
+/// A q-th root of `x`; in a field with p = 3 mod 4 whose p - 1 has no odd factor of q: unique up to sign, and of a
+/// square for every factor of two.
 fn root(f: &Field, x: u64, q: i64) -> Option<u64> {
     let p = f.modulus();
     let (mut odd, mut twos) = (q.unsigned_abs(), 0);

@@ -45,8 +45,8 @@ impl Criterion {
 }
 
 impl Evaluator {
-    /// The root of the information, psi and the coefficients that do not count first: the block of the others is the root of the
-    /// inverse of their covariance. False when one of them is not determined.
+    /// The root of the information, psi and the coefficients that do not count first: the block of the others is the
+    /// root of the inverse of their covariance. False when one of them is not determined.
     pub(super) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
         let n = self.n;
         let first = if self.carry() == Carry::Reset { 3 } else { 0 };
@@ -73,8 +73,8 @@ impl Evaluator {
         true
     }
 
-    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient that counts
-    /// is not determined. Sigmas are in deg/h (per g). `root` is working space.
+    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient
+    /// that counts is not determined. Sigmas are in deg/h (per g). `root` is working space.
     pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
         if !self.root(state, root) {
             return f64::INFINITY;

@@ -1,4 +1,5 @@
-//! The information of a sequence of positions, built up position by position: what a search evaluates millions of times.
+//! The information of a sequence of positions, built up position by position: what a search evaluates millions of
+//! times.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::W_IE;
@@ -62,8 +63,8 @@ pub struct State {
 }
 
 impl Evaluator {
-    /// The evaluator for positions of `dwell_s` each, without drift noise. `required` are the coefficients that count (indices
-    /// among the coefficients); the others are estimated with them.
+    /// The evaluator for positions of `dwell_s` each, without drift noise. `required` are the coefficients that count
+    /// (indices among the coefficients); the others are estimated with them.
     ///
     /// # Errors
     /// [`DesignError`].

@@ -1,8 +1,9 @@
 //! Finding schemes: the fewest positions, and the best of a number of positions.
 //!
-//! Sets of candidates are first judged exactly (`observability`). Sequences of those that make the required coefficients observable, in
-//! every order where the carry makes order matter and by both ways of half turns (`ways`), are then ranked (`search`): constraints
-//! first, then the worst degree, then a criterion of optimal design (`information`), up to turns of the platform axes (`symmetry`).
+//! Sets of candidates are first judged exactly (`observability`). Sequences of those that make the required
+//! coefficients observable, in every order where the carry makes order matter and by both ways of half turns (`ways`),
+//! are then ranked (`search`): constraints first, then the worst degree, then a criterion of optimal design
+//! (`information`), up to turns of the platform axes (`symmetry`).
 
 pub(crate) mod answer;
 pub(crate) mod candidates;
@@ -176,7 +177,8 @@ pub struct DesignOptions {
     pub required: Vec<String>,
     /// Largest degrees: of a coefficient or family, or of all that are required.
     pub degree_caps: Vec<(Option<String>, usize)>,
-    /// Only schemes that meet the requirements of the conditions on what is required, and on psi when that is everything.
+    /// Only schemes that meet the requirements of the conditions on what is required, and on psi when that is
+    /// everything.
     pub meet: bool,
     /// Largest total time, in s.
     pub total_s: Option<f64>,
@@ -233,8 +235,9 @@ pub enum CriterionName {
     Margin,
 }
 
-/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise, the dwell, the rate of
-/// slews and the requirements. `progress` says whether to go on: a search that is stopped gives the best so far.
+/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise, the dwell,
+/// the rate of slews and the requirements. `progress` says whether to go on: a search that is stopped gives the best so
+/// far.
 ///
 /// # Errors
 /// [`DesignError`].

@@ -6,8 +6,8 @@ use super::information::{Evaluator, State};
 use super::ways::Stop;
 
 impl Evaluator {
-    /// Sigma in deg of psi in platform axes at the start of a whole sequence, or of its every position under reset carry; infinite where it is
-    /// not determined, none when a coefficient that counts is not.
+    /// Sigma in deg of psi in platform axes at the start of a whole sequence, or of its every position under reset
+    /// carry; infinite where it is not determined, none when a coefficient that counts is not.
     pub fn psi_sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<[f64; 3]> {
         let (state, mut root) = (self.state_of(sequence), Vec::new());
         if self.root(&state, &mut root) { self.psi_of(&state, &root) } else { Vec::new() }
@@ -22,7 +22,8 @@ impl Evaluator {
         self.psi_of(state, root).into_iter().map(over).fold(0.0, f64::max)
     }
 
-    /// Sigma in deg of psi in platform axes at the start, or of every position under reset carry; infinite where it is not determined.
+    /// Sigma in deg of psi in platform axes at the start, or of every position under reset carry; infinite where it is
+    /// not determined.
     fn psi_of(&self, state: &State, root: &[f64]) -> Vec<[f64; 3]> {
         let n = self.n;
         let unit = |k: usize| -> [f64; 3] { std::array::from_fn(|r| f64::from(u8::from(r == k))) };
@@ -41,7 +42,8 @@ impl Evaluator {
         }
     }
 
-    /// Sigma in deg of psi of a position with a psi of its own, when the rest of the scheme knows the coefficients as `root` says.
+    /// Sigma in deg of psi of a position with a psi of its own, when the rest of the scheme knows the coefficients as
+    /// `root` says.
     fn psi_of_position(&self, candidate: usize, root: &[f64]) -> [f64; 3] {
         let (n, c) = (self.n, &self.candidates[candidate].c);
         let drift = &self.candidates[candidate].drift;

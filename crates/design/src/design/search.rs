@@ -131,8 +131,8 @@ pub struct Best {
     pub complete: bool,
     /// Sequences whose sigma was computed.
     pub examined: u64,
-    /// Of these, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what is required, as far
-    /// as double precision tells.
+    /// Of these, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what
+    /// is required, as far as double precision tells.
     pub lost: u64,
 }
 
@@ -164,7 +164,8 @@ impl Best {
         }
     }
 
-    /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion; drops what it beats.
+    /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion; drops what
+    /// it beats.
     fn add_to_front(&mut self, new: &Scored) {
         if self.is_on_front(&new.worth, new.seconds) {
             let beaten = |f: &Scored| {
@@ -391,15 +392,15 @@ impl Search<'_> {
         degrees.iter().max().copied().filter(|_| self.constraints.cap(&degrees))
     }
 
-    /// The worst degree of every observable set, where it is known beforehand: none is better than all candidates together, none worse
-    /// than the last order.
+    /// The worst degree of every observable set, where it is known beforehand: none is better than all candidates
+    /// together, none worse than the last order.
     fn only_degree(&self) -> Option<usize> {
         (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
     }
 
-    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the first of an orbit (where order
-    /// does not matter: that have one of them as their smallest). As many of the best as are kept: worst degrees that are too large for
-    /// these are not looked at.
+    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the first of an
+    /// orbit (where order does not matter: that have one of them as their smallest). As many of the best as are kept:
+    /// worst degrees that are too large for these are not looked at.
     pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
         if !self.evaluator.ordered() {
             return self.exhaust_sets(symmetry, k);
@@ -470,7 +471,8 @@ impl Search<'_> {
         meter.gather(self.keep, parts)
     }
 
-    /// The keys of all observable sets of up to `k` within the caps, by their worst degree; `None` when the search was stopped.
+    /// The keys of all observable sets of up to `k` within the caps, by their worst degree; `None` when the search was
+    /// stopped.
     fn levels(&self, k: usize) -> Option<BTreeMap<usize, HashSet<u128>>> {
         let meter = Meter::new(self, 1);
         let going = || meter.report(0, 0, None);
@@ -509,7 +511,8 @@ impl Search<'_> {
         Scored { worth, seconds: state.seconds, sequence: sequence.to_vec() }
     }
 
-    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at once, does not.
+    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at
+    /// once, does not.
     fn judged(&self, mut scored: Scored) -> Scored {
         let degrees = self.rows.likely_degrees(&candidates(&scored.sequence));
         scored.worth.violation += degrees.iter().filter(|d| d.is_none()).count() as f64;
@@ -527,8 +530,8 @@ impl Search<'_> {
         (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
     }
 
-    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of half turns, then any
-    /// two change places, until none helps. From the sequences given, then from random ones.
+    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of
+    /// half turns, then any two change places, until none helps. From the sequences given, then from random ones.
     pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
         let candidates = self.rows.candidates();
         let total = given.len() + restarts as usize;

@@ -351,7 +351,8 @@ impl<'a> Task<'a> {
         Ok(())
     }
 
-    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a smaller criterion.
+    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a
+    /// smaller criterion.
     pub(super) fn refined(
         &self,
         evaluator: &Evaluator,

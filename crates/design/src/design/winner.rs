@@ -10,8 +10,8 @@ use super::answer::Found;
 /// Half a turn in degrees.
 const HALF: i32 = 180;
 
-/// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of half turns: its sigmas are
-/// those that the search gave. Positions are p1, p2, ...
+/// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of half
+/// turns: its sigmas are those that the search gave. Positions are p1, p2, ...
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a dwell that no scheme has.

@@ -67,7 +67,8 @@ pub enum ReviewError {
     Interrupted,
 }
 
-/// Reviews schemes and models. `progress` hears what is done next, with a share of the whole, and says whether to go on.
+/// Reviews schemes and models. `progress` hears what is done next, with a share of the whole, and says whether to go
+/// on.
 ///
 /// # Errors
 /// [`ReviewError`].

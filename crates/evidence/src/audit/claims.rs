@@ -108,8 +108,9 @@ fn common_mode(seed: u64) -> Result<CommonMode, AnalysisError> {
     Ok(out)
 }
 
-/// Whether nothing that one position shows moves along psi^n = (0,1,0), eps^n = (0,0,wN), and the zero-order coefficients make this drift at
-/// every attitude: then psi, which it turns, is not observable at one position, whatever its attitude.
+/// Whether nothing that one position shows moves along psi^n = (0,1,0), eps^n = (0,0,wN), and the zero-order
+/// coefficients make this drift at every attitude: then psi, which it turns, is not observable at one position,
+/// whatever its attitude.
 fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
     let platform = Platform::new(generic(1, carry))?;
     for sample in samples(&platform, seed)? {

@@ -1,8 +1,8 @@
 //! The paper against the algebra: every numbered equation and claim, recomputed.
 //!
-//! The source is Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06. Equations are compared with the model as identities in
-//! random prime fields; claims about degrees are judged by the engine, those of section 3.3 by the filter under the conditions of section 3.1.
-//! What is not covered is a line of its own.
+//! The source is Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06. Equations are compared with the model
+//! as identities in random prime fields; claims about degrees are judged by the engine, those of section 3.3 by the
+//! filter under the conditions of section 3.1. What is not covered is a line of its own.
 
 mod claims;
 mod equations;

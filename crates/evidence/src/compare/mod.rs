@@ -87,8 +87,8 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
 }
 
-/// Every unknown with its standard deviation in deg, deg/h, deg/h/g by the information of all samples, without prior and drift noise;
-/// `None` when it is not observable.
+/// Every unknown with its standard deviation in deg, deg/h, deg/h/g by the information of all samples, without prior
+/// and drift noise; `None` when it is not observable.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -236,8 +236,8 @@ fn quantities(
     Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
 }
 
-/// Per position and coefficient: the length of its column of `eps^n = C E(g) D` at a position, its root mean square over the arc of a
-/// rotating segment (the columns of C are orthonormal, so this is the product of components of g).
+/// Per position and coefficient: the length of its column of `eps^n = C E(g) D` at a position, its root mean square
+/// over the arc of a rotating segment (the columns of C are orthonormal, so this is the product of components of g).
 fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
     let (plan, platform) = (&judged.plan, judged.platform());
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
@@ -260,8 +260,8 @@ fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
     platform.scheme().positions.iter().enumerate().map(of).collect()
 }
 
-/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five degrees, which is exact to 1e-10
-/// for the squares of second-order terms.
+/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five degrees,
+/// which is exact to 1e-10 for the squares of second-order terms.
 fn quadrature(arc: f64) -> Vec<(f64, f64)> {
     const PART: f64 = std::f64::consts::PI / 36.0;
     const MOST: f64 = 10_000.0;

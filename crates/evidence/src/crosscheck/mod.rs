@@ -1,9 +1,9 @@
 //! The exact verdicts against a filter: two independent paths, item by item.
 //!
-//! a. the slope of sigma against the dwell is -(accuracy order + 1/2); b. a larger prior leaves what is observable as it
-//! is; the directions that Z does not see are those of the information; c. the filter's covariance is the inverse
-//! information; d. errors and innovations are what the filter believes; e. predicted and measured orders rank alike;
-//! f. filters that are wrong on purpose are found out.
+//! a. the slope of sigma against the dwell is -(accuracy order + 1/2); b. a larger prior leaves what is observable as
+//! it is; the directions that Z does not see are those of the information; c. the filter's covariance is the inverse
+//! information; d. errors and innovations are what the filter believes; e. predicted and measured orders rank alike; f.
+//! filters that are wrong on purpose are found out.
 
 pub(crate) mod answer;
 pub(crate) mod monte_carlo;

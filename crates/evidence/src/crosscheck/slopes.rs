@@ -9,8 +9,8 @@ use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::Conditions;
 use crate::simulation::plan::Plan;
 
-/// The dwells at which the slope is measured, in s: so short that the highest order outweighs the lower ones, long against
-/// rounding.
+/// The dwells at which the slope is measured, in s: so short that the highest order outweighs the lower ones, long
+/// against rounding.
 const MEASURED: [f64; 5] = [2.0, 3.56, 6.32, 11.2, 20.0];
 /// More dwells for the plot.
 const SHOWN: [f64; 6] = [63.2, 200.0, 632.0, 1120.0, 2000.0, 6320.0];
@@ -30,8 +30,9 @@ pub(crate) struct Slopes {
     pub sigmas: Vec<Vec<f64>>,
     /// Of every functional: the slope over the measured dwells.
     pub slopes: Vec<f64>,
-    /// Of every functional: whether that is a slope. It is none where sigma is that of the prior, nor where it bends: where rounding bounds
-    /// it, or where the dwells are not short (positions that hardly differ, a latitude close to a pole).
+    /// Of every functional: whether that is a slope. It is none where sigma is that of the prior, nor where it bends:
+    /// where rounding bounds it, or where the dwells are not short (positions that hardly differ, a latitude close to a
+    /// pole).
     pub straight: Vec<bool>,
 }
 

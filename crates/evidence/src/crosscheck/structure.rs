@@ -16,7 +16,8 @@ use crate::simulation::conditions::{shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
-/// Parts of a null vector that are smaller, beside its largest and by what Z shows of each alone, show no correlation where other directions are hardly seen.
+/// Parts of a null vector that are smaller, beside its largest and by what Z shows of each alone, show no correlation
+/// where other directions are hardly seen.
 const SMALL_PART: f64 = 0.01;
 /// What counts as not seen, relative to the best seen direction.
 const UNSEEN: f64 = 1e-10;
@@ -155,8 +156,8 @@ fn quantities(
             // the slope is that of the start, the inflation that of the end
             let inflation = rules::LINEAR.check(at_end, ratio);
             let mut slope = rules::slope(accuracy_order, slope);
-            // what no slope shows is no evidence against an order where the measurements determine it all the same, nor are slopes of
-            // what they do not determine, which rounding makes under so wide a prior
+            // what no slope shows is no evidence against an order where the measurements determine it all the same, nor
+            // are slopes of what they do not determine, which rounding makes under so wide a prior
             let bent = found.is_some_and(|f| !f.0.1);
             if slope.fails() && (bent || accuracy_order.is_none()) && !inflation.fails() {
                 slope.pass = None;

@@ -79,7 +79,8 @@ impl Default for Conditions {
     }
 }
 
-/// Families before single unknowns, so that these are what they say in whatever order they are given; of equal names the last counts.
+/// Families before single unknowns, so that these are what they say in whatever order they are given; of equal names
+/// the last counts.
 pub fn general_first(mut given: Vec<Assignment>) -> Vec<Assignment> {
     given.sort_by_key(|a| a.name.len());
     given
@@ -172,7 +173,8 @@ impl Conditions {
         ]
     }
 
-    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or other positions.
+    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or other
+    /// positions.
     pub(crate) fn within(&self, platform: &Platform) -> Self {
         let kept = |list: &[Assignment]| -> Vec<Assignment> {
             let has = |a: &&Assignment| {

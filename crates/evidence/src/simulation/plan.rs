@@ -115,7 +115,8 @@ impl Plan {
         Self::derived(scheme, conditions)
     }
 
-    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond what is admitted.
+    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond what is
+    /// admitted.
     ///
     /// # Errors
     /// [`SimulationError`], as [`Self::new`].

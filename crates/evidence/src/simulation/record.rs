@@ -103,8 +103,8 @@ pub struct Record {
 /// Runs the filter of `plan` against one truth.
 ///
 /// # Errors
-/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact truth that turns too fast,
-/// [`SimulationError::Unresolvable`] when something is not finite.
+/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact truth that
+/// turns too fast, [`SimulationError::Unresolvable`] when something is not finite.
 pub fn run(
     plan: &Plan,
     conditions: &Conditions,

@@ -29,12 +29,14 @@ impl Noise {
     }
 }
 
-/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at most.
+/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at
+/// most.
 fn drift_turn(drifts: f64, dt: f64) -> f64 {
     (drifts + W_IE) * dt
 }
 
-/// Refuses an exact truth whose drifts take too many integration steps: `drifts` bounds the sum of the coefficients, in rad/s.
+/// Refuses an exact truth whose drifts take too many integration steps: `drifts` bounds the sum of the coefficients, in
+/// rad/s.
 ///
 /// # Errors
 /// [`SimulationError::TooManySteps`].

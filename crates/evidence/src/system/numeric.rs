@@ -17,8 +17,8 @@ pub enum FilterState {
     Input(usize, usize),
 }
 
-/// A model with numbers for what is known: states of the filter are the states of the model, its parameters, and the derivatives
-/// of its unknown inputs.
+/// A model with numbers for what is known: states of the filter are the states of the model, its parameters, and the
+/// derivatives of its unknown inputs.
 #[derive(Debug, Clone)]
 pub struct Numeric<'a> {
     compiled: &'a Compiled,

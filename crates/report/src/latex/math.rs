@@ -73,8 +73,8 @@ fn name_of_model(name: &str) -> String {
     }
 }
 
-/// An expression in program notation as math: `*` becomes a thin space, every quotient a fraction, so that nothing hangs on
-/// which of two operations binds more; text as it is where it is no expression.
+/// An expression in program notation as math: `*` becomes a thin space, every quotient a fraction, so that nothing
+/// hangs on which of two operations binds more; text as it is where it is no expression.
 pub(crate) fn expression(text: &str) -> String {
     let mut reader = Reader { rest: text, depth: 0 };
     match reader.sum() {

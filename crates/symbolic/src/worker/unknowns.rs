@@ -1,8 +1,9 @@
 //! The unknowns of a rational system, one after the other.
 //!
-//! States are eliminated first: an equation that is linear in one gives it by all others, and its derivative is the next equation
-//! (`d/dt` of the expression, less `f`). What is left holds parameters and signals only, at any time; it and its derivatives are linear
-//! in the products of parameters that occur, and elimination over rational functions of the signals shows which parameters stand alone.
+//! States are eliminated first: an equation that is linear in one gives it by all others, and its derivative is the
+//! next equation (`d/dt` of the expression, less `f`). What is left holds parameters and signals only, at any time; it
+//! and its derivatives are linear in the products of parameters that occur, and elimination over rational functions of
+//! the signals shows which parameters stand alone.
 
 use std::collections::BTreeMap;
 
@@ -245,7 +246,8 @@ impl Elimination<'_> {
         Ok(found)
     }
 
-    /// The expression with what is not observable, but found once a free parameter is given, replaced: with it the free one goes too.
+    /// The expression with what is not observable, but found once a free parameter is given, replaced: with it the free
+    /// one goes too.
     fn without_unobservable(&self, value: &Scalar, found: &[Option<Scalar>]) -> Result<Scalar, JobError> {
         let n = self.system.states.len();
         let mut expression = to_atom(value);
@@ -321,7 +323,8 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// Whether an expression holds nothing of a higher degree than the unknown itself, and no unknown of the same that waits for it.
+    /// Whether an expression holds nothing of a higher degree than the unknown itself, and no unknown of the same that
+    /// waits for it.
     fn is_solution(&self, unknown: usize, e: &Scalar) -> bool {
         let Some(degree) = self.system.degrees[unknown] else { return false };
         let names = self.system.states.iter().chain(&self.system.parameters);
