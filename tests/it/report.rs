@@ -543,7 +543,8 @@ fn the_pdf_holds_every_table() {
     let bytes = std::fs::read(&file).expect("written");
     assert!(bytes.starts_with(b"%PDF-"));
     assert!(bytes == std::fs::read(&again).expect("written"), "the same command gives the same bytes");
-    let Ok(out) = Command::new("pdftotext").arg("-layout").arg(&file).arg("-").output() else {
+    let pdftotext = &mut std::process::Command::new("pdftotext");
+    let Ok(out) = pdftotext.arg("-layout").arg(&file).arg("-").output() else {
         eprintln!("skipped: no pdftotext on this machine");
         return;
     };
