@@ -20,8 +20,9 @@
 //! ```
 //! use obsdeg_core::system::{SystemOptions, analyze_system, model_file};
 //!
-//! let model = model_file::read("name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz =
-//! \"x\"")?; let answer = analyze_system(&model, SystemOptions::default(), None)?;
+//! let text = "name = 'decay'\n[states]\nx = '-p*x'\n[parameters]\np = {}\n[outputs]\nz = 'x'";
+//! let model = model_file::read(text)?;
+//! let answer = analyze_system(&model, SystemOptions::default(), None)?;
 //! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
 //! # Ok::<(), obsdeg_core::system::ModelError>(())
 //! ```
