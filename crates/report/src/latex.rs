@@ -34,7 +34,7 @@ pub(crate) fn alone(d: &Document) -> String {
         "\\documentclass[a4paper]{{article}}\n\\usepackage{{amsmath,booktabs,graphicx,longtable}}\n\\usepackage[margin=15mm]{{geometry}}\n\
          \\title{{{}}}\n\\date{{}}\n\\begin{{document}}\n\\maketitle\n\\footnotesize\n{}\\end{{document}}\n",
         escape(&d.title),
-        document(d)
+        body(d)
     )
 }
 
@@ -75,9 +75,14 @@ fn table(columns: &[Column], rows: &[Vec<Cell>]) -> String {
     )
 }
 
+/// A document to be input by another.
 pub(crate) fn document(d: &Document) -> String {
-    let mut out = format!("% {}\n", escape(&d.title));
-    out.push_str(&items(d.lead.iter().map(|l| escape(l))));
+    let title = heading(&d.title);
+    format!("% needs the packages amsmath, booktabs and longtable\n{title}{}", body(d))
+}
+
+fn body(d: &Document) -> String {
+    let mut out = items(d.lead.iter().map(|l| escape(l)));
     for block in &d.blocks {
         match block {
             Block::Table { heading: title, columns, rows } => {
