@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use obsdeg_report::Format;
 use serde_json::Value;
 
 use crate::program::obsdeg;
@@ -104,7 +105,7 @@ fn results_in_every_format() {
         &["crosscheck", "--model", "model.toml"],
         &["compare", "scheme.toml"],
     ] {
-        for format in ["table", "json", "markdown", "csv", "latex"] {
+        for format in Format::ALL.map(|(_, name)| name) {
             let text = files.done(&[command, &["--format", format]].concat());
             match format {
                 "json" => {
@@ -205,7 +206,7 @@ fn messages() {
     // a scheme without a name is called after its file
     let unnamed = renamed.split_once("description").expect("there").1;
     fs::write(files.path(&path), format!("description{unnamed}")).expect("written");
-    for format in ["table", "markdown", "csv", "latex", "json"] {
-        files.done(&["compare", &path, "--format", format]);
+    for format in Format::ALL.map(|(_, name)| name) {
+        files.done(&["compare", &path, "--format", &format]);
     }
 }

@@ -195,7 +195,7 @@ impl Term {
         [Self::F, Self::I, Self::O, Self::S, Self::II, Self::OO, Self::SS, Self::IO, Self::IS, Self::OS];
 
     /// The letters of the term.
-    pub fn letters(self) -> &'static str {
+    pub const fn letters(self) -> &'static str {
         match self {
             Self::F => "F",
             Self::I => "I",
@@ -224,8 +224,8 @@ impl Term {
     }
 
     /// The number of g factors.
-    pub fn order(self) -> usize {
-        if self == Self::F { 0 } else { self.letters().len() }
+    pub const fn order(self) -> usize {
+        if matches!(self, Self::F) { 0 } else { self.letters().len() }
     }
 
     /// The unit of its coefficient.

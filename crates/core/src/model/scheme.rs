@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::angle::{Angle, AngleError, MAX_NAME, excerpt, format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, Turned, c_n, cardinal, cardinal_name};
 use super::dwell::Dwell;
-use super::geometry::{Geometry, Unknowns};
+use super::geometry::{Geometry, Term, Unknowns};
 use super::gimbals::Gimbals;
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
@@ -401,6 +401,17 @@ pub enum SchemeError {
 const FULL_TURN: i64 = 360_000_000_000;
 /// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of them.
 const STATION_STEPS: i64 = 8;
+/// So many are different along a whole turn, which is enough for two g factors; with more the verdicts would say too little.
+const _: () = {
+    let mut term = 0;
+    while term < Term::ALL.len() {
+        assert!(
+            2 * (1 + Term::ALL[term].order() as i64) < STATION_STEPS,
+            "more steps for a term of more g factors"
+        );
+        term += 1;
+    }
+};
 
 /// Most positions that a scheme may have.
 pub(crate) const MAX_POSITIONS: usize = 1000;
