@@ -20,7 +20,12 @@
 //! ```
 //! use obsdeg_core::system::{SystemOptions, analyze_system, model_file};
 //!
-//! let text = "name = 'decay'\n[states]\nx = '-p*x'\n[parameters]\np = {}\n[outputs]\nz = 'x'";
+//! let text = r#"
+//! name = "decay"
+//! states = { x = "-p*x" }
+//! parameters = ["p"]
+//! outputs = { z = "x" }
+//! "#;
 //! let model = model_file::read(text)?;
 //! let answer = analyze_system(&model, SystemOptions::default(), None)?;
 //! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
