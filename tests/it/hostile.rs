@@ -207,6 +207,6 @@ fn messages() {
     let unnamed = renamed.split_once("description").expect("there").1;
     fs::write(files.path(&path), format!("description{unnamed}")).expect("written");
     for format in Format::ALL.map(|(_, name)| name) {
-        files.done(&["compare", &path, "--format", &format]);
+        files.done(&["compare", &path, "--format", format]);
     }
 }
