@@ -206,6 +206,43 @@ fn at_the_pole_the_dwell_takes_away() {
     assert!(of("psi_y").slope.measured.is_some_and(|s| s > 0.9));
 }
 
+/// The control at another latitude is far from the scheme's: at 89.9999 degrees a filter at the pole is hardly wrong.
+#[test]
+fn the_control_is_at_a_latitude_far_away() {
+    for (latitude, control) in
+        [(Some("89.9999"), "0"), (Some("-60"), "0"), (Some("50"), "0"), (Some("40"), "90"), (None, "90")]
+    {
+        let scheme = Scheme { latitude: latitude.and_then(|l| l.parse().ok()), ..paper(Carry::Platform) };
+        let options = CrossCheckOptions { runs: 2, seed: 1, filter: FilterChange::default() };
+        let c = crosscheck(&scheme, &Conditions::default(), &options, &|_| true).expect("checked");
+        let name = format!("filter at latitude {control} deg");
+        assert!(c.controls.iter().any(|k| k.name == name && k.pass), "{latitude:?}: {:?}", c.controls);
+    }
+}
+
+/// Of white innovations the probability is even: 500 times ten runs of 20 samples, whose longest lag has half as many products. The mean of
+/// 500 even numbers is 0.5 +- 0.013, and one in a hundred is below 0.01.
+#[test]
+fn whiteness_of_right_filters_is_even() {
+    let conditions = Conditions { dwell_s: 100.0, ..Conditions::default() };
+    let plan = Plan::new(&paper(Carry::Inertial), &conditions).expect("a plan");
+    let experiment =
+        Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: None, seed: 3 };
+    let prepared = Prepared::new(experiment).expect("prepared");
+    let p: Vec<f64> = (0..500).map(|k| prepared.whiteness(&prepared.chunk(10 * k, 10 * k + 10))).collect();
+    let (mean, small) = (p.iter().sum::<f64>() / 500.0, p.iter().filter(|p| **p < 0.01).count());
+    assert!((mean - 0.5).abs() < 0.05 && (1..=12).contains(&small), "{mean} {small}");
+    // of one sample, and of two, there are no lags and one
+    let short = Conditions { dwell_s: 10.0, ..conditions };
+    for attitudes in [&["0,0,0"][..], &["0,0,0", "180,0,0"]] {
+        let plan = Plan::new(&scheme(attitudes, Carry::Inertial), &short).expect("a plan");
+        let experiment =
+            Experiment { filter: &plan, truth: &plan, conditions: &short, null_space: None, seed: 3 };
+        let prepared = Prepared::new(experiment).expect("prepared");
+        assert!((0.001..=1.0).contains(&prepared.whiteness(&prepared.chunk(0, 50))));
+    }
+}
+
 /// Same seed, same bytes, whatever the number of threads; and the bar hears of every run.
 #[test]
 fn threads_do_not_change_the_sums() {

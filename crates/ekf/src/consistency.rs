@@ -81,8 +81,23 @@ pub fn autocorrelation(whitened: &[f64], lags: usize) -> Vec<f64> {
 /// The probability that white noise has autocorrelations (of `count` samples) at least this large: Ljung and
 /// Box 1978, doi:10.1093/biomet/65.2.297.
 pub fn ljung_box(autocorrelation: &[f64], count: usize) -> f64 {
-    let n = count as f64;
-    let sum: f64 = autocorrelation.iter().enumerate().map(|(k, r)| r * r / (n - k as f64 - 1.0)).sum();
-    let statistic = n * (n + 2.0) * sum;
+    ljung_box_of_sequences(autocorrelation, count, 1)
+}
+
+/// The same of `sequences` independent sequences of `length` samples each, whose products are summed at every lag: each
+/// has `length - lag` of them.
+///
+/// ```
+/// use obsdeg_ekf::consistency::{ljung_box, ljung_box_of_sequences};
+/// assert_eq!(ljung_box_of_sequences(&[0.1], 50, 1), ljung_box(&[0.1], 50));
+/// // one sequence of twice the length has one more product
+/// assert!(ljung_box_of_sequences(&[0.1], 50, 2) < ljung_box(&[0.1], 100));
+/// ```
+pub fn ljung_box_of_sequences(autocorrelation: &[f64], length: usize, sequences: usize) -> f64 {
+    let (length, sequences) = (length as f64, sequences as f64);
+    let n = length * sequences;
+    // white, r at a lag has the variance (length - lag) / (length (n + 2))
+    let term = |(k, r): (usize, &f64)| r * r / (length - k as f64 - 1.0);
+    let statistic = length * (n + 2.0) * autocorrelation.iter().enumerate().map(term).sum::<f64>();
     ChiSquared::new(autocorrelation.len() as f64).map_or(f64::NAN, |chi| chi.sf(statistic))
 }

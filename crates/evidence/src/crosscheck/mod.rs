@@ -239,7 +239,9 @@ fn controls(
     let conditions = &Conditions { slews: false, ..conditions.clone() };
     let truth = Plan::new(scheme, conditions)?;
     let other = if scheme.carry == Carry::Platform { Carry::Inertial } else { Carry::Platform };
-    let elsewhere = if scheme.latitude.is_some_and(|l| l.degrees().abs() > 80.0) { "0" } else { "90" };
+    // far away: a filter at a latitude close by is hardly wrong
+    let latitude = truth.platform.scheme().latitude.map_or(0.0, |l| l.degrees().abs());
+    let elsewhere = if latitude > 45.0 { "0" } else { "90" };
     let last = scheme.positions.len() - 1;
     let many = last > 0;
     let changes = [

@@ -242,9 +242,14 @@ impl<'a> Prepared<'a> {
 
     /// The probability of autocorrelations as large as those found, for white innovations.
     pub fn whiteness(&self, totals: &Totals) -> f64 {
-        let count = totals.runs * self.samples() * self.experiment.filter.components.len();
-        let correlations: Vec<f64> = totals.lagged[1..].iter().map(|l| l / totals.lagged[0]).collect();
-        obsdeg_ekf::consistency::ljung_box(&correlations, count)
+        let sequences = totals.runs * self.experiment.filter.components.len();
+        // a short run has no products at long lags
+        let lags = LAGS.min(self.samples() - 1);
+        if lags == 0 {
+            return 1.0;
+        }
+        let correlations: Vec<f64> = totals.lagged[1..=lags].iter().map(|l| l / totals.lagged[0]).collect();
+        obsdeg_ekf::consistency::ljung_box_of_sequences(&correlations, self.samples(), sequences)
     }
 
     /// Averages over time.
