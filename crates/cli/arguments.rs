@@ -109,7 +109,7 @@ impl InputArguments {
     /// The model, or the scheme: from the file or the angles, with whatever options override.
     pub(crate) fn read(&self) -> Result<Input, Failure> {
         if let Some(path) = &self.model {
-            return Source::read(path, "model")?.model().map(Input::Model);
+            return Source::read(path, "model")?.model().map(Input::model);
         }
         let mut scheme = match &self.scheme {
             Some(path) => Source::read(path, "scheme")?.scheme()?,
@@ -132,6 +132,6 @@ impl InputArguments {
         }
         scheme.measured_azimuth |= self.measured_azimuth;
         scheme.combinations.extend(self.combination.iter().cloned());
-        Ok(Input::Scheme(scheme))
+        Ok(Input::scheme(scheme))
     }
 }

@@ -5,7 +5,7 @@ use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{
     Assignment, AssignmentError, DriftNoise, Propagation, Settings, Truth, concerns, known,
 };
-use obsdeg_core::model::{Platform, Scheme};
+use obsdeg_core::model::{PerGyro, Platform, Scheme};
 use obsdeg_evidence::simulation::{Conditions, general_first};
 
 use crate::arguments::one_of;
@@ -53,6 +53,41 @@ pub(crate) struct MeasurementArguments {
     requirement: Vec<Assignment>,
 }
 
+/// The datasheet of the gyros; a scheme file may give it too.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Gyro noise")]
+pub(crate) struct GyroNoiseArguments {
+    /// Angle random walk in deg/sqrt(h), one number for all gyros or X,Y,Z; without --drift-noise it is all the white drift there is
+    /// (default: none; 0, or 1e-12 to 1e6)
+    #[arg(long, value_name = "N[,N,N]")]
+    angle_random_walk: Option<PerGyro>,
+
+    /// Rate random walk in deg/h/sqrt(h), likewise: a state of each gyro (default: none; 0, or 1e-12 to 1e6)
+    #[arg(long, value_name = "K[,K,K]")]
+    rate_random_walk: Option<PerGyro>,
+
+    /// Bias instability in deg/h, likewise: B of IEEE Std 952, a first-order Gauss-Markov state of each gyro whose Allan peak is 0.664 B
+    /// (default: none; 0, or 1e-12 to 1e6)
+    #[arg(long, value_name = "B[,B,B]")]
+    bias_instability: Option<PerGyro>,
+
+    /// Its correlation time, in s (default: 3600; 1 to 1e9 s)
+    #[arg(long, value_name = "S", value_parser = within(ranges::CORRELATION_S))]
+    correlation_time: Option<f64>,
+}
+
+impl GyroNoiseArguments {
+    fn settings(&self) -> Settings {
+        Settings {
+            angle_random_walk_deg_sqrt_h: self.angle_random_walk,
+            rate_random_walk_dph_sqrt_h: self.rate_random_walk,
+            bias_instability_dph: self.bias_instability,
+            correlation_time_s: self.correlation_time,
+            ..Settings::default()
+        }
+    }
+}
+
 /// A run's conditions; a scheme file may give them too, options come last.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Conditions of the run")]
@@ -73,6 +108,9 @@ pub(crate) struct ConditionArguments {
     /// (default: 0.01 deg/h; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "NOISE")]
     drift_noise: Option<DriftNoise>,
+
+    #[command(flatten)]
+    gyro_noise: GyroNoiseArguments,
 
     /// Transition matrix of the filter: exponential or rk4 (default: exponential)
     #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = one_of([("exponential", Propagation::Exponential), ("rk4", Propagation::Rk4)]))]
@@ -169,7 +207,7 @@ impl ConditionArguments {
             drift_noise: self.drift_noise,
             propagation: self.propagation,
             drift_scale: self.drift_scale,
-            ..Settings::default()
+            ..self.gyro_noise.settings()
         });
         out.values.extend(general_first(self.value.clone()));
         out.priors.extend(general_first(self.prior.clone()));

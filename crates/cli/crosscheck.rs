@@ -65,7 +65,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.output.target.check_folder()?;
     let passed = match a.input.read()? {
         Input::Scheme(scheme) => {
-            a.conditions.concern(std::iter::once(&scheme))?;
+            a.conditions.concern(std::iter::once(&*scheme))?;
             let conditions = a.conditions.conditions(&scheme);
             let dropped = a.filter_drop.as_ref().map(|name| position(&scheme, name)).transpose()?;
             let filter = FilterChange { carry: a.filter_carry, latitude: a.filter_latitude, dropped };

@@ -15,8 +15,18 @@ const MAX_FILE: u64 = 50_000_000;
 
 /// What is judged.
 pub(crate) enum Input {
-    Scheme(Scheme),
-    Model(ModelFile),
+    Scheme(Box<Scheme>),
+    Model(Box<ModelFile>),
+}
+
+impl Input {
+    pub(crate) fn scheme(scheme: Scheme) -> Self {
+        Self::Scheme(Box::new(scheme))
+    }
+
+    pub(crate) fn model(file: ModelFile) -> Self {
+        Self::Model(Box::new(file))
+    }
 }
 
 /// A model with the file it came from.
@@ -82,7 +92,7 @@ impl Source {
 
     /// The scheme or the model that it is.
     pub(crate) fn scheme_or_model(self) -> Result<Input, Failure> {
-        if self.is_model() { self.model().map(Input::Model) } else { self.scheme().map(Input::Scheme) }
+        if self.is_model() { self.model().map(Input::model) } else { self.scheme().map(Input::scheme) }
     }
 
     /// The scheme.

@@ -98,12 +98,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         let source = Source::read(path, "scheme or model")?;
         let title = source.title();
         match source.scheme_or_model()? {
-            Input::Model(file) => files.push(file),
+            Input::Model(file) => files.push(*file),
             Input::Scheme(mut scheme) => {
                 a.assumptions.apply(&mut scheme);
                 let conditions = a.conditions.conditions(&scheme);
                 let name = if scheme.name.is_empty() { title } else { scheme.name.clone() };
-                entries.push(Entry { name, scheme, conditions });
+                entries.push(Entry { name, scheme: *scheme, conditions });
             }
         }
     }

@@ -46,7 +46,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.output.target.check_folder()?;
     match a.input.read()? {
         Input::Scheme(scheme) => {
-            a.conditions.concern(std::iter::once(&scheme))?;
+            a.conditions.concern(std::iter::once(&*scheme))?;
             let (summary, record) = simulate(&scheme, &a.conditions.conditions(&scheme), a.seed)?;
             let more = || files(&record.traces);
             a.output.write_folder(&summary, "summary.json", more)

@@ -1,6 +1,7 @@
 //! The filter against a simulated truth: the paper's run, other carries, exact truth, slews.
 
 mod command;
+mod gyro_noise;
 
 use std::collections::BTreeMap;
 
@@ -339,10 +340,10 @@ fn held_drift_noise_of_any_step() {
             }
         }
         let held = 1f64.to_radians() / 3600.0;
-        let root = plan.noise_roots[0];
+        let root = &plan.noise_roots[0];
         for i in 0..3 {
             for j in 0..3 {
-                let found: f64 = (0..3).map(|k| root[i][k] * root[j][k]).sum();
+                let found: f64 = (0..3).map(|k| root[(i, k)] * root[(j, k)]).sum();
                 let expected: f64 =
                     (0..3).map(|k| integral[i][k] * integral[j][k]).sum::<f64>() * held * held;
                 assert!(

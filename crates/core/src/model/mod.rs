@@ -10,6 +10,7 @@ pub(crate) mod file_error;
 pub(crate) mod geometry;
 pub(crate) mod gimbals;
 mod parser;
+pub(crate) mod per_gyro;
 pub(crate) mod platform;
 pub mod ranges;
 pub(crate) mod ring;
@@ -27,6 +28,7 @@ pub use attitude::{
 pub use dwell::{Dwell, DwellError};
 pub use geometry::{GYROS, Geometry, GeometryError, GyroAxes, SignedAxis, Term, TermError, Unknowns};
 pub use gimbals::{GimbalError, Gimbals};
+pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{Block, LOCAL, Platform, Point, RandomValues, Sample, local_dynamics, local_output};
 pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};

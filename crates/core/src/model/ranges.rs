@@ -30,6 +30,10 @@ pub const NOISE_G: Range = range(1e-15, 1e3, "g");
 pub const AZIMUTH_NOISE_DEG: Range = range(1e-12, 1e3, "deg");
 /// Random drift that is not zero, in deg/h or deg/sqrt(h).
 pub const DRIFT_NOISE: Range = range(1e-12, 1e6, "");
+/// A noise of a gyro that is not zero, in deg/sqrt(h), deg/h/sqrt(h) or deg/h.
+pub const GYRO_NOISE: Range = range(1e-12, 1e6, "");
+/// The correlation time of a bias instability.
+pub const CORRELATION_S: Range = range(1.0, 1e9, "s");
 /// The factor on the true drifts and their priors.
 pub const DRIFT_SCALE: Range = range(1e-6, 1e6, "");
 /// A prior standard deviation.

@@ -7,9 +7,9 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Platform;
 use super::expression::nearest;
 use super::ranges::{self, Range, RangeError};
+use super::{PerGyro, Platform};
 
 /// How the truth is generated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -193,6 +193,14 @@ pub struct Settings {
     pub azimuth_noise_deg: Option<f64>,
     /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
     pub drift_noise: Option<DriftNoise>,
+    /// Angle random walk of the gyros in deg/sqrt(h), instead of drift_noise; none when left out.
+    pub angle_random_walk_deg_sqrt_h: Option<PerGyro>,
+    /// Rate random walk of the gyros in deg/h/sqrt(h); none when left out.
+    pub rate_random_walk_dph_sqrt_h: Option<PerGyro>,
+    /// Bias instability of the gyros in deg/h; none when left out.
+    pub bias_instability_dph: Option<PerGyro>,
+    /// Correlation time of the bias instability in s; 3600 when left out.
+    pub correlation_time_s: Option<f64>,
     /// exponential (default) or rk4.
     pub propagation: Option<Propagation>,
     /// Factor on the true drift coefficients and their priors.
@@ -215,6 +223,7 @@ impl Settings {
             ("accelerometer_noise_g", self.accelerometer_noise_g, ranges::NOISE_G),
             ("azimuth_noise_deg", self.azimuth_noise_deg, ranges::AZIMUTH_NOISE_DEG),
             ("drift_scale", self.drift_scale, ranges::DRIFT_SCALE),
+            ("correlation_time_s", self.correlation_time_s, ranges::CORRELATION_S),
             (
                 "drift_noise",
                 self.drift_noise.map(DriftNoise::amount).filter(|x| *x != 0.0),
@@ -223,10 +232,23 @@ impl Settings {
         ];
         let single =
             single.into_iter().filter_map(|(key, x, range)| Some((format!("simulation.{key}"), x?, range)));
+        let gyros = self.gyros().into_iter().flat_map(|(key, x)| {
+            let amounts = x.into_iter().flat_map(PerGyro::amounts);
+            amounts.map(move |x| (format!("simulation.{key}"), x, ranges::GYRO_NOISE))
+        });
         let lists = self.lists().into_iter().flat_map(|(key, list, range)| {
             list.iter().map(move |(name, x)| (format!("simulation.{key}.{name}"), *x, range))
         });
-        single.chain(lists).collect()
+        single.chain(gyros).chain(lists).collect()
+    }
+
+    /// The noises of the gyros by their keys.
+    pub(crate) fn gyros(&self) -> [(&'static str, Option<PerGyro>); 3] {
+        [
+            ("angle_random_walk_deg_sqrt_h", self.angle_random_walk_deg_sqrt_h),
+            ("rate_random_walk_dph_sqrt_h", self.rate_random_walk_dph_sqrt_h),
+            ("bias_instability_dph", self.bias_instability_dph),
+        ]
     }
 
     /// The lists by their keys, with the range of their numbers.

@@ -3,7 +3,7 @@
 //! The filter is linear, so its error without noise is the mean of its errors over all noise: offsets are read from
 //! such a run, made with the gains for the noise of the paper; sigma says how far one run lies from it.
 
-use obsdeg_core::model::settings::{DriftNoise, Propagation, Truth};
+use obsdeg_core::model::settings::{Propagation, Truth};
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, Scheme};
 
@@ -42,10 +42,9 @@ impl Mean {
         let plan = Plan::new(&scheme(carry), &conditions)?;
         let start = RunStart::new(&plan, &conditions)?;
         let prediction = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
-        let noise_roots = vec![[[0.0; 3]; 3]; plan.noise_roots.len()];
+        let noise_roots = plan.noise_roots.iter().map(|r| r * 0.0).collect();
         let quiet = Plan { noise_roots, ..plan };
-        let silent =
-            Conditions { accelerometer_noise_g: 0.0, drift_noise: DriftNoise::OneStep(0.0), ..conditions };
+        let silent = Conditions { accelerometer_noise_g: 0.0, ..conditions.without_drift_noise() };
         let record = run(&quiet, &silent, &start, &prediction, seed)?;
         Ok(Self { plan: quiet, record })
     }

@@ -8,7 +8,6 @@ pub use answer::*;
 use std::collections::BTreeMap;
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Carry, Float, Matrix3, Platform, Position, Scheme, slew};
 use obsdeg_ekf::SquareRootInformation;
 use rayon::prelude::*;
@@ -113,8 +112,7 @@ impl Judged {
     fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
         // other carries and fewer positions have other unknowns
         let conditions = conditions.within(&Platform::new(scheme.clone())?);
-        let still = Conditions { drift_noise: DriftNoise::OneStep(0.0), ..conditions };
-        let plan = Plan::new(scheme, &still)?;
+        let plan = Plan::new(scheme, &conditions.without_drift_noise())?;
         let prediction = predict(&plan, seed)?;
         let prior = SquareRootInformation::prior(&no_prior(&plan)?)?;
         let sigmas = batch(&plan, prior)?.information.sigmas()?;

@@ -99,9 +99,14 @@ impl<'a> Prepared<'a> {
         let (filter, conditions) = (experiment.filter, experiment.conditions);
         let start = RunStart::new(filter, &conditions.within(&filter.platform))?;
         let same = filter.platform.names() == experiment.truth.platform.names();
-        let truth_start = if same { start.clone() } else { RunStart::new(experiment.truth, conditions)? };
-        let first = truth_start.sigma.len() - experiment.truth.platform.coefficients();
-        let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).skip(first);
+        let truth_start = if same && filter.biases == experiment.truth.biases {
+            start.clone()
+        } else {
+            RunStart::new(experiment.truth, conditions)?
+        };
+        let unknowns = experiment.truth.unknowns();
+        let first = unknowns - experiment.truth.platform.coefficients();
+        let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).take(unknowns).skip(first);
         // six sigma
         check_drifts(
             experiment.truth,
@@ -188,7 +193,9 @@ impl<'a> Prepared<'a> {
                     if self.checkpoints[next] == step {
                         if comparable {
                             let truth = truth.borrow();
-                            for ((e, a), b) in error.iter_mut().zip(x).zip(truth.x()) {
+                            // a truth without biases has none
+                            let true_x = truth.x().iter().chain(std::iter::repeat(&0.0));
+                            for ((e, a), b) in error.iter_mut().zip(x).zip(true_x) {
                                 *e = a - b;
                             }
                             totals.nees[next] += self.nees[next].of(&mut error);
@@ -199,7 +206,8 @@ impl<'a> Prepared<'a> {
             );
             if let (true, Some((basis, nees))) = (comparable, &self.observable) {
                 let truth = truth.borrow();
-                let errors = || x.iter().zip(truth.x()).map(|(a, b)| a - b);
+                let true_x = || truth.x().iter().chain(std::iter::repeat(&0.0));
+                let errors = || x.iter().zip(true_x()).map(|(a, b)| a - b);
                 let mut projected: Vec<f64> =
                     basis.column_iter().map(|c| c.iter().zip(errors()).map(|(a, e)| a * e).sum()).collect();
                 totals.nees_observable += nees.of(&mut projected);
@@ -228,7 +236,10 @@ impl<'a> Prepared<'a> {
         let mut out = Vec::new();
         if self.comparable() {
             let last = totals.nees.last().copied().unwrap_or(0.0);
-            out.push(statistic(&format!("ANEES, {n} unknowns"), n, last / runs, runs));
+            let biases = self.experiment.filter.biases.len();
+            let states = if biases > 0 { format!(" and {biases} biases") } else { String::new() };
+            let name = format!("ANEES, {} unknowns{states}", n - biases);
+            out.push(statistic(&name, n, last / runs, runs));
             if let Some((basis, _)) = &self.observable {
                 let r = basis.ncols();
                 let name = format!("ANEES, observable subspace ({r})");

@@ -1,6 +1,5 @@
 //! Evidence a: the slope of sigma against the dwell, on logarithmic axes.
 
-use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme, SchemeError};
 use obsdeg_ekf::SquareRootInformation;
 
@@ -107,8 +106,7 @@ fn scaled(scheme: &Scheme, conditions: &Conditions, dwell: f64) -> Result<(Schem
         slews: false,
         accelerometer_noise_g: conditions.accelerometer_noise_g * (conditions.step_s / step).sqrt(),
         azimuth_noise_deg: conditions.azimuth_noise_deg * (conditions.step_s / step).sqrt(),
-        drift_noise: DriftNoise::OneStep(0.0),
-        ..conditions.clone()
+        ..conditions.clone().without_drift_noise()
     };
     Ok((scheme, conditions))
 }

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::Scheme;
-use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
@@ -70,7 +69,7 @@ pub(super) fn structure(
 
 /// Without drift noise and slews.
 pub(super) fn still(conditions: &Conditions) -> Conditions {
-    Conditions { drift_noise: DriftNoise::OneStep(0.0), slews: false, ..conditions.clone() }
+    Conditions { slews: false, ..conditions.clone().without_drift_noise() }
 }
 
 /// Unknowns, then combinations.

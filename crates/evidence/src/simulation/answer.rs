@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
+use super::gyro_noise::GyroNoise;
 use crate::requirements::{Miss, Requirements, meets};
 
 /// Name and version of the JSON layout.
@@ -64,6 +65,9 @@ pub struct ConditionsReport {
     pub drift_noise_step_s: Option<f64>,
     /// Whether the density is another than with that step, by more than 1 %.
     pub drift_noise_differs: bool,
+    /// What the datasheet of the gyros says besides, states of the filter and of the truth; left out where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_noise: Option<GyroNoise>,
     /// Propagation of the filter.
     pub propagation: Propagation,
     /// Factor on true drifts and their priors.

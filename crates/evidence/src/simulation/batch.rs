@@ -24,13 +24,14 @@ pub struct Batch {
     pub to_end: DMatrix<f64>,
 }
 
-/// Adds all measurements of `plan` to `information`; process noise is left out.
+/// Adds all measurements of `plan` to `information`, as functionals of the initial unknowns; process noise is left out, and so are the biases.
 ///
 /// # Errors
 /// [`EkfError`] when a number is not finite.
 pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batch, EkfError> {
     let n = plan.unknowns();
-    let mut to_now: DMatrix<f64> = DMatrix::identity(n, n);
+    // states by unknowns
+    let mut to_now: DMatrix<f64> = DMatrix::identity(plan.states(), n);
     let mut scratch = Vec::new();
     let most = ROWS.max(4 * n);
     let mut rows: Vec<f64> = Vec::new();
@@ -41,12 +42,17 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
     };
     for stage in &plan.stages {
         for _ in 0..stage.steps {
-            for column in to_now.as_mut_slice().chunks_exact_mut(n) {
+            for column in to_now.as_mut_slice().chunks_exact_mut(plan.states()) {
                 stage.transition.apply(column, &mut scratch);
             }
             for output in &stage.outputs {
                 let weight = 1.0 / output.r.sqrt();
-                rows.extend(to_now.as_slice().chunks_exact(n).map(|column| weight * output.predict(column)));
+                rows.extend(
+                    to_now
+                        .as_slice()
+                        .chunks_exact(plan.states())
+                        .map(|column| weight * output.predict(column)),
+                );
             }
             if rows.len() >= most * n {
                 add(&mut rows)?;
@@ -56,7 +62,7 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
     if !rows.is_empty() {
         add(&mut rows)?;
     }
-    Ok(Batch { information, to_end: to_now })
+    Ok(Batch { information, to_end: to_now.resize_vertically(n, 0.0) })
 }
 
 /// Standard deviations that say nothing beside the measurements of `plan`: in units of what these say, so that noise,

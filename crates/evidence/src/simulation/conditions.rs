@@ -9,6 +9,7 @@ use obsdeg_core::model::settings::{
 use obsdeg_core::model::{Latitude, Platform, Position, Scheme};
 
 use super::SimulationError;
+use super::gyro_noise::GyroNoise;
 
 /// Everything that a run needs besides the scheme.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +32,8 @@ pub struct Conditions {
     pub drift_noise: DriftNoise,
     /// The step in s for which it was given: a bias of one step has another density with other steps.
     pub drift_noise_step_s: f64,
+    /// What the datasheet of the gyros says besides.
+    pub gyro_noise: GyroNoise,
     /// How the filter is propagated.
     pub propagation: Propagation,
     /// True values, later ones override.
@@ -69,6 +72,7 @@ impl Default for Conditions {
             azimuth_noise_deg: 0.001,
             drift_noise: DriftNoise::OneStep(0.01),
             drift_noise_step_s: 10.0,
+            gyro_noise: GyroNoise::default(),
             propagation: Propagation::Exponential,
             values: values.chain(first_order(5.0)).chain(drift).collect(),
             drift_scale: 1.0,
@@ -107,6 +111,15 @@ impl Conditions {
             self.drift_noise = noise;
             self.drift_noise_step_s = self.step_s;
         }
+        let gyros = &mut self.gyro_noise;
+        set(&mut gyros.angle_random_walk_deg_sqrt_h, settings.angle_random_walk_deg_sqrt_h);
+        set(&mut gyros.rate_random_walk_dph_sqrt_h, settings.rate_random_walk_dph_sqrt_h);
+        set(&mut gyros.bias_instability_dph, settings.bias_instability_dph);
+        set(&mut gyros.correlation_time_s, settings.correlation_time_s);
+        // an angle random walk says what there is of white drift
+        if settings.angle_random_walk_deg_sqrt_h.is_some() && settings.drift_noise.is_none() {
+            self.drift_noise = DriftNoise::OneStep(0.0);
+        }
         set(&mut self.propagation, settings.propagation);
         set(&mut self.drift_scale, settings.drift_scale);
         self.slew_rate_deg_s = settings.slew_rate_deg_s.or(self.slew_rate_deg_s);
@@ -138,6 +151,11 @@ impl Conditions {
         own.or(self.slew_rate_deg_s).filter(|_| self.slews)
     }
 
+    /// The same without random drift of any kind.
+    pub fn without_drift_noise(self) -> Self {
+        Self { drift_noise: DriftNoise::OneStep(0.0), gyro_noise: GyroNoise::default(), ..self }
+    }
+
     /// Checks what the types do not: every number is in its range.
     ///
     /// # Errors
@@ -155,6 +173,7 @@ impl Conditions {
             range.check(what, x)?;
         }
         self.drift_noise.check("drift_noise")?;
+        self.gyro_noise.validate()?;
         for (what, list, range) in self.lists() {
             for a in list {
                 range.check(format!("the {what} of {}", a.name), a.value)?;

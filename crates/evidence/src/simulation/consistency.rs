@@ -37,7 +37,8 @@ pub struct Consistency {
     pub nis_band: (f64, f64),
     /// The band of 99.9 %, in which it must be.
     pub nis_wide_band: (f64, f64),
-    /// Normalised estimation error squared at the end; its expectation is the number of unknowns.
+    /// Normalised estimation error squared at the end; its expectation is the number of states: unknowns, and the biases of the gyros where these
+    /// are states.
     pub nees: f64,
     /// Its band, 95 %.
     pub nees_band: (f64, f64),

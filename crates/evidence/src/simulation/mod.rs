@@ -4,6 +4,7 @@ pub(crate) mod answer;
 pub(crate) mod batch;
 pub(crate) mod conditions;
 pub(crate) mod consistency;
+pub(crate) mod gyro_noise;
 pub(crate) mod plan;
 pub(crate) mod record;
 mod seen;
@@ -13,6 +14,7 @@ pub use answer::*;
 pub use batch::{Batch, batch, diffuse_prior};
 pub use conditions::{Conditions, general_first, latitude_of, resolve, si_per_shown};
 pub use consistency::{Consistency, Doubt};
+pub use gyro_noise::{Bias, GyroNoise};
 pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
 pub use record::{Record, RunStart, Series, Traces, run};
 pub use seen::{no_prior, predict, predict_run};
@@ -145,7 +147,7 @@ pub fn simulate(
 ) -> Result<(Simulation, Record), SimulationError> {
     let plan = Plan::new(scheme, conditions)?;
     let start = RunStart::new(&plan, conditions)?;
-    let prediction = predict_run(&plan, &start.sigma, seed)?;
+    let prediction = predict_run(&plan, &start.sigma[..plan.unknowns()], seed)?;
     let record = run(&plan, conditions, &start, &prediction, seed)?;
     let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
     Ok((summary, record))
@@ -180,11 +182,10 @@ fn summary(
         estimate(&c.expression, units[lead], verdict, n + i, record, required(lead))
     });
     let combinations: Vec<Estimate> = combinations.collect();
-    let last = |v: &[f64]| v.last().copied().unwrap_or(f64::NAN);
     let consistency = Consistency::of(Outcomes {
         whitened: &record.whitened,
         outputs: plan.components.len(),
-        error: record.traces.series[..n].iter().map(|s| last(&s.estimate) - last(&s.truth)).collect(),
+        error: record.last_error.clone(),
         covariance: &record.last_covariance,
         normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
     })?;
@@ -235,6 +236,7 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         drift_noise_density_deg_sqrt_h: density,
         drift_noise_step_s: given,
         drift_noise_differs: given.is_some_and(differs),
+        gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
         propagation: conditions.propagation,
         drift_scale: conditions.drift_scale,
     }

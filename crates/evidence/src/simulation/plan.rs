@@ -8,10 +8,11 @@ use obsdeg_core::model::{
     local_output,
 };
 use obsdeg_ekf::integrate::{runge_kutta, van_loan};
-use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, Stage, Transition};
+use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, SensorNoise, Stage, Transition};
 
 use super::SimulationError;
 use super::conditions::{Conditions, latitude_of};
+use super::gyro_noise::{Bias, biases, root};
 
 /// Most unknowns of a run: the covariance is a full matrix.
 pub(crate) const MAX_UNKNOWNS: usize = 300;
@@ -98,8 +99,12 @@ pub struct Plan {
     pub segments: Vec<Segment>,
     /// The filter's model of every segment.
     pub stages: Vec<Stage>,
-    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad).
-    pub noise_roots: Vec<Matrix3<f64>>,
+    /// Random errors of the gyros X, Y, Z, in rad/s.
+    pub gyros: [SensorNoise; 3],
+    /// What of them is a state, behind the unknowns.
+    pub biases: Vec<Bias>,
+    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the biases (rad/s).
+    pub noise_roots: Vec<DMatrix<f64>>,
     /// Components of Z that are used (1, 3, and 2 for a measured azimuth).
     pub components: Vec<usize>,
 }
@@ -151,6 +156,7 @@ impl Plan {
         let blocks: Vec<_> = bounds.iter().filter_map(|b| blocks[b.0].take()).collect();
         let outputs = local_output(&Float, scheme.measured_azimuth);
         let components = outputs.iter().map(|(c, _)| *c).collect();
+        let gyros = conditions.gyro_noise.sensors();
         let mut plan = Self {
             platform,
             point,
@@ -159,6 +165,8 @@ impl Plan {
             blocks,
             segments,
             stages: Vec::new(),
+            biases: biases(&gyros),
+            gyros,
             noise_roots: Vec::new(),
             components,
         };
@@ -173,6 +181,11 @@ impl Plan {
     /// The number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.platform.names().len()
+    }
+
+    /// The number of states of its filter: the unknowns, then the biases.
+    pub fn states(&self) -> usize {
+        self.unknowns() + self.biases.len()
     }
 
     /// The total time in s.
@@ -225,7 +238,7 @@ impl Plan {
         &self,
         segment: usize,
         conditions: &Conditions,
-    ) -> Result<(Stage, Matrix3<f64>), SimulationError> {
+    ) -> Result<(Stage, DMatrix<f64>), SimulationError> {
         let s = &self.segments[segment];
         let held = conditions.drift_noise.held_rad_s(s.dt);
         let block = &self.blocks[s.position];
@@ -254,11 +267,23 @@ impl Plan {
                 (phi, q)
             }
         };
-        let columns = &block.columns[..3];
-        let mut full = DMatrix::zeros(n, n);
-        for (i, &r) in columns.iter().enumerate() {
-            for (j, &c) in columns.iter().enumerate() {
-                full[(r, c)] = q[i][j];
+        let states = self.states();
+        let mut phi = phi.resize(states, states, 0.0);
+        let mut q = DMatrix::from_fn(3, 3, |i, j| q[i][j]).resize(3 + states - n, 3 + states - n, 0.0);
+        let moved: Vec<usize> = block.columns[..3].iter().copied().chain(n..states).collect();
+        if self.is_noisy() {
+            let (own, noise) = self.bias_step(segment)?;
+            q += noise;
+            for (k, &c) in moved.iter().enumerate().skip(3) {
+                for (i, &r) in moved.iter().enumerate() {
+                    phi[(r, c)] = own[(i, k)];
+                }
+            }
+        }
+        let mut full = DMatrix::zeros(states, states);
+        for (i, &r) in moved.iter().enumerate() {
+            for (j, &c) in moved.iter().enumerate() {
+                full[(r, c)] = q[(i, j)];
             }
         }
         let outputs = match s.kind {
@@ -276,7 +301,7 @@ impl Plan {
             outputs,
             steps: s.steps,
         };
-        Ok((stage, cholesky(&q)))
+        Ok((stage, root(&q)))
     }
 
     /// Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by `S_i`.
@@ -386,22 +411,6 @@ fn timeline(
         }
     }
     Ok(segments)
-}
-
-/// The lower triangular root of a covariance, zero in directions without noise.
-fn cholesky(q: &Matrix3<f64>) -> Matrix3<f64> {
-    let mut l = [[0.0; 3]; 3];
-    for i in 0..3 {
-        for j in 0..=i {
-            let sum: f64 = q[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
-            l[i][j] = match (i == j, l[j][j]) {
-                (true, _) => sum.max(0.0).sqrt(),
-                (false, d) if d > 0.0 => sum / d,
-                _ => 0.0,
-            };
-        }
-    }
-    l
 }
 
 /// The linear model of one segment as a process: `psi' = psi x omega + eps` in the axes of the unknowns.

@@ -11,7 +11,7 @@ use super::plan::Plan;
 use super::truth::{Noise, TruthModel, check_drifts};
 use crate::prediction::Prediction;
 
-/// Where a run starts, in SI units (shape n each).
+/// Where a run starts, in SI units (shape n each: the unknowns, then the biases).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunStart {
     /// The true unknowns.
@@ -38,11 +38,16 @@ impl RunStart {
             units.zip(values).map(|(u, v)| v * si_per_shown(u) * scale(u)).collect()
         };
         let sigma = resolve(PRIOR, p, &conditions.priors, 1.0)?;
-        Ok(Self {
+        let mut out = Self {
             truth: si(resolve(TRUE_VALUE, p, &conditions.values, 0.0)?, true),
             estimate: si(resolve(ESTIMATE, p, &conditions.estimates, 0.0)?, false),
             sigma: si(sigma, true),
-        })
+        };
+        let biases = plan.bias_sigmas();
+        out.truth.extend(biases.iter().map(|_| 0.0));
+        out.estimate.extend(biases.iter().map(|_| 0.0));
+        out.sigma.extend(biases);
+        Ok(out)
     }
 
     /// The initial covariance.
@@ -96,11 +101,13 @@ pub struct Record {
     pub whitened: Vec<f64>,
     /// The covariance at the end.
     pub last_covariance: Covariance,
+    /// Estimate minus truth of all its states at the end.
+    pub last_error: Vec<f64>,
     /// Largest `|psi|`, in rad.
     pub largest_psi: f64,
 }
 
-/// Runs the filter of `plan` against one truth.
+/// Runs the filter of `plan` against one truth; its biases are drawn.
 ///
 /// # Errors
 /// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact truth that
@@ -114,7 +121,7 @@ pub fn run(
 ) -> Result<Record, SimulationError> {
     let n = plan.unknowns();
     let first = n - plan.platform.coefficients();
-    check_drifts(plan, conditions, start.truth[first..].iter().map(|d| d.abs()).sum())?;
+    check_drifts(plan, conditions, start.truth[first..n].iter().map(|d| d.abs()).sum())?;
     let combinations: Vec<&[(usize, f64)]> = prediction.combinations.iter().map(|c| &c.terms[..]).collect();
     let mut traces = Traces {
         names: plan.platform.names().to_vec(),
@@ -143,6 +150,7 @@ pub fn run(
         traces,
         whitened: Vec::new(),
         last_covariance: start.covariance(Form::Ud)?,
+        last_error: Vec::new(),
         largest_psi: 0.0,
     };
     let value = |x: &[f64], i: usize| match i.checked_sub(n) {
@@ -169,8 +177,12 @@ pub fn run(
         }
     })?;
 
-    let mut truth = TruthModel::new(plan, conditions, start.truth.clone());
     let mut noise = Noise::new(seed, 0);
+    let mut true_start = start.truth.clone();
+    for (x, sigma) in true_start.iter_mut().zip(&start.sigma).skip(n) {
+        *x = sigma * noise.normal();
+    }
+    let mut truth = TruthModel::new(plan, conditions, true_start);
     let mut x = start.estimate.clone();
     for (i, s) in record.traces.series.iter_mut().enumerate() {
         s.truth.push(value(truth.x(), i));
@@ -200,9 +212,10 @@ pub fn run(
         s.truth.extend(t);
     }
     record.largest_psi = truth.largest_psi;
+    record.last_error = x.iter().zip(truth.x()).map(|(a, b)| a - b).collect();
     let finite = |list: &[f64]| list.iter().all(|x| x.is_finite());
     let ended = |s: &Series| finite(&s.truth) && finite(&s.estimate) && finite(&s.sigma);
-    if !(finite(&record.whitened) && record.traces.series.iter().all(ended)) {
+    if !(finite(&record.whitened) && finite(&record.last_error) && record.traces.series.iter().all(ended)) {
         let what = "the run of the filter ends in numbers that are none".into();
         return Err(SimulationError::Unresolvable { what });
     }

@@ -9,6 +9,7 @@ use rand_pcg::Pcg64;
 
 use super::SimulationError;
 use super::conditions::Conditions;
+use super::gyro_noise::Gyros;
 use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
 
 /// The stream of random numbers of one run.
@@ -47,7 +48,7 @@ pub(crate) fn check_drifts(plan: &Plan, conditions: &Conditions, drifts: f64) ->
     let mut turn = 0.0;
     for s in &plan.segments {
         // the random drift of a step: six sigma of three axes
-        let kick = 11.0 * conditions.drift_noise.held_rad_s(s.dt);
+        let kick = 11.0 * conditions.drift_noise.held_rad_s(s.dt) + plan.random_rate(s.dt);
         turn += drift_turn(drifts + kick, s.dt) * s.steps as f64;
     }
     integration_steps(turn).map(|_| ())
@@ -61,8 +62,11 @@ pub struct TruthModel<'a> {
     /// The true unknowns, psi of now.
     x: Vec<f64>,
     scratch: Vec<f64>,
+    kick: Vec<f64>,
     /// Standard deviations of the components of Z.
     sigmas: Vec<f64>,
+    /// The gyros of the exact truth, for the parts of the last step.
+    gyros: Option<Gyros>,
     /// `E = C_p^n C_n^c = exp([psi^n x])` and the segment it belongs to, for the exact truth.
     exact: Option<(Matrix3<f64>, usize)>,
     /// Largest `|psi|` so far, in rad.
@@ -70,11 +74,20 @@ pub struct TruthModel<'a> {
 }
 
 impl<'a> TruthModel<'a> {
-    /// The truth that starts from the unknowns `x` (shape n, SI).
+    /// The truth that starts from the unknowns and biases `x` (shape n, SI).
     pub fn new(plan: &'a Plan, conditions: &'a Conditions, x: Vec<f64>) -> Self {
         let sigmas = plan.components.iter().map(|&c| Plan::output_sigma(c, conditions)).collect();
-        let mut out =
-            Self { plan, conditions, x, scratch: Vec::new(), sigmas, exact: None, largest_psi: 0.0 };
+        let mut out = Self {
+            plan,
+            conditions,
+            x,
+            scratch: Vec::new(),
+            kick: Vec::new(),
+            sigmas,
+            gyros: None,
+            exact: None,
+            largest_psi: 0.0,
+        };
         out.restart();
         out
     }
@@ -93,7 +106,7 @@ impl<'a> TruthModel<'a> {
         self.watch(0);
     }
 
-    /// The true unknowns, psi of now.
+    /// The true unknowns, psi of now, and biases.
     pub fn x(&self) -> &[f64] {
         &self.x
     }
@@ -119,10 +132,13 @@ impl<'a> TruthModel<'a> {
     fn step_linear(&mut self, segment: usize, noise: &mut Noise, z: &mut [f64]) {
         let stage = &self.plan.stages[segment];
         stage.transition.apply(&mut self.x, &mut self.scratch);
-        let kick = [noise.normal(), noise.normal(), noise.normal()];
-        let root = &self.plan.noise_roots[segment];
-        for (i, &c) in self.plan.psi_columns(segment).iter().enumerate() {
-            self.x[c] += (0..=i).map(|k| root[i][k] * kick[k]).sum::<f64>();
+        let plan = self.plan;
+        let root = &plan.noise_roots[segment];
+        self.kick.clear();
+        self.kick.extend((0..root.nrows()).map(|_| noise.normal()));
+        let moved = plan.psi_columns(segment).iter().copied().chain(plan.unknowns()..plan.states());
+        for (i, c) in moved.enumerate() {
+            self.x[c] += (0..=i).map(|k| root[(i, k)] * self.kick[k]).sum::<f64>();
         }
         for (z, output) in z.iter_mut().zip(&stage.outputs) {
             *z = output.predict(&self.x);
@@ -140,16 +156,23 @@ impl<'a> TruthModel<'a> {
         let held = self.conditions.drift_noise.held_rad_s(s.dt);
         let kick = [0; 3].map(|_| held * noise.normal());
         let kicked = kick.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let drifts =
-            self.x[self.x.len() - plan.platform.coefficients()..].iter().map(|d| d.abs()).sum::<f64>();
+        let drifts = self.coefficients().iter().map(|d| d.abs()).sum::<f64>();
         // as many as have been counted before the run
-        let turn = drift_turn(drifts + kicked, s.dt);
+        let turn = drift_turn(drifts + kicked + plan.random_rate(s.dt), s.dt);
         let substeps = plan.substeps(segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let h = s.dt / substeps as f64;
+        let gyros = plan
+            .is_noisy()
+            .then(|| self.gyros.take().filter(|g| g.is_for(h)).unwrap_or_else(|| Gyros::new(plan, h)));
         for i in 0..substeps {
             let t = step as f64 * s.dt + i as f64 * h;
-            e = self.runge_kutta(segment, t, h, &e, &kick);
+            let mut drift = kick;
+            if let Some(gyros) = &gyros {
+                gyros.draw(plan, &mut self.x[plan.unknowns()..], noise, &mut drift);
+            }
+            e = self.runge_kutta(segment, t, h, &e, &drift);
         }
+        self.gyros = gyros;
         self.exact = Some((e, segment));
         let psi_n = rotation_vector(&e);
         let block = &plan.blocks[s.position];
@@ -208,8 +231,13 @@ impl<'a> TruthModel<'a> {
 
     /// `eps^n = C_p^n E(g^p) D` at the true attitude.
     fn drift_n(&self, c: &Matrix3<f64>) -> [f64; 3] {
-        let first = self.x.len() - self.plan.platform.coefficients();
         let rows = self.plan.platform.drift_rows(&Float, c);
-        std::array::from_fn(|r| rows[r].iter().zip(&self.x[first..]).map(|(a, d)| a * d).sum())
+        std::array::from_fn(|r| rows[r].iter().zip(self.coefficients()).map(|(a, d)| a * d).sum())
+    }
+
+    /// The true drift coefficients.
+    fn coefficients(&self) -> &[f64] {
+        let n = self.plan.unknowns();
+        &self.x[n - self.plan.platform.coefficients()..n]
     }
 }

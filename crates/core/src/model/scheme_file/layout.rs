@@ -85,6 +85,18 @@ pub(super) struct SimulationEntry {
     /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
     #[schemars(with = "Option<String>", extend("pattern" = "deg */ *(h|sqrt\\(h\\))|^ *0+[.]?0* *$"))]
     pub(super) drift_noise: Option<Spanned<DriftNoise>>,
+    /// Angle random walk of the gyros in deg/sqrt(h), one for all or [X, Y, Z]; without drift_noise beside it, it is all the white drift there is.
+    #[schemars(with = "Option<PerGyroEntry>")]
+    pub(super) angle_random_walk_deg_sqrt_h: Literal,
+    /// Rate random walk of the gyros in deg/h/sqrt(h), one for all or [X, Y, Z].
+    #[schemars(with = "Option<PerGyroEntry>")]
+    pub(super) rate_random_walk_dph_sqrt_h: Literal,
+    /// Bias instability of the gyros in deg/h (B of IEEE Std 952), one for all or [X, Y, Z].
+    #[schemars(with = "Option<PerGyroEntry>")]
+    pub(super) bias_instability_dph: Literal,
+    /// Correlation time of the bias instability in s; 3600 when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high))]
+    pub(super) correlation_time_s: Option<Spanned<f64>>,
     /// exponential (default) or rk4.
     pub(super) propagation: Option<Propagation>,
     /// Factor on the true drift coefficients and their priors.
@@ -160,6 +172,15 @@ pub(super) struct SlewEntry {
     pub(super) angle_deg: Literal,
 }
 
+/// A noise of all gyros, or of X, Y, Z.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "says what a file may hold")]
+enum PerGyroEntry {
+    All(#[schemars(extend("minimum" = 0, "maximum" = ranges::GYRO_NOISE.high))] f64),
+    Each(#[schemars(extend("items" = none_or(ranges::GYRO_NOISE)))] [f64; 3]),
+}
+
 /// An axis by its name, or a direction in n.
 #[derive(JsonSchema)]
 #[serde(untagged)]
@@ -195,4 +216,9 @@ fn angle() -> serde_json::Value {
 /// Numbers of a range.
 fn within(range: ranges::Range) -> serde_json::Value {
     serde_json::json!({ "type": "number", "minimum": range.low, "maximum": range.high })
+}
+
+/// Numbers up to the end of a range.
+fn none_or(range: ranges::Range) -> serde_json::Value {
+    serde_json::json!({ "type": "number", "minimum": 0, "maximum": range.high })
 }

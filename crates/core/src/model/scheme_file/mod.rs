@@ -15,11 +15,12 @@ pub use write::write;
 use super::angle::parse_decimal;
 use super::file_error::explain;
 use super::geometry::Unknowns;
+use super::per_gyro::PerGyro;
 use super::platform::Platform;
 use super::scheme::{Latitude, Scheme};
 use crate::model::settings::Settings;
 use crate::model::{combination, settings};
-use layout::{GimbalEntry, Numbers, SimulationEntry};
+use layout::{GimbalEntry, Literal, Numbers, SimulationEntry};
 
 /// Longest scheme file, in bytes: a thousand positions with all their keys.
 pub const MAX_FILE: usize = 1_000_000;
@@ -86,9 +87,27 @@ impl Reader<'_> {
         kept.collect()
     }
 
-    fn settings(&mut self, s: &SimulationEntry) -> Settings {
+    /// A number, or a list of three.
+    fn per_gyro(&mut self, key: String, value: &Literal) -> Result<Option<PerGyro>, SchemeFileError> {
+        let Some(value) = value else { return Ok(None) };
+        let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+        let found = match value.get_ref() {
+            toml::Value::Array(list) => {
+                let numbers: Option<Vec<f64>> = list.iter().map(number).collect();
+                numbers.and_then(|n| n.try_into().ok()).map(PerGyro)
+            }
+            one => number(one).map(PerGyro::all),
+        };
+        let message =
+            "expected a number, or a list of three for the gyros X, Y, Z such as [0.01, 0.01, 0.02]";
+        let found = found.ok_or_else(|| self.at(value.span(), message))?;
+        self.places.insert(key, value.span());
+        Ok(Some(found))
+    }
+
+    fn settings(&mut self, s: &SimulationEntry) -> Result<Settings, SchemeFileError> {
         let key = |key: &str| format!("simulation.{key}");
-        Settings {
+        Ok(Settings {
             truth: s.truth,
             propagation: s.propagation,
             step_s: self.keep(key("step_s"), s.step_s.as_ref()),
@@ -97,11 +116,17 @@ impl Reader<'_> {
             accelerometer_noise_g: self.keep(key("accelerometer_noise_g"), s.accelerometer_noise_g.as_ref()),
             azimuth_noise_deg: self.keep(key("azimuth_noise_deg"), s.azimuth_noise_deg.as_ref()),
             drift_noise: self.keep(key("drift_noise"), s.drift_noise.as_ref()),
+            angle_random_walk_deg_sqrt_h: self
+                .per_gyro(key("angle_random_walk_deg_sqrt_h"), &s.angle_random_walk_deg_sqrt_h)?,
+            rate_random_walk_dph_sqrt_h: self
+                .per_gyro(key("rate_random_walk_dph_sqrt_h"), &s.rate_random_walk_dph_sqrt_h)?,
+            bias_instability_dph: self.per_gyro(key("bias_instability_dph"), &s.bias_instability_dph)?,
+            correlation_time_s: self.keep(key("correlation_time_s"), s.correlation_time_s.as_ref()),
             drift_scale: self.keep(key("drift_scale"), s.drift_scale.as_ref()),
             values: self.numbers("simulation.values", &s.values),
             estimates: self.numbers("simulation.estimates", &s.estimates),
             priors: self.numbers("simulation.priors", &s.priors),
-        }
+        })
     }
 
     /// `["F", "I"]`, or `"F,I"`.
@@ -193,7 +218,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         description: r.keep("description", file.description.as_ref()).unwrap_or_default(),
         geometry: r.keep("geometry", file.geometry.as_ref()).unwrap_or_default(),
         measured_azimuth: file.measured_azimuth,
-        simulation: r.settings(&file.simulation),
+        simulation: r.settings(&file.simulation)?,
         requirements: r.numbers("requirements", &file.requirements),
         ..Scheme::default()
     };

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{Propagation, Settings, Truth};
-use crate::model::{Geometry, SlewAxis, Unknowns};
+use crate::model::{Geometry, PerGyro, SlewAxis, Unknowns};
 
 /// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
 pub fn write(scheme: &Scheme) -> String {
@@ -114,6 +114,11 @@ fn settings(out: &mut String, s: &Settings) {
         Propagation::Exponential => "exponential",
         Propagation::Rk4 => "rk4",
     });
+    let per_gyro = |x: PerGyro| match x.0 {
+        [x, y, z] if x == y && y == z => number(x),
+        each => list(each.map(number)),
+    };
+    let gyros = s.gyros().map(|(key, x)| (key, x.map(per_gyro)));
     let texts = [
         ("truth", truth.map(quoted)),
         ("step_s", s.step_s.map(number)),
@@ -122,10 +127,11 @@ fn settings(out: &mut String, s: &Settings) {
         ("accelerometer_noise_g", s.accelerometer_noise_g.map(number)),
         ("azimuth_noise_deg", s.azimuth_noise_deg.map(number)),
         ("drift_noise", s.drift_noise.map(|n| quoted(&n.to_string()))),
+        ("correlation_time_s", s.correlation_time_s.map(number)),
         ("propagation", propagation.map(quoted)),
         ("drift_scale", s.drift_scale.map(number)),
     ];
-    for (key, value) in texts {
+    for (key, value) in texts.into_iter().chain(gyros) {
         if let Some(value) = value {
             line(&mut lines, key, &value);
         }
@@ -212,14 +218,18 @@ mod tests {
             accelerometer_noise_g in prop::option::of(1e-15f64..1e-3),
             azimuth_noise_deg in prop::option::of(1e-12f64..1e3),
             noise in prop::option::of((1e-12f64..1e6, any::<bool>())),
+            gyros in prop::array::uniform3(prop::option::of((1e-12f64..1e6, prop::array::uniform3(0u8..3)))),
+            correlation_time_s in prop::option::of(1f64..1e9),
             drift_scale in prop::option::of(1e-6f64..1e6),
             values in numbers(-20..5),
             estimates in numbers(-20..5),
             priors in numbers(-9..8),
         ) -> Settings {
             let drift_noise = noise.map(|(x, walk)| if walk { DriftNoise::RandomWalk(x) } else { DriftNoise::OneStep(x) });
+            let [angle, rate, bias] = gyros.map(|g| g.map(|(x, of)| PerGyro(of.map(|k| x * f64::from(k.min(1))))));
             Settings {
-                truth, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
+                angle_random_walk_deg_sqrt_h: angle, rate_random_walk_dph_sqrt_h: rate, bias_instability_dph: bias,
+                correlation_time_s, truth, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
                 drift_noise, drift_scale, values, estimates, priors,
             }
         }

@@ -1,0 +1,245 @@
+//! Random drift of the gyros by their datasheet: angle random walk as white drift, rate random walk and bias instability as states behind the
+//! unknowns, in the filter and in the truth alike.
+//!
+//! The drift of a gyro is `D_F + b_K + b_B` about its input axis, with g-sensitive terms as ever. `b_K' = w`, `b_K(0) = 0`, is the rate random
+//! walk, `b_B' = -b_B/T + w` the bias instability: so every D is a constant, and D_F is the bias at the *start* of the run, but for what of
+//! `b_B` is there. A coefficient is not what the bias is at the end.
+
+use nalgebra::DMatrix;
+use obsdeg_core::model::ranges;
+use obsdeg_core::model::slew::apply;
+use obsdeg_core::model::{Float, GYROS, Matrix3, PerGyro, local_dynamics};
+use obsdeg_ekf::noise::discretised;
+use obsdeg_ekf::{BiasState, SensorNoise};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::SimulationError;
+use super::plan::{Plan, SegmentKind};
+use super::truth::Noise;
+
+/// The datasheet of the gyros X, Y, Z.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct GyroNoise {
+    /// Angle random walk in deg/sqrt(h).
+    pub angle_random_walk_deg_sqrt_h: PerGyro,
+    /// Rate random walk in deg/h/sqrt(h).
+    pub rate_random_walk_dph_sqrt_h: PerGyro,
+    /// Bias instability in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B.
+    pub bias_instability_dph: PerGyro,
+    /// Correlation time in s of the Gauss-Markov process that stands for it.
+    pub correlation_time_s: f64,
+}
+
+impl Default for GyroNoise {
+    fn default() -> Self {
+        let none = PerGyro::default();
+        Self {
+            angle_random_walk_deg_sqrt_h: none,
+            rate_random_walk_dph_sqrt_h: none,
+            bias_instability_dph: none,
+            correlation_time_s: 3600.0,
+        }
+    }
+}
+
+impl GyroNoise {
+    fn lists(&self) -> [(&'static str, PerGyro); 3] {
+        [
+            ("angle_random_walk_deg_sqrt_h", self.angle_random_walk_deg_sqrt_h),
+            ("rate_random_walk_dph_sqrt_h", self.rate_random_walk_dph_sqrt_h),
+            ("bias_instability_dph", self.bias_instability_dph),
+        ]
+    }
+
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        self.lists().iter().all(|(_, x)| x.is_none())
+    }
+
+    /// Checks that every number is in its range.
+    ///
+    /// # Errors
+    /// [`SimulationError::Range`] naming the offender.
+    pub(crate) fn validate(&self) -> Result<(), SimulationError> {
+        for (what, x) in self.lists() {
+            x.check(what)?;
+        }
+        Ok(ranges::CORRELATION_S.check("correlation_time_s", self.correlation_time_s)?)
+    }
+
+    /// The gyros X, Y, Z in SI units.
+    pub fn sensors(&self) -> [SensorNoise; GYROS.len()] {
+        let [angle, rate, bias] = self.lists().map(|(_, x)| x.0);
+        std::array::from_fn(|g| SensorNoise::gyro(angle[g], rate[g], bias[g], self.correlation_time_s))
+    }
+}
+
+/// A state behind the unknowns: part of the bias of a gyro, in rad/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bias {
+    /// The gyro: 0, 1, 2 for X, Y, Z.
+    pub gyro: usize,
+    /// Its process.
+    pub process: BiasState,
+}
+
+/// What of all gyros goes on as states.
+pub(super) fn biases(gyros: &[SensorNoise; 3]) -> Vec<Bias> {
+    let of = |(gyro, noise): (usize, &SensorNoise)| {
+        noise.states().into_iter().map(move |process| Bias { gyro, process }).collect::<Vec<_>>()
+    };
+    gyros.iter().enumerate().flat_map(of).collect()
+}
+
+/// `(Phi, Q)` of some states over a step.
+pub(super) type Step = (DMatrix<f64>, DMatrix<f64>);
+
+impl Plan {
+    /// The input axis of a gyro in platform axes.
+    fn input_axis(&self, gyro: usize) -> [f64; 3] {
+        self.platform.scheme().geometry.gyros()[gyro].I.vector().map(f64::from)
+    }
+
+    /// Whether the gyros have random drift of their own.
+    pub(super) fn is_noisy(&self) -> bool {
+        !self.biases.is_empty() || self.gyros.iter().any(|g| g.white > 0.0)
+    }
+
+    /// `(Phi, Q)` of psi (in the axes of the unknowns) and the biases over a step of a segment (3 + m states), by the noise of the gyros: exact
+    /// at a position; while the platform turns, in parts of at most 0.02 rad with the attitude of their middle.
+    pub(super) fn bias_step(&self, segment: usize) -> Result<Step, SimulationError> {
+        let s = &self.segments[segment];
+        let n = 3 + self.biases.len();
+        let parts = match &s.kind {
+            SegmentKind::Dwell => 1,
+            SegmentKind::Slew(_) | SegmentKind::Rotation(_) => self.substeps(segment),
+        };
+        let h = s.dt / parts as f64;
+        let (mut phi, mut q) = (DMatrix::identity(n, n), DMatrix::zeros(n, n));
+        for i in 0..parts {
+            let (f, density) = self.bias_model(&self.attitude(segment, (i as f64 + 0.5) * h));
+            let (part, noise) = discretised(&f, &density, h)?;
+            q = &part * q * part.transpose() + noise;
+            phi = part * phi;
+        }
+        // psi^n = P psi
+        let block = &self.blocks[s.position];
+        let mut to_psi = DMatrix::identity(n, n);
+        for i in 0..3 {
+            for j in 0..3 {
+                to_psi[(i, j)] = block.rows[j][i];
+            }
+        }
+        let q = &to_psi * q * to_psi.transpose();
+        Ok((&to_psi * phi * to_psi.transpose(), (&q + q.transpose()) / 2.0))
+    }
+
+    /// F and the density Q of psi^n and the biases at the attitude `C_c^n`.
+    fn bias_model(&self, attitude: &Matrix3<f64>) -> Step {
+        let n = 3 + self.biases.len();
+        let (mut f, mut q) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+        let local = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
+        for i in 0..3 {
+            for j in 0..3 {
+                f[(i, j)] = local[i][j];
+            }
+        }
+        let axes: [[f64; 3]; 3] = std::array::from_fn(|g| apply(attitude, &self.input_axis(g)));
+        for (axis, gyro) in axes.iter().zip(&self.gyros) {
+            for i in 0..3 {
+                for j in 0..3 {
+                    q[(i, j)] += gyro.white.powi(2) * axis[i] * axis[j];
+                }
+            }
+        }
+        for (k, bias) in self.biases.iter().enumerate() {
+            for i in 0..3 {
+                f[(i, 3 + k)] = axes[bias.gyro][i];
+            }
+            f[(3 + k, 3 + k)] = -bias.process.decay;
+            q[(3 + k, 3 + k)] = bias.process.density;
+        }
+        (f, q)
+    }
+
+    /// Standard deviations of the biases at the start. A filter takes positive ones: a random walk, which starts at none, has a millionth of
+    /// what the shortest step makes of it.
+    pub(super) fn bias_sigmas(&self) -> Vec<f64> {
+        let shortest = self.segments.iter().map(|s| s.dt).fold(f64::MAX, f64::min);
+        let sigma = |b: &Bias| b.process.variance.max(1e-12 * b.process.density * shortest).sqrt();
+        self.biases.iter().map(sigma).collect()
+    }
+
+    /// A bound, six sigma, on what biases and white drift of all gyros turn in a step, as a rate: rad/s.
+    pub(super) fn random_rate(&self, dt: f64) -> f64 {
+        let bias = |b: &Bias| (b.process.variance + b.process.density * self.duration_s()).sqrt();
+        let white: f64 = self.gyros.iter().map(|g| g.white / dt.sqrt()).sum();
+        6.0 * (self.biases.iter().map(bias).sum::<f64>() + white)
+    }
+}
+
+/// The lower triangular root of a covariance, zero in directions without noise.
+pub(super) fn root(q: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = q.nrows();
+    let mut l = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = q[(i, j)] - (0..j).map(|k| l[(i, k)] * l[(j, k)]).sum::<f64>();
+            // a pivot that rounding leaves is no noise
+            l[(i, j)] = match (i == j, l[(j, j)]) {
+                (true, _) if sum > 1e-13 * q[(i, i)] => sum.sqrt(),
+                (false, d) if d > 0.0 => sum / d,
+                _ => 0.0,
+            };
+        }
+    }
+    l
+}
+
+/// The gyros of an exact truth, drawn part by part of a step: angle and biases of each together.
+#[derive(Debug, Clone)]
+pub(super) struct Gyros {
+    h: f64,
+    /// Per gyro: Phi, and the root of Q, of its angle and its biases.
+    steps: Vec<Step>,
+}
+
+impl Gyros {
+    /// For parts of `h` s.
+    pub(super) fn new(plan: &Plan, h: f64) -> Self {
+        let of = |gyro: &SensorNoise| {
+            let (f, q) = gyro.model();
+            // what is not finite ends the run
+            let refused = |_| (f.map(|_| f64::NAN), q.map(|_| f64::NAN));
+            discretised(&f, &q, h).map_or_else(refused, |(phi, q)| (phi, root(&q)))
+        };
+        Self { h, steps: plan.gyros.iter().map(of).collect() }
+    }
+
+    /// Whether it is for parts of `h` s.
+    pub(super) fn is_for(&self, h: f64) -> bool {
+        self.h == h
+    }
+
+    /// Draws one part: the biases go on, and the mean drift over it is added to `drift`, in platform axes (rad/s).
+    pub(super) fn draw(&self, plan: &Plan, biases: &mut [f64], noise: &mut Noise, drift: &mut [f64; 3]) {
+        let mut first = 0;
+        for (g, (phi, root)) in self.steps.iter().enumerate() {
+            let n = phi.nrows();
+            let own = &mut biases[first..first + n - 1];
+            first += n - 1;
+            let kick: Vec<f64> = (0..n).map(|_| noise.normal()).collect();
+            let next: Vec<f64> = (0..n)
+                .map(|i| {
+                    let carried: f64 = own.iter().enumerate().map(|(k, b)| phi[(i, k + 1)] * b).sum();
+                    carried + (0..=i).map(|k| root[(i, k)] * kick[k]).sum::<f64>()
+                })
+                .collect();
+            own.copy_from_slice(&next[1..]);
+            for (sum, axis) in drift.iter_mut().zip(plan.input_axis(g)) {
+                *sum += axis * next[0] / self.h;
+            }
+        }
+    }
+}
