@@ -23,6 +23,12 @@ pub fn chi_square_band(dof: f64, count: f64, confidence: f64) -> (f64, f64) {
     (chi.inverse_cdf(tail) / count, chi.inverse_cdf(1.0 - tail) / count)
 }
 
+/// What a chi-square variable of `dof` degrees of freedom stays below with probability `confidence`: the gate of an
+/// innovation. Infinite where `dof` is none.
+pub fn chi_square_quantile(dof: f64, confidence: f64) -> f64 {
+    ChiSquared::new(dof).map_or(f64::INFINITY, |chi| chi.inverse_cdf(confidence))
+}
+
 /// `e^T P^-1 e` of a fixed covariance for any number of errors, by `P = U diag(d) U^T`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nees {
@@ -49,9 +55,15 @@ impl Nees {
         Ok(Self { u, d })
     }
 
-    /// `e^T P^-1 e`, chi-square with n degrees of freedom when `e ~ N(0, P)`; `e` is used up.
-    pub fn of(&self, e: &mut [f64]) -> f64 {
+    /// `e^T P^-1 e`, chi-square with n degrees of freedom when `e ~ N(0, P)`; `e` (shape n) is used up.
+    ///
+    /// # Errors
+    /// [`EkfError::Shape`].
+    pub fn of(&self, e: &mut [f64]) -> Result<f64, EkfError> {
         let n = self.d.len();
+        if e.len() != n {
+            return Err(EkfError::Shape { what: "e", expected: (n, 1), found: (e.len(), 1) });
+        }
         let mut sum = 0.0;
         // y = U^-1 e from the last component up
         for j in (0..n).rev() {
@@ -62,7 +74,30 @@ impl Nees {
                 *x -= u * y;
             }
         }
-        sum
+        Ok(sum)
+    }
+
+    /// `P^-1 b` (n x any).
+    pub(crate) fn solve(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.d.len();
+        let u = |i: usize, j: usize| self.u[j * n + i];
+        let mut out = b.clone();
+        for mut column in out.column_iter_mut() {
+            for j in (0..n).rev() {
+                for i in 0..j {
+                    column[i] -= u(i, j) * column[j];
+                }
+            }
+            for (x, d) in column.iter_mut().zip(&self.d) {
+                *x /= d;
+            }
+            for j in 0..n {
+                for i in 0..j {
+                    column[j] -= u(i, j) * column[i];
+                }
+            }
+        }
+        out
     }
 }
 

@@ -35,10 +35,32 @@ impl ScalarOutput {
     pub fn predict(&self, x: &[f64]) -> f64 {
         self.h.iter().map(|&(i, c)| c * x[i]).sum()
     }
+
+    /// Checks that it is one of n states, and its variance one.
+    ///
+    /// # Errors
+    /// [`EkfError`].
+    pub(crate) fn check(&self, n: usize) -> Result<(), EkfError> {
+        check_entries("H", &self.h, n)?;
+        if is_positive(self.r) && self.r.is_finite() {
+            Ok(())
+        } else {
+            Err(EkfError::NotPositive { what: "R", value: self.r })
+        }
+    }
+}
+
+/// Checks that the entries of a row are finite and those of n states.
+fn check_entries(what: &'static str, row: &[(usize, f64)], n: usize) -> Result<(), EkfError> {
+    match row.iter().find(|(state, x)| *state >= n || !x.is_finite()) {
+        Some(&(column, value)) if column < n => Err(EkfError::NotFinite { what, value, row: 0, column }),
+        Some(&(state, _)) => Err(EkfError::Shape { what, expected: (1, n), found: (1, state + 1) }),
+        None => Ok(()),
+    }
 }
 
 /// The noise that one step adds to the state: Q, positive semidefinite, with the states it touches.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProcessNoise {
     states: Vec<usize>,
     /// Q on these states.
@@ -48,6 +70,11 @@ pub struct ProcessNoise {
 }
 
 impl ProcessNoise {
+    /// No noise.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
     /// The noise of covariance `q` (n x n).
     ///
     /// # Errors
@@ -62,13 +89,6 @@ impl ProcessNoise {
         let column = |j: usize| (0..m).map(|i| u[(i, j)]).collect();
         let factors = (0..m).filter(|&j| d[j] > 0.0).map(|j| (d[j], column(j))).collect();
         Ok(Self { states, q: block, factors })
-    }
-}
-
-impl ProcessNoise {
-    /// The last state that it touches.
-    pub(crate) fn last_state(&self) -> Option<usize> {
-        self.states.last().copied()
     }
 }
 
@@ -138,8 +158,12 @@ impl Covariance {
     }
 
     /// The variance `c P c^T` of a functional, given by its non-zero entries.
-    pub fn variance(&self, c: &[(usize, f64)]) -> f64 {
-        match self.form {
+    ///
+    /// # Errors
+    /// [`EkfError`] for an entry that is not finite, or is of no state.
+    pub fn variance(&self, c: &[(usize, f64)]) -> Result<f64, EkfError> {
+        check_entries("c", c, self.n)?;
+        Ok(match self.form {
             Form::Joseph => {
                 let row = |i: usize| c.iter().map(|&(j, b)| b * self.m[j * self.n + i]).sum::<f64>();
                 c.iter().map(|&(i, a)| a * row(i)).sum()
@@ -148,7 +172,7 @@ impl Covariance {
             Form::Ud => (0..self.n)
                 .map(|j| c.iter().map(|&(i, a)| a * self.u(i, j)).sum::<f64>().powi(2) * self.d[j])
                 .sum(),
-        }
+        })
     }
 
     fn u(&self, i: usize, j: usize) -> f64 {
@@ -160,7 +184,17 @@ impl Covariance {
     }
 
     /// `P <- Phi P Phi^T + Q`.
-    pub fn propagate(&mut self, phi: &Transition, noise: &ProcessNoise) {
+    ///
+    /// # Errors
+    /// [`EkfError::Shape`] unless Phi and Q are of the states of P.
+    pub fn propagate(&mut self, phi: &Transition, noise: &ProcessNoise) -> Result<(), EkfError> {
+        check_step(self.n, phi, noise)?;
+        self.propagate_checked(phi, noise);
+        Ok(())
+    }
+
+    /// The same for a step that was checked.
+    pub(crate) fn propagate_checked(&mut self, phi: &Transition, noise: &ProcessNoise) {
         match self.form {
             Form::Joseph => self.propagate_full(phi, noise),
             Form::Ud => self.propagate_ud(phi, noise),
@@ -256,7 +290,17 @@ impl Covariance {
     }
 
     /// The update by one scalar measurement; the gain goes to `gain` (its `k` is resized to n).
-    pub fn update(&mut self, output: &ScalarOutput, gain: &mut Gain) {
+    ///
+    /// # Errors
+    /// [`EkfError`] for an output that is none of these states, or without noise; nothing has changed then.
+    pub fn update(&mut self, output: &ScalarOutput, gain: &mut Gain) -> Result<(), EkfError> {
+        output.check(self.n)?;
+        self.update_checked(output, gain);
+        Ok(())
+    }
+
+    /// The same for an output that was checked.
+    pub(crate) fn update_checked(&mut self, output: &ScalarOutput, gain: &mut Gain) {
         gain.k.resize(self.n, 0.0);
         match self.form {
             Form::Joseph => self.update_joseph(output, gain),
@@ -352,6 +396,19 @@ impl Covariance {
                 Ok((u.as_slice().to_vec(), d))
             }
         }
+    }
+}
+
+/// Checks that Phi and Q of a step are of n states.
+///
+/// # Errors
+/// [`EkfError::Shape`].
+pub(crate) fn check_step(n: usize, phi: &Transition, noise: &ProcessNoise) -> Result<(), EkfError> {
+    let refuse = |what, found| Err(EkfError::Shape { what, expected: (n, n), found: (found, found) });
+    match noise.states.last() {
+        _ if phi.states() != n => refuse("Phi", phi.states()),
+        Some(&last) if last >= n => refuse("Q", last + 1),
+        _ => Ok(()),
     }
 }
 

@@ -27,6 +27,12 @@ pub enum EkfError {
         /// Column, from 0.
         column: usize,
     },
+    /// A state with NaN or infinity.
+    #[error("{what} is not finite")]
+    StateNotFinite {
+        /// The input.
+        what: &'static str,
+    },
     /// Not symmetric.
     #[error("{what} is not symmetric: entries ({row},{column}) and ({column},{row}) differ")]
     NotSymmetric {
@@ -57,6 +63,14 @@ pub enum EkfError {
         /// Row, from 0.
         row: usize,
     },
+    /// A variance of measurement noise that is none.
+    #[error("{what} is {value:e}; expected a variance above 0")]
+    NotPositive {
+        /// The input.
+        what: &'static str,
+        /// The value found.
+        value: f64,
+    },
     /// The information leaves a direction undetermined.
     #[error("the information is singular: unknown {column} is not determined")]
     Singular {
@@ -75,6 +89,17 @@ impl EkfError {
 /// Whether `x` is a number above zero; false for NaN.
 pub(crate) fn is_positive(x: f64) -> bool {
     x > 0.0
+}
+
+/// Checks the shape of a column and that all its entries are finite.
+pub(crate) fn check_column(what: &'static str, v: &[f64], expected: usize) -> Result<(), EkfError> {
+    if v.len() != expected {
+        return Err(EkfError::Shape { what, expected: (expected, 1), found: (v.len(), 1) });
+    }
+    match v.iter().position(|x| !x.is_finite()) {
+        Some(row) => Err(EkfError::NotFinite { what, value: v[row], row, column: 0 }),
+        None => Ok(()),
+    }
 }
 
 /// Checks the shape of `m` and that all its entries are finite.

@@ -2,13 +2,16 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use crate::consistency::{Nees, chi_square_quantile};
 use crate::covariance::{Covariance, Form, Gain, ProcessNoise, ScalarOutput};
-use crate::error::{EkfError, check, check_symmetric, is_positive};
+use crate::error::{EkfError, check, check_column, check_symmetric, is_positive};
 use crate::integrate::runge_kutta;
-use crate::model::{Measurement, Process};
+use crate::manifold::Manifold;
+use crate::model::{Measurement, Motion, Process};
 use crate::transition::Transition;
 
-/// An estimate with its covariance.
+/// An estimate with its covariance: that of the error in local coordinates about the estimate. After an update the error
+/// is folded into the estimate (the reset of an error-state filter), so that Jacobians are taken where the estimate is.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector, dmatrix, dvector};
@@ -38,39 +41,74 @@ use crate::transition::Transition;
 /// # Ok::<(), obsdeg_ekf::EkfError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filter {
-    x: DVector<f64>,
+pub struct Filter<X = DVector<f64>> {
+    x: X,
     covariance: Covariance,
+}
+
+/// How an update is made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Update {
+    /// Most linearisations: 1 is the extended filter; more iterate by Gauss and Newton to the most probable state
+    /// (Bell, Cathey 1993, doi:10.1109/9.250476).
+    pub iterations: usize,
+    /// The iteration ends when no coordinate moves by more than so many of its standard deviations.
+    pub tolerance: f64,
+    /// The probability with which the measurement of a right model is accepted: what is less likely is left out. `None`
+    /// accepts all.
+    pub gate: Option<f64>,
+}
+
+impl Default for Update {
+    /// The extended filter without a gate.
+    fn default() -> Self {
+        Self { iterations: 1, tolerance: 1e-3, gate: None }
+    }
+}
+
+impl Update {
+    /// Up to so many linearisations.
+    pub fn iterated(iterations: usize) -> Self {
+        Self { iterations, ..Self::default() }
+    }
 }
 
 /// What one update saw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Innovation {
-    /// The innovation, whitened: independent unit normals when the model is right (shape m).
+    /// The innovation at the prediction, whitened: independent unit normals when the model is right (one per component
+    /// that was there).
     pub whitened: Vec<f64>,
+    /// Whether it was used: false where the gate left it out.
+    pub accepted: bool,
+    /// Linearisations.
+    pub iterations: usize,
+    /// Whether the last step was within the tolerance; the extended filter takes one step and does not ask.
+    pub converged: bool,
 }
 
 impl Innovation {
-    /// The normalised innovation squared, chi-square with m degrees of freedom when the model is right.
+    /// The normalised innovation squared, chi-square with as many degrees of freedom as there are components when the
+    /// model is right.
     pub fn nis(&self) -> f64 {
         self.whitened.iter().map(|v| v * v).sum()
     }
 }
 
-impl Filter {
-    /// A filter that starts from `x0 ~ N(x0, p0)`.
+impl<X: Manifold> Filter<X> {
+    /// A filter that starts from `x0` with an error of covariance `p0` (n x n).
     ///
     /// # Errors
     /// [`EkfError`] unless `x0` is finite and `p0` positive definite.
-    pub fn new(x0: DVector<f64>, p0: &DMatrix<f64>, form: Form) -> Result<Self, EkfError> {
-        let n = x0.len();
-        check("x0", &DMatrix::from_column_slice(n, 1, x0.as_slice()), (n, 1))?;
+    pub fn new(x0: X, p0: &DMatrix<f64>, form: Form) -> Result<Self, EkfError> {
+        let n = x0.dimension();
+        check_state("x0", &x0)?;
         check("P0", p0, (n, n))?;
         Ok(Self { covariance: Covariance::new("P0", p0, form)?, x: x0 })
     }
 
-    /// The estimate (shape n).
-    pub fn x(&self) -> &DVector<f64> {
+    /// The estimate.
+    pub fn x(&self) -> &X {
         &self.x
     }
 
@@ -79,6 +117,151 @@ impl Filter {
         &self.covariance
     }
 
+    /// From `t` to `t + dt`; a gap in the measurements is a longer step, or several. Gives Phi, which a smoother wants.
+    ///
+    /// # Errors
+    /// [`EkfError`] when the model gives a shape or a number that cannot be.
+    pub fn advance(&mut self, motion: &impl Motion<X>, t: f64, dt: f64) -> Result<Transition, EkfError> {
+        let (phi, noise) = motion.advance(t, dt, &mut self.x)?;
+        check_state("x", &self.x)?;
+        self.covariance.propagate(&phi, &noise)?;
+        Ok(phi)
+    }
+
+    /// A jump to `x`, of which the local coordinates are `jacobian` times those before, with the noise of the jump: a
+    /// repositioning, or a part of the state that starts anew.
+    ///
+    /// # Errors
+    /// [`EkfError`] for a wrong shape or a number that is not finite; nothing has changed then.
+    pub fn jump(&mut self, x: X, jacobian: &Transition, noise: &ProcessNoise) -> Result<(), EkfError> {
+        check_state("x", &x)?;
+        self.covariance.propagate(jacobian, noise)?;
+        self.x = x;
+        Ok(())
+    }
+
+    /// The update by the measurement `z` (shape m) at `t`, all components of which are there.
+    ///
+    /// # Errors
+    /// As [`Self::update_with`].
+    pub fn update(
+        &mut self,
+        m: &impl Measurement<X>,
+        t: f64,
+        z: &DVector<f64>,
+    ) -> Result<Innovation, EkfError> {
+        let all: Vec<Option<f64>> = z.iter().copied().map(Some).collect();
+        self.update_with(m, t, &all, &Update::default())
+    }
+
+    /// The update by those components of `z` (shape m) that are there, at `t`. Correlated noise is decorrelated first; then
+    /// the components are processed one by one, which is the same for a linearised model. An iteration that makes the
+    /// state less probable is damped.
+    ///
+    /// # Errors
+    /// [`EkfError`] for a wrong shape, a number that is not finite, or an R that is not positive definite.
+    pub fn update_with(
+        &mut self,
+        m: &impl Measurement<X>,
+        t: f64,
+        z: &[Option<f64>],
+        how: &Update,
+    ) -> Result<Innovation, EkfError> {
+        let (n, outputs) = (self.x.dimension(), m.outputs());
+        if z.len() != outputs {
+            return Err(EkfError::Shape { what: "z", expected: (outputs, 1), found: (z.len(), 1) });
+        }
+        let there: Vec<usize> = (0..outputs).filter(|&i| z[i].is_some()).collect();
+        let z: Vec<f64> = z.iter().copied().flatten().collect();
+        check_column("z", &z, z.len())?;
+        let r = m.noise(t);
+        check("R", &r, (outputs, outputs))?;
+        let whitener = Whitener::new(&r.select_rows(&there).select_columns(&there))?;
+        // what is left of z at a state, and the derivative of h by the coordinates about it
+        let seen = |x: &X| -> Result<(Vec<f64>, DMatrix<f64>), EkfError> {
+            let (h, jacobian) = (m.h(t, x), m.jacobian(t, x));
+            check_column("h", h.as_slice(), outputs)?;
+            check("H", &jacobian, (outputs, n))?;
+            let residual = there.iter().zip(&z).map(|(&i, z)| z - h[i]).collect();
+            Ok((whitener.apply(residual), whitener.rows(&jacobian.select_rows(&there))))
+        };
+        let (residual, rows) = seen(&self.x)?;
+        let mut after = self.covariance.clone();
+        let mut whitened = Vec::with_capacity(there.len());
+        let mut delta = sequential(&mut after, &rows, &residual, &whitener.variances, |w| whitened.push(w))?;
+        let mut out = Innovation { whitened, accepted: true, iterations: 1, converged: true };
+        if let Some(probability) = how.gate
+            && !there.is_empty()
+            && out.nis() > chi_square_quantile(there.len() as f64, probability)
+        {
+            out.accepted = false;
+            return Ok(out);
+        }
+        if how.iterations > 1 {
+            out.converged = false;
+            let prior = Nees::of_covariance(&self.covariance)?;
+            let moved = |delta: &[f64]| {
+                let mut x = self.x.clone();
+                x.retract(delta);
+                x
+            };
+            // twice the negative logarithm of the probability of the state at `delta`
+            let cost = |delta: &[f64], residual: &[f64]| -> Result<f64, EkfError> {
+                let misfit = residual.iter().zip(&whitener.variances).map(|(e, r)| e * e / r).sum::<f64>();
+                Ok(prior.of(&mut delta.to_vec())? + misfit)
+            };
+            let mut before = vec![0.0; n];
+            let mut least = cost(&before, &residual)?;
+            while out.iterations < how.iterations {
+                let (mut x, (mut residual, mut rows));
+                let mut halvings = 0;
+                loop {
+                    x = moved(&delta);
+                    (residual, rows) = seen(&x)?;
+                    let found = cost(&delta, &residual)?;
+                    if found <= least * (1.0 + 1e-12) || halvings == HALVINGS {
+                        least = found;
+                        break;
+                    }
+                    delta.iter_mut().zip(&before).for_each(|(d, b)| *d = 0.5 * (*d + b));
+                    halvings += 1;
+                }
+                // the rows in the coordinates about the prediction, and what they leave of z there
+                if let Some(transport) = self.x.transport(&delta) {
+                    rows *= transport.matrix();
+                }
+                let linear = &rows * DVector::from_column_slice(&delta);
+                residual.iter_mut().zip(linear.iter()).for_each(|(e, l)| *e += l);
+                after = self.covariance.clone();
+                let next = sequential(&mut after, &rows, &residual, &whitener.variances, |_| {})?;
+                out.iterations += 1;
+                let sigmas = after.sigmas();
+                out.converged = next
+                    .iter()
+                    .zip(&delta)
+                    .zip(&sigmas)
+                    .all(|((a, b), s)| (a - b).abs() <= how.tolerance * s);
+                before = std::mem::replace(&mut delta, next);
+                if out.converged {
+                    break;
+                }
+            }
+        }
+        if let Some(transport) = self.x.transport(&delta) {
+            after.propagate(&transport, &ProcessNoise::none())?;
+        }
+        let mut x = self.x.clone();
+        x.retract(&delta);
+        check_state("x", &x)?;
+        (self.x, self.covariance) = (x, after);
+        Ok(out)
+    }
+}
+
+/// Halvings of a step that makes the state less probable.
+const HALVINGS: usize = 8;
+
+impl Filter {
     /// From `t` to `t + dt`, integrated in `substeps` Runge-Kutta steps.
     ///
     /// # Errors
@@ -90,73 +273,82 @@ impl Filter {
         dt: f64,
         substeps: usize,
     ) -> Result<(), EkfError> {
-        let n = self.x.len();
-        let f = process.f(t, &self.x);
-        check("f", &DMatrix::from_column_slice(f.len(), 1, f.as_slice()), (n, 1))?;
-        check("F", &process.jacobian(t, &self.x), (n, n))?;
-        check_symmetric("Q", &process.noise(t), n)?;
-        let next = runge_kutta(process, t, &self.x, dt, substeps);
-        check("x", &DMatrix::from_column_slice(n, 1, next.x.as_slice()), (n, 1))?;
-        self.covariance.propagate(&Transition::new(&next.phi)?, &ProcessNoise::new(&next.q)?);
-        self.x = next.x;
-        Ok(())
-    }
-
-    /// The update by the measurement `z` (shape m) at `t`. Correlated noise is decorrelated first; then the
-    /// components are processed one by one, which is the same for a linearised model.
-    ///
-    /// # Errors
-    /// [`EkfError`] for a wrong shape, a number that is not finite, or an R that is not positive definite.
-    pub fn update(&mut self, m: &impl Measurement, t: f64, z: &DVector<f64>) -> Result<Innovation, EkfError> {
-        let (n, outputs) = (self.x.len(), m.outputs());
-        let (jacobian, r) = (m.jacobian(t, &self.x), m.noise(t));
-        let column = |v: &DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
-        let predicted = m.h(t, &self.x);
-        check("z", &column(z), (outputs, 1))?;
-        check("h", &column(&predicted), (outputs, 1))?;
-        check("H", &jacobian, (outputs, n))?;
-        let (root, variances) = decorrelation(&r, outputs)?;
-        let (h, residual) = match &root {
-            None => (jacobian, z - predicted),
-            Some(l) => {
-                let solve = |m: &DMatrix<f64>| l.solve_lower_triangular(m).unwrap_or_else(|| m.clone());
-                let residual = solve(&column(&(z - predicted)));
-                (solve(&jacobian), DVector::from_column_slice(residual.as_slice()))
-            }
-        };
-        let before = self.x.clone();
-        let mut gain = Gain { k: vec![0.0; n], s: 0.0 };
-        let mut whitened = Vec::with_capacity(outputs);
-        for (i, &variance) in variances.iter().enumerate() {
-            let row = (0..n).map(|j| (j, h[(i, j)])).filter(|(_, c)| *c != 0.0).collect();
-            let output = ScalarOutput { h: row, r: variance };
-            self.covariance.update(&output, &mut gain);
-            // the residual was taken at the prediction; components already used have moved x
-            let moved = (&self.x - &before).as_slice().to_vec();
-            let innovation = residual[i] - output.predict(&moved);
-            whitened.push(innovation / gain.s.sqrt());
-            for (x, k) in self.x.iter_mut().zip(&gain.k) {
-                *x += k * innovation;
-            }
-        }
-        Ok(Innovation { whitened })
+        let next = runge_kutta(process, t, &self.x, dt, substeps)?;
+        self.jump(next.x, &Transition::new(&next.phi)?, &ProcessNoise::new(&next.q)?)
     }
 }
 
-/// The Cholesky factor that makes the noise independent of unit variance, `None` when it is independent
-/// already; and the variances.
-fn decorrelation(r: &DMatrix<f64>, m: usize) -> Result<(Option<DMatrix<f64>>, Vec<f64>), EkfError> {
-    check_symmetric("R", r, m)?;
-    let diagonal = (0..m).all(|j| (0..m).all(|i| i == j || r[(i, j)] == 0.0));
-    let refuse = |row: usize, pivot: f64| EkfError::NotPositiveDefinite { what: "R", pivot, row };
-    if diagonal {
-        let variances: Vec<f64> = (0..m).map(|i| r[(i, i)]).collect();
-        return match variances.iter().position(|v| !is_positive(*v)) {
-            Some(row) => Err(refuse(row, variances[row])),
-            None => Ok((None, variances)),
-        };
+/// Refuses a state with a number that is none.
+fn check_state<X: Manifold>(what: &'static str, x: &X) -> Result<(), EkfError> {
+    if x.is_finite() { Ok(()) } else { Err(EkfError::StateNotFinite { what }) }
+}
+
+/// The update of `p` by independent rows, one by one; gives the estimate of the error, and tells the whitened innovations.
+fn sequential(
+    p: &mut Covariance,
+    rows: &DMatrix<f64>,
+    residual: &[f64],
+    variances: &[f64],
+    mut seen: impl FnMut(f64),
+) -> Result<Vec<f64>, EkfError> {
+    let n = p.states();
+    let mut delta = vec![0.0; n];
+    let mut gain = Gain { k: vec![0.0; n], s: 0.0 };
+    for (i, (residual, &r)) in residual.iter().zip(variances).enumerate() {
+        let h = (0..n).map(|j| (j, rows[(i, j)])).filter(|(_, c)| *c != 0.0).collect();
+        let output = ScalarOutput { h, r };
+        p.update(&output, &mut gain)?;
+        // the residual is that of the prediction; components already used have moved the error
+        let innovation = residual - output.predict(&delta);
+        seen(innovation / gain.s.sqrt());
+        for (x, k) in delta.iter_mut().zip(&gain.k) {
+            *x += k * innovation;
+        }
     }
-    crate::covariance::ud_factors("R", r, true)?;
-    let root = Cholesky::new(r.clone()).ok_or_else(|| refuse(0, f64::NAN))?;
-    Ok((Some(root.l()), vec![1.0; m]))
+    Ok(delta)
+}
+
+/// What makes the noise of a measurement independent.
+struct Whitener {
+    /// The lower triangular root of R; `None` where the noise is independent already.
+    root: Option<DMatrix<f64>>,
+    /// The variances of the independent components.
+    variances: Vec<f64>,
+}
+
+impl Whitener {
+    /// Of the covariance `r`.
+    ///
+    /// # Errors
+    /// [`EkfError`] unless it is finite, symmetric and positive definite.
+    fn new(r: &DMatrix<f64>) -> Result<Self, EkfError> {
+        let m = r.nrows();
+        check_symmetric("R", r, m)?;
+        let diagonal = (0..m).all(|j| (0..m).all(|i| i == j || r[(i, j)] == 0.0));
+        let refuse = |row: usize, pivot: f64| EkfError::NotPositiveDefinite { what: "R", pivot, row };
+        if diagonal {
+            let variances: Vec<f64> = (0..m).map(|i| r[(i, i)]).collect();
+            return match variances.iter().position(|v| !is_positive(*v)) {
+                Some(row) => Err(refuse(row, variances[row])),
+                None => Ok(Self { root: None, variances }),
+            };
+        }
+        crate::covariance::ud_factors("R", r, true)?;
+        let root = Cholesky::new(r.clone()).ok_or_else(|| refuse(0, f64::NAN))?;
+        Ok(Self { root: Some(root.l()), variances: vec![1.0; m] })
+    }
+
+    /// Rows (m x n) of independent components.
+    fn rows(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let solved = self.root.as_ref().and_then(|l| l.solve_lower_triangular(rows));
+        solved.unwrap_or_else(|| rows.clone())
+    }
+
+    /// The independent components of a residual.
+    fn apply(&self, residual: Vec<f64>) -> Vec<f64> {
+        if self.root.is_none() {
+            return residual;
+        }
+        self.rows(&DMatrix::from_column_slice(residual.len(), 1, &residual)).as_slice().to_vec()
+    }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::{EkfError, check, check_symmetric};
+use crate::error::{EkfError, check, check_column, check_symmetric};
 use crate::model::Process;
 
 /// A state after a step, with its transition matrix and the noise of the step.
@@ -17,8 +17,21 @@ pub struct Propagated {
 }
 
 /// The classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in `substeps` equal parts.
-pub fn runge_kutta(process: &impl Process, t: f64, x: &DVector<f64>, dt: f64, substeps: usize) -> Propagated {
+///
+/// # Errors
+/// [`EkfError`] for a shape that is none of these states, before and after the step for a number that is none.
+pub fn runge_kutta(
+    process: &impl Process,
+    t: f64,
+    x: &DVector<f64>,
+    dt: f64,
+    substeps: usize,
+) -> Result<Propagated, EkfError> {
     let n = process.states();
+    check_column("x", x.as_slice(), n)?;
+    check_column("f", process.f(t, x).as_slice(), n)?;
+    check("F", &process.jacobian(t, x), (n, n))?;
+    check_symmetric("Q", &process.noise(t), n)?;
     let slope = |t: f64, y: &Propagated| {
         let f = process.jacobian(t, &y.x);
         let fq = &f * &y.q;
@@ -41,7 +54,8 @@ pub fn runge_kutta(process: &impl Process, t: f64, x: &DVector<f64>, dt: f64, su
             y = moved(&y, &k, h * weight / 6.0);
         }
     }
-    y
+    check_column("x", y.x.as_slice(), n)?;
+    Ok(y)
 }
 
 /// The exact discretisation of `x' = F x + w` over `dt`: `(Phi, Q_d)` by the exponential of

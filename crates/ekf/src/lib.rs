@@ -2,7 +2,8 @@
 //! knows of exact verdicts, which is why it can confirm or refute them.
 //!
 //! - [`model`]: what a system is to a filter; [`integrate`]: Runge-Kutta and exact discretisation;
-//! - [`filter`]: the extended Kalman filter; [`covariance`]: Joseph's and the UD form;
+//! - [`filter`]: the extended and the iterated Kalman filter; [`manifold`]: states that are no vectors; [`smoother`]: all that
+//!   an interval says of every moment in it; [`covariance`]: Joseph's and the UD form;
 //! - [`linear`]: linear models in stages, whose covariance is computed once for many runs;
 //! - [`information`]: the square root of the information matrix of a batch;
 //! - [`noise`]: random walks and bias instability of sensors; [`allan`]: the Allan deviation;
@@ -17,15 +18,19 @@ pub mod filter;
 pub mod information;
 pub mod integrate;
 pub mod linear;
+pub mod manifold;
 pub mod model;
 pub mod noise;
+pub mod smoother;
 pub mod transition;
 
 pub use covariance::{Covariance, Form, Gain, ProcessNoise, ScalarOutput};
 pub use error::EkfError;
-pub use filter::{Filter, Innovation};
+pub use filter::{Filter, Innovation, Update};
 pub use information::SquareRootInformation;
 pub use linear::{Gains, Stage};
-pub use model::{Measurement, Process};
+pub use manifold::Manifold;
+pub use model::{Measurement, Motion, Process};
 pub use noise::{BiasState, SensorNoise};
+pub use smoother::{Interval, Smoothed};
 pub use transition::Transition;

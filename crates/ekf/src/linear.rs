@@ -1,7 +1,7 @@
 //! Linear time-varying models in stages of equal steps: the covariance does not depend on the data, so its
 //! recursion runs once and serves any number of runs.
 
-use crate::covariance::{Covariance, Gain, ProcessNoise, ScalarOutput};
+use crate::covariance::{Covariance, Gain, ProcessNoise, ScalarOutput, check_step};
 use crate::error::EkfError;
 use crate::transition::Transition;
 
@@ -21,18 +21,8 @@ pub struct Stage {
 impl Stage {
     /// Checks that all its parts are of n states.
     fn check(&self, n: usize) -> Result<(), EkfError> {
-        let refuse = |what, found| Err(EkfError::Shape { what, expected: (n, n), found: (found, found) });
-        if self.transition.states() != n {
-            return refuse("Phi", self.transition.states());
-        }
-        if let Some(state) = self.noise.last_state().filter(|&s| s >= n) {
-            return refuse("Q", state + 1);
-        }
-        let last = self.outputs.iter().flat_map(|o| &o.h).map(|(state, _)| *state).max();
-        match last.filter(|&s| s >= n) {
-            Some(state) => Err(EkfError::Shape { what: "H", expected: (1, n), found: (1, state + 1) }),
-            None => Ok(()),
-        }
+        check_step(n, &self.transition, &self.noise)?;
+        self.outputs.iter().try_for_each(|output| output.check(n))
     }
 }
 
@@ -57,7 +47,8 @@ impl Gains {
 /// from 0.
 ///
 /// # Errors
-/// [`EkfError::Shape`] for a stage that is not one of the states of `p`, before anything is computed.
+/// [`EkfError`] for a stage that is not one of the states of `p`, or an output without noise, before anything is
+/// computed.
 pub fn covariance_pass(
     stages: &[Stage],
     mut p: Covariance,
@@ -72,9 +63,9 @@ pub fn covariance_pass(
     let mut step = 0;
     for stage in stages {
         for _ in 0..stage.steps {
-            p.propagate(&stage.transition, &stage.noise);
+            p.propagate_checked(&stage.transition, &stage.noise);
             for output in &stage.outputs {
-                p.update(output, &mut gain);
+                p.update_checked(output, &mut gain);
                 gains.k.extend_from_slice(&gain.k);
                 gains.inverse_root.push(1.0 / gain.s.sqrt());
             }
@@ -87,13 +78,24 @@ pub fn covariance_pass(
 
 /// The state recursion: `measure` fills in the measurements of a step (its number, the stage, one number per
 /// output), `on_step` sees the estimate and the whitened innovations.
+///
+/// # Errors
+/// [`EkfError::Shape`] unless `stages` and `x` are those of the gains, before anything is computed.
 pub fn state_pass(
     stages: &[Stage],
     gains: &Gains,
     x: &mut [f64],
     mut measure: impl FnMut(usize, usize, &mut [f64]),
     mut on_step: impl FnMut(usize, &[f64], &[f64]),
-) {
+) -> Result<(), EkfError> {
+    let updates = stages.iter().map(|s| s.steps * s.outputs.len()).sum::<usize>();
+    if x.len() != gains.n || updates != gains.updates() {
+        let (expected, found) = ((gains.n, gains.updates()), (x.len(), updates));
+        return Err(EkfError::Shape { what: "states by updates of the run", expected, found });
+    }
+    for stage in stages {
+        stage.check(gains.n)?;
+    }
     let mut scratch = Vec::with_capacity(gains.n);
     let most = stages.iter().map(|s| s.outputs.len()).max().unwrap_or(0);
     let (mut z, mut whitened) = (vec![0.0; most], vec![0.0; most]);
@@ -115,4 +117,5 @@ pub fn state_pass(
             step += 1;
         }
     }
+    Ok(())
 }

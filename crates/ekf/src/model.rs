@@ -1,6 +1,12 @@
 //! What a filter needs to know of a system: `x' = f(t, x) + w`, `z = h(t, x) + v`.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
+
+use crate::covariance::ProcessNoise;
+use crate::error::EkfError;
+use crate::transition::Transition;
 
 /// The dynamics `x' = f(t, x) + w`, w white of spectral density Q. States are in the units of the model,
 /// time in seconds.
@@ -15,14 +21,26 @@ pub trait Process {
     fn noise(&self, t: f64) -> DMatrix<f64>;
 }
 
-/// The observation `z = h(t, x) + v`, `v ~ N(0, R)`.
-pub trait Measurement {
+/// How a state of any kind moves over a step: the discrete form of a [`Process`], and the only one for a state that is no
+/// vector.
+pub trait Motion<X> {
+    /// Takes `x` from `t` to `t + dt`. Says how its local coordinates move (Phi, n x n, from those about the state before to
+    /// those about the state after), and the noise of the step in the latter.
+    ///
+    /// # Errors
+    /// [`EkfError`] when the model gives a number that is none.
+    fn advance(&self, t: f64, dt: f64, x: &mut X) -> Result<(Transition, Cow<'_, ProcessNoise>), EkfError>;
+}
+
+/// The observation `z = h(t, x) + v`, `v ~ N(0, R)`. For a state that is no vector, H is the derivative by its local
+/// coordinates.
+pub trait Measurement<X = DVector<f64>> {
     /// The number m of outputs.
     fn outputs(&self) -> usize;
     /// `h(t, x)` (shape m).
-    fn h(&self, t: f64, x: &DVector<f64>) -> DVector<f64>;
+    fn h(&self, t: f64, x: &X) -> DVector<f64>;
     /// `H = dh/dx` (m x n).
-    fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64>;
+    fn jacobian(&self, t: f64, x: &X) -> DMatrix<f64>;
     /// Covariance R of the noise (m x m), positive definite.
     fn noise(&self, t: f64) -> DMatrix<f64>;
 }

@@ -15,6 +15,11 @@ pub struct Transition {
 }
 
 impl Transition {
+    /// The identity of n states.
+    pub fn identity(n: usize) -> Self {
+        Self { n, active: Vec::new(), rows: Vec::new() }
+    }
+
     /// The transition of `phi`.
     ///
     /// # Errors
@@ -26,6 +31,27 @@ impl Transition {
         let active: Vec<usize> = (0..n).filter(|&i| !is_unit(i)).collect();
         let rows = active.iter().flat_map(|&i| (0..n).map(move |j| phi[(i, j)])).collect();
         Ok(Self { n, active, rows })
+    }
+
+    /// The identity but for the rows `active` (ascending), given one after the other, n numbers each.
+    ///
+    /// # Errors
+    /// [`EkfError`] for rows that are not ascending states of the n, a wrong count of numbers, or one that is not
+    /// finite.
+    pub fn of_rows(n: usize, active: Vec<usize>, rows: Vec<f64>) -> Result<Self, EkfError> {
+        let ascending = active.windows(2).all(|w| w[0] < w[1]);
+        let last = active.last().map_or(0, |i| i + 1);
+        if !ascending || last > n || rows.len() != n * active.len() {
+            let found = (last.max(active.len()), rows.len().checked_div(active.len()).unwrap_or(0));
+            return Err(EkfError::Shape { what: "Phi", expected: (n, n), found });
+        }
+        match rows.iter().position(|x| !x.is_finite()) {
+            Some(k) => {
+                let (row, column) = (active[k / n], k % n);
+                Err(EkfError::NotFinite { what: "Phi", value: rows[k], row, column })
+            }
+            None => Ok(Self { n, active, rows }),
+        }
     }
 
     /// The number of states.
