@@ -34,3 +34,8 @@ pub use model::{Measurement, Motion, Process};
 pub use noise::{BiasState, SensorNoise};
 pub use smoother::{Interval, Smoothed};
 pub use transition::Transition;
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

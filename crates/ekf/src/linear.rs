@@ -1,8 +1,10 @@
 //! Linear time-varying models in stages of equal steps: the covariance does not depend on the data, so its
 //! recursion runs once and serves any number of runs.
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::covariance::{Covariance, Gain, ProcessNoise, ScalarOutput, check_step};
-use crate::error::EkfError;
+use crate::error::{EkfError, check, check_column};
 use crate::transition::Transition;
 
 /// Equal steps: predict, then update by scalar measurements.
@@ -118,4 +120,91 @@ pub fn state_pass(
         }
     }
     Ok(())
+}
+
+/// Both recursions at once, for a single run: `measure` as in [`state_pass`]; `on_step` sees the estimate, its covariance and the
+/// whitened innovations after every step.
+///
+/// # Errors
+/// As [`covariance_pass`], and [`EkfError::Shape`] unless `x` has the states of `p`.
+pub fn filter_pass(
+    stages: &[Stage],
+    mut p: Covariance,
+    x: &mut [f64],
+    mut measure: impl FnMut(usize, usize, &mut [f64]),
+    mut on_step: impl FnMut(usize, &[f64], &Covariance, &[f64]),
+) -> Result<Gains, EkfError> {
+    let n = p.states();
+    check_column("x", x, n)?;
+    for stage in stages {
+        stage.check(n)?;
+    }
+    let mut gains = Gains { n, ..Gains::default() };
+    let mut gain = Gain { k: vec![0.0; n], s: 0.0 };
+    let mut scratch = Vec::with_capacity(n);
+    let most = stages.iter().map(|s| s.outputs.len()).max().unwrap_or(0);
+    let (mut z, mut whitened) = (vec![0.0; most], vec![0.0; most]);
+    let mut step = 0;
+    for (i, stage) in stages.iter().enumerate() {
+        let m = stage.outputs.len();
+        for _ in 0..stage.steps {
+            p.propagate_checked(&stage.transition, &stage.noise);
+            stage.transition.apply(x, &mut scratch);
+            measure(step, i, &mut z[..m]);
+            for (j, output) in stage.outputs.iter().enumerate() {
+                p.update_checked(output, &mut gain);
+                let (innovation, inverse_root) = (z[j] - output.predict(x), 1.0 / gain.s.sqrt());
+                whitened[j] = innovation * inverse_root;
+                x.iter_mut().zip(&gain.k).for_each(|(x, k)| *x += k * innovation);
+                gains.k.extend_from_slice(&gain.k);
+                gains.inverse_root.push(inverse_root);
+            }
+            on_step(step, x, &p, &whitened[..m]);
+            step += 1;
+        }
+    }
+    Ok(gains)
+}
+
+/// The estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times what the
+/// innovations say of the start, summed backwards through the gains (Bryson, Frazier 1963; Bierman 1973,
+/// doi:10.1016/0005-1098(73)90027-2). No covariance is inverted. `whitened` holds the innovations of the run divided
+/// by their standard deviations, in order.
+///
+/// # Errors
+/// [`EkfError::Shape`] unless stages, gains, innovations and `p0` are those of one run.
+pub fn smoothed_start(
+    stages: &[Stage],
+    gains: &Gains,
+    whitened: &[f64],
+    p0: &DMatrix<f64>,
+) -> Result<Vec<f64>, EkfError> {
+    let n = gains.n;
+    check("P0", p0, (n, n))?;
+    check_column("the innovations", whitened, gains.updates())?;
+    let updates = stages.iter().map(|s| s.steps * s.outputs.len()).sum::<usize>();
+    if updates != gains.updates() {
+        let (expected, found) = ((n, gains.updates()), (n, updates));
+        return Err(EkfError::Shape { what: "states by updates of the run", expected, found });
+    }
+    for stage in stages {
+        stage.check(n)?;
+    }
+    let mut lambda = vec![0.0; n];
+    let mut update = updates;
+    let mut scratch = Vec::with_capacity(n);
+    for stage in stages.iter().rev() {
+        for _ in 0..stage.steps {
+            for output in stage.outputs.iter().rev() {
+                update -= 1;
+                // lambda <- (I - k h)^T lambda + h^T e/s
+                let k = &gains.k[update * n..(update + 1) * n];
+                let against: f64 = k.iter().zip(&lambda).map(|(k, l)| k * l).sum();
+                let seen = whitened[update] * gains.inverse_root[update] - against;
+                output.h.iter().for_each(|&(i, c)| lambda[i] += c * seen);
+            }
+            stage.transition.apply_transposed(&mut lambda, &mut scratch);
+        }
+    }
+    Ok((p0 * DVector::from_vec(lambda)).as_slice().to_vec())
 }

@@ -90,6 +90,18 @@ impl Transition {
     }
 }
 
+impl Transition {
+    /// `x <- Phi^T x` (shape n); `scratch` has room for the active rows.
+    pub(crate) fn apply_transposed(&self, x: &mut [f64], scratch: &mut Vec<f64>) {
+        scratch.clear();
+        scratch.extend(self.active.iter().map(|&i| x[i]));
+        self.active.iter().for_each(|&i| x[i] = 0.0);
+        for (row, y) in self.rows.chunks_exact(self.n.max(1)).zip(scratch.iter()) {
+            x.iter_mut().zip(row).for_each(|(x, phi)| *x += phi * y);
+        }
+    }
+}
+
 /// The scalar product, in four partial sums.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (mut s, n) = ([0.0; 4], a.len().min(b.len()));

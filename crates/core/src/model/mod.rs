@@ -29,7 +29,9 @@ pub use dwell::{Dwell, DwellError};
 pub use geometry::{GYROS, Geometry, GeometryError, GyroAxes, SignedAxis, Term, TermError, Unknowns};
 pub use gimbals::{GimbalError, Gimbals};
 pub use per_gyro::{PerGyro, PerGyroError};
-pub use platform::{Block, LOCAL, Platform, Point, RandomValues, Sample, local_dynamics, local_output};
+pub use platform::{
+    Block, DriftTerm, LOCAL, Platform, Point, RandomValues, Sample, local_dynamics, local_output,
+};
 pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
 pub use scheme::{

@@ -25,9 +25,11 @@ pub struct Platform {
 
 /// How one coefficient enters the drift: along the input axis of its gyro, times components of g.
 #[derive(Debug, Clone)]
-struct DriftTerm {
-    input: SignedAxis,
-    factors: Vec<SignedAxis>,
+pub struct DriftTerm {
+    /// The input axis of the gyro.
+    pub input: SignedAxis,
+    /// The components of g that the coefficient multiplies; none for a constant drift.
+    pub factors: Vec<SignedAxis>,
 }
 
 /// The platform at one point: cosines and sines of all angles and the earth rate, in some ring.
@@ -165,6 +167,11 @@ impl Platform {
     /// coefficient; none when the unknowns are the drift itself.
     pub fn drift_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
         drift_block(ring, &self.drift, c)
+    }
+
+    /// How each coefficient enters the drift, in the order of the unknowns; none when the unknowns are the drift itself.
+    pub fn drift_terms(&self) -> &[DriftTerm] {
+        &self.drift
     }
 
     /// The number of coefficients.

@@ -198,19 +198,20 @@ impl<'a> Prepared<'a> {
                             for ((e, a), b) in error.iter_mut().zip(x).zip(true_x) {
                                 *e = a - b;
                             }
-                            totals.nees[next] += self.nees[next].of(&mut error);
+                            totals.nees[next] += self.nees[next].of(&mut error).unwrap_or(f64::NAN);
                         }
                         next = (next + 1).min(self.checkpoints.len() - 1);
                     }
                 },
-            );
+            )
+            .expect("gains and states are those of the filter's stages");
             if let (true, Some((basis, nees))) = (comparable, &self.observable) {
                 let truth = truth.borrow();
                 let true_x = || truth.x().iter().chain(std::iter::repeat(&0.0));
                 let errors = || x.iter().zip(true_x()).map(|(a, b)| a - b);
                 let mut projected: Vec<f64> =
                     basis.column_iter().map(|c| c.iter().zip(errors()).map(|(a, e)| a * e).sum()).collect();
-                totals.nees_observable += nees.of(&mut projected);
+                totals.nees_observable += nees.of(&mut projected).unwrap_or(f64::NAN);
             }
             let outputs = filter.components.len();
             for (lag, sum) in totals.lagged.iter_mut().enumerate() {

@@ -106,8 +106,8 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
         last_covariance(plan, &RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }, Form::Ud)
     };
     let (small, large) = (end(1.0)?, end(10.0)?);
-    let ratio = |c: &Combination| (large.variance(c) / small.variance(c)).sqrt();
-    let ratios = functionals.iter().map(ratio).collect();
+    let ratio = |c: &Combination| Ok((large.variance(c)? / small.variance(c)?).sqrt());
+    let ratios = functionals.iter().map(ratio).collect::<Result<_, obsdeg_ekf::EkfError>>()?;
     let n = plan.unknowns();
     let small = small.matrix();
     let sigma: Vec<f64> = (0..n).map(|i| small[(i, i)].sqrt()).collect();

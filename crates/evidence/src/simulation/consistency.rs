@@ -77,7 +77,7 @@ impl Consistency {
         let samples = run.whitened.len() / run.outputs;
         let count = samples as f64;
         let nis = run.whitened.iter().map(|v| v * v).sum::<f64>() / count;
-        let nees = Nees::of_covariance(run.covariance)?.of(&mut run.error);
+        let nees = Nees::of_covariance(run.covariance)?.of(&mut run.error)?;
         let lags = LAGS.min(samples / 4).max(1);
         let whiteness = (0..run.outputs)
             .map(|j| {

@@ -4,20 +4,26 @@ pub(crate) mod answer;
 pub(crate) mod batch;
 pub(crate) mod conditions;
 pub(crate) mod consistency;
+pub(crate) mod extended;
 pub(crate) mod gyro_noise;
+pub(crate) mod iterated;
 pub(crate) mod plan;
 pub(crate) mod record;
 mod seen;
+pub(crate) mod state;
 pub(crate) mod truth;
 
 pub use answer::*;
 pub use batch::{Batch, batch, diffuse_prior};
 pub use conditions::{Conditions, general_first, latitude_of, resolve, si_per_shown};
 pub use consistency::{Consistency, Doubt};
+pub use extended::{Ended, Extended, PlatformMotion};
 pub use gyro_noise::{Bias, GyroNoise};
+pub use iterated::iterated;
 pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
 pub use record::{Record, RunStart, Series, Traces, run};
 pub use seen::{no_prior, predict, predict_run};
+pub use state::PlatformState;
 pub use truth::{Noise, TruthModel};
 
 use obsdeg_core::degree::Status;

@@ -188,6 +188,11 @@ impl Plan {
         self.unknowns() + self.biases.len()
     }
 
+    /// The number of states that are no psi: coefficients and biases.
+    pub fn constants(&self) -> usize {
+        self.platform.coefficients() + self.biases.len()
+    }
+
     /// The total time in s.
     pub fn duration_s(&self) -> f64 {
         self.segments.last().map_or(0.0, |s| s.start_s + s.dt * s.steps as f64)
@@ -249,17 +254,17 @@ impl Plan {
                 let phi = match conditions.propagation {
                     Propagation::Exponential => self.exponential(block, s.dt)?,
                     Propagation::Rk4 => {
-                        runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi
+                        runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi
                     }
                 };
                 (phi, self.held_noise(block, s.dt, held))
             }
             SegmentKind::Rotation(_) => {
-                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi;
                 (phi, self.held_noise(block, s.dt, held))
             }
             SegmentKind::Slew(_) => {
-                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment)).phi;
+                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi;
                 // the noise of a slew: that of as many steps as it would have
                 let dt = conditions.step_s.min(s.dt);
                 let held = conditions.drift_noise.held_rad_s(dt);

@@ -8,6 +8,7 @@ use obsdeg_ekf::{Covariance, Form};
 use super::SimulationError;
 use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, resolve, shown_unit, si_per_shown};
 use super::plan::Plan;
+use super::state::PlatformState;
 use super::truth::{Noise, TruthModel, check_drifts};
 use crate::prediction::Prediction;
 
@@ -55,8 +56,17 @@ impl RunStart {
     /// # Errors
     /// [`SimulationError::Filter`].
     pub fn covariance(&self, form: Form) -> Result<Covariance, SimulationError> {
-        let variances = DVector::from_iterator(self.sigma.len(), self.sigma.iter().map(|s| s * s));
-        Ok(Covariance::new("P0", &DMatrix::from_diagonal(&variances), form)?)
+        Ok(Covariance::new("P0", &self.variances(), form)?)
+    }
+
+    /// The initial variances (n x n, diagonal).
+    pub(super) fn variances(&self) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&DVector::from_iterator(self.sigma.len(), self.sigma.iter().map(|s| s * s)))
+    }
+
+    /// The initial estimate as the state of a filter that carries attitudes.
+    pub(super) fn state(&self, plan: &Plan) -> PlatformState {
+        PlatformState::of_unknowns(&self.estimate, plan.constants())
     }
 }
 
@@ -161,7 +171,7 @@ pub fn run(
         let own = p.sigmas();
         for (i, s) in series.iter_mut().enumerate() {
             s.sigma.push(match i.checked_sub(n) {
-                Some(c) => p.variance(combinations[c]).max(0.0).sqrt(),
+                Some(c) => p.variance(combinations[c]).map_or(f64::NAN, |v| v.max(0.0).sqrt()),
                 None => own[i],
             });
         }
@@ -207,7 +217,7 @@ pub fn run(
             }
             whitened.extend_from_slice(innovations);
         },
-    );
+    )?;
     for (s, t) in record.traces.series.iter_mut().zip(truths) {
         s.truth.extend(t);
     }

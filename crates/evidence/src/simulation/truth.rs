@@ -11,6 +11,7 @@ use super::SimulationError;
 use super::conditions::Conditions;
 use super::gyro_noise::Gyros;
 use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
+use super::state::orthonormal;
 
 /// The stream of random numbers of one run.
 #[derive(Debug, Clone)]
@@ -32,8 +33,8 @@ impl Noise {
 
 /// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at
 /// most.
-fn drift_turn(drifts: f64, dt: f64) -> f64 {
-    (drifts + W_IE) * dt
+pub(super) fn drift_turn(drifts: f64, dt: f64) -> f64 {
+    (drifts + W_IE) * dt.abs()
 }
 
 /// Refuses an exact truth whose drifts take too many integration steps: `drifts` bounds the sum of the coefficients, in
@@ -221,12 +222,7 @@ impl<'a> TruthModel<'a> {
         let next: Matrix3<f64> = std::array::from_fn(|i| {
             std::array::from_fn(|j| e[i][j] + h / 6.0 * (k1[i][j] + 2.0 * (k2[i][j] + k3[i][j]) + k4[i][j]))
         });
-        // back onto the rotations: E (3 - E^T E)/2
-        let square = times(&transpose(&next), &next);
-        let correction: Matrix3<f64> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| 1.5 * f64::from(u8::from(i == j)) - 0.5 * square[i][j])
-        });
-        times(&next, &correction)
+        orthonormal(&next)
     }
 
     /// `eps^n = C_p^n E(g^p) D` at the true attitude.

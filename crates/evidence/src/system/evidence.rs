@@ -107,7 +107,11 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
         let (process, measurement) = (numeric.process(segment), numeric.measurement(segment, &setup.sigmas));
         for k in 0..SAMPLES {
             let t = begin + k as f64 * dt;
-            let next = runge_kutta(&process, t, &x, dt, SUBSTEPS);
+            let next = runge_kutta(&process, t, &x, dt, SUBSTEPS).map_err(|error| RunError::Filter {
+                time: t,
+                duration: horizon,
+                error,
+            })?;
             (x, phi) = (next.x, next.phi * phi);
             let h = measurement.jacobian(t + dt, &x) * &phi;
             for (i, sigma) in setup.sigmas.iter().enumerate() {

@@ -225,7 +225,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         let measurement = numeric.measurement(segment, &sigmas);
         for k in 0..samples as usize {
             let t = begin + k as f64 * dt;
-            truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).x;
+            truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?.x;
             filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
             let mut z = measurement.h(t + dt, &truth);
             for (z, sigma) in z.iter_mut().zip(&sigmas) {

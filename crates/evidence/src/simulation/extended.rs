@@ -1,0 +1,487 @@
+//! The extended filter of a platform: its state is the attitude itself, its dynamics those of direction cosines, and its
+//! Jacobians are taken at the estimate. Nothing here is the linear model (6), (8): equations are written anew.
+//!
+//! `E = C_p^n C_n^c = exp([psi^n x])` obeys `E' = [(E omega - omega + eps^n) x] E`, with `eps^n = C_p^n eps^p(g^p)` and
+//! `g^p = C_n^p g^n`, and the output is `Z^n = g^n - E^T g^n`. The error is `delta` with `E_true = exp([delta x]) E`, so
+//!
+//! ```text
+//! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD        Gamma = d eps^p / d g^p,  N D = eps^n
+//! dZ^n   = -E^T [g^n x] delta
+//! ```
+//!
+//! which at `E = 1`, `D = 0` is the linear model (`[g^n x] delta` is what g gains in platform axes that turn by `delta`).
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::slew::{apply, cross, rotation_vector, times, transpose};
+use obsdeg_core::model::{Carry, DriftTerm, Matrix3, SignedAxis};
+use obsdeg_ekf::{
+    Covariance, EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Transition, Update,
+};
+
+use super::SimulationError;
+use super::conditions::Conditions;
+use super::gyro_noise::Bias;
+use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
+use super::record::RunStart;
+use super::state::{PlatformState, inverse_left_jacobian, orthonormal};
+use super::truth::drift_turn;
+
+/// The drift in platform axes, with its derivatives.
+struct Drift {
+    /// `eps^p` in rad/s.
+    eps: [f64; 3],
+    /// `Gamma = d eps^p / d g^p`.
+    by_g: Matrix3<f64>,
+}
+
+/// Of the constants `d` where gravity is `g` (platform axes, in g), each times its weight; `by_d` becomes what each adds to
+/// its platform axis per unit: `(axis, value)`.
+fn drift(
+    terms: &[DriftTerm],
+    weights: &[f64],
+    d: &[f64],
+    g: &[f64; 3],
+    by_d: &mut Vec<(usize, f64)>,
+) -> Drift {
+    let mut out = Drift { eps: [0.0; 3], by_g: [[0.0; 3]; 3] };
+    by_d.clear();
+    let sign = |negative: bool| if negative { -1.0 } else { 1.0 };
+    for ((term, weight), d) in terms.iter().zip(weights).zip(d) {
+        let (axis, along) = (term.input.axis, weight * sign(term.input.negative));
+        let factor = |a: &SignedAxis| sign(a.negative) * g[a.axis];
+        let excitation = along * term.factors.iter().map(factor).product::<f64>();
+        by_d.push((axis, excitation));
+        out.eps[axis] += excitation * d;
+        for (k, one) in term.factors.iter().enumerate() {
+            let others = term.factors.iter().enumerate().filter(|(j, _)| *j != k);
+            let others: f64 = others.map(|(_, a)| factor(a)).product();
+            out.by_g[axis][one.axis] += along * sign(one.negative) * others * d;
+        }
+    }
+    out
+}
+
+/// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at the start.
+#[derive(Clone)]
+struct Moving {
+    e: Matrix3<f64>,
+    rows: Vec<f64>,
+}
+
+/// One step of a segment as the extended filter sees it.
+pub struct PlatformMotion<'a> {
+    plan: &'a Plan,
+    conditions: &'a Conditions,
+    /// How the constants of the state enter the drift.
+    terms: &'a [DriftTerm],
+    segment: usize,
+    /// `psi^n` of psi in the axes of the unknowns.
+    to_n: &'a Matrix3<f64>,
+    /// The psi that moves.
+    block: usize,
+}
+
+impl PlatformMotion<'_> {
+    /// What is left of each constant, on average over a step of `dt`: all of a coefficient, less of a bias that fades.
+    fn weights(&self, dt: f64) -> Vec<f64> {
+        let mean = |x: f64| if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x };
+        let fading = self.plan.biases.iter().map(|b| mean(b.process.decay * dt));
+        vec![1.0; self.plan.platform.coefficients()].into_iter().chain(fading).collect()
+    }
+
+    /// The slope of `moving` at `t` of the segment.
+    fn slope(
+        &self,
+        t: f64,
+        moving: &Moving,
+        [d, weights]: [&[f64]; 2],
+        by_d: &mut Vec<(usize, f64)>,
+    ) -> Moving {
+        let (e, earth) = (&moving.e, self.plan.earth_rate());
+        let c = times(e, &self.plan.attitude(self.segment, t));
+        let back = transpose(&c);
+        let drift = drift(self.terms, weights, d, &apply(&back, &G_N), by_d);
+        let (turned, eps) = (apply(e, &earth), apply(&c, &drift.eps));
+        let rate: [f64; 3] = std::array::from_fn(|i| turned[i] - earth[i] + eps[i]);
+        // -omega x + C Gamma C^T [g x]
+        let (omega, tilted) = (cross(&earth), times(&times(&c, &times(&drift.by_g, &back)), &cross(&G_N)));
+        let a: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| tilted[i][j] - omega[i][j]));
+        let width = 3 + d.len();
+        let mut rows = vec![0.0; 3 * width];
+        for i in 0..3 {
+            let row = &mut rows[i * width..(i + 1) * width];
+            for (j, k) in a[i].iter().enumerate() {
+                let from = &moving.rows[j * width..(j + 1) * width];
+                row.iter_mut().zip(from).for_each(|(x, y)| *x += k * y);
+            }
+            for (x, &(axis, value)) in row[3..].iter_mut().zip(by_d.iter()) {
+                *x += c[i][axis] * value;
+            }
+        }
+        Moving { e: times(&cross(&rate), e), rows }
+    }
+}
+
+impl Motion<PlatformState> for PlatformMotion<'_> {
+    fn advance(
+        &self,
+        t: f64,
+        dt: f64,
+        x: &mut PlatformState,
+    ) -> Result<(Transition, Cow<'_, ProcessNoise>), EkfError> {
+        let (p, d) = (self.to_n, &x.constants[..]);
+        let weights = self.weights(dt);
+        let back = transpose(p);
+        let width = 3 + d.len();
+        let mut now =
+            Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows: vec![0.0; 3 * width] };
+        (0..3).for_each(|i| now.rows[i * width + i] = 1.0);
+        let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
+        let turn = drift_turn(d.iter().map(|d| d.abs()).sum::<f64>() + kick, dt);
+        let substeps =
+            self.plan.substeps(self.segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
+        let h = dt / substeps as f64;
+        let mut by_d = Vec::with_capacity(d.len());
+        let moved = |y: &Moving, k: &Moving, h: f64| {
+            let mut out = y.clone();
+            out.e.iter_mut().flatten().zip(k.e.iter().flatten()).for_each(|(x, k)| *x += h * k);
+            out.rows.iter_mut().zip(&k.rows).for_each(|(x, k)| *x += h * k);
+            out
+        };
+        for i in 0..substeps {
+            let t = t + i as f64 * h;
+            let mut slope = |t: f64, y: &Moving| self.slope(t, y, [d, &weights], &mut by_d);
+            let k1 = slope(t, &now);
+            let k2 = slope(t + h / 2.0, &moved(&now, &k1, h / 2.0));
+            let k3 = slope(t + h / 2.0, &moved(&now, &k2, h / 2.0));
+            let k4 = slope(t + h, &moved(&now, &k3, h));
+            for (k, weight) in [(k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)] {
+                now = moved(&now, &k, h * weight / 6.0);
+            }
+            now.e = orthonormal(&now.e);
+        }
+        x.attitudes[self.block] = times(&back, &times(&now.e, p));
+        // into the axes of the unknowns
+        let (n, first) = (x.dimension(), 3 * x.attitudes.len());
+        let mut rows = vec![0.0; 3 * n];
+        for (i, row) in rows.chunks_exact_mut(n).enumerate() {
+            let entry = |k: usize| (0..3).map(|r| back[i][r] * now.rows[r * width + k]).sum::<f64>();
+            let local: [f64; 3] = std::array::from_fn(entry);
+            for j in 0..3 {
+                row[3 * self.block + j] = (0..3).map(|r| local[r] * p[r][j]).sum();
+            }
+            (0..x.constants.len()).for_each(|k| row[first + k] = entry(3 + k));
+        }
+        let mut active: Vec<usize> = (3 * self.block..3 * self.block + 3).collect();
+        // biases fade
+        let behind = n - self.plan.biases.len();
+        for (k, bias) in self.plan.biases.iter().enumerate().filter(|(_, b)| b.process.decay > 0.0) {
+            let left = (-bias.process.decay * dt).exp();
+            x.constants[behind - first + k] *= left;
+            active.push(behind + k);
+            rows.resize(rows.len() + n, 0.0);
+            if let Some(row) = rows.chunks_exact_mut(n).last() {
+                row[behind + k] = left;
+            }
+        }
+        let noise = Cow::Borrowed(&self.plan.stages[self.segment].noise);
+        Ok((Transition::of_rows(n, active, rows)?, noise))
+    }
+}
+
+impl Measurement<PlatformState> for PlatformMotion<'_> {
+    fn outputs(&self) -> usize {
+        self.plan.components.len()
+    }
+
+    fn h(&self, _: f64, x: &PlatformState) -> DVector<f64> {
+        let e = times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)));
+        let seen = apply(&transpose(&e), &G_N);
+        let component = |&c: &usize| if c == 2 { rotation_vector(&e)[1] } else { G_N[c - 1] - seen[c - 1] };
+        DVector::from_iterator(self.outputs(), self.plan.components.iter().map(component))
+    }
+
+    fn jacobian(&self, _: f64, x: &PlatformState) -> DMatrix<f64> {
+        let e = times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)));
+        let horizontal = times(&transpose(&e), &cross(&G_N));
+        let mut out = DMatrix::zeros(self.outputs(), x.dimension());
+        for (i, &c) in self.plan.components.iter().enumerate() {
+            let row = if c == 2 {
+                inverse_left_jacobian(&rotation_vector(&e))[1]
+            } else {
+                horizontal[c - 1].map(|x| -x)
+            };
+            for j in 0..3 {
+                out[(i, 3 * self.block + j)] = (0..3).map(|r| row[r] * self.to_n[r][j]).sum();
+            }
+        }
+        out
+    }
+
+    fn noise(&self, _: f64) -> DMatrix<f64> {
+        let sigma = self.plan.components.iter().map(|&c| Plan::output_sigma(c, self.conditions));
+        DMatrix::from_diagonal(&DVector::from_iterator(self.outputs(), sigma.map(|s| s * s)))
+    }
+}
+
+/// The extended filter of a plan, ready to be run.
+pub struct Extended<'a> {
+    plan: &'a Plan,
+    conditions: &'a Conditions,
+    /// Of every position: `psi^n` of psi in the axes of the unknowns, and which psi it is.
+    carried: Vec<(Matrix3<f64>, usize)>,
+    /// How the constants of the state enter the drift: coefficients, then biases of the gyros.
+    terms: Vec<DriftTerm>,
+    update: Update,
+}
+
+/// What a filter says after its last step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ended {
+    /// The estimate.
+    pub x: PlatformState,
+    /// The covariance of its local coordinates.
+    pub covariance: Covariance,
+    /// Linearisations of the whole run: 1 of a filter that goes through it once.
+    pub passes: usize,
+    /// Whether they settled.
+    pub converged: bool,
+}
+
+impl<'a> Extended<'a> {
+    /// The filter of `plan`; `update` says how often a single update is iterated.
+    ///
+    /// # Errors
+    /// [`SimulationError::ExactDrift`] unless the unknowns are coefficients.
+    pub fn new(plan: &'a Plan, conditions: &'a Conditions, update: Update) -> Result<Self, SimulationError> {
+        if !plan.has_coefficients() {
+            return Err(SimulationError::ExactDrift);
+        }
+        let mut carried: Vec<(Matrix3<f64>, usize)> = Vec::with_capacity(plan.attitudes.len());
+        for (i, c) in plan.attitudes.iter().enumerate() {
+            carried.push(match (carried.last(), plan.platform.scheme().carry) {
+                // psi^c goes on
+                (Some((before, _)), Carry::Platform) => {
+                    (times(c, &times(&transpose(&plan.ends[i - 1]), before)), 0)
+                }
+                // psi^n goes on
+                (Some((before, _)), Carry::Inertial) => (*before, 0),
+                (None, _) | (_, Carry::Reset) => (*c, i),
+            });
+        }
+        let gyros = plan.platform.scheme().geometry.gyros();
+        let bias = |b: &Bias| DriftTerm { input: gyros[b.gyro].I, factors: Vec::new() };
+        let terms = plan.platform.drift_terms().iter().cloned().chain(plan.biases.iter().map(bias)).collect();
+        Ok(Self { plan, conditions, carried, terms, update })
+    }
+
+    /// The motion of a segment.
+    pub(super) fn motion(&self, segment: usize) -> PlatformMotion<'_> {
+        let (to_n, block) = &self.carried[self.plan.segments[segment].position];
+        PlatformMotion {
+            plan: self.plan,
+            conditions: self.conditions,
+            terms: &self.terms,
+            segment,
+            to_n,
+            block: *block,
+        }
+    }
+
+    /// The plan.
+    pub(super) fn plan(&self) -> &'a Plan {
+        self.plan
+    }
+
+    /// Runs it from `start` over the measurements `z`: of every step as many as there are outputs, those of slews unused.
+    /// `on_step` sees the number of every step, the estimate, the covariance of its local coordinates and the whitened
+    /// innovations.
+    ///
+    /// # Errors
+    /// [`EkfError`] when a number is none, or `z` is of another run.
+    pub fn run(
+        &self,
+        start: &RunStart,
+        z: &[f64],
+        mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
+    ) -> Result<Ended, EkfError> {
+        let plan = self.plan;
+        let outputs = plan.components.len();
+        check_measurements(plan, z)?;
+        let mut filter = Filter::new(start.state(plan), &start.variances(), Form::Ud)?;
+        let mut there = Vec::with_capacity(outputs);
+        let mut step = 0;
+        for (segment, s) in plan.segments.iter().enumerate() {
+            let motion = self.motion(segment);
+            for i in 0..s.steps {
+                filter.advance(&motion, i as f64 * s.dt, s.dt)?;
+                let mut whitened = Vec::new();
+                if !plan.stages[segment].outputs.is_empty() {
+                    there.clear();
+                    there.extend(z[step * outputs..(step + 1) * outputs].iter().copied().map(Some));
+                    let t = s.start_s + s.dt * (i + 1) as f64;
+                    whitened = filter.update_with(&motion, t, &there, &self.update)?.whitened;
+                }
+                on_step(step, filter.x(), filter.covariance(), &whitened);
+                step += 1;
+            }
+        }
+        let (x, covariance) = (filter.x().clone(), filter.covariance().clone());
+        Ok(Ended { x, covariance, passes: 1, converged: true })
+    }
+}
+
+/// Refuses measurements that are not those of the steps of `plan`.
+pub(super) fn check_measurements(plan: &Plan, z: &[f64]) -> Result<(), EkfError> {
+    let (steps, outputs) = (plan.segments.iter().map(|s| s.steps).sum::<usize>(), plan.components.len());
+    if z.len() == steps * outputs {
+        return Ok(());
+    }
+    Err(EkfError::Shape {
+        what: "z",
+        expected: (steps, outputs),
+        found: (z.len().div_ceil(outputs), outputs),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_core::model::settings::{DriftNoise, Truth};
+    use obsdeg_core::model::{Rotation, Scheme, parse_attitude};
+    use obsdeg_ekf::Manifold;
+    use obsdeg_exact::SplitMix64;
+
+    use super::*;
+    use crate::simulation::truth::{Noise, TruthModel};
+
+    /// Three positions, the middle one turning, with terms of every order; slews where `slew` says so.
+    fn plan(carry: Carry, slew: Option<f64>, azimuth: bool) -> (Plan, Conditions) {
+        let attitudes =
+            ["10,25,40", "130,-50,70", "-95,33,-160"].map(|a| parse_attitude(a).expect("an attitude"));
+        let mut scheme = Scheme { carry, measured_azimuth: azimuth, ..Scheme::of_angles(attitudes) };
+        scheme.unknowns = "F,I,O,S,II,SS,IO".parse().expect("terms");
+        scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
+        let conditions = Conditions {
+            truth: Truth::Exact,
+            slew_rate_deg_s: slew,
+            dwell_s: 300.0,
+            step_s: 60.0,
+            drift_noise: DriftNoise::OneStep(0.0),
+            accelerometer_noise_g: 1e-15,
+            azimuth_noise_deg: 1e-12,
+            ..Conditions::default()
+        };
+        (Plan::new(&scheme, &conditions).expect("a plan"), conditions)
+    }
+
+    const CASES: [(Carry, Option<f64>, bool); 5] = [
+        (Carry::Platform, None, false),
+        (Carry::Inertial, None, true),
+        (Carry::Reset, None, false),
+        (Carry::Inertial, Some(1.0), false),
+        (Carry::Inertial, Some(0.3), true),
+    ];
+
+    fn random(plan: &Plan, rng: &mut SplitMix64, psi: f64, drift: f64) -> Vec<f64> {
+        let mut next = |scale: f64| scale * (2.0 * (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 1.0);
+        plan.platform.units().iter().map(|u| next(if *u == "rad" { psi } else { drift })).collect()
+    }
+
+    /// Phi and H are the derivatives of motion and output, far from zero, at every kind of segment.
+    #[test]
+    fn jacobians_are_derivatives() {
+        let mut rng = SplitMix64::new(3);
+        for (carry, slew, azimuth) in CASES {
+            let (plan, conditions) = plan(carry, slew, azimuth);
+            let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+            let n = plan.states();
+            for segment in 0..plan.segments.len() {
+                let motion = filter.motion(segment);
+                let x = PlatformState::of_unknowns(&random(&plan, &mut rng, 0.3, 1e-4), plan.constants());
+                let dt = plan.segments[segment].dt;
+                let moved = |x: &PlatformState| {
+                    let mut y = x.clone();
+                    let phi = motion.advance(0.0, dt, &mut y).expect("finite").0;
+                    (y, phi)
+                };
+                let (end, phi) = moved(&x);
+                let (phi, h) = (phi.matrix(), Measurement::jacobian(&motion, 0.0, &end));
+                for j in 0..n {
+                    let size = if plan.platform.units()[j] == "rad" { 1e-5 } else { 1e-8 };
+                    let at = |from: &PlatformState, sign: f64| {
+                        let mut delta = vec![0.0; n];
+                        delta[j] = sign * size;
+                        let mut y = from.clone();
+                        y.retract(&delta);
+                        y
+                    };
+                    let ends = [1.0, -1.0].map(|s| DVector::from_vec(moved(&at(&x, s)).0.local(&end)));
+                    let found = (&ends[0] - &ends[1]) / (2.0 * size);
+                    let scale = phi.column(j).amax().max(1.0);
+                    assert!((found - phi.column(j)).amax() < 1e-7 * scale, "{carry} {segment}: Phi, {j}");
+                    let seen = [1.0, -1.0].map(|s| motion.h(0.0, &at(&end, s)));
+                    let found = (&seen[0] - &seen[1]) / (2.0 * size);
+                    assert!((found - h.column(j)).amax() < 1e-8, "{carry} {segment}: H, {j}");
+                }
+            }
+        }
+    }
+
+    /// At zero the Jacobians are those of the linear model of the verdicts, which shares no line with them: (1)-(6) and the
+    /// carries a second time.
+    #[test]
+    fn at_zero_it_is_the_linear_model() {
+        for (carry, slew, azimuth) in CASES {
+            let (plan, conditions) = plan(carry, slew, azimuth);
+            let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+            let n = plan.states();
+            let zero = PlatformState::of_unknowns(&vec![0.0; n], plan.constants());
+            for (segment, stage) in
+                plan.segments.iter().zip(&plan.stages).enumerate().map(|(i, (_, s))| (i, s))
+            {
+                let motion = filter.motion(segment);
+                let phi =
+                    motion.advance(0.0, plan.segments[segment].dt, &mut zero.clone()).expect("finite").0;
+                let difference = phi.matrix() - stage.transition.matrix();
+                assert!(difference.amax() < 1e-9, "{carry} {segment}: {:e}", difference.amax());
+                let h = Measurement::jacobian(&motion, 0.0, &zero);
+                for (i, output) in stage.outputs.iter().enumerate() {
+                    let mut row = DVector::zeros(n);
+                    output.h.iter().for_each(|&(j, c)| row[j] += c);
+                    assert!((row - h.row(i).transpose()).amax() < 1e-14, "{carry} {segment}: output {i}");
+                }
+            }
+        }
+    }
+
+    /// Its motion and output are those of the exact truth, step by step, for large drifts.
+    #[test]
+    fn it_goes_with_the_exact_truth() {
+        let mut rng = SplitMix64::new(5);
+        for (carry, slew, azimuth) in CASES {
+            let (plan, conditions) = plan(carry, slew, azimuth);
+            let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+            let start = random(&plan, &mut rng, 0.02, 6e-5);
+            let mut truth = TruthModel::new(&plan, &conditions, start.clone());
+            let mut x = PlatformState::of_unknowns(&start, plan.constants());
+            let mut noise = Noise::new(1, 0);
+            for (segment, s) in plan.segments.iter().enumerate() {
+                let motion = filter.motion(segment);
+                for i in 0..s.steps {
+                    let mut z = vec![0.0; plan.stages[segment].outputs.len()];
+                    truth.step(segment, i, &mut noise, &mut z);
+                    motion.advance(i as f64 * s.dt, s.dt, &mut x).expect("finite");
+                    let far =
+                        x.unknowns().iter().zip(truth.x()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(far < 1e-11, "{carry} {segment}: {far:e}");
+                    for (z, h) in z.iter().zip(motion.h(0.0, &x).iter()) {
+                        assert!((z - h).abs() < 1e-11, "{carry} {segment}: {z} {h}");
+                    }
+                }
+            }
+            assert!(truth.largest_psi > 0.03, "something moved");
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! The filter that is linearised again along the whole run: Gauss and Newton for its most probable start.
+//!
+//! A filter that goes through a run once linearises every step where the estimate was then, before the drifts were known;
+//! later steps cannot mend that, and iterating single updates cannot either, since it is the motion between them that is
+//! bent. So the run is linearised along one trajectory of the nonlinear equations, filtered with its process noise as a
+//! linear model, and what all measurements say of its start (`linear::smoothed_start`) moves the trajectory, until the
+//! estimate at the end stays (Bell 1994, doi:10.1137/0804035).
+
+use obsdeg_ekf::consistency::Nees;
+use obsdeg_ekf::linear::{filter_pass, smoothed_start};
+use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Measurement, Motion, ScalarOutput, Stage};
+
+use super::extended::{Ended, Extended, check_measurements};
+use super::record::RunStart;
+use super::state::PlatformState;
+
+/// Most linearisations of the run.
+const PASSES: usize = 40;
+/// The run has settled when the estimate at its end moves by less than this, in standard deviations of any combination.
+const SETTLED: f64 = 0.01;
+/// Halvings of a step that leads away.
+const HALVINGS: usize = 12;
+/// A step leads away when the sum of the squared innovations grows by more than this part of it, and this.
+const AWAY: (f64, f64) = (0.02, 10.0);
+
+/// A run linearised along one trajectory.
+struct Along {
+    /// One per step.
+    stages: Vec<Stage>,
+    /// The outputs of the trajectory, as many per step as there are.
+    outputs: Vec<f64>,
+    /// Its states after the steps.
+    states: Vec<PlatformState>,
+}
+
+impl Along {
+    /// Along the trajectory that starts from `x`.
+    fn new(filter: &Extended<'_>, mut x: PlatformState) -> Result<Self, EkfError> {
+        let plan = filter.plan();
+        let mut out = Self { stages: Vec::new(), outputs: Vec::new(), states: Vec::new() };
+        for (segment, s) in plan.segments.iter().enumerate() {
+            let motion = filter.motion(segment);
+            for i in 0..s.steps {
+                let (transition, noise) = motion.advance(i as f64 * s.dt, s.dt, &mut x)?;
+                let rows = Measurement::jacobian(&motion, 0.0, &x);
+                let row = |(j, o): (usize, &ScalarOutput)| ScalarOutput {
+                    h: rows.row(j).iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect(),
+                    r: o.r,
+                };
+                let outputs = plan.stages[segment].outputs.iter().enumerate().map(row).collect();
+                out.stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
+                out.outputs.extend_from_slice(motion.h(0.0, &x).as_slice());
+                out.states.push(x.clone());
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// What a pass over the run made of it.
+struct Pass {
+    ended: (PlatformState, Covariance),
+    /// The correction of the start.
+    correction: Vec<f64>,
+    /// The sum of the squared whitened innovations.
+    misfit: f64,
+}
+
+/// One pass along the trajectory from `x0`.
+fn pass(
+    filter: &Extended<'_>,
+    start: &RunStart,
+    z: &[f64],
+    x0: &PlatformState,
+    mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
+) -> Result<Pass, EkfError> {
+    let outputs = filter.plan().components.len();
+    let along = Along::new(filter, x0.clone())?;
+    let p0 = start.variances();
+    let prior = Covariance::new("P0", &p0, Form::Ud)?;
+    let mut ended = (x0.clone(), prior.clone());
+    let from = start.state(filter.plan()).local(x0);
+    let mut delta = from.clone();
+    let mut whitened = Vec::with_capacity(z.len());
+    let measure = |step: usize, _: usize, out: &mut [f64]| {
+        for (j, x) in out.iter_mut().enumerate() {
+            *x = z[step * outputs + j] - along.outputs[step * outputs + j];
+        }
+    };
+    let gains = filter_pass(&along.stages, prior, &mut delta, measure, |step, delta, p, innovations| {
+        whitened.extend_from_slice(innovations);
+        let mut x = along.states[step].clone();
+        x.retract(delta);
+        on_step(step, &x, p, innovations);
+        if step + 1 == along.states.len() {
+            ended = (x, p.clone());
+        }
+    })?;
+    let mut correction = smoothed_start(&along.stages, &gains, &whitened, &p0)?;
+    correction.iter_mut().zip(&from).for_each(|(c, f)| *c += f);
+    Ok(Pass { ended, correction, misfit: whitened.iter().map(|w| w * w).sum() })
+}
+
+/// Where the trajectory starts that ends at `x`.
+fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, EkfError> {
+    for (segment, s) in filter.plan().segments.iter().enumerate().rev() {
+        let motion = filter.motion(segment);
+        for i in (1..=s.steps).rev() {
+            motion.advance(i as f64 * s.dt, -s.dt, &mut x)?;
+        }
+    }
+    Ok(x)
+}
+
+/// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory that it found,
+/// until that stays.
+///
+/// # Errors
+/// [`EkfError`] when a number is none, or `z` is of another run.
+pub fn iterated(
+    filter: &Extended<'_>,
+    start: &RunStart,
+    z: &[f64],
+    on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
+) -> Result<Ended, EkfError> {
+    check_measurements(filter.plan(), z)?;
+    let once = filter.run(start, z, |_, _, _, _| {})?;
+    let mut x0 = back(filter, once.x)?;
+    let mut best = pass(filter, start, z, &x0, |_, _, _, _| {})?;
+    let (mut passes, mut converged) = (1, false);
+    while passes < PASSES && !converged {
+        let mut step = best.correction.clone();
+        let mut found = None;
+        for _ in 0..=HALVINGS {
+            let mut x = x0.clone();
+            x.retract(&step);
+            passes += 1;
+            // a trajectory far off may end in numbers that are none
+            let next = pass(filter, start, z, &x, |_, _, _, _| {}).ok();
+            found = next.filter(|n| n.misfit <= best.misfit * (1.0 + AWAY.0) + AWAY.1).map(|n| (x, n));
+            if found.is_some() {
+                break;
+            }
+            step.iter_mut().for_each(|s| *s /= 2.0);
+        }
+        let Some((x, next)) = found else { break };
+        let mut moved = next.ended.0.local(&best.ended.0);
+        converged = Nees::of_covariance(&next.ended.1)?.of(&mut moved)? <= SETTLED * SETTLED;
+        (x0, best) = (x, next);
+    }
+    let last = pass(filter, start, z, &x0, on_step)?;
+    let (x, covariance) = last.ended;
+    Ok(Ended { x, covariance, passes, converged })
+}
