@@ -6,7 +6,7 @@ use clap::{Arg, Args};
 use obsdeg_evidence::compare::{Entry, compare};
 
 use crate::arguments::Assumptions;
-use crate::conditions::MeasurementArguments;
+use crate::conditions::{GyroNoiseArguments, MeasurementArguments};
 use crate::failure::Failure;
 use crate::input::Source;
 use crate::interrupt;
@@ -18,7 +18,8 @@ Examples:
   obsdeg compare examples/five-positions/scheme.toml examples/six-positions/scheme.toml
   obsdeg compare a.toml b.toml --carry inertial --requirement D=0.05 --format markdown -o review.md
 
-Requirements are those of a scheme file, [requirements], or --requirement.
+Requirements are those of a scheme file, [requirements], or --requirement. Gyro noise adds the noise floor of every coefficient: predicted
+sigmas are without drift noise.
 Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
@@ -40,6 +41,9 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     measurement: MeasurementArguments,
+
+    #[command(flatten)]
+    gyro_noise: GyroNoiseArguments,
 }
 
 /// What shared options say here.
@@ -61,7 +65,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         let source = Source::read(path, "scheme")?;
         let mut scheme = source.scheme()?;
         a.assumptions.apply(&mut scheme);
-        let conditions = a.measurement.conditions(&scheme);
+        let mut conditions = a.measurement.conditions(&scheme);
+        conditions.apply(&a.gyro_noise.settings());
         entries.push(Entry { name: source.title(), scheme, conditions });
     }
     a.measurement.concern(entries.iter().map(|e| &e.scheme))?;

@@ -77,7 +77,7 @@ pub(crate) struct GyroNoiseArguments {
 }
 
 impl GyroNoiseArguments {
-    fn settings(&self) -> Settings {
+    pub(crate) fn settings(&self) -> Settings {
         Settings {
             angle_random_walk_deg_sqrt_h: self.angle_random_walk,
             rate_random_walk_dph_sqrt_h: self.rate_random_walk,

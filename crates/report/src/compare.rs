@@ -2,6 +2,7 @@
 
 use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity, Worst};
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
 use crate::{Answer, words};
@@ -177,6 +178,29 @@ impl Answer for Comparison {
             [left("condition"), left("scheme"), right("rank with dwell"), left("worst sigma(D)")],
             rows,
         ));
+        let floors = || self.schemes.iter().filter_map(|r| Some((r, r.noise_floor.as_ref()?)));
+        if floors().next().is_some() {
+            let mut columns = vec![left("coefficient"), left("scheme"), left("unit")];
+            columns.extend(words::FLOOR.map(right));
+            let mut names: Vec<&String> = Vec::new();
+            for c in floors().flat_map(|(_, f)| &f.coefficients) {
+                if !names.contains(&&c.name) {
+                    names.push(&c.name);
+                }
+            }
+            let mut rows = Vec::new();
+            for name in names {
+                for (r, f) in floors() {
+                    let of = f.coefficients.iter().filter(|c| c.name == *name);
+                    let lead = |c: &CoefficientFloor| vec![name.clone(), r.name.clone(), c.unit.clone()];
+                    rows.extend(of.map(|c| [lead(c), words::floor(c).into()].concat()));
+                }
+            }
+            blocks.push(Block::table("Noise floor", columns, rows));
+            let own = floors().map(|(r, f)| format!("{}: {}", r.name, words::floor_of(f).join("; ")));
+            let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
+            blocks.push(Block::list("Noise floor: what it is", means.collect()));
+        }
         let missed = |r: &ComparedScheme| format!("{}: {}", r.name, words::requirements(&r.requirements));
         blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
         let mut lines = Vec::new();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::model::settings::{Propagation, Truth};
 use obsdeg_evidence::simulation::{
-    ConditionsReport, Estimate, GyroNoise, Simulation, TimelineReport, Validity,
+    CoefficientFloor, ConditionsReport, Estimate, Simulation, TimelineReport, Validity,
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
@@ -51,7 +51,7 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
     if c.drift_scale != 1.0 {
         out.push(format!("true drifts and their priors times {}", c.drift_scale));
     }
-    out.extend(c.gyro_noise.as_ref().map(gyro_noise));
+    out.extend(c.gyro_noise.as_ref().map(words::gyro_noise));
     out.extend(warning(c));
     out
 }
@@ -68,31 +68,6 @@ fn drift_noise(c: &ConditionsReport) -> String {
         Some(_) => format!("{} held for one step: {}", c.drift_noise, density(c)),
         None => c.drift_noise.clone(),
     }
-}
-
-/// What the datasheet of the gyros adds.
-pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
-    let listed = [
-        (g.angle_random_walk_deg_sqrt_h, "angle random walk", "deg/sqrt(h)"),
-        (g.rate_random_walk_dph_sqrt_h, "rate random walk", "deg/h/sqrt(h)"),
-        (g.bias_instability_dph, "bias instability B", "deg/h"),
-    ];
-    let there = listed.iter().filter(|(x, ..)| !x.is_none());
-    let parts: Vec<String> = there.map(|(x, what, unit)| format!("{what} {x} {unit}")).collect();
-    let markov = if g.bias_instability_dph.is_none() {
-        String::new()
-    } else {
-        format!(
-            " (first-order Gauss-Markov of {} s, sigma 1.076 B: Allan peak 0.664 B)",
-            g.correlation_time_s
-        )
-    };
-    let states = if g.rate_random_walk_dph_sqrt_h.is_none() && g.bias_instability_dph.is_none() {
-        ""
-    } else {
-        "; the biases are states of filter and truth, and D_F is the constant part: the walk counts from the start of the run"
-    };
-    format!("gyros (X, Y, Z where they differ): {}{markov}{states}", parts.join(", "))
 }
 
 /// Says that a bias of one step was given for another step.
@@ -208,6 +183,16 @@ impl Answer for Simulation {
         ));
         blocks.push(Block::list("Consistency", words::consistency(&self.consistency)));
         blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
+        if let Some(f) = &self.noise_floor {
+            let mut columns = vec![left("coefficient"), left("unit")];
+            columns.extend(words::FLOOR.map(right));
+            let row = |c: &CoefficientFloor| {
+                [vec![c.name.clone(), c.unit.clone()], words::floor(c).into()].concat()
+            };
+            blocks.push(Block::table("Noise floor", columns, f.coefficients.iter().map(row)));
+            let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(words::floor_of(f));
+            blocks.push(Block::list("Noise floor: what it is", means.collect()));
+        }
         let mut assumed = conditions(&self.conditions, &self.timeline);
         assumed.push(format!("carry {}; seed {}", self.carry, self.seed));
         assumed.push(format!("required sigma {}", requirements(&self.quantities).join(", ")));

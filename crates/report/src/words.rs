@@ -8,9 +8,11 @@ use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
-use obsdeg_evidence::simulation::{Consistency, Doubt, MeasurementReport, Outcome, SimulationError};
+use obsdeg_evidence::simulation::{
+    CoefficientFloor, Consistency, Doubt, GyroNoise, MeasurementReport, NoiseFloor, Outcome, SimulationError,
+};
 
-use crate::document::number;
+use crate::document::{number, optional};
 
 pub(crate) fn degree(d: Option<usize>) -> String {
     d.map_or_else(|| "-".into(), |k| k.to_string())
@@ -452,6 +454,65 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         ),
         format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
         format!("latitude {} deg{by}", m.latitude_deg),
+    ]
+}
+
+/// What the datasheet of the gyros adds.
+pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
+    let listed = [
+        (g.angle_random_walk_deg_sqrt_h, "angle random walk", "deg/sqrt(h)"),
+        (g.rate_random_walk_dph_sqrt_h, "rate random walk", "deg/h/sqrt(h)"),
+        (g.bias_instability_dph, "bias instability B", "deg/h"),
+    ];
+    let there = listed.iter().filter(|(x, ..)| !x.is_none());
+    let parts: Vec<String> = there.map(|(x, what, unit)| format!("{what} {x} {unit}")).collect();
+    let markov = if g.bias_instability_dph.is_none() {
+        String::new()
+    } else {
+        format!(
+            " (first-order Gauss-Markov of {} s, sigma 1.076 B: Allan peak 0.664 B)",
+            g.correlation_time_s
+        )
+    };
+    let states = if g.rate_random_walk_dph_sqrt_h.is_none() && g.bias_instability_dph.is_none() {
+        ""
+    } else {
+        "; the biases are states of filter and truth, and D_F is the constant part: the walk counts from the start of the run"
+    };
+    format!("gyros (X, Y, Z where they differ): {}{markov}{states}", parts.join(", "))
+}
+
+/// The cells of a noise floor: sigma with the scheme's dwells, the least, and where it is reached.
+pub(crate) const FLOOR: [&str; 3] = ["sigma now", "least sigma", "no better beyond [s]"];
+
+/// Those of one coefficient.
+pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
+    let dwell = match (c.least_sigma, c.dwell_s) {
+        (Some(_), None) => "still falls".into(),
+        (_, dwell) => optional(dwell),
+    };
+    [optional(c.sigma), optional(c.least_sigma), dwell]
+}
+
+/// What a noise floor is.
+pub(crate) const FLOOR_MEANS: [&str; 3] = [
+    "sigma of the filter without a prior, with noise of Z and random drift: now, and the least over all dwells in proportion to these",
+    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the least; still falls: that is beyond a \
+     quarter of the longest",
+    "every coefficient is a constant: D_F is the bias at the start of the run, and the walk of a gyro takes its bias away from there",
+];
+
+/// Of which dwells and of what noise.
+pub(crate) fn floor_of(f: &NoiseFloor) -> [String; 2] {
+    let [low, high] = f.dwells_s.map(number);
+    let drift = if f.drift_noise_deg_sqrt_h > 0.0 {
+        format!("; random drift of {} deg/sqrt(h) besides", number(f.drift_noise_deg_sqrt_h))
+    } else {
+        String::new()
+    };
+    [
+        format!("dwells from {low} to {high} s, mean of the positions"),
+        format!("{}{drift}", gyro_noise(&f.gyro_noise)),
     ]
 }
 

@@ -1,6 +1,7 @@
 //! The filter against a simulated truth: the paper's run, other carries, exact truth, slews.
 
 mod command;
+mod floor;
 mod gyro_noise;
 
 use std::collections::BTreeMap;

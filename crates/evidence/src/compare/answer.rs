@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::requirements::{Claim, Miss, Requirements};
+use crate::simulation::NoiseFloor;
 use crate::simulation::answer::MeasurementReport;
 
 /// Name and version of the JSON layout.
@@ -59,6 +60,9 @@ pub struct ComparedScheme {
     pub drop_one: Vec<DropOne>,
     /// The worst sigma under other conditions.
     pub sensitivity: Vec<Sensitivity>,
+    /// How well coefficients can be known under random drift, however long the dwells; left out where the gyros have no noise of their own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor: Option<NoiseFloor>,
 }
 
 /// A turn to a position.

@@ -18,7 +18,7 @@ use crate::simulation::answer::MeasurementReport;
 use crate::simulation::batch::batch;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::plan::MAX_UNKNOWNS;
-use crate::simulation::{Plan, SimulationError, no_prior, predict};
+use crate::simulation::{Plan, SimulationError, no_prior, noise_floor, predict};
 
 /// Latitudes of the sweep, in degrees.
 const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
@@ -184,6 +184,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         has_accuracy_orders: judged.prediction.has_accuracy_orders,
         quantities,
         worst: judged.worst(),
+        noise_floor: noise_floor(scheme, conditions, &judged.prediction)?,
         drop_one,
         sensitivity: sensitivity(scheme, conditions, &judged.determined(), has_slews, seed)?,
     })

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
+use super::floor::NoiseFloor;
 use super::gyro_noise::GyroNoise;
 use crate::requirements::{Miss, Requirements, meets};
 
@@ -38,6 +39,9 @@ pub struct Simulation {
     pub consistency: Consistency,
     /// Whether the linear model holds for these drifts.
     pub validity: Validity,
+    /// How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor: Option<NoiseFloor>,
     /// Seed of the noise.
     pub seed: u64,
 }

@@ -5,6 +5,7 @@ pub(crate) mod batch;
 pub(crate) mod conditions;
 pub(crate) mod consistency;
 pub(crate) mod extended;
+pub(crate) mod floor;
 pub(crate) mod gyro_noise;
 pub(crate) mod iterated;
 pub(crate) mod plan;
@@ -18,6 +19,7 @@ pub use batch::{Batch, batch, diffuse_prior};
 pub use conditions::{Conditions, general_first, latitude_of, resolve, si_per_shown};
 pub use consistency::{Consistency, Doubt};
 pub use extended::{Ended, Extended, PlatformMotion};
+pub use floor::{CoefficientFloor, NoiseFloor, noise_floor, sigmas_without_prior};
 pub use gyro_noise::{Bias, GyroNoise};
 pub use iterated::iterated;
 pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
@@ -196,6 +198,7 @@ fn summary(
         normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
     })?;
     let validity = validity(plan, conditions, record, &requirements);
+    let noise_floor = noise_floor(scheme, conditions, prediction)?;
     Ok(Simulation {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -215,6 +218,7 @@ fn summary(
         combinations,
         consistency,
         validity,
+        noise_floor,
         seed,
     })
 }

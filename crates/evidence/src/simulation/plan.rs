@@ -170,12 +170,50 @@ impl Plan {
             noise_roots: Vec::new(),
             components,
         };
-        for i in 0..plan.segments.len() {
-            let (stage, root) = plan.stage(i, conditions)?;
-            plan.stages.push(stage);
-            plan.noise_roots.push(root);
-        }
+        plan.model(conditions)?;
         Ok(plan)
+    }
+
+    /// The filter's model of every segment.
+    fn model(&mut self, conditions: &Conditions) -> Result<(), SimulationError> {
+        let models = (0..self.segments.len()).map(|i| self.stage(i, conditions));
+        (self.stages, self.noise_roots) = models.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        Ok(())
+    }
+
+    /// The same with other steps: every segment at a position in parts of so many steps of so many s, as `parts` divides its length.
+    ///
+    /// # Errors
+    /// [`SimulationError`], as [`Self::new`].
+    pub(super) fn in_steps(
+        mut self,
+        conditions: &Conditions,
+        parts: impl Fn(f64) -> Vec<(usize, f64)>,
+    ) -> Result<Self, SimulationError> {
+        let mut segments = Vec::new();
+        for s in &self.segments {
+            if matches!(s.kind, SegmentKind::Slew(_)) {
+                segments.push(s.clone());
+                continue;
+            }
+            let mut t = 0.0;
+            for (steps, dt) in parts(s.steps as f64 * s.dt) {
+                let part = |kind, t: f64, steps| Segment { kind, start_s: s.start_s + t, steps, dt, ..*s };
+                match &s.kind {
+                    // each step has a model of its own
+                    SegmentKind::Rotation(whole) => segments.extend((0..steps).map(|i| {
+                        let t = t + i as f64 * dt;
+                        let slew = Slew { from: whole.at(t), duration_s: dt, ..whole.clone() };
+                        part(SegmentKind::Rotation(slew), t, 1)
+                    })),
+                    kind => segments.push(part(kind.clone(), t, steps)),
+                }
+                t += steps as f64 * dt;
+            }
+        }
+        self.segments = segments;
+        self.model(conditions)?;
+        Ok(self)
     }
 
     /// The number of unknowns.

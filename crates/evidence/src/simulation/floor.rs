@@ -1,0 +1,237 @@
+//! The noise floor: how well a coefficient can be known at all under random drift, and the dwell beyond which longer is no better.
+//!
+//! All dwells of a scheme are multiplied by a factor, from 1/16 to 256 in steps of sqrt 2; for each the covariance of the filter runs once,
+//! with noise of Z, random drift and biases as in a run but without a prior (that is, with one that says nothing). The least sigma of a
+//! coefficient over these dwells is its floor; the dwell beyond which longer is no better is the shortest at which sigma is within 5 % of it. A
+//! coefficient whose sigma gets there only in the last two octaves still falls, and has no floor in this range. Within a long
+//! position samples are taken together, of the same density of noise: twice as many after every 20 steps, from its start and from its end, for it is
+//! there that what a walk forgets is seen.
+//!
+//! # One position in closed form
+//! About an axis that the earth does not turn (psi_x at the equator, X_p to the North) `psi' = D + b + w`, `b' = v`, `z = psi + u`, with
+//! densities `N^2` of w (angle random walk), `K^2` of v (rate random walk) and `R = sigma_Z^2 dt` of u. With an unknown psi(0) and D, and
+//! `b(0) = 0`, D is the rate at the start; by time reversal it is as well known as `D + b` at the end.
+//!
+//! - Exact observations, R = 0: D is seen through `psi'`, with white noise of density N^2. The Riccati equation `p' = K^2 - p^2/N^2` from
+//!   p(0) = infinity has `sigma^2 = K N coth(K T/N)`: the floor is `sqrt(K N)`, and it is within 5 % at `T = 1.530 N/K`, where
+//!   `coth = 1.05^2`.
+//! - No angle random walk, N = 0: with `P = U V^-1` the Riccati equation is `U' = F U + Q V`, `V' = H^T U/R - F^T V`, U(0) = 1, V(0) = 0. In units
+//!   of `1/lambda = (R/K^2)^(1/4)` every entry obeys `y'''' = -y`, so with `a = lambda T/sqrt 2`
+//!   `sigma^2 = K^(3/2) R^(1/4) sqrt 2 (sinh a cosh a + sin a cos a)/(sinh^2 a - sin^2 a)`: `12 R/T^3` for short dwells (order one), and a floor of
+//!   `sqrt 2 K^(3/2) R^(1/4)`.
+//! - No rate random walk, K = 0: `sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau)))` with `tau = sqrt R/N`: `12 R/T^3`, then `N^2/T`, and no floor.
+
+use obsdeg_core::model::Scheme;
+use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_ekf::linear::covariance_pass;
+use obsdeg_ekf::{Form, SquareRootInformation};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::batch::{batch, wider};
+use super::conditions::{Conditions, shown_unit, si_per_shown};
+use super::plan::Plan;
+use super::record::RunStart;
+use super::{GyroNoise, SimulationError};
+use crate::prediction::Prediction;
+
+/// Factors on the dwells as powers of sqrt 2.
+const FACTORS: std::ops::RangeInclusive<i32> = -8..=16;
+/// Steps of one length.
+const STEPS: usize = 20;
+/// How many times wider a prior that says nothing is than what is said of the best known unknown.
+const WIDTH: f64 = 1e10;
+/// How far above the floor sigma counts as there.
+const WITHIN: f64 = 1.05;
+/// What gets there later than this part of the longest dwell still falls.
+const SETTLED: f64 = 0.25;
+
+/// How well coefficients can be known under random drift, however long the dwells.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct NoiseFloor {
+    /// Density of the random drift besides what the gyros have, in deg/sqrt(h).
+    pub drift_noise_deg_sqrt_h: f64,
+    /// The gyros.
+    pub gyro_noise: GyroNoise,
+    /// The shortest and the longest dwell looked at, in s: the mean of the positions, all in proportion.
+    pub dwells_s: [f64; 2],
+    /// Per coefficient.
+    pub coefficients: Vec<CoefficientFloor>,
+}
+
+/// The floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of the run.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CoefficientFloor {
+    /// Its name.
+    pub name: String,
+    /// The unit of its sigmas.
+    pub unit: String,
+    /// Sigma with the dwells of the scheme, without prior; null when samples do not determine it.
+    pub sigma: Option<f64>,
+    /// The least sigma over all dwells looked at; null when samples do not determine it.
+    pub least_sigma: Option<f64>,
+    /// The shortest dwell (mean of the positions) in s at which sigma is within 5 % of the least; null where it still falls at the longest.
+    pub dwell_s: Option<f64>,
+}
+
+/// The noise floor of a scheme, if its gyros have noise of their own.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn noise_floor(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    prediction: &Prediction,
+) -> Result<Option<NoiseFloor>, SimulationError> {
+    if conditions.gyro_noise.is_none() {
+        return Ok(None);
+    }
+    let factors: Vec<f64> = FACTORS.map(|k| 2f64.powf(f64::from(k) / 2.0)).collect();
+    let curves: Vec<Vec<f64>> =
+        factors.par_iter().map(|&f| sigmas_without_prior(scheme, conditions, f)).collect::<Result<_, _>>()?;
+    let plan = Plan::new(scheme, conditions)?;
+    let mean = mean_dwell(scheme, conditions);
+    let (names, units) = (plan.platform.names(), plan.platform.units());
+    let of = |c: usize| {
+        let scale = si_per_shown(units[c]);
+        let curve: Vec<(f64, f64)> =
+            factors.iter().zip(&curves).map(|(f, s)| (f * mean, s[c] / scale)).collect();
+        let found = prediction.unknowns[c].determined.then(|| least(&curve));
+        CoefficientFloor {
+            name: names[c].clone(),
+            unit: shown_unit(units[c]).into(),
+            sigma: found.and_then(|_| curve.iter().find(|(t, _)| *t == mean).map(|p| p.1)),
+            least_sigma: found.map(|f| f.0),
+            dwell_s: found.and_then(|f| f.1),
+        }
+    };
+    Ok(Some(NoiseFloor {
+        drift_noise_deg_sqrt_h: conditions.drift_noise.density_deg_sqrt_h(conditions.step_s),
+        gyro_noise: conditions.gyro_noise,
+        dwells_s: [factors[0] * mean, factors[factors.len() - 1] * mean],
+        coefficients: (0..names.len()).filter(|&c| units[c] != "rad").map(of).collect(),
+    }))
+}
+
+/// The least sigma of a curve of (dwell, sigma), and the shortest dwell within 5 % of it, unless it still falls there.
+fn least(curve: &[(f64, f64)]) -> (f64, Option<f64>) {
+    let least = curve.iter().map(|p| p.1).fold(f64::MAX, f64::min);
+    let limit = WITHIN * least;
+    let longest = curve.last().map_or(0.0, |p| p.0);
+    let reached = curve.iter().position(|p| p.1 <= limit).map(|i| match i.checked_sub(1) {
+        None => curve[0].0,
+        // between two dwells along a power of the dwell
+        Some(before) => {
+            let ((t0, s0), (t1, s1)) = (curve[before], curve[i]);
+            t0 * (t1 / t0).powf((limit / s0).ln() / (s1 / s0).ln())
+        }
+    });
+    (least, reached.filter(|t| *t <= SETTLED * longest))
+}
+
+/// The mean dwell of the positions, in s.
+fn mean_dwell(scheme: &Scheme, conditions: &Conditions) -> f64 {
+    let dwells = scheme.positions.iter().map(|p| p.dwell.map_or(conditions.dwell_s, |d| d.seconds()));
+    dwells.sum::<f64>() / scheme.positions.len() as f64
+}
+
+/// Sigma of every unknown at the end of a run with all dwells times `factor`, with all noise and without a prior, in SI units (shape n).
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn sigmas_without_prior(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    factor: f64,
+) -> Result<Vec<f64>, SimulationError> {
+    let scaled = scheme.with_dwells(conditions.dwell_s, factor)?;
+    let density = conditions.drift_noise.density_deg_sqrt_h(conditions.step_s);
+    let drift_noise = DriftNoise::RandomWalk(density);
+    // one step a position, then parts
+    let whole = Conditions { step_s: f64::MAX, drift_noise, ..conditions.clone() };
+    let plan = Plan::derived(&scaled, &whole)?;
+    let mut plan = plan.in_steps(&whole, |dwell| parts(dwell, conditions.step_s))?;
+    for (stage, segment) in plan.stages.iter_mut().zip(&plan.segments) {
+        // the samples of one longer step, taken together
+        let dwell = scaled.positions[segment.position].dwell.map_or(segment.dt, |d| d.seconds());
+        for output in &mut stage.outputs {
+            output.r *= own_step(dwell, conditions.step_s) / segment.dt;
+        }
+    }
+    // what the samples say is worth no more than the random drift of the run lets it be
+    let information = batch(&plan, SquareRootInformation::none(plan.unknowns()))?.information;
+    let duration = plan.duration_s();
+    let random = plan.random_rate(duration) + 6.0 * drift_noise.held_rad_s(duration);
+    let width = WIDTH * (1.0 + random * duration / conditions.accelerometer_noise_g);
+    let mut sigma = wider(&plan, &information, width, width);
+    sigma.extend(plan.bias_sigmas());
+    let prior = RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)?;
+    let mut last = Vec::new();
+    covariance_pass(&plan.stages, prior, |_, p| last = p.sigmas())?;
+    last.truncate(plan.unknowns());
+    Ok(last)
+}
+
+/// The equal steps of at most `step` that a dwell is divided into, in s.
+fn own_step(dwell: f64, step: f64) -> f64 {
+    dwell / (dwell / step - 1e-9).ceil().max(1.0)
+}
+
+/// Parts of a dwell: so many steps of so many s, twice as long from part to part, from both ends.
+fn parts(dwell: f64, step: f64) -> Vec<(usize, f64)> {
+    let (mut dt, mut left) = (own_step(dwell, step), dwell);
+    let mut ends = Vec::new();
+    while left > 4.0 * STEPS as f64 * dt {
+        ends.push((STEPS, dt));
+        left -= 2.0 * STEPS as f64 * dt;
+        dt *= 2.0;
+    }
+    let middle = (left / dt - 1e-9).ceil().max(1.0);
+    let back: Vec<_> = ends.iter().rev().copied().collect();
+    ends.push((middle as usize, left / middle));
+    ends.extend(back);
+    ends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_the_dwell() {
+        for (dwell, step) in
+            [(1000.0, 10.0), (100.0, 10.0), (5.0, 10.0), (256_000.0, 10.0), (12_345.0, 7.0), (1e9, 1e-6)]
+        {
+            let parts = parts(dwell, step);
+            let total: f64 = parts.iter().map(|(n, dt)| *n as f64 * dt).sum();
+            assert!((total / dwell - 1.0).abs() < 1e-12, "{dwell} {step}: {total}");
+            let steps: usize = parts.iter().map(|p| p.0).sum();
+            assert!(steps <= 2500, "{dwell} {step}: {steps}");
+            // at its ends it is sampled as ever, and nowhere by much more than the distance from them
+            assert_eq!(parts[0].1, own_step(dwell, step));
+            let mut t = 0.0f64;
+            for (n, dt) in &parts {
+                let distance = t.min(dwell - t - *n as f64 * dt);
+                assert!(
+                    *dt <= own_step(dwell, step) * (1.0 + 1e-12) || *dt <= distance / 8.0,
+                    "{dwell} {step}: {dt} at {t}"
+                );
+                t += *n as f64 * dt;
+            }
+        }
+        assert_eq!(parts(100.0, 10.0), [(10, 10.0)]);
+    }
+
+    #[test]
+    fn the_least_of_a_curve() {
+        let dwells = (0..10).map(|k| 2f64.powi(k));
+        let curve =
+            |f: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> { dwells.clone().map(|t| (t, f(t))).collect() };
+        // a power goes on; what rises again has its least in between
+        assert_eq!(least(&curve(&|t| 1.0 / t)).1, None);
+        let (found, dwell) = least(&curve(&|t| if t < 8.0 { 8.0 / t } else { t / 8.0 }));
+        assert!(found == 1.0 && dwell.is_some_and(|t| (t - 8.0 / 1.05).abs() < 1e-9), "{dwell:?}");
+        assert_eq!(least(&curve(&|_| 3.0)), (3.0, Some(1.0)));
+    }
+}
