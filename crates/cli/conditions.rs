@@ -3,7 +3,7 @@
 use clap::Args;
 use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{
-    Assignment, AssignmentError, DriftNoise, Propagation, Settings, Truth, concerns, known,
+    Assignment, AssignmentError, DriftNoise, FilterKind, Propagation, Settings, Truth, concerns, known,
 };
 use obsdeg_core::model::{PerGyro, Platform, Scheme};
 use obsdeg_evidence::simulation::{Conditions, general_first};
@@ -98,6 +98,11 @@ pub(crate) struct ConditionArguments {
     /// linear: the model itself; exact: direction cosines, specific force in the true platform frame (default: linear)
     #[arg(long, value_name = "LEVEL", hide_possible_values = true, value_parser = one_of([("linear", Truth::Linear), ("exact", Truth::Exact)]))]
     truth: Option<Truth>,
+
+    /// linear: small angles, gains known beforehand; extended: full attitudes, Jacobians at the estimate; iterated: the same,
+    /// linearised again along the whole run (default: linear where its model holds, else iterated)
+    #[arg(long, value_name = "FILTER", hide_possible_values = true, value_parser = one_of(FilterKind::ALL.map(|f| (f.name(), f))))]
+    filter: Option<FilterKind>,
 
     /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
     /// 0.001 to 10000 deg/s)
@@ -203,6 +208,7 @@ impl ConditionArguments {
         let mut out = self.measurement.conditions(scheme);
         out.apply(&Settings {
             truth: self.truth,
+            filter: self.filter,
             slew_rate_deg_s: self.slew_rate,
             drift_noise: self.drift_noise,
             propagation: self.propagation,

@@ -82,6 +82,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "azimuth-noise" => &["0.001", "1e-12", "1e200", "0", "nan"],
         "requirement" => &["D_F=0.1", "psi=1e-9", "D_FX=1e-300", "D=-0.1", "D_QX=1", "D_F", "=1", "D_F=nan"],
         "truth" => &["linear", "exact", "other"],
+        "filter" => &["linear", "extended", "iterated", "other"],
         "slew-rate" => &["0.5", "10", "1e-6", "1e300", "0", "-1", "nan"],
         "drift-noise" => {
             &["0.01 deg/h", "0.001 deg/sqrt(h)", "1e200 deg/h", "0 deg/h", "0.01", "1e-300 deg/h", "x deg/h"]

@@ -264,7 +264,7 @@ fn a_verdict_leads_with_what_limits_it() {
     assert!(verdict.contains("every requirement is met, 6 of 6; worst margin "), "{verdict}");
     assert!(statuses(&page)[0].iter().all(|r| r[1] == "good"), "{:?}", statuses(&page));
     // a truth that the linear filter cannot follow
-    let (page, verdict) = page_of("exact.html", &[PAPER, "--truth", "exact"]);
+    let (page, verdict) = page_of("exact.html", &[PAPER, "--truth", "exact", "--filter", "linear"]);
     for limit in [
         "does NOT hold",
         "is NOT consistent with its truth (mean NIS",

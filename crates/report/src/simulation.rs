@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::model::settings::{Propagation, Truth};
+use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_evidence::simulation::{
-    CoefficientFloor, ConditionsReport, Estimate, Simulation, TimelineReport, Validity,
+    CoefficientFloor, ConditionsReport, Estimate, FilterReason, FilterReport, Simulation, TimelineReport,
+    Validity,
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
@@ -110,6 +111,38 @@ pub(crate) fn validity(v: &Validity) -> Vec<String> {
     ]
 }
 
+/// Which filter ran, and why.
+pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
+    let (what, passes) = match f.kind {
+        FilterKind::Linear => ("linear: small angles, gains known beforehand".into(), String::new()),
+        FilterKind::Extended => {
+            ("extended: full attitudes, Jacobians at the estimate of the moment".into(), String::new())
+        }
+        FilterKind::Iterated => (
+            format!("iterated: full attitudes, linearised along the whole run, {} times", f.passes),
+            if f.converged { String::new() } else { ", which did NOT settle".into() },
+        ),
+    };
+    let why = match f.reason {
+        FilterReason::Given => "as asked for",
+        FilterReason::LinearTruth => "chosen since the truth is that of the linear model",
+        FilterReason::Valid => "chosen since the small-angle model holds for this truth",
+        FilterReason::NotValid => "chosen since the small-angle model does not hold for this truth",
+    };
+    let mut out = vec![format!("{what}{passes}; {why}")];
+    if f.kind != FilterKind::Linear {
+        out.push("verdicts and degrees are those of small angles; what a filter learns beyond them comes of the attitudes that drift reached".into());
+    }
+    out
+}
+
+/// What the linear filter makes of the same measurements.
+fn linear(e: &Estimate) -> Option<Vec<String>> {
+    let l = e.linear?;
+    let [error, sigma, own] = [l.error, l.sigma, e.sigma].map(number);
+    Some(vec![e.name.clone(), e.unit.clone(), own, sigma, error, format!("{:.2}", l.error / l.sigma)])
+}
+
 fn row(e: &Estimate) -> Vec<String> {
     let mut out = vec![e.name.clone(), e.unit.clone()];
     out.extend(words::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
@@ -181,6 +214,13 @@ impl Answer for Simulation {
             "Requirements (sigma of the filter at the end of the run)",
             requirements_met(self),
         ));
+        blocks.push(Block::list("Filter", filter(&self.filter)));
+        if self.filter.kind != FilterKind::Linear {
+            let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
+            let columns: Vec<_> = [left("unknown"), left("unit")].into_iter().chain(numbers).collect();
+            let rows = self.quantities.iter().chain(&self.combinations).filter_map(linear);
+            blocks.push(Block::table("Beside it, the linear filter on the same measurements", columns, rows));
+        }
         blocks.push(Block::list("Consistency", words::consistency(&self.consistency)));
         blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
         if let Some(f) = &self.noise_floor {

@@ -367,6 +367,7 @@ pub(crate) fn outcome(o: Outcome) -> &'static str {
         Outcome::Converging => "converging",
         Outcome::RestsOnPrior => "rests on the prior",
         Outcome::PriorOnly => "known from the prior only",
+        Outcome::LargeAnglesOnly => "large angles only",
         Outcome::Inconsistent => "inconsistent",
         Outcome::NoNumber => "no number",
     }

@@ -7,13 +7,13 @@ mod gyro_noise;
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::settings::{Assignment, DriftNoise, Propagation, Settings, Truth};
+use obsdeg_core::model::settings::{Assignment, DriftNoise, FilterKind, Propagation, Settings, Truth};
 use obsdeg_core::model::{Carry, Rotation, Scheme};
 use obsdeg_ekf::Process;
 use obsdeg_ekf::model::central_difference;
 use obsdeg_evidence::simulation::{
-    Conditions, Doubt, Estimate, Noise, Outcome, Plan, PlatformProcess, RunStart, Simulation,
-    SimulationError, TruthModel, simulate,
+    Conditions, Doubt, Estimate, FilterReason, FilterReport, Noise, Outcome, Plan, PlatformProcess, RunStart,
+    Simulation, SimulationError, TruthModel, simulate,
 };
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
@@ -145,7 +145,9 @@ fn consistency_takes_all_errors_together() {
     assert!(text.contains("the filter is NOT consistent with this truth: NEES"), "{text}");
     assert!(text.contains("its sigmas are not to be relied upon"), "{text}");
     // exact truth at the paper's drifts: by every measure
-    let exact = simulated(Carry::Platform, &Conditions { truth: Truth::Exact, ..Conditions::default() });
+    let linear = Some(FilterKind::Linear);
+    let exact = Conditions { truth: Truth::Exact, filter: linear, ..Conditions::default() };
+    let exact = simulated(Carry::Platform, &exact);
     for doubt in [Doubt::Nis, Doubt::Nees, Doubt::Error, Doubt::Correlated] {
         assert!(exact.consistency.doubts.contains(&doubt), "{doubt:?}: {:?}", exact.consistency);
     }
@@ -203,16 +205,70 @@ fn inertial_carry_swaps_the_inseparable_coefficient() {
 
 #[test]
 fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
-    let exact = Conditions { truth: Truth::Exact, ..Conditions::default() };
+    let chosen = Conditions { truth: Truth::Exact, ..Conditions::default() };
+    let exact = Conditions { filter: Some(FilterKind::Linear), ..chosen.clone() };
     for carry in [Carry::Platform, Carry::Inertial] {
         let s = simulated(carry, &exact);
         assert!(s.consistency.nis > 20.0 && !s.consistency.consistent && !s.validity.holds, "{carry}");
         assert!(s.validity.neglected_g > 100.0 * s.validity.accelerometer_noise_g);
     }
     assert!(of(&simulated(Carry::Platform, &exact), "D_FY").error.abs() > 5.0);
-    let small = Conditions { drift_scale: 1e-3, ..exact };
+    let small = Conditions { drift_scale: 1e-3, ..exact.clone() };
     let s = simulated(Carry::Inertial, &small);
     assert!(s.consistency.consistent && s.validity.holds, "{:?} {:?}", s.consistency, s.validity);
+    // left to itself the program takes the filter that follows, and shows the linear one beside it
+    let FilterReport { kind, reason, .. } =
+        simulated(Carry::Inertial, &Conditions { filter: None, ..small }).filter;
+    assert_eq!((kind, reason), (FilterKind::Linear, FilterReason::Valid));
+    let asked = simulated(Carry::Platform, &exact);
+    assert!(
+        asked.filter.reason == FilterReason::Given && asked.quantities.iter().all(|q| q.linear.is_none())
+    );
+    for carry in [Carry::Platform, Carry::Inertial] {
+        let s = simulated(carry, &chosen);
+        let FilterReport { kind, reason, passes, converged } = s.filter;
+        assert_eq!((kind, reason, converged), (FilterKind::Iterated, FilterReason::NotValid, true));
+        assert!(s.consistency.consistent && passes > 1, "{carry}: {:?}", s.consistency);
+        let d_fy = of(&s, "D_FY");
+        assert!(d_fy.error_over_sigma.abs() < 3.0 && (0.5..1.0).contains(&d_fy.sigma), "{carry}: {d_fy:?}");
+        // the linear filter believes what is not so
+        let linear = d_fy.linear.expect("beside it");
+        let alone = simulated(carry, &exact);
+        assert_eq!((linear.error, linear.sigma), (of(&alone, "D_FY").error, of(&alone, "D_FY").sigma));
+        assert!(
+            linear.error.abs() > 20.0 * linear.sigma && linear.sigma < d_fy.sigma / 5.0,
+            "{carry}: {linear:?}"
+        );
+    }
+    let s = simulated(Carry::Platform, &chosen);
+    assert_eq!(of(&s, "D_IX").verdict, Outcome::LargeAnglesOnly);
+    assert!(of(&s, "D_FX").sigma > 10.0 * of(&s, "D_FX").linear.expect("beside it").sigma);
+}
+
+/// As drifts shrink the three filters become one.
+#[test]
+fn for_small_drifts_all_filters_agree() {
+    for carry in Carry::ALL {
+        let small = Conditions { truth: Truth::Exact, drift_scale: 1e-3, ..Conditions::default() };
+        let values = [small.values.clone(), vec![Assignment { name: "psi".into(), value: 1e-4 }]].concat();
+        let priors = [small.priors.clone(), vec![Assignment { name: "psi".into(), value: 1e-4 }]].concat();
+        let small = Conditions { values, priors, ..small };
+        let [linear, extended, iterated] =
+            FilterKind::ALL.map(|f| simulated(carry, &Conditions { filter: Some(f), ..small.clone() }));
+        for other in [&extended, &iterated] {
+            for (a, b) in linear.quantities.iter().zip(&other.quantities) {
+                assert!(
+                    (b.sigma / a.sigma - 1.0).abs() < 0.01,
+                    "{carry} {}: {} {}",
+                    a.name,
+                    a.sigma,
+                    b.sigma
+                );
+                assert!((b.estimate - a.estimate).abs() < 0.01 * a.sigma, "{carry} {}", a.name);
+            }
+            assert!((other.consistency.nis / linear.consistency.nis - 1.0).abs() < 0.01, "{carry}");
+        }
+    }
 }
 
 /// Without noise and for tiny angles, exact and linear truth are the same, position by position and through

@@ -23,6 +23,32 @@ pub enum Truth {
     Exact,
 }
 
+/// Which filter estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum FilterKind {
+    /// Of the linear model, with gains that are known beforehand: small psi.
+    Linear,
+    /// With full attitudes, its Jacobians at the estimate of the moment.
+    Extended,
+    /// The same, linearised again along the whole run until that settles.
+    Iterated,
+}
+
+impl FilterKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Linear, Self::Extended, Self::Iterated];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Extended => "extended",
+            Self::Iterated => "iterated",
+        }
+    }
+}
+
 /// How the filter gets its transition matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -181,6 +207,8 @@ impl FromStr for Assignment {
 pub struct Settings {
     /// linear (default) or exact.
     pub truth: Option<Truth>,
+    /// linear, extended or iterated; when left out, linear where the small-angle model holds.
+    pub filter: Option<FilterKind>,
     /// Largest step in s; 10 when left out.
     pub step_s: Option<f64>,
     /// Dwell of positions without dwell_s; 1000 when left out.

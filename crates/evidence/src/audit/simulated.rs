@@ -3,7 +3,7 @@
 //! The filter is linear, so its error without noise is the mean of its errors over all noise: offsets are read from
 //! such a run, made with the gains for the noise of the paper; sigma says how far one run lies from it.
 
-use obsdeg_core::model::settings::{Propagation, Truth};
+use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, Scheme};
 
@@ -264,7 +264,8 @@ fn slow(carries: &Carries) -> Line {
 /// What one run with noise says of the model that is simulated.
 fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
     let linear = simulate(&scheme(Carry::Platform), &conditions(), seed)?.0;
-    let exact = Conditions { truth: Truth::Exact, ..conditions() };
+    // the filter of the paper, which is linear
+    let exact = Conditions { truth: Truth::Exact, filter: Some(FilterKind::Linear), ..conditions() };
     let exact = simulate(&scheme(Carry::Platform), &exact, seed)?.0;
     let d_fy = exact.quantities.iter().find(|q| q.name == "D_FY").map_or(f64::NAN, |q| q.error);
     let (consistent, v) = (linear.consistency.consistent, &linear.validity);

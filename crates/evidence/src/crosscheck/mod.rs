@@ -22,10 +22,9 @@ use obsdeg_ekf::{Form, SquareRootInformation};
 
 use crate::prediction::Prediction;
 use crate::simulation::batch::batch;
-use crate::simulation::conditions::resolve;
 use crate::simulation::plan::SegmentKind;
-use crate::simulation::record::{RunStart, run};
-use crate::simulation::{Conditions, Plan, SimulationError, conditions_report, timeline_report, validity};
+use crate::simulation::record::{RunStart, largest_psi};
+use crate::simulation::{Conditions, Plan, SimulationError, Validity, conditions_report, timeline_report};
 use structure::{last_covariance, still, structure};
 
 /// Relative difference of covariances that is rounding; P itself holds half the digits of its root.
@@ -144,8 +143,7 @@ pub fn crosscheck(
     };
 
     let start = RunStart::new(&truth, conditions)?;
-    let record = run(&truth, conditions, &start, &prediction, options.seed)?;
-    let requirements = resolve("required sigma", &truth.platform, &conditions.requirements, f64::NAN)?;
+    let largest_psi = largest_psi(&truth, conditions, &start, options.seed)?;
     let mut out = CrossCheck {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -165,7 +163,7 @@ pub fn crosscheck(
         covariance,
         monte_carlo,
         controls,
-        validity: validity(&truth, conditions, &record, &requirements),
+        validity: Validity::of(&truth, conditions, &start.truth, largest_psi)?,
         correlation: structure.correlation,
         seed: options.seed,
         error_bound: prediction.error_bound,

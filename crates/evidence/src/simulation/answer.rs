@@ -1,7 +1,7 @@
 //! The answer of one run: plain data.
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::settings::{Propagation, Truth};
+use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Scheme};
 use schemars::JsonSchema;
@@ -37,6 +37,8 @@ pub struct Simulation {
     pub requirements: Requirements,
     /// Whether errors and innovations are what the filter believes.
     pub consistency: Consistency,
+    /// Which filter it is, and why.
+    pub filter: FilterReport,
     /// Whether the linear model holds for these drifts.
     pub validity: Validity,
     /// How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own.
@@ -150,6 +152,8 @@ pub struct Estimate {
     pub sigma: f64,
     /// Error over sigma.
     pub error_over_sigma: f64,
+    /// What the linear filter makes of the same measurements; null where it is the filter.
+    pub linear: Option<LinearEstimate>,
     /// Sigma at the start.
     pub prior_sigma: f64,
     /// The sigma to be reached.
@@ -160,6 +164,42 @@ pub struct Estimate {
     pub verdict: Outcome,
     /// On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only.
     pub prior_of: Vec<String>,
+}
+
+/// What the linear filter says at the end of the run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct LinearEstimate {
+    /// Estimate minus truth.
+    pub error: f64,
+    /// What it believes of the error.
+    pub sigma: f64,
+}
+
+/// Which filter ran.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct FilterReport {
+    /// The filter.
+    pub kind: FilterKind,
+    /// Why this one.
+    pub reason: FilterReason,
+    /// Linearisations of the whole run: 1 but for the iterated filter.
+    pub passes: usize,
+    /// Whether they settled.
+    pub converged: bool,
+}
+
+/// Why a filter was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterReason {
+    /// It was asked for.
+    Given,
+    /// The truth is that of the linear model.
+    LinearTruth,
+    /// The small-angle model holds for the truth.
+    Valid,
+    /// It does not.
+    NotValid,
 }
 
 /// What a run says of one unknown.
@@ -174,6 +214,9 @@ pub enum Outcome {
     RestsOnPrior,
     /// The samples do not determine it: whatever sigma says, it comes of the prior.
     PriorOnly,
+    /// The verdict, which is about small angles, has it undetermined; a filter with full attitudes learns of it through large
+    /// ones.
+    LargeAnglesOnly,
     /// The error is beyond four sigma: the filter is wrong about it.
     Inconsistent,
     /// The error or sigma is no number.
@@ -184,16 +227,19 @@ impl Outcome {
     /// The outcome for an unknown that samples determine or not, with its sigma at the start and at the end.
     pub(crate) fn of(
         determined: bool,
+        filter: FilterKind,
         error_over_sigma: f64,
         [prior, sigma]: [f64; 2],
         required: Option<f64>,
     ) -> Self {
         if !(error_over_sigma.is_finite() && sigma.is_finite()) {
             Self::NoNumber
-        } else if !determined {
+        } else if !determined && (filter == FilterKind::Linear || sigma > 0.9 * prior) {
             Self::PriorOnly
         } else if error_over_sigma.abs() > CREDIBLE {
             Self::Inconsistent
+        } else if !determined {
+            Self::LargeAnglesOnly
         } else if sigma > 0.9 * prior {
             Self::RestsOnPrior
         } else if required.is_some_and(|r| meets(sigma, r)) {
@@ -208,7 +254,7 @@ impl Outcome {
         match self {
             Self::Reached | Self::Converging => None,
             Self::RestsOnPrior => Some(Miss::RestsOnPrior),
-            Self::PriorOnly => Some(Miss::NotObservable),
+            Self::PriorOnly | Self::LargeAnglesOnly => Some(Miss::NotObservable),
             Self::Inconsistent => Some(Miss::Inconsistent),
             Self::NoNumber => Some(Miss::NoNumber),
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{
-    Assignment, DriftNoise, Propagation, Settings, Truth, concerns, is_family, known,
+    Assignment, DriftNoise, FilterKind, Propagation, Settings, Truth, concerns, is_family, known,
 };
 use obsdeg_core::model::{Latitude, Platform, Position, Scheme};
 
@@ -16,6 +16,8 @@ use super::gyro_noise::GyroNoise;
 pub struct Conditions {
     /// How the truth is generated.
     pub truth: Truth,
+    /// Which filter; `None`: the linear one while its model holds, the iterated one where it does not.
+    pub filter: Option<FilterKind>,
     /// Largest step, in s; a position is divided into equal steps.
     pub step_s: f64,
     /// Dwell of positions that do not say theirs, in s.
@@ -64,6 +66,7 @@ impl Default for Conditions {
         let priors = [assign("D", 1.0), assign("psi", 0.1), assign("eps", 20.0), assign("D_F", 20.0)];
         Self {
             truth: Truth::Linear,
+            filter: None,
             step_s: 10.0,
             dwell_s: 1000.0,
             slew_rate_deg_s: None,
@@ -103,6 +106,7 @@ impl Conditions {
             }
         }
         set(&mut self.truth, settings.truth);
+        self.filter = settings.filter.or(self.filter);
         set(&mut self.step_s, settings.step_s);
         set(&mut self.dwell_s, settings.dwell_s);
         set(&mut self.accelerometer_noise_g, settings.accelerometer_noise_g);

@@ -14,6 +14,8 @@ use super::extended::{Ended, Extended, check_measurements};
 use super::record::RunStart;
 use super::state::PlatformState;
 
+/// Most steps of a run that is iterated: each has a model of its own.
+pub(crate) const MAX_ITERATED_STEPS: usize = 100_000;
 /// Most linearisations of the run.
 const PASSES: usize = 40;
 /// The run has settled when the estimate at its end moves by less than this, in standard deviations of any combination.

@@ -35,7 +35,7 @@ use obsdeg_ekf::EkfError;
 
 use crate::prediction::{Prediction, PredictionError};
 use crate::requirements::{Basis, Claim, Requirements, meets};
-use conditions::shown_unit;
+use conditions::{REQUIRED, shown_unit};
 use consistency::Outcomes;
 
 /// Why a scheme cannot be simulated.
@@ -171,7 +171,7 @@ fn summary(
 ) -> Result<Simulation, SimulationError> {
     let n = plan.unknowns();
     let (names, units) = (plan.platform.names(), plan.platform.units());
-    let requirements = resolve("required sigma", &plan.platform, &conditions.requirements, f64::NAN)?;
+    let requirements = resolve(REQUIRED, &plan.platform, &conditions.requirements, f64::NAN)?;
     let required = |c: usize| Some(requirements[c]).filter(|r| !r.is_nan());
     let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
         let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
@@ -197,7 +197,6 @@ fn summary(
         covariance: &record.last_covariance,
         normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
     })?;
-    let validity = validity(plan, conditions, record, &requirements);
     let noise_floor = noise_floor(scheme, conditions, prediction)?;
     Ok(Simulation {
         schema: SCHEMA.into(),
@@ -217,7 +216,8 @@ fn summary(
         quantities,
         combinations,
         consistency,
-        validity,
+        filter: record.filter,
+        validity: record.validity.clone(),
         noise_floor,
         seed,
     })
@@ -291,6 +291,10 @@ fn estimate(
     let last = |v: &[f64]| v.last().map_or(f64::NAN, |x| x / scale);
     let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
     let prior_sigma = series.sigma[0] / scale;
+    let linear = record.traces.linear.as_ref().map(|all| {
+        let s = &all[i];
+        LinearEstimate { error: last(&s.estimate) - truth, sigma: last(&s.sigma) }
+    });
     let error = estimate - truth;
     let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
     let reached = required_sigma.and_then(|r| series.sigma.iter().position(|s| meets(s / scale, r)));
@@ -305,31 +309,48 @@ fn estimate(
         error,
         sigma,
         error_over_sigma,
+        linear,
         prior_sigma,
         required_sigma,
         time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
-        verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], required_sigma),
+        verdict: Outcome::of(
+            determined,
+            record.filter.kind,
+            error_over_sigma,
+            [prior_sigma, sigma],
+            required_sigma,
+        ),
         prior_of: Vec::new(),
     }
 }
 
-/// The validity of the small-angle model, by the figures that decide it.
-pub fn validity(plan: &Plan, conditions: &Conditions, record: &Record, requirements: &[f64]) -> Validity {
-    let psi = record.largest_psi;
-    let dph = si_per_shown("deg/h");
-    let sensitive =
-        plan.platform.units().iter().zip(&record.traces.series).filter(|(unit, _)| unit.contains("/g"));
-    let coefficient = sensitive.map(|(_, s)| s.truth[0].abs()).fold(0.0, f64::max) / dph;
-    let smallest =
-        plan.platform.units().iter().zip(requirements).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
-    let smallest = smallest.map(|(_, t)| *t).reduce(f64::min);
-    let (neglected_g, neglected_dph) = (psi * psi / 2.0, coefficient * psi);
-    Validity {
-        largest_psi_deg: psi.to_degrees(),
-        neglected_g,
-        accelerometer_noise_g: conditions.accelerometer_noise_g,
-        neglected_dph,
-        smallest_requirement_dph: smallest,
-        holds: neglected_g <= conditions.accelerometer_noise_g && smallest.is_none_or(|t| neglected_dph <= t),
+impl Validity {
+    /// The figures that decide it, for a run from the true states `start` in which `|psi|` reached `psi` (rad).
+    ///
+    /// # Errors
+    /// [`SimulationError::UnknownName`] for a requirement on what the scheme does not have.
+    pub fn of(
+        plan: &Plan,
+        conditions: &Conditions,
+        start: &[f64],
+        psi: f64,
+    ) -> Result<Self, SimulationError> {
+        let dph = si_per_shown("deg/h");
+        let requirements = resolve(REQUIRED, &plan.platform, &conditions.requirements, f64::NAN)?;
+        let units = plan.platform.units();
+        let sensitive = units.iter().zip(start).filter(|(unit, _)| unit.contains("/g"));
+        let coefficient = sensitive.map(|(_, d)| d.abs()).fold(0.0, f64::max) / dph;
+        let smallest = units.iter().zip(&requirements).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
+        let smallest = smallest.map(|(_, t)| *t).reduce(f64::min);
+        let (neglected_g, neglected_dph) = (psi * psi / 2.0, coefficient * psi);
+        let small = neglected_g <= conditions.accelerometer_noise_g;
+        Ok(Self {
+            largest_psi_deg: psi.to_degrees(),
+            neglected_g,
+            accelerometer_noise_g: conditions.accelerometer_noise_g,
+            neglected_dph,
+            smallest_requirement_dph: smallest,
+            holds: small && smallest.is_none_or(|t| neglected_dph <= t),
+        })
     }
 }

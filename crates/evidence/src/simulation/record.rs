@@ -1,12 +1,15 @@
 //! One run: truth, filter, and everything that is plotted of it.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::settings::Truth;
+use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Covariance, Form};
+use obsdeg_ekf::{Covariance, Form, Manifold, Update};
 
 use super::SimulationError;
+use super::answer::{FilterReason, FilterReport, Validity};
 use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, resolve, shown_unit, si_per_shown};
+use super::extended::{Ended, Extended};
+use super::iterated::{MAX_ITERATED_STEPS, iterated};
 use super::plan::Plan;
 use super::state::PlatformState;
 use super::truth::{Noise, TruthModel, check_drifts};
@@ -100,6 +103,8 @@ pub struct Traces {
     pub position: Vec<usize>,
     /// One per name.
     pub series: Vec<Series>,
+    /// The same of a linear filter on the same measurements, where another filter is shown.
+    pub linear: Option<Vec<Series>>,
 }
 
 /// A run, sample by sample.
@@ -113,11 +118,211 @@ pub struct Record {
     pub last_covariance: Covariance,
     /// Estimate minus truth of all its states at the end.
     pub last_error: Vec<f64>,
-    /// Largest `|psi|`, in rad.
-    pub largest_psi: f64,
+    /// Which filter it was.
+    pub filter: FilterReport,
+    /// Whether the small-angle model holds for the truth.
+    pub validity: Validity,
 }
 
-/// Runs the filter of `plan` against one truth; its biases are drawn.
+/// What a run records: unknowns, then combinations, as functionals of the unknowns.
+struct Recorded<'a> {
+    /// The number of unknowns.
+    unknowns: usize,
+    combinations: Vec<&'a [(usize, f64)]>,
+}
+
+impl Recorded<'_> {
+    fn len(&self) -> usize {
+        self.unknowns + self.combinations.len()
+    }
+
+    /// All values at the state `x`.
+    fn values<'b>(&'b self, x: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
+        let combination = |c: &&[(usize, f64)]| c.iter().map(|&(j, k)| k * x[j]).sum();
+        x[..self.unknowns].iter().copied().chain(self.combinations.iter().map(combination))
+    }
+
+    /// All standard deviations; `local` makes a functional of the unknowns one of what the covariance is of, where that is
+    /// another.
+    fn sigmas(
+        &self,
+        p: &Covariance,
+        local: impl Fn(usize, &[(usize, f64)]) -> Option<Vec<(usize, f64)>>,
+    ) -> Vec<f64> {
+        let own = p.sigmas();
+        let of = |c: &[(usize, f64)]| p.variance(c).map_or(f64::NAN, |v| v.max(0.0).sqrt());
+        (0..self.len())
+            .map(|i| match i.checked_sub(self.unknowns) {
+                None => local(i, &[(i, 1.0)]).map_or(own[i], |c| of(&c)),
+                Some(c) => {
+                    let terms = self.combinations[c];
+                    local(i, terms).map_or_else(|| of(terms), |c| of(&c))
+                }
+            })
+            .collect()
+    }
+}
+
+/// A truth and what is measured of it.
+pub(crate) struct Sampled {
+    /// Per quantity that is recorded: its values, from t = 0.
+    truth: Vec<Vec<f64>>,
+    /// Measurements: of every step as many as there are components; zero where none is taken.
+    pub(crate) z: Vec<f64>,
+    /// The true states at the end.
+    pub(crate) end: Vec<f64>,
+    /// Largest `|psi|`, in rad.
+    pub(crate) largest_psi: f64,
+}
+
+/// The truth that starts from the states `x`, measured over the whole of `plan`; `record` sees the states from t = 0.
+pub(crate) fn sample(
+    truth: &mut TruthModel<'_>,
+    plan: &Plan,
+    noise: &mut Noise,
+    z: &mut Vec<f64>,
+    mut record: impl FnMut(&[f64]),
+) {
+    z.clear();
+    record(truth.x());
+    let mut now = vec![0.0; plan.components.len()];
+    for (segment, s) in plan.segments.iter().enumerate() {
+        let seen = plan.stages[segment].outputs.len();
+        now.fill(0.0);
+        for step in 0..s.steps {
+            truth.step(segment, step, noise, &mut now[..seen]);
+            z.extend_from_slice(&now);
+            record(truth.x());
+        }
+    }
+}
+
+fn sampled(
+    plan: &Plan,
+    conditions: &Conditions,
+    start: &RunStart,
+    recorded: &Recorded<'_>,
+    seed: u64,
+) -> Result<Sampled, SimulationError> {
+    let n = plan.unknowns();
+    let first = n - plan.platform.coefficients();
+    check_drifts(plan, conditions, start.truth[first..n].iter().map(|d| d.abs()).sum())?;
+    let mut noise = Noise::new(seed, 0);
+    let mut from = start.truth.clone();
+    for (x, sigma) in from.iter_mut().zip(&start.sigma).skip(n) {
+        *x = sigma * noise.normal();
+    }
+    let mut truth = TruthModel::new(plan, conditions, from);
+    let (mut values, mut z) = (vec![Vec::new(); recorded.len()], Vec::new());
+    sample(&mut truth, plan, &mut noise, &mut z, |x| {
+        values.iter_mut().zip(recorded.values(x)).for_each(|(v, x)| v.push(x));
+    });
+    Ok(Sampled { truth: values, z, end: truth.x().to_vec(), largest_psi: truth.largest_psi })
+}
+
+/// The largest `|psi|` of the run of `seed`, in rad.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn largest_psi(
+    plan: &Plan,
+    conditions: &Conditions,
+    start: &RunStart,
+    seed: u64,
+) -> Result<f64, SimulationError> {
+    let nothing = Recorded { unknowns: 0, combinations: Vec::new() };
+    Ok(sampled(plan, conditions, start, &nothing, seed)?.largest_psi)
+}
+
+/// A filter's run over some measurements.
+struct Filtered {
+    /// Per quantity, from t = 0.
+    estimate: Vec<Vec<f64>>,
+    /// Its standard deviation.
+    sigma: Vec<Vec<f64>>,
+    whitened: Vec<f64>,
+    covariance: Covariance,
+    /// Estimate minus truth at the end, in the coordinates of the covariance.
+    error: Vec<f64>,
+    /// Linearisations, and whether they settled.
+    passes: (usize, bool),
+}
+
+/// The linear filter: its gains, and then its state.
+fn linear(
+    plan: &Plan,
+    start: &RunStart,
+    sampled: &Sampled,
+    recorded: &Recorded<'_>,
+) -> Result<Filtered, SimulationError> {
+    let prior = start.covariance(Form::Ud)?;
+    let mut sigma = vec![Vec::new(); recorded.len()];
+    let mut push = |p: &Covariance| {
+        let now = recorded.sigmas(p, |_, _| None);
+        sigma.iter_mut().zip(now).for_each(|(s, now)| s.push(now));
+    };
+    push(&prior);
+    let mut covariance = prior.clone();
+    let total = plan.segments.iter().map(|s| s.steps).sum::<usize>();
+    let gains = covariance_pass(&plan.stages, prior, |step, p| {
+        push(p);
+        if step + 1 == total {
+            covariance.clone_from(p);
+        }
+    })?;
+    let mut x = start.estimate.clone();
+    let (mut estimate, mut whitened) = (vec![Vec::new(); recorded.len()], Vec::new());
+    let mut push = |x: &[f64]| estimate.iter_mut().zip(recorded.values(x)).for_each(|(e, x)| e.push(x));
+    push(&x);
+    let m = plan.components.len();
+    let measure =
+        |step: usize, _: usize, z: &mut [f64]| z.copy_from_slice(&sampled.z[step * m..step * m + z.len()]);
+    state_pass(&plan.stages, &gains, &mut x, measure, |_, x, innovations| {
+        push(x);
+        whitened.extend_from_slice(innovations);
+    })?;
+    let error = x.iter().zip(&sampled.end).map(|(a, b)| a - b).collect();
+    Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (1, true) })
+}
+
+/// The extended filter, once or iterated.
+fn extended(
+    plan: &Plan,
+    conditions: &Conditions,
+    start: &RunStart,
+    sampled: &Sampled,
+    recorded: &Recorded<'_>,
+    again: bool,
+) -> Result<Filtered, SimulationError> {
+    let filter = Extended::new(plan, conditions, Update::default())?;
+    let (mut estimate, mut sigma) = (vec![Vec::new(); recorded.len()], vec![Vec::new(); recorded.len()]);
+    let mut push = |state: &PlatformState, p: &Covariance| {
+        let x = state.unknowns();
+        estimate.iter_mut().zip(recorded.values(&x)).for_each(|(e, x)| e.push(x));
+        let psi = plan.states() - plan.constants();
+        // coefficients are local coordinates as they are
+        let local = |i: usize, c: &[(usize, f64)]| (i < psi || c.len() > 1).then(|| state.functional(c));
+        sigma.iter_mut().zip(recorded.sigmas(p, local)).for_each(|(s, now)| s.push(now));
+    };
+    push(&start.state(plan), &start.covariance(Form::Ud)?);
+    let mut whitened = Vec::new();
+    let on_step = |_: usize, x: &PlatformState, p: &Covariance, innovations: &[f64]| {
+        push(x, p);
+        whitened.extend_from_slice(innovations);
+    };
+    let ended = if again {
+        iterated(&filter, start, &sampled.z, on_step)?
+    } else {
+        filter.run(start, &sampled.z, on_step)?
+    };
+    let truth = PlatformState::of_unknowns(&sampled.end, plan.constants());
+    let error = truth.local(&ended.x).iter().map(|x| -x).collect();
+    let Ended { covariance, passes, converged, .. } = ended;
+    Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
+}
+
+/// Runs the filter of `plan` against one truth; its biases are drawn. Which filter, the conditions say, or whether the
+/// small-angle model holds; where it is not the linear one, that goes along on the same measurements.
 ///
 /// # Errors
 /// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact truth that
@@ -130,15 +335,15 @@ pub fn run(
     seed: u64,
 ) -> Result<Record, SimulationError> {
     let n = plan.unknowns();
-    let first = n - plan.platform.coefficients();
-    check_drifts(plan, conditions, start.truth[first..n].iter().map(|d| d.abs()).sum())?;
-    let combinations: Vec<&[(usize, f64)]> = prediction.combinations.iter().map(|c| &c.terms[..]).collect();
+    let recorded = Recorded {
+        unknowns: n,
+        combinations: prediction.combinations.iter().map(|c| &c.terms[..]).collect(),
+    };
     let mut traces = Traces {
         names: plan.platform.names().to_vec(),
         time_unit: "s".into(),
         time: vec![0.0],
         position: vec![0],
-        series: vec![Series::default(); n + combinations.len()],
         ..Traces::default()
     };
     traces.names.extend(prediction.combinations.iter().map(|c| c.expression.clone()));
@@ -156,80 +361,58 @@ pub fn run(
             traces.position.push(segment.position);
         }
     }
-    let mut record = Record {
-        traces,
-        whitened: Vec::new(),
-        last_covariance: start.covariance(Form::Ud)?,
-        last_error: Vec::new(),
-        largest_psi: 0.0,
+    let sampled = sampled(plan, conditions, start, &recorded, seed)?;
+    let validity = Validity::of(plan, conditions, &start.truth, sampled.largest_psi)?;
+    let (kind, reason) = choose(plan, conditions, &validity)?;
+    let filtered = match kind {
+        FilterKind::Linear => linear(plan, start, &sampled, &recorded)?,
+        FilterKind::Extended => extended(plan, conditions, start, &sampled, &recorded, false)?,
+        FilterKind::Iterated => extended(plan, conditions, start, &sampled, &recorded, true)?,
     };
-    let value = |x: &[f64], i: usize| match i.checked_sub(n) {
-        None => x[i],
-        Some(c) => combinations[c].iter().map(|&(j, k)| k * x[j]).sum(),
-    };
-    let sigmas = |series: &mut [Series], p: &Covariance| {
-        let own = p.sigmas();
-        for (i, s) in series.iter_mut().enumerate() {
-            s.sigma.push(match i.checked_sub(n) {
-                Some(c) => p.variance(combinations[c]).map_or(f64::NAN, |v| v.max(0.0).sqrt()),
-                None => own[i],
-            });
-        }
-    };
-    let prior = record.last_covariance.clone();
-    sigmas(&mut record.traces.series, &prior);
-    let (series, last) = (&mut record.traces.series, &mut record.last_covariance);
-    let total = record.traces.time.len() - 1;
-    let gains = covariance_pass(&plan.stages, prior, |step, p| {
-        sigmas(series, p);
-        if step + 1 == total {
-            last.clone_from(p);
-        }
-    })?;
-
-    let mut noise = Noise::new(seed, 0);
-    let mut true_start = start.truth.clone();
-    for (x, sigma) in true_start.iter_mut().zip(&start.sigma).skip(n) {
-        *x = sigma * noise.normal();
-    }
-    let mut truth = TruthModel::new(plan, conditions, true_start);
-    let mut x = start.estimate.clone();
-    for (i, s) in record.traces.series.iter_mut().enumerate() {
-        s.truth.push(value(truth.x(), i));
-        s.estimate.push(value(&x, i));
-    }
-    let first_step = first_steps(plan);
-    let mut truths: Vec<Vec<f64>> = vec![Vec::with_capacity(total); record.traces.series.len()];
-    let (series, whitened) = (&mut record.traces.series, &mut record.whitened);
-    state_pass(
-        &plan.stages,
-        &gains,
-        &mut x,
-        |step, segment, z| {
-            truth.step(segment, step - first_step[segment], &mut noise, z);
-            for (i, t) in truths.iter_mut().enumerate() {
-                t.push(value(truth.x(), i));
-            }
-        },
-        |_, x, innovations| {
-            for (i, s) in series.iter_mut().enumerate() {
-                s.estimate.push(value(x, i));
-            }
-            whitened.extend_from_slice(innovations);
-        },
-    )?;
-    for (s, t) in record.traces.series.iter_mut().zip(truths) {
-        s.truth.extend(t);
-    }
-    record.largest_psi = truth.largest_psi;
-    record.last_error = x.iter().zip(truth.x()).map(|(a, b)| a - b).collect();
     let finite = |list: &[f64]| list.iter().all(|x| x.is_finite());
-    let ended = |s: &Series| finite(&s.truth) && finite(&s.estimate) && finite(&s.sigma);
-    if !(finite(&record.whitened) && finite(&record.last_error) && record.traces.series.iter().all(ended)) {
+    let all = |lists: &[Vec<f64>]| lists.iter().all(|l| finite(l));
+    let ended = finite(&filtered.whitened) && finite(&filtered.error) && all(&sampled.truth);
+    if !(ended && all(&filtered.estimate) && all(&filtered.sigma)) {
         let what = "the run of the filter ends in numbers that are none".into();
         return Err(SimulationError::Unresolvable { what });
     }
-    Ok(record)
+    let series = |filtered: Filtered| -> Vec<Series> {
+        let both = filtered.estimate.into_iter().zip(filtered.sigma).zip(&sampled.truth);
+        both.map(|((estimate, sigma), truth)| Series { truth: truth.clone(), estimate, sigma }).collect()
+    };
+    // what the linear filter would have made of it
+    if kind != FilterKind::Linear {
+        traces.linear = Some(series(linear(plan, start, &sampled, &recorded)?));
+    }
+    let (passes, converged) = filtered.passes;
+    Ok(Record {
+        whitened: filtered.whitened.clone(),
+        last_covariance: filtered.covariance.clone(),
+        last_error: filtered.error.clone(),
+        filter: FilterReport { kind, reason, passes, converged },
+        validity,
+        traces: Traces { series: series(filtered), ..traces },
+    })
+}
+
+/// Which filter runs, and why.
+fn choose(
+    plan: &Plan,
+    conditions: &Conditions,
+    validity: &Validity,
+) -> Result<(FilterKind, FilterReason), SimulationError> {
+    let steps = plan.segments.iter().map(|s| s.steps).sum::<usize>();
+    match conditions.filter {
+        Some(FilterKind::Iterated) if steps > MAX_ITERATED_STEPS => {
+            let (found, what) = (steps.to_string(), "steps of an iterated filter");
+            Err(SimulationError::TooManySteps { found, what, most: MAX_ITERATED_STEPS })
+        }
+        Some(kind) => Ok((kind, FilterReason::Given)),
+        None if conditions.truth == Truth::Linear => Ok((FilterKind::Linear, FilterReason::LinearTruth)),
+        None if validity.holds => Ok((FilterKind::Linear, FilterReason::Valid)),
+        None if steps > MAX_ITERATED_STEPS => Ok((FilterKind::Extended, FilterReason::NotValid)),
+        None => Ok((FilterKind::Iterated, FilterReason::NotValid)),
+    }
 }
 
 /// The number of the first step of every segment.

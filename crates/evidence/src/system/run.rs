@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
+use obsdeg_core::model::settings::FilterKind;
 use obsdeg_core::system::{Compiled, Judgement, ModelError, StateStart, SystemModel, judge_compiled};
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
@@ -297,7 +298,13 @@ fn estimates(
             sigma,
             error_over_sigma,
             prior_sigma,
-            verdict: Outcome::of(determined, error_over_sigma, [prior_sigma, sigma], None),
+            verdict: Outcome::of(
+                determined,
+                FilterKind::Linear,
+                error_over_sigma,
+                [prior_sigma, sigma],
+                None,
+            ),
         }
     };
     numeric.names.iter().enumerate().map(of).collect()

@@ -9,7 +9,7 @@ use serde_spanned::Spanned;
 use crate::model::geometry::{Geometry, Term};
 use crate::model::ranges;
 use crate::model::scheme::Carry;
-use crate::model::settings::{DriftNoise, Propagation, Truth};
+use crate::model::settings::{DriftNoise, FilterKind, Propagation, Truth};
 
 /// A number as it is written.
 pub(super) type Literal = Option<Spanned<toml::Value>>;
@@ -67,6 +67,8 @@ pub struct SchemeFile {
 pub(super) struct SimulationEntry {
     /// linear (default) or exact.
     pub(super) truth: Option<Truth>,
+    /// linear, extended or iterated; when left out, linear where the small-angle model holds.
+    pub(super) filter: Option<FilterKind>,
     /// Largest step in s; 10 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::STEP_S.low, "maximum" = ranges::STEP_S.high))]
     pub(super) step_s: Option<Spanned<f64>>,

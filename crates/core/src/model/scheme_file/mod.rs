@@ -109,6 +109,7 @@ impl Reader<'_> {
         let key = |key: &str| format!("simulation.{key}");
         Ok(Settings {
             truth: s.truth,
+            filter: s.filter,
             propagation: s.propagation,
             step_s: self.keep(key("step_s"), s.step_s.as_ref()),
             dwell_s: self.keep(key("dwell_s"), s.dwell_s.as_ref()),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
-use crate::model::settings::{Propagation, Settings, Truth};
+use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
 use crate::model::{Geometry, PerGyro, SlewAxis, Unknowns};
 
 /// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
@@ -121,6 +121,7 @@ fn settings(out: &mut String, s: &Settings) {
     let gyros = s.gyros().map(|(key, x)| (key, x.map(per_gyro)));
     let texts = [
         ("truth", truth.map(quoted)),
+        ("filter", s.filter.map(FilterKind::name).map(quoted)),
         ("step_s", s.step_s.map(number)),
         ("dwell_s", s.dwell_s.map(number)),
         ("slew_rate_deg_s", s.slew_rate_deg_s.map(number)),
@@ -211,6 +212,7 @@ mod tests {
     prop_compose! {
         fn settings()(
             truth in prop::option::of(prop::sample::select(vec![Truth::Linear, Truth::Exact])),
+            filter in prop::option::of(prop::sample::select(FilterKind::ALL.to_vec())),
             propagation in prop::option::of(prop::sample::select(vec![Propagation::Exponential, Propagation::Rk4])),
             step_s in prop::option::of(1e-6f64..1e6),
             dwell_s in prop::option::of(1e-3f64..1e6),
@@ -229,7 +231,7 @@ mod tests {
             let [angle, rate, bias] = gyros.map(|g| g.map(|(x, of)| PerGyro(of.map(|k| x * f64::from(k.min(1))))));
             Settings {
                 angle_random_walk_deg_sqrt_h: angle, rate_random_walk_dph_sqrt_h: rate, bias_instability_dph: bias,
-                correlation_time_s, truth, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
+                correlation_time_s, truth, filter, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
                 drift_noise, drift_scale, values, estimates, priors,
             }
         }
