@@ -9,7 +9,8 @@ use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
 use obsdeg_evidence::simulation::{
-    CoefficientFloor, Consistency, Doubt, GyroNoise, MeasurementReport, NoiseFloor, Outcome, SimulationError,
+    CoefficientFloor, Consistency, Doubt, GyroNoise, MeasurementReport, NoiseFloor, Outcome, Reached,
+    SimulationError,
 };
 
 use crate::document::{number, optional};
@@ -488,18 +489,20 @@ pub(crate) const FLOOR: [&str; 3] = ["sigma now", "least sigma", "no better beyo
 
 /// Those of one coefficient.
 pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
-    let dwell = match (c.least_sigma, c.dwell_s) {
-        (Some(_), None) => "still falls".into(),
-        (_, dwell) => optional(dwell),
+    let dwell = match c.reached {
+        Some(Reached::StillFalls) => "still falls".into(),
+        Some(Reached::AtTheShortest) => "the shortest".into(),
+        Some(Reached::Within) | None => optional(c.dwell_s),
     };
     [optional(c.sigma), optional(c.least_sigma), dwell]
 }
 
 /// What a noise floor is.
 pub(crate) const FLOOR_MEANS: [&str; 3] = [
-    "sigma of the filter without a prior, with noise of Z and random drift: now, and the least over all dwells in proportion to these",
-    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the least; still falls: that is beyond a \
-     quarter of the longest",
+    "sigma of the linear filter, as far as the small-angle model holds, without a prior, with noise of Z and random drift: now, and the least over all dwells \
+     in proportion to these",
+    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the least; the shortest: of those \
+     looked at, so that shorter ones may do as well or better; still falls: not before a quarter of the longest",
     "every coefficient is a constant: D_F is the bias at the start of the run, and the walk of a gyro takes its bias away from there",
 ];
 

@@ -2,7 +2,9 @@
 
 use nalgebra::Cholesky;
 use obsdeg_core::model::PerGyro;
-use obsdeg_evidence::simulation::{CoefficientFloor, GyroNoise, noise_floor, predict, sigmas_without_prior};
+use obsdeg_evidence::simulation::{
+    CoefficientFloor, GyroNoise, Reached, noise_floor, predict, sigmas_without_prior,
+};
 
 use super::*;
 use crate::schemes::S6;
@@ -105,13 +107,18 @@ fn angle_random_walk_alone_has_no_floor() {
     }
     let found = of_d_fx(&alone(), &conditions);
     assert!(found.least_sigma < found.sigma && found.dwell_s.is_none(), "{found:?}");
+    assert_eq!(found.reached, Some(Reached::StillFalls));
     // a bias that forgets averages out too
     let forgets = GyroNoise {
         bias_instability_dph: PerGyro::all(0.01),
         correlation_time_s: 10.0,
         ..conditions.gyro_noise
     };
-    assert_eq!(of_d_fx(&alone(), &Conditions { gyro_noise: forgets, ..conditions }).dwell_s, None);
+    let forgetful = Conditions { gyro_noise: forgets, ..conditions };
+    assert_eq!(of_d_fx(&alone(), &forgetful).reached, Some(Reached::StillFalls));
+    // where all dwells are long, none is named
+    let long = of_d_fx(&alone(), &Conditions { dwell_s: 1e6, ..with(0.006, 0.06, 1e-5) });
+    assert_eq!((long.reached, long.dwell_s), (Some(Reached::AtTheShortest), None));
 }
 
 /// Two positions turned about the North at the equator, psi carried inertially: `psi_x' = D_FX -+ D_SX + b + w`. Sigmas of D_FX and D_SX by generalised least
@@ -216,6 +223,7 @@ fn simulate_and_compare_show_the_floor() {
     };
     assert!(
         of("D_FZ")["least_sigma"].is_null()
+            && of("D_FZ")["reached"].is_null()
             && of("D_FZ")["dwell_s"].is_null()
             && of("D_FZ")["sigma"].is_null()
     );

@@ -1,9 +1,10 @@
 //! The noise floor: how well a coefficient can be known at all under random drift, and the dwell beyond which longer is no better.
 //!
-//! All dwells of a scheme are multiplied by a factor, from 1/16 to 256 in steps of sqrt 2; for each the covariance of the filter runs once,
+//! All dwells of a scheme are multiplied by a factor, from 1/16 to 256 in steps of sqrt 2 as far as dwells are admitted (on average); for each the covariance of the filter runs once,
 //! with noise of Z, random drift and biases as in a run but without a prior (that is, with one that says nothing). The least sigma of a
 //! coefficient over these dwells is its floor; the dwell beyond which longer is no better is the shortest at which sigma is within 5 % of it. A
-//! coefficient whose sigma gets there only in the last two octaves still falls, and has no floor in this range. Within a long
+//! coefficient whose sigma gets there only in the last two octaves still falls, and has no floor in this range; one that is there at the shortest dwell
+//! may have its least at a shorter one. Within a long
 //! position samples are taken together, of the same density of noise: twice as many after every 20 steps, from its start and from its end, for it is
 //! there that what a walk forgets is seen.
 //!
@@ -21,8 +22,8 @@
 //!   `sqrt 2 K^(3/2) R^(1/4)`.
 //! - No rate random walk, K = 0: `sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau)))` with `tau = sqrt R/N`: `12 R/T^3`, then `N^2/T`, and no floor.
 
-use obsdeg_core::model::Scheme;
 use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::{Scheme, ranges};
 use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Form, SquareRootInformation};
 use rayon::prelude::*;
@@ -71,8 +72,22 @@ pub struct CoefficientFloor {
     pub sigma: Option<f64>,
     /// The least sigma over all dwells looked at; null when samples do not determine it.
     pub least_sigma: Option<f64>,
-    /// The shortest dwell (mean of the positions) in s at which sigma is within 5 % of the least; null where it still falls at the longest.
+    /// Where it is reached; null when samples do not determine it.
+    pub reached: Option<Reached>,
+    /// The shortest dwell (mean of the positions) in s at which sigma is within 5 % of the least, where this lies within the dwells looked at.
     pub dwell_s: Option<f64>,
+}
+
+/// Where a sigma is within 5 % of the least.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reached {
+    /// At the shortest dwell looked at already: shorter ones may do as well, or better.
+    AtTheShortest,
+    /// Within the dwells looked at.
+    Within,
+    /// Beyond a quarter of the longest dwell: sigma still falls.
+    StillFalls,
 }
 
 /// The noise floor of a scheme, if its gyros have noise of their own.
@@ -87,11 +102,12 @@ pub fn noise_floor(
     if conditions.gyro_noise.is_none() {
         return Ok(None);
     }
-    let factors: Vec<f64> = FACTORS.map(|k| 2f64.powf(f64::from(k) / 2.0)).collect();
+    let mean = mean_dwell(scheme, conditions);
+    let factors = FACTORS.map(|k| 2f64.powf(f64::from(k) / 2.0));
+    let factors: Vec<f64> = factors.filter(|f| *f == 1.0 || ranges::DWELL_S.admits(f * mean)).collect();
     let curves: Vec<Vec<f64>> =
         factors.par_iter().map(|&f| sigmas_without_prior(scheme, conditions, f)).collect::<Result<_, _>>()?;
     let plan = Plan::new(scheme, conditions)?;
-    let mean = mean_dwell(scheme, conditions);
     let (names, units) = (plan.platform.names(), plan.platform.units());
     let of = |c: usize| {
         let scale = si_per_shown(units[c]);
@@ -103,7 +119,8 @@ pub fn noise_floor(
             unit: shown_unit(units[c]).into(),
             sigma: found.and_then(|_| curve.iter().find(|(t, _)| *t == mean).map(|p| p.1)),
             least_sigma: found.map(|f| f.0),
-            dwell_s: found.and_then(|f| f.1),
+            reached: found.map(|f| f.1),
+            dwell_s: found.and_then(|f| (f.1 == Reached::Within).then_some(f.2)),
         }
     };
     Ok(Some(NoiseFloor {
@@ -114,20 +131,17 @@ pub fn noise_floor(
     }))
 }
 
-/// The least sigma of a curve of (dwell, sigma), and the shortest dwell within 5 % of it, unless it still falls there.
-fn least(curve: &[(f64, f64)]) -> (f64, Option<f64>) {
+/// The least sigma of a curve of (dwell, sigma), and the shortest dwell within 5 % of it.
+fn least(curve: &[(f64, f64)]) -> (f64, Reached, f64) {
     let least = curve.iter().map(|p| p.1).fold(f64::MAX, f64::min);
     let limit = WITHIN * least;
     let longest = curve.last().map_or(0.0, |p| p.0);
-    let reached = curve.iter().position(|p| p.1 <= limit).map(|i| match i.checked_sub(1) {
-        None => curve[0].0,
-        // between two dwells along a power of the dwell
-        Some(before) => {
-            let ((t0, s0), (t1, s1)) = (curve[before], curve[i]);
-            t0 * (t1 / t0).powf((limit / s0).ln() / (s1 / s0).ln())
-        }
-    });
-    (least, reached.filter(|t| *t <= SETTLED * longest))
+    let reached = curve.iter().position(|p| p.1 <= limit).unwrap_or(0);
+    let Some(before) = reached.checked_sub(1) else { return (least, Reached::AtTheShortest, curve[0].0) };
+    // between two dwells along a power of the dwell
+    let ((t0, s0), (t1, s1)) = (curve[before], curve[reached]);
+    let dwell = t0 * (t1 / t0).powf((limit / s0).ln() / (s1 / s0).ln());
+    (least, if dwell <= SETTLED * longest { Reached::Within } else { Reached::StillFalls }, dwell)
 }
 
 /// The mean dwell of the positions, in s.
@@ -229,9 +243,11 @@ mod tests {
         let curve =
             |f: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> { dwells.clone().map(|t| (t, f(t))).collect() };
         // a power goes on; what rises again has its least in between
-        assert_eq!(least(&curve(&|t| 1.0 / t)).1, None);
-        let (found, dwell) = least(&curve(&|t| if t < 8.0 { 8.0 / t } else { t / 8.0 }));
-        assert!(found == 1.0 && dwell.is_some_and(|t| (t - 8.0 / 1.05).abs() < 1e-9), "{dwell:?}");
-        assert_eq!(least(&curve(&|_| 3.0)), (3.0, Some(1.0)));
+        assert_eq!(least(&curve(&|t| 1.0 / t)).1, Reached::StillFalls);
+        let (found, reached, dwell) = least(&curve(&|t| if t < 8.0 { 8.0 / t } else { t / 8.0 }));
+        assert_eq!((found, reached), (1.0, Reached::Within));
+        assert!((dwell - 8.0 / 1.05).abs() < 1e-9, "{dwell}");
+        assert_eq!(least(&curve(&|_| 3.0)), (3.0, Reached::AtTheShortest, 1.0));
+        assert_eq!(least(&curve(&|t| t)), (1.0, Reached::AtTheShortest, 1.0));
     }
 }

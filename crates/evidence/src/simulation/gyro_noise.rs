@@ -173,7 +173,9 @@ impl Plan {
 
     /// A bound, six sigma, on what biases and white drift of all gyros turn in a step, as a rate: rad/s.
     pub(super) fn random_rate(&self, dt: f64) -> f64 {
-        let bias = |b: &Bias| (b.process.variance + b.process.density * self.duration_s()).sqrt();
+        let walked =
+            |b: &Bias| if b.process.decay > 0.0 { 0.0 } else { b.process.density * self.duration_s() };
+        let bias = |b: &Bias| (b.process.variance + walked(b)).sqrt();
         let white: f64 = self.gyros.iter().map(|g| g.white / dt.sqrt()).sum();
         6.0 * (self.biases.iter().map(bias).sum::<f64>() + white)
     }

@@ -19,7 +19,7 @@ pub use batch::{Batch, batch, diffuse_prior};
 pub use conditions::{Conditions, general_first, latitude_of, resolve, si_per_shown};
 pub use consistency::{Consistency, Doubt};
 pub use extended::{Ended, Extended, PlatformMotion};
-pub use floor::{CoefficientFloor, NoiseFloor, noise_floor, sigmas_without_prior};
+pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_without_prior};
 pub use gyro_noise::{Bias, GyroNoise};
 pub use iterated::iterated;
 pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
