@@ -9,6 +9,7 @@ use obsdeg_core::model::{Scheme, cardinal};
 use obsdeg_core::system::{Judgement, SystemOptions, Unknown, analyze_system, json, judge, model_file};
 use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{Measurement, Process};
+use obsdeg_evidence::crosscheck::Agreement;
 use obsdeg_evidence::system::{Numeric, SystemEvidence, crosscheck_system, simulate_system};
 use serde_json::Value;
 
@@ -396,13 +397,17 @@ fn what_is_not_measured_is_no_agreement() {
     let orders = |e: &SystemEvidence| (e.orders.measured, e.orders.of);
     let e = crosscheck_system(&example("two-position-alignment"), 1).expect("evidence");
     assert_eq!((e.passed, orders(&e)), (true, (0, 10)));
-    assert!(e.quantities.iter().all(|q| q.slope.pass.is_none() && q.inflation.pass == Some(true)));
+    assert!(
+        e.quantities
+            .iter()
+            .all(|q| !q.slope.outcome.is_resolved() && q.inflation.outcome == Agreement::Agrees)
+    );
     // three states in closed form: degrees 0, 1, 2
     let chain = "name='c'\n[states]\nx='y'\ny='z'\nz='0'\n[outputs]\no='x'\n[simulation]\nduration=1\nstep=0.1\n\
                  noise={o=0.01}\nvalues={x=1, y=1, z=1}";
     let e = crosscheck_system(&model_file::read(chain).expect("a model"), 1).expect("evidence");
     assert!(e.passed && orders(&e) == (3, 3) && e.checks == 7, "{e:?}");
-    assert!(e.quantities.iter().all(|q| q.slope.pass == Some(true)));
+    assert!(e.quantities.iter().all(|q| q.slope.outcome == Agreement::Agrees));
 }
 
 /// A pendulum that starts at rest: its slopes go up and down with the horizon until rounding hides them. Two horizons that agree by chance

@@ -34,6 +34,8 @@ pub struct PredictedUnknown {
 pub struct PredictedCombination {
     /// In words: `D_FZ - wN*psi_y`.
     pub expression: String,
+    /// Whether it was asked for: others are part of a basis.
+    pub requested: bool,
     /// Its coefficients; the first is its leading unknown.
     pub terms: Combination,
     /// Whether it can be solved.
@@ -55,6 +57,13 @@ pub struct Prediction {
     pub unknowns: Vec<PredictedUnknown>,
     /// Observable combinations beyond single unknowns, and those that the scheme asks for.
     pub combinations: Vec<PredictedCombination>,
+    /// `dim V_0, dim V_1, ...` by derivatives.
+    pub rank_profile: Vec<usize>,
+    /// Whether all combinations of the basis have numbers.
+    pub all_combinations: bool,
+    /// Basis of the directions that no derivative of Z sees, unknowns that are not excited left out; `None` when some have no
+    /// numbers.
+    pub unseen_by_derivatives: Option<Vec<Combination>>,
     /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis, except at a
     /// pole, where others move psi as well.
     pub null_space: Vec<Combination>,
@@ -116,6 +125,7 @@ impl Prediction {
             let Verdict { status, degree } = c.verdict;
             Some(PredictedCombination {
                 expression: c.name.clone(),
+                requested: c.requested,
                 terms: numbers(&c.functional.as_ref()?.terms).filter(|t| !t.is_empty())?,
                 status,
                 degree,
@@ -124,7 +134,11 @@ impl Prediction {
                 determined_at_end: determined(c.orders.end, degree),
             })
         };
-        let combinations = found.combinations.iter().filter_map(predicted).collect();
+        let combinations: Vec<PredictedCombination> =
+            found.combinations.iter().filter_map(predicted).collect();
+        let all_combinations = combinations.len() == found.combinations.len();
+        let components = found.null_space.iter().map(|v| numbers(v.components.as_ref()?));
+        let unseen_by_derivatives = components.collect();
         // with dwells, a direction may be seen that derivatives do not see (at a pole)
         let unseen = |v: &[u64]| !accuracy.is_some_and(|a| a.sees(v));
         let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).filter(|&c| {
@@ -139,8 +153,17 @@ impl Prediction {
         let Findings { degrees, error_bound, .. } = &found.verdicts;
         let rank = accuracy.and_then(Accuracy::rank).unwrap_or_else(|| degrees.rank());
         let error_bound = accuracy.map_or(*error_bound, |a| error_bound.max(a.error_bound));
-        let has_accuracy_orders = accuracy.is_some();
-        Ok(Self { unknowns, combinations, null_space, rank, has_accuracy_orders, error_bound })
+        Ok(Self {
+            unknowns,
+            combinations,
+            rank_profile: degrees.rank_profile.clone(),
+            all_combinations,
+            unseen_by_derivatives,
+            null_space,
+            rank,
+            has_accuracy_orders: accuracy.is_some(),
+            error_bound,
+        })
     }
 }
 

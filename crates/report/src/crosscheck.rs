@@ -1,26 +1,35 @@
 //! The cross-check of exact verdicts and filter.
 
 use obsdeg_core::model::settings::Truth;
-use obsdeg_evidence::crosscheck::{Check, Control, CrossCheck, NullEvidence, QuantityEvidence, Statistic};
+use obsdeg_evidence::crosscheck::{
+    Agreement, Check, Control, Counts, CrossCheck, NullEvidence, QuantityEvidence, Statistic,
+};
 
 use crate::Answer;
 use crate::document::{Block, Document, left, number, optional, right};
 use crate::simulation::{conditions, validity, warning};
 use crate::words::{self, band};
 
-/// What was not measured is neither.
-fn mark(pass: impl Into<Option<bool>>) -> String {
-    match pass.into() {
-        Some(true) => "pass",
-        Some(false) => "FAIL",
-        None => "-",
+/// The mark of a check.
+fn mark(outcome: Agreement) -> String {
+    match outcome {
+        Agreement::Agrees => "pass",
+        Agreement::Disagrees => "FAIL",
+        Agreement::NotResolvable => "not resolvable",
+        Agreement::NotTested => "-",
     }
     .into()
 }
 
-/// The mark of a slope; one that was measured and is none is no failure.
-fn slope(c: &Check) -> String {
-    if c.measured.is_some() && c.pass.is_none() { "not resolvable".into() } else { mark(c.pass) }
+fn passed(pass: bool) -> String {
+    mark(if pass { Agreement::Agrees } else { Agreement::Disagrees })
+}
+
+/// The gravest of some outcomes.
+fn gravest(outcomes: impl IntoIterator<Item = Agreement>) -> Agreement {
+    let order = [Agreement::Disagrees, Agreement::NotResolvable, Agreement::Agrees];
+    let found: Vec<Agreement> = outcomes.into_iter().collect();
+    order.into_iter().find(|o| found.contains(o)).unwrap_or(Agreement::NotTested)
 }
 
 fn measured(c: &Check) -> String {
@@ -28,26 +37,61 @@ fn measured(c: &Check) -> String {
     if text == "-0.000" { "0.000".into() } else { text }
 }
 
-/// Items a and b, unknown by unknown.
+/// Item a without dwells, unknown by unknown.
+fn by_derivatives(c: &CrossCheck) -> Block {
+    let row = |q: &QuantityEvidence| {
+        let partners = q.partners.as_ref().map_or(Agreement::NotTested, |p| p.outcome);
+        vec![
+            q.name.clone(),
+            q.status.to_string(),
+            q.status_measured.map_or_else(|| "-".into(), |s| s.to_string()),
+            words::degree(q.degree),
+            format!("{:.1}", q.degree_slope.predicted),
+            measured(&q.degree_slope),
+            q.partners.as_ref().map_or_else(|| "-".into(), |p| p.predicted.len().to_string()),
+            q.partners
+                .as_ref()
+                .and_then(|p| p.measured.as_ref())
+                .map_or_else(|| "-".into(), |m| m.len().to_string()),
+            mark(gravest([q.status_outcome, q.degree_slope.outcome, partners])),
+        ]
+    };
+    Block::table(
+        "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was at the start of each",
+        [
+            left("unknown"),
+            left("verdict"),
+            left("measured"),
+            right("degree"),
+            right("slope predicted"),
+            right("measured"),
+            right("partners"),
+            right("measured"),
+            left(""),
+        ],
+        c.quantities.iter().map(row),
+    )
+}
+
+/// Items a and b with dwells, unknown by unknown.
 fn by_unknown(c: &CrossCheck) -> Block {
     let row = |q: &QuantityEvidence| {
         vec![
             q.name.clone(),
-            words::degree(q.degree),
             words::accuracy_order(q.degree, q.accuracy_order, true),
             format!("{:.1}", q.slope.predicted),
             measured(&q.slope),
-            slope(&q.slope),
+            mark(gravest([q.slope.outcome, q.slope_at_end.outcome])),
             format!("{:.0}", q.inflation.predicted),
             measured(&q.inflation),
-            mark(q.inflation.pass),
+            mark(q.inflation.outcome),
         ]
     };
     Block::table(
-        "a. slope of log sigma (psi: of the start) against log dwell; b. factor on sigma (psi: of the end) for a prior variance times 100",
+        "a. the accuracy order: slope of log sigma (psi: of the start; held against that of the end as well) against log dwell; b. factor on sigma \
+         (psi: of the end) for a prior variance times 100",
         [
             left("unknown"),
-            right("degree"),
             right("accuracy order"),
             right("slope predicted"),
             right("measured"),
@@ -67,9 +111,9 @@ fn by_direction(c: &CrossCheck) -> Block {
         vec![
             v.direction.clone(),
             v.seen.measured.map_or_else(|| "-".into(), |x| format!("{x:.1e}")),
-            mark(v.seen.pass),
+            mark(v.seen.outcome),
             v.correlation.map_or_else(|| "-".into(), correlation),
-            v.correlation.map_or_else(String::new, |k| mark(k.pass)),
+            v.correlation.map_or_else(String::new, |k| mark(k.outcome)),
         ]
     };
     Block::table(
@@ -82,18 +126,23 @@ fn by_direction(c: &CrossCheck) -> Block {
 /// What is not of one unknown or direction: item b's count, and c to f.
 fn whole(c: &CrossCheck) -> Block {
     let row = |evidence: String, predicted: String, measured: String, band: String, pass: bool| {
-        vec![evidence, predicted, measured, band, mark(pass)]
+        vec![evidence, predicted, measured, band, passed(pass)]
     };
-    let mut rows = vec![row(
-        "b. directions not seen".into(),
+    let spaces = c.spaces.iter().map(|s| {
+        let what = format!("a. {}", s.what);
+        vec![what, s.predicted.clone(), s.measured.clone(), String::new(), mark(s.outcome)]
+    });
+    let mut rows: Vec<Vec<String>> = spaces.collect();
+    rows.push(vec![
+        "a. directions not seen with dwells".into(),
         c.defect.predicted.to_string(),
         c.defect.measured.to_string(),
         String::new(),
-        c.defect.pass,
-    )];
+        mark(c.defect.outcome),
+    ]);
     rows.extend(c.covariance.iter().map(|d| {
         let limit = format!("up to {:.0e}", d.limit);
-        row(format!("c. {}", d.name), "0".into(), format!("{:.1e}", d.difference), limit, d.pass)
+        vec![format!("c. {}", d.name), "0".into(), format!("{:.1e}", d.difference), limit, mark(d.outcome)]
     }));
     rows.extend(c.monte_carlo.statistics.iter().map(|s: &Statistic| {
         let name = format!("d. {}, {} runs", s.name, c.monte_carlo.runs);
@@ -112,12 +161,12 @@ fn whole(c: &CrossCheck) -> Block {
         "1".into(),
         c.ranking.kendall_tau.map_or_else(|| "all tied".into(), number),
         String::new(),
-        mark(c.ranking.pass),
+        passed(c.ranking.pass),
     ]);
     rows.extend(c.controls.iter().map(|k: &Control| {
         let name = format!("f. {}: failing checks of a, b; NIS", k.name);
         let found = format!("{} of {}; {}", k.failed, k.checks, number(k.nis));
-        row(name, "fails".into(), found, format!("(99.9 %: {})", band(k.band)), k.pass)
+        vec![name, "fails".into(), found, format!("(99.9 %: {})", band(k.band)), mark(k.outcome)]
     }));
     let columns = [left("evidence"), right("predicted"), right("measured"), left("band (95 %)"), left("")];
     Block::table("The filter as a whole", columns, rows)
@@ -126,7 +175,11 @@ fn whole(c: &CrossCheck) -> Block {
 /// What a reader must know before the rows.
 fn lead(c: &CrossCheck) -> Vec<String> {
     let mut out: Vec<String> = warning(&c.conditions).into_iter().collect();
-    out.push(format!("{} of {} accuracy orders measured", c.orders.measured, c.orders.of));
+    let Counts { agree, disagree, not_resolvable, not_tested } = c.counts;
+    out.push(format!(
+        "checks: {agree} agree, {disagree} disagree, {not_resolvable} not resolvable, {not_tested} not tested; {} of {} accuracy orders measured",
+        c.orders.measured, c.orders.of
+    ));
     if c.timeline.iter().any(|t| t.slew) {
         out.push(
             "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \
@@ -147,10 +200,14 @@ fn lead(c: &CrossCheck) -> Vec<String> {
 impl Answer for CrossCheck {
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
-        blocks.extend((!self.quantities.is_empty()).then(|| by_unknown(self)));
+        if !self.quantities.is_empty() {
+            blocks.extend([by_derivatives(self), by_unknown(self)]);
+        }
         blocks.extend((!self.null_space.is_empty()).then(|| by_direction(self)));
         blocks.push(whole(self));
         blocks.extend(Block::list_if_any("What disagrees", self.disagreements.clone()));
+        blocks.push(Block::list("How", self.method.clone()));
+        blocks.push(Block::list("Not tested by evidence", self.not_tested.clone()));
         blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
         let mut assumed = conditions(&self.conditions, &self.timeline);
         assumed.push(format!("carry {}; seed {}; truths drawn from the prior", self.carry, self.seed));

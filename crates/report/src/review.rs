@@ -368,6 +368,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
     match &s.evidence {
         Ok(c) => {
             let outcome = match (c.passed, c.verdicts_agree) {
+                (true, _) if c.counts.not_resolvable > 0 => "agree in every check that is resolvable",
                 (true, _) => "agree in every check",
                 (false, true) => "agree, but the Monte Carlo runs do NOT fit the filter, as listed below",
                 (false, false) => "DISAGREE, as listed below",

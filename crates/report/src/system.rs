@@ -2,7 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity};
-use obsdeg_evidence::crosscheck::Check;
+use obsdeg_evidence::crosscheck::{Agreement, Check};
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
@@ -222,7 +222,7 @@ impl Answer for SystemEvidence {
             "unobservable directions: {} exact, {} singular values vanish, {}",
             self.defect.predicted,
             self.defect.measured,
-            if self.defect.pass { "agrees" } else { "DISAGREES" }
+            if self.defect.outcome == Agreement::Disagrees { "DISAGREES" } else { "agrees" }
         ));
         blocks.push(Block::list("Directions that no output sees", null));
         blocks.push(Block::list(

@@ -71,6 +71,9 @@ fn numbered(places: impl Iterator<Item = Place>) -> Vec<(usize, Place)> {
     places.enumerate().collect()
 }
 
+/// Six digits are printed.
+const CERTAIN: f64 = 1e-9;
+
 impl Problem {
     /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique).
     /// The right sides are the target's entries, column by column. Behind `y` stand the unknowns of every motion.
@@ -142,8 +145,8 @@ impl Problem {
         Some(self.outputs_of(f, table, x))
     }
 
-    /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the
-    /// right side or anything is not finite.
+    /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the right side, when the rounding of
+    /// the table alone may move a value by more than [`CERTAIN`] of the largest, or anything is not finite.
     pub(crate) fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
         let m = self.equations.len();
         let mut a = DMatrix::zeros(m, self.unknowns);
@@ -158,7 +161,11 @@ impl Problem {
         let (q, r) = (qr.q(), qr.r());
         let x = r.solve_upper_triangular(&(q.transpose() * &b))?;
         let residual = (&a * &x - &b).norm();
-        let fine = x.iter().all(|v| v.is_finite()) && residual <= 1e-9 * (1.0 + b.norm());
+        // |A^+| (|A| |x| + |b|): what relative errors of the entries make of x
+        let inverse = r.solve_upper_triangular(&q.transpose())?;
+        let moved = inverse.abs() * (a.abs() * x.abs() + b.abs()) * f64::EPSILON;
+        let certain = moved.amax() <= CERTAIN * x.amax();
+        let fine = certain && x.iter().all(|v| v.is_finite()) && residual <= 1e-9 * (1.0 + b.norm());
         fine.then(|| self.outputs_of(&Float, table, x.iter().copied().collect()))
     }
 

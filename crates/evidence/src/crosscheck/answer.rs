@@ -31,6 +31,14 @@ pub struct CrossCheck {
     pub verdicts_agree: bool,
     /// What disagrees, in words.
     pub disagreements: Vec<String>,
+    /// How many checks agree, disagree, are not resolvable, were not made.
+    pub counts: Counts,
+    /// How slopes are measured, and when something is not resolvable.
+    pub method: Vec<String>,
+    /// What an analysis says and nothing here is held against.
+    pub not_tested: Vec<String>,
+    /// a: ranks, null space and combinations against the samples.
+    pub spaces: Vec<SpaceCheck>,
     /// How many accuracy orders were measured.
     pub orders: Measured,
     /// Evidence a and b per unknown and combination.
@@ -59,6 +67,73 @@ pub struct CrossCheck {
     pub error_bound: f64,
 }
 
+/// What evidence makes of a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Agreement {
+    /// What was measured is what the verdict says.
+    Agrees,
+    /// It is not.
+    Disagrees,
+    /// Something was measured, but neither for nor against the verdict, by a test that the answer states.
+    NotResolvable,
+    /// Nothing was measured.
+    NotTested,
+}
+
+impl Agreement {
+    /// Of what was measured.
+    pub(crate) fn of(agrees: bool) -> Self {
+        if agrees { Self::Agrees } else { Self::Disagrees }
+    }
+
+    /// Whether it is for or against the verdict.
+    pub fn is_resolved(self) -> bool {
+        matches!(self, Self::Agrees | Self::Disagrees)
+    }
+}
+
+/// How many checks came out how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub struct Counts {
+    /// Agree.
+    pub agree: usize,
+    /// Disagree.
+    pub disagree: usize,
+    /// Are not resolvable.
+    pub not_resolvable: usize,
+    /// Were not made.
+    pub not_tested: usize,
+}
+
+impl Counts {
+    pub(crate) fn of(outcomes: impl Iterator<Item = Agreement>) -> Self {
+        let mut out = Self::default();
+        for outcome in outcomes {
+            *match outcome {
+                Agreement::Agrees => &mut out.agree,
+                Agreement::Disagrees => &mut out.disagree,
+                Agreement::NotResolvable => &mut out.not_resolvable,
+                Agreement::NotTested => &mut out.not_tested,
+            } += 1;
+        }
+        out
+    }
+}
+
+/// Something that is no number, predicted and measured.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SpaceCheck {
+    /// What is held against the samples.
+    pub what: String,
+    /// By the exact verdicts.
+    pub predicted: String,
+    /// By the samples; empty when nothing was measured.
+    pub measured: String,
+    /// Whether they agree.
+    pub outcome: Agreement,
+}
+
 /// A predicted and a measured number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Check {
@@ -66,19 +141,20 @@ pub struct Check {
     pub predicted: f64,
     /// What the filter shows; null when it could not be measured.
     pub measured: Option<f64>,
-    /// Whether they agree; null when nothing was measured, which is neither.
-    pub pass: Option<bool>,
+    /// Whether they agree.
+    pub outcome: Agreement,
 }
 
 impl Check {
-    /// What was measured is held against the prediction by `agrees`; what was not is left open.
+    /// What was measured is held against the prediction by `agrees`; what was not is not tested.
     pub(crate) fn new(predicted: f64, measured: Option<f64>, agrees: impl Fn(f64) -> bool) -> Self {
-        Self { predicted, measured, pass: measured.map(agrees) }
+        let outcome = measured.map_or(Agreement::NotTested, |x| Agreement::of(agrees(x)));
+        Self { predicted, measured, outcome }
     }
 
     /// Whether something was measured that disagrees.
     pub fn fails(&self) -> bool {
-        self.pass == Some(false)
+        self.outcome == Agreement::Disagrees
     }
 }
 
@@ -95,7 +171,7 @@ impl Measured {
     /// Counts over slopes, each with whether the verdict says an order.
     pub(crate) fn count<'a>(slopes: impl Iterator<Item = (&'a Check, bool)>) -> Self {
         let said: Vec<&Check> = slopes.filter(|(_, said)| *said).map(|(slope, _)| slope).collect();
-        Self { measured: said.iter().filter(|c| c.pass.is_some()).count(), of: said.len() }
+        Self { measured: said.iter().filter(|c| c.outcome.is_resolved()).count(), of: said.len() }
     }
 }
 
@@ -112,10 +188,32 @@ pub struct QuantityEvidence {
     pub accuracy_order: Option<usize>,
     /// Whether the filter has it: one that was made wrong may lack an unknown, and nothing is measured then.
     pub modelled: bool,
-    /// a: log-log slope of sigma (psi: of the start) against the dwell; 0, or more, when nothing is learnt.
+    /// a: log-log slope of sigma against the dwell, psi handed on between positions as it was at the start of each:
+    /// -(degree + 1/2); 0 when nothing is learnt.
+    pub degree_slope: Check,
+    /// a: whether its column of that information is zero, and whether it is in the span; null when it was not measured.
+    pub status_measured: Option<Status>,
+    /// Whether that is the verdict.
+    pub status_outcome: Agreement,
+    /// Unknowns that derivatives do not tell it from; null for a combination.
+    pub partners: Option<Partners>,
+    /// a: log-log slope of sigma (psi: of the start) against the dwell: -(accuracy order + 1/2); 0 when nothing is learnt.
     pub slope: Check,
+    /// The same with psi of the end, which is what a filter shows.
+    pub slope_at_end: Check,
     /// b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100.
     pub inflation: Check,
+}
+
+/// Unknowns that share with one a direction that Z does not see and that holds no shorter one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Partners {
+    /// By the exact verdicts.
+    pub predicted: Vec<String>,
+    /// Those of the directions that the samples do not show; null when they were not measured.
+    pub measured: Option<Vec<String>>,
+    /// Whether they are the same.
+    pub outcome: Agreement,
 }
 
 /// Evidence on one null vector.
@@ -135,10 +233,10 @@ pub struct NullEvidence {
 pub struct Count {
     /// By the exact verdicts.
     pub predicted: usize,
-    /// Singular values of the information below 1e-10 of the largest.
+    /// By the samples.
     pub measured: usize,
     /// Whether they agree.
-    pub pass: bool,
+    pub outcome: Agreement,
 }
 
 /// The largest difference of two covariances.
@@ -150,8 +248,9 @@ pub struct Difference {
     pub difference: f64,
     /// The limit.
     pub limit: f64,
-    /// Whether it is kept.
-    pub pass: bool,
+    /// Whether it is kept; not resolvable where rounding may make a tenth of it: the largest variance of the prior, beside the smallest at the
+    /// end, times the steps times 2e-16.
+    pub outcome: Agreement,
 }
 
 /// A statistic with its bands.
@@ -221,8 +320,10 @@ pub struct Control {
     pub nis: f64,
     /// The band in which a right filter's would be (99.9 %).
     pub band: (f64, f64),
-    /// Whether it was found out.
-    pub pass: bool,
+    /// By how many degrees its latitude or an attitude is off.
+    pub off_deg: f64,
+    /// Whether it was found out; not resolvable where it was not, and need not be.
+    pub outcome: Agreement,
 }
 
 /// Sigma against the dwell.

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::answer::{Check, Count};
+use super::answer::{Agreement, Check, Count};
 
 /// How far a measured slope may be from the predicted one.
 pub(crate) const SLOPE_TOLERANCE: f64 = 0.1;
@@ -42,12 +42,7 @@ pub(crate) fn slope(order: Option<usize>, measured: Option<f64>) -> Check {
 pub(crate) fn defect(predicted: usize, values: &[f64], unseen: f64) -> Count {
     let largest = values.first().copied().unwrap_or(1.0);
     let measured = values.iter().filter(|s| **s <= unseen * largest).count();
-    Count { predicted, measured, pass: predicted == measured }
-}
-
-/// How many checks fail, and of how many: what was not measured is none.
-pub(crate) fn failures(checks: impl Iterator<Item = Option<bool>>) -> (usize, usize) {
-    checks.flatten().fold((0, 0), |(failed, all), pass| (failed + usize::from(!pass), all + 1))
+    Count { predicted, measured, outcome: Agreement::of(predicted == measured) }
 }
 
 #[cfg(test)]
@@ -56,31 +51,32 @@ mod tests {
 
     #[test]
     fn what_agrees() {
-        let passes = |order, x| slope(order, x).pass;
+        use Agreement::{Agrees, Disagrees, NotTested};
+        let passes = |order, x| slope(order, x).outcome;
         assert_eq!(
             [-2.41, -2.59, -2.61, -1.5].map(|x| passes(Some(2), Some(x))),
-            [true, true, false, false].map(Some)
+            [Agrees, Agrees, Disagrees, Disagrees]
         );
         assert_eq!(
             [0.0, 0.5, -0.1, -0.5].map(|x| passes(None, Some(x))),
-            [true, true, true, false].map(Some)
+            [Agrees, Agrees, Agrees, Disagrees]
         );
         // what is no number agrees with nothing; what was not measured is neither
-        assert_eq!([passes(Some(2), Some(f64::NAN)), passes(None, Some(f64::NAN))], [Some(false); 2]);
-        assert_eq!([passes(Some(2), None), passes(None, None)], [None; 2]);
-        let inflated = |rules: &Inflation, determined, x| rules.check(determined, Some(x)).pass == Some(true);
+        assert_eq!([passes(Some(2), Some(f64::NAN)), passes(None, Some(f64::NAN))], [Disagrees; 2]);
+        assert_eq!([passes(Some(2), None), passes(None, None)], [NotTested; 2]);
+        let inflated = |rules: &Inflation, determined, x| rules.check(determined, Some(x)).outcome == Agrees;
         assert_eq!([1.0, 1.02, 9.5].map(|x| inflated(&LINEAR, true, x)), [true, false, false]);
         assert_eq!([10.0, 8.9, 1.0].map(|x| inflated(&LINEAR, false, x)), [true, false, false]);
         assert_eq!([1.4, 1.6, f64::NAN].map(|x| inflated(&LINEARISED, true, x)), [true, false, false]);
         assert_eq!([6.0, 4.0, f64::NAN].map(|x| inflated(&LINEARISED, false, x)), [true, false, false]);
-        assert_eq!(LINEAR.check(true, None).pass, None);
+        assert_eq!(LINEAR.check(true, None).outcome, NotTested);
     }
 
     #[test]
     fn what_counts() {
-        assert_eq!(failures([Some(true), None, Some(false), Some(true)].into_iter()), (1, 3));
-        assert_eq!(defect(1, &[10.0, 1.0, 1e-12], 1e-10), Count { predicted: 1, measured: 1, pass: true });
-        assert_eq!(defect(0, &[10.0, 1.0, 1e-12], 1e-10), Count { predicted: 0, measured: 1, pass: false });
+        let count = |predicted, measured, outcome| Count { predicted, measured, outcome };
+        assert_eq!(defect(1, &[10.0, 1.0, 1e-12], 1e-10), count(1, 1, Agreement::Agrees));
+        assert_eq!(defect(0, &[10.0, 1.0, 1e-12], 1e-10), count(0, 1, Agreement::Disagrees));
         assert_eq!(defect(0, &[], 1e-10).measured, 0);
     }
 }

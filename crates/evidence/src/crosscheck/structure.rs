@@ -1,15 +1,20 @@
 //! Evidence a and b: what the filter's model can tell apart, against what the exact verdicts say of it.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::Scheme;
+use obsdeg_core::degree::Status;
+use obsdeg_core::model::{Carry, Dwell, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 
-use super::answer::{Check, Correlation, Count, NullEvidence, QuantityEvidence, SlopeCurve};
-use super::rules;
+use super::answer::{
+    Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SpaceCheck,
+};
+use super::asymptotics::{Asymptotics, Course, Question, asymptotics, weakest};
+use super::precise::Between;
 use super::slopes::{self, slopes};
-use crate::prediction::{Combination, Prediction};
+use super::{rules, spaces};
+use crate::prediction::{Combination, PredictedUnknown, Prediction};
 use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::{shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
@@ -18,25 +23,44 @@ use crate::simulation::{Conditions, Plan, SimulationError};
 /// Parts of a null vector that are smaller, beside its largest and by what Z shows of each alone, show no correlation
 /// where other directions are hardly seen.
 const SMALL_PART: f64 = 0.01;
+/// Sigma of the weakest direction that is seen, beside the prior of evidence b: above it, that prior is none, and doubles lose what is seen.
+pub(super) const WEAK: f64 = 1e-2;
+/// What of a column is rounding, relative to the longest of its kind.
+const NOTHING: f64 = 1e-14;
 /// What counts as not seen, relative to the best seen direction.
 const UNSEEN: f64 = 1e-10;
 
 /// Evidence a and b: what the filter's model can tell apart.
 pub(super) struct Structure {
     pub(super) quantities: Vec<QuantityEvidence>,
+    pub(super) spaces: Vec<SpaceCheck>,
     pub(super) null_space: Vec<NullEvidence>,
     pub(super) defect: Count,
     pub(super) slopes: Vec<SlopeCurve>,
     pub(super) correlation: Correlation,
 }
 
+/// The outcomes of evidence a and b.
+pub(super) fn outcomes(
+    quantities: &[QuantityEvidence],
+    spaces: &[SpaceCheck],
+    null_space: &[NullEvidence],
+    defect: &Count,
+) -> impl Iterator<Item = Agreement> {
+    let missing = quantities.iter().filter(|q| !q.modelled).map(|_| Agreement::Disagrees);
+    let measured = quantities.iter().flat_map(|q| {
+        let numbers = [q.degree_slope, q.slope, q.slope_at_end, q.inflation].map(|c| c.outcome);
+        numbers.into_iter().chain([q.status_outcome]).chain(q.partners.as_ref().map(|p| p.outcome))
+    });
+    let null = null_space.iter().flat_map(|v| [Some(v.seen.outcome), v.correlation.map(|c| c.outcome)]);
+    let spaces = spaces.iter().map(|s| s.outcome);
+    missing.chain(measured).chain(null.flatten()).chain(spaces).chain([defect.outcome])
+}
+
 impl Structure {
-    /// The number of checks that fail, and of all checks.
-    pub(super) fn failures(&self) -> (usize, usize) {
-        let missing = self.quantities.iter().filter(|q| !q.modelled).map(|_| false);
-        let measured = self.quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
-        let null = self.null_space.iter().flat_map(|v| [v.seen.pass, v.correlation.and_then(|c| c.pass)]);
-        rules::failures(measured.chain(null).chain(missing.map(Some)).chain([Some(self.defect.pass)]))
+    /// How its checks came out.
+    pub(super) fn counts(&self) -> Counts {
+        Counts::of(outcomes(&self.quantities, &self.spaces, &self.null_space, &self.defect))
     }
 }
 
@@ -52,19 +76,108 @@ pub(super) fn structure(
     let names = names(truth, prediction);
     let functionals = functionals(truth, &filter, prediction);
     let known: Vec<Combination> = functionals.iter().flatten().cloned().collect();
-    let measured = slopes(filter_scheme, conditions, &known)?;
+    let shown = Shown::of(&filter, truth, &functionals);
     let inflation = inflation(&filter, &known)?;
-    let (null_space, defect) = null_evidence(truth, &filter, prediction, &inflation.correlation)?;
+    let weak = is_weak(&filter, conditions, &inflation.prior);
+    let (null_space, defect) = null_evidence(truth, &filter, prediction, &shown, &inflation.correlation)?;
+    let is_psi = |c: usize| filter.platform.units()[c] == "rad";
+    let same = truth.platform.names() == filter.platform.names();
+    let mut quantities = quantities(truth, &names, prediction, &functionals, &shown, &inflation.ratios);
+    let mut null_space = null_space;
+    if weak {
+        let correlations = null_space.iter_mut().filter_map(|v| v.correlation.as_mut());
+        let checks = quantities.iter_mut().map(|q| &mut q.inflation).chain(correlations);
+        for check in checks.filter(|c| c.fails()) {
+            check.outcome = Agreement::NotResolvable;
+        }
+    }
     Ok(Structure {
-        quantities: quantities(&names, prediction, &functionals, &measured, &inflation.ratios),
+        quantities,
+        spaces: if same {
+            spaces::spaces(prediction, shown.derivatives.as_ref(), &is_psi)
+        } else {
+            Vec::new()
+        },
         null_space,
         defect,
-        slopes: curves(truth, prediction, &names, &functionals, &measured),
+        slopes: curves(truth, prediction, &names, &functionals, &slopes(filter_scheme, conditions, &known)),
         correlation: Correlation {
             names: filter.platform.names().to_vec(),
             values: inflation.correlation.row_iter().map(|r| r.iter().copied().collect()).collect(),
         },
     })
+}
+
+/// Whether a direction that is seen has, by many digits, hardly a smaller sigma than the prior.
+fn is_weak(filter: &Plan, conditions: &Conditions, prior: &[f64]) -> bool {
+    let (scheme, units) = (filter.platform.scheme(), filter.platform.units());
+    let dwell_s = scheme.positions[0].dwell.map_or(conditions.dwell_s, Dwell::seconds);
+    let density = conditions.step_s.sqrt();
+    let noise =
+        [conditions.accelerometer_noise_g, conditions.azimuth_noise_deg.to_radians()].map(|s| s * density);
+    weakest(scheme, dwell_s, &|c| units[c] == "rad", prior, noise).is_none_or(|sigma| sigma > WEAK)
+}
+
+/// What samples show as the dwell goes to zero.
+struct Shown {
+    /// Of every functional of the filter: psi handed on as it was at the start of a position.
+    derivatives: Option<Asymptotics>,
+    /// With dwells: first with psi of the start, then with psi of the end. `None` where psi is not handed on, and both are the same.
+    dwells: Option<Option<Asymptotics>>,
+}
+
+impl Shown {
+    fn of(filter: &Plan, truth: &Plan, functionals: &[Option<Combination>]) -> Self {
+        let scheme = filter.platform.scheme();
+        let units = filter.platform.units();
+        let is_psi = |c: usize| units[c] == "rad";
+        let questions = |at_end: bool| {
+            // the coefficients of unknowns are exact, those of combinations doubles
+            let present = functionals.iter().enumerate().filter_map(|(i, f)| Some((i, f.clone()?)));
+            present.map(move |(i, terms)| Question { terms, exact: i < truth.unknowns(), at_end })
+        };
+        let start: Vec<Question> = questions(false).collect();
+        let alone = scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift;
+        let both = || -> Vec<Question> { questions(false).chain(questions(true)).collect() };
+        Self {
+            derivatives: asymptotics(scheme, Between::Nothing, &is_psi, &start),
+            dwells: (!alone).then(|| asymptotics(scheme, Between::Dwell, &is_psi, &both())),
+        }
+    }
+
+    /// Of the functional of this number: the courses by derivatives, with dwells, and with dwells at the end.
+    fn courses(&self, i: usize) -> [Option<Course>; 3] {
+        let by_derivatives = self.derivatives.as_ref().map(|a| a.courses[i]);
+        let dwells = |a: &Asymptotics, half: usize| a.courses[half * (a.courses.len() / 2) + i];
+        match &self.dwells {
+            None => [by_derivatives; 3],
+            Some(found) => {
+                let with = |half| found.as_ref().map(|a| dwells(a, half));
+                [by_derivatives, with(0), with(1)]
+            }
+        }
+    }
+
+    /// The rank with dwells.
+    fn rank(&self) -> Option<usize> {
+        let found = self.dwells.as_ref().unwrap_or(&self.derivatives);
+        Some(found.as_ref()?.seen.rank())
+    }
+}
+
+/// The check of an order against a course; what bends, or is not told from rounding, is neither for nor against.
+fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check {
+    let measured = match course {
+        Some(Course::Slope(s)) => Some(s),
+        // whatever prior there is, sigma stays that of it
+        Some(Course::Unseen) => Some(0.0),
+        Some(Course::Bends) | None => None,
+    };
+    let mut check = rules::slope(order, measured);
+    if modelled && measured.is_none() {
+        check.outcome = Agreement::NotResolvable;
+    }
+    check
 }
 
 /// Without drift noise and slews.
@@ -97,6 +210,8 @@ struct Inflation {
     ratios: Vec<f64>,
     /// Correlation under the diffuse prior.
     correlation: DMatrix<f64>,
+    /// Standard deviations of that.
+    prior: Vec<f64>,
 }
 
 fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, SimulationError> {
@@ -112,6 +227,7 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let small = small.matrix();
     let sigma: Vec<f64> = (0..n).map(|i| small[(i, i)].sqrt()).collect();
     Ok(Inflation {
+        prior,
         ratios,
         correlation: DMatrix::from_fn(n, n, |i, j| small[(i, j)] / (sigma[i] * sigma[j])),
     })
@@ -134,41 +250,63 @@ pub(super) fn last_covariance(
 }
 
 fn quantities(
+    truth: &Plan,
     names: &[String],
     prediction: &Prediction,
     functionals: &[Option<Combination>],
-    slopes: &slopes::Slopes,
+    shown: &Shown,
     ratios: &[f64],
 ) -> Vec<QuantityEvidence> {
+    let n = truth.unknowns();
     let unknowns = prediction.unknowns.iter();
-    let unknowns = unknowns.map(|u| (u.status, u.degree, u.accuracy_order, u.determined_at_end));
+    let unknowns =
+        unknowns.map(|u| (u.status, u.degree, [u.accuracy_order, u.order_at_end], u.determined_at_end));
     let combinations = prediction.combinations.iter();
-    let combinations = combinations.map(|c| (c.status, c.degree, c.accuracy_order, c.determined_at_end));
-    let mut measured = slopes.slopes.iter().zip(&slopes.straight).zip(ratios);
+    let combinations =
+        combinations.map(|c| (c.status, c.degree, [c.accuracy_order, c.order_at_end], c.determined_at_end));
+    let comparable = functionals[..n].iter().all(Option::is_some);
+    let seen = shown.derivatives.as_ref().map(|a| &a.seen);
+    let partners = seen.filter(|_| comparable).map(spaces::partners);
+    let mut measured = ratios.iter().enumerate();
     names
         .iter()
         .zip(unknowns.chain(combinations))
         .zip(functionals)
-        .map(|((name, (status, degree, accuracy_order, at_end)), functional)| {
-            let found = functional.as_ref().and_then(|_| measured.next());
-            let (slope, ratio) = (found.map(|f| *f.0.0), found.map(|f| *f.1));
-            // the slope is that of the start, the inflation that of the end
-            let inflation = rules::LINEAR.check(at_end, ratio);
-            let mut slope = rules::slope(accuracy_order, slope);
-            // what no slope shows is no evidence against an order where the measurements determine it all the same, nor
-            // are slopes of what they do not determine, which rounding makes under so wide a prior
-            let bent = found.is_some_and(|f| !f.0.1);
-            if slope.fails() && (bent || accuracy_order.is_none()) && !inflation.fails() {
-                slope.pass = None;
-            }
+        .enumerate()
+        .map(|(c, ((name, (status, degree, orders, at_end)), functional))| {
+            let found = functional.as_ref().and_then(|f| Some((f, measured.next()?)));
+            let courses = found.map_or([None; 3], |(_, (i, _))| shown.courses(i));
+            let modelled = functional.is_some();
+            let status_measured = found.and_then(|(f, _)| {
+                let excited = f.iter().any(|(c, _)| seen.is_some_and(|s| s.excited[*c]));
+                match courses[0]? {
+                    Course::Slope(_) => Some(Status::Observable),
+                    Course::Unseen => Some(Status::of(None, excited)),
+                    Course::Bends => None,
+                }
+            });
+            let status_outcome = match (modelled, status_measured) {
+                (_, Some(found)) => Agreement::of(found == status),
+                (true, None) => Agreement::NotResolvable,
+                (false, None) => Agreement::NotTested,
+            };
+            let named = |u: &PredictedUnknown| {
+                let found = partners.as_ref().map(|p| p[c].as_slice());
+                spaces::named(&u.partners, found, truth.platform.names())
+            };
             QuantityEvidence {
                 name: name.clone(),
                 status,
                 degree,
-                accuracy_order,
-                modelled: functional.is_some(),
-                slope,
-                inflation,
+                accuracy_order: orders[0],
+                modelled,
+                degree_slope: slope(degree, modelled, courses[0]),
+                status_measured,
+                status_outcome,
+                partners: prediction.unknowns.get(c).filter(|_| comparable).map(named),
+                slope: slope(orders[0], modelled, courses[1]),
+                slope_at_end: slope(orders[1], modelled, courses[2]),
+                inflation: rules::LINEAR.check(at_end, found.map(|(_, (_, ratio))| *ratio)),
             }
         })
         .collect()
@@ -179,17 +317,29 @@ fn null_evidence(
     truth: &Plan,
     filter: &Plan,
     prediction: &Prediction,
+    shown: &Shown,
     correlation: &DMatrix<f64>,
 ) -> Result<(Vec<NullEvidence>, Count), SimulationError> {
     let n = filter.unknowns();
     let root = batch(filter, SquareRootInformation::none(n))?.information;
-    // columns of unit length, so that units do not matter
-    let norms: Vec<f64> =
-        root.root().column_iter().map(|c| c.norm()).map(|x| if x > 0.0 { x } else { 1.0 }).collect();
+    // columns of unit length, so that units do not matter; what cosines of right angles leave of a column is nothing
+    let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
+    let units = filter.platform.units();
+    let largest = |unit: &str| {
+        let own = lengths.iter().zip(units).filter(|(_, u)| (**u == "rad") == (unit == "rad"));
+        own.map(|(x, _)| *x).fold(0.0, f64::max)
+    };
+    let norm = |(x, unit): (&f64, &&str)| if *x > NOTHING * largest(unit) { *x } else { 1.0 };
+    let norms: Vec<f64> = lengths.iter().zip(units).map(norm).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| root.root()[(i, j)] / norms[j]);
     let (values, _) = singular_values(&scaled)?;
     let largest = values.first().copied().unwrap_or(1.0);
-    let defect = rules::defect(truth.unknowns() - prediction.rank, &values, UNSEEN);
+    let predicted = truth.unknowns() - prediction.rank;
+    let defect = match shown.rank() {
+        Some(rank) => Count { predicted, measured: n - rank, outcome: Agreement::of(predicted == n - rank) },
+        // doubles may lose what is hardly seen
+        None => Count { outcome: Agreement::NotResolvable, ..rules::defect(predicted, &values, UNSEEN) },
+    };
     let mut evidence = Vec::new();
     for (k, vector) in prediction.null_space.iter().enumerate() {
         let names = truth.platform.names();
@@ -218,7 +368,7 @@ fn null_evidence(
             let parts = vector.iter().map(|&(c, x)| (x * norms[c]).abs());
             let (least, most) = parts.fold((f64::MAX, 0.0f64), |(l, m), x| (l.min(x), m.max(x)));
             if check.fails() && least < SMALL_PART * most {
-                check.pass = None;
+                check.outcome = Agreement::NotResolvable;
             }
             check
         });

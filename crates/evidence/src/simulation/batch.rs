@@ -30,9 +30,6 @@ pub struct Batch {
 /// [`EkfError`] when a number is not finite.
 pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batch, EkfError> {
     let n = plan.unknowns();
-    // states by unknowns
-    let mut to_now: DMatrix<f64> = DMatrix::identity(plan.states(), n);
-    let mut scratch = Vec::new();
     let most = ROWS.max(4 * n);
     let mut rows: Vec<f64> = Vec::new();
     let mut add = |rows: &mut Vec<f64>| {
@@ -40,29 +37,40 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
         rows.clear();
         information.add(&taken)
     };
+    let to_end = each_row(plan, |row| {
+        rows.extend(row);
+        if rows.len() >= most * n { add(&mut rows) } else { Ok(()) }
+    })?;
+    if !rows.is_empty() {
+        add(&mut rows)?;
+    }
+    Ok(Batch { information, to_end })
+}
+
+/// All measurements of `plan` in units of their noise as functionals of the initial unknowns, one after the other; the transition from
+/// start to end.
+pub(crate) fn each_row(
+    plan: &Plan,
+    mut sink: impl FnMut(&mut dyn Iterator<Item = f64>) -> Result<(), EkfError>,
+) -> Result<DMatrix<f64>, EkfError> {
+    let (n, states) = (plan.unknowns(), plan.states());
+    // states by unknowns
+    let mut to_now: DMatrix<f64> = DMatrix::identity(states, n);
+    let mut scratch = Vec::new();
     for stage in &plan.stages {
         for _ in 0..stage.steps {
-            for column in to_now.as_mut_slice().chunks_exact_mut(plan.states()) {
+            for column in to_now.as_mut_slice().chunks_exact_mut(states) {
                 stage.transition.apply(column, &mut scratch);
             }
             for output in &stage.outputs {
                 let weight = 1.0 / output.r.sqrt();
-                rows.extend(
-                    to_now
-                        .as_slice()
-                        .chunks_exact(plan.states())
-                        .map(|column| weight * output.predict(column)),
-                );
-            }
-            if rows.len() >= most * n {
-                add(&mut rows)?;
+                sink(
+                    &mut to_now.as_slice().chunks_exact(states).map(|column| weight * output.predict(column)),
+                )?;
             }
         }
     }
-    if !rows.is_empty() {
-        add(&mut rows)?;
-    }
-    Ok(Batch { information, to_end: to_now.resize_vertically(n, 0.0) })
+    Ok(to_now.resize_vertically(n, 0.0))
 }
 
 /// Standard deviations that say nothing beside the measurements of `plan`: in units of what these say, so that noise,

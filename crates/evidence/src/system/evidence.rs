@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::numeric::{FilterState, Numeric};
 use super::run::{RunError, Setup};
-use crate::crosscheck::answer::{Check, Count, Measured};
+use crate::crosscheck::answer::{Check, Count, Counts, Measured};
 use crate::crosscheck::rules::{self, SLOPE_TOLERANCE};
 
 /// Name and version of the JSON layout.
@@ -233,9 +233,9 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
             SymmetryEvidence { words: report.words, seen: Check::new(0.0, Some(seen), |x| x <= 1e-6) }
         })
         .collect();
-    let measured = quantities.iter().flat_map(|q| [q.slope.pass, q.inflation.pass]);
-    let moved = symmetries.iter().map(|s| s.seen.pass);
-    let (failures, checks) = rules::failures(measured.chain(moved).chain([Some(defect.pass)]));
+    let measured = quantities.iter().flat_map(|q| [q.slope.outcome, q.inflation.outcome]);
+    let moved = symmetries.iter().map(|s| s.seen.outcome);
+    let counts = Counts::of(measured.chain(moved).chain([defect.outcome]));
     Ok(SystemEvidence {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -244,9 +244,9 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         quantities,
         symmetries,
         defect,
-        failures,
-        checks,
-        passed: failures == 0,
+        failures: counts.disagree,
+        checks: counts.agree + counts.disagree,
+        passed: counts.disagree == 0,
         duration: setup.duration,
         error_bound: judged.findings.error_bound,
         seed,

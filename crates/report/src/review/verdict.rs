@@ -54,7 +54,11 @@ fn lost_with_dwell(s: &SchemeReview) -> Vec<&str> {
 fn evidence(s: &SchemeReview) -> (Grade, String) {
     match &s.evidence {
         Ok(e) if e.passed => {
-            (Grade::Good, format!("agree in every check, {} Monte Carlo runs", e.monte_carlo.runs))
+            let open = match e.counts.not_resolvable {
+                0 => String::new(),
+                n => format!(" but {n} that are not resolvable"),
+            };
+            (Grade::Good, format!("agree in every check{open}, {} Monte Carlo runs", e.monte_carlo.runs))
         }
         Ok(e) => {
             let n = e.disagreements.len();

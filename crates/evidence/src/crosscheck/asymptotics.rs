@@ -1,0 +1,220 @@
+//! Log-log slopes of sigma against the dwell where the dwell goes to zero, and what is seen there.
+
+use obsdeg_core::model::Scheme;
+use obsdeg_core::model::slew::W_IE;
+
+use super::precise::{Between, Digits, Functional, Information, Seen};
+
+/// Digits that are tried in turn.
+const BITS: [usize; 2] = [1024, 2048];
+/// Dwells of the first position, in 1/w_ie: 2^-133 is 9e-41. Angles and latitudes are whole 1e-9 degrees, 2e-11 rad, so that what
+/// hardly differs still differs by far more.
+const DWELLS: [i32; 3] = [-133, -140, -147];
+/// How far slopes between neighbouring dwells may differ.
+const SETTLED: f64 = 0.01;
+
+/// How slopes are measured and what counts, in words.
+pub(super) fn method() -> Vec<String> {
+    let [first, .., last] = DWELLS;
+    let [few, many] = BITS;
+    vec![
+        format!(
+            "a: samples of Z in a model written apart from the exact engine's, in {few} bits ({many} where these do not tell what is seen from \
+             rounding; not resolvable where those do not), at dwells of 2^{first} to 2^{last} of 1/w_ie"
+        ),
+        format!(
+            "a: a slope counts where it changes by less than {SETTLED} between these dwells, for a combination whether its coefficients are \
+             taken to 1e-7 or to 1e-12; it is not resolvable elsewhere"
+        ),
+    ]
+}
+
+/// How sigma of a functional goes with the dwell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Course {
+    /// It falls, or stays, with this slope on logarithmic axes.
+    Slope(f64),
+    /// The samples do not determine it.
+    Unseen,
+    /// The slope still changes with the dwell.
+    Bends,
+}
+
+/// A functional whose course is asked for.
+pub(super) struct Question {
+    /// `(unknown, coefficient)`, drifts in rad/s.
+    pub(super) terms: Vec<(usize, f64)>,
+    /// Whether its coefficients are exact, or rounded to doubles.
+    pub(super) exact: bool,
+    /// Whether its psi is that of the end.
+    pub(super) at_end: bool,
+}
+
+/// Relative errors of rounded coefficients, at most and at least: where the difference matters, nothing is resolvable.
+pub(super) const ROUNDED: [f64; 2] = [1e-7, 1e-12];
+
+/// What samples show as the dwell goes to zero.
+pub(super) struct Asymptotics {
+    pub(super) courses: Vec<Course>,
+    /// dim V_0, dim V_1, ..., from how the pivots fall; `None` where they do not settle.
+    pub(super) profile: Option<Vec<usize>>,
+    /// What is seen at the shortest dwell.
+    pub(super) seen: Seen,
+}
+
+/// Terms with drifts in units of the earth rate: of a functional, or (`change`) of a change of the unknowns.
+pub(super) fn functional(
+    digits: Digits,
+    is_psi: &dyn Fn(usize) -> bool,
+    terms: &[(usize, f64)],
+    change: bool,
+) -> Functional {
+    let scaled = |c: usize, k: f64| match (is_psi(c), change) {
+        (true, _) => k,
+        (false, true) => k / W_IE,
+        (false, false) => k * W_IE,
+    };
+    terms.iter().map(|&(c, k)| (c, digits.double(scaled(c, k)))).collect()
+}
+
+/// How far the weakest direction that is seen at the dwells of the scheme is from a prior: sigma in that of the prior (standard
+/// deviations in rad and rad/s); `None` where it is not told from rounding. `noise` is that of Z per root of density, and of a
+/// measured azimuth.
+pub(super) fn weakest(
+    scheme: &Scheme,
+    dwell_s: f64,
+    is_psi: &dyn Fn(usize) -> bool,
+    prior: &[f64],
+    noise: [f64; 2],
+) -> Option<f64> {
+    BITS.iter().find_map(|&bits| {
+        let digits = Digits { bits };
+        let information =
+            Information::new(scheme, Between::Dwell, dwell_s * W_IE, digits, (noise[0] / noise[1]).powi(2))?;
+        let unit = |c: usize| if is_psi(c) { 1.0 } else { W_IE };
+        let scale: Vec<f64> = prior.iter().enumerate().map(|(c, p)| p / unit(c)).collect();
+        let smallest = information.scaled(&scale).seen()?.sizes.into_iter().reduce(f64::min);
+        Some(smallest.map_or(0.0, |s| (-s / 2.0).exp2() * noise[0] * W_IE.sqrt()))
+    })
+}
+
+/// The courses of `questions`; `None` where no digits tell what is seen from rounding.
+pub(super) fn asymptotics(
+    scheme: &Scheme,
+    between: Between,
+    is_psi: &dyn Fn(usize) -> bool,
+    questions: &[Question],
+) -> Option<Asymptotics> {
+    BITS.iter().find_map(|&bits| {
+        let digits = Digits { bits };
+        let seen = |k: i32| Information::new(scheme, between, 2f64.powi(k), digits, 1.0)?.seen();
+        let seen: Vec<Seen> = DWELLS.iter().map(|&k| seen(k)).collect::<Option<_>>()?;
+        let course = |q: &Question| {
+            let terms = functional(digits, is_psi, &q.terms, false);
+            let sigmas = |rounded: Option<f64>| -> Vec<Option<f64>> {
+                let moved = |s: &Seen| if q.at_end { s.at_start(&terms) } else { terms.clone() };
+                seen.iter().map(|s| s.sigma(&moved(s), rounded)).collect()
+            };
+            let [sigmas, closer] = if q.exact { [None; 2] } else { ROUNDED.map(Some) }.map(sigmas);
+            if sigmas != closer {
+                return Course::Bends;
+            }
+            if sigmas.iter().all(Option::is_none) {
+                return Course::Unseen;
+            }
+            let Some(sigmas) = sigmas.into_iter().collect::<Option<Vec<f64>>>() else { return Course::Bends };
+            slope(&sigmas).map_or(Course::Bends, Course::Slope)
+        };
+        let courses = questions.iter().map(course).collect();
+        let rank = seen[0].rank();
+        let same = seen.iter().all(|s| s.rank() == rank);
+        let orders: Option<Vec<usize>> = (0..rank)
+            .map(|k| {
+                let sizes: Vec<f64> = seen.iter().filter_map(|s| s.sizes.get(k).copied()).collect();
+                // the square root falls as the dwell to the order + 1/2
+                let order = slope(&sizes)? / 2.0 - 0.5;
+                ((order - order.round()).abs() < SETTLED).then_some(order.round().max(0.0) as usize)
+            })
+            .collect();
+        let profile = orders.filter(|_| same).map(|orders| {
+            let last = orders.iter().copied().max().unwrap_or(0);
+            (0..=last).map(|k| orders.iter().filter(|o| **o <= k).count()).collect()
+        });
+        let seen = seen.into_iter().next_back()?;
+        Some(Asymptotics { courses, profile, seen })
+    })
+}
+
+/// The slope of binary logarithms at the dwells, if it settles.
+fn slope(values: &[f64]) -> Option<f64> {
+    let [a, b, c] = *values else { return None };
+    let between = |y: f64, x: f64, i: usize| (y - x) / f64::from(DWELLS[i + 1] - DWELLS[i]);
+    let (first, last) = (between(b, a, 0), between(c, b, 1));
+    ((last - first).abs() < SETTLED).then_some(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_core::model::{Carry, Scheme, parse_attitude};
+
+    use super::*;
+
+    fn courses(
+        attitudes: &[&str],
+        latitude: &str,
+        carry: Carry,
+        between: Between,
+    ) -> (Vec<Course>, Vec<usize>) {
+        let angles = attitudes.iter().map(|a| parse_attitude(a).expect("an attitude"));
+        let scheme = Scheme { carry, latitude: latitude.parse().ok(), ..Scheme::of_angles(angles) };
+        let ask = |c| Question { terms: vec![(c, 1.0)], exact: true, at_end: false };
+        let n = if carry == Carry::Reset { 3 * attitudes.len() + 12 } else { 15 };
+        let questions: Vec<Question> = (0..n).map(ask).collect();
+        let found = asymptotics(&scheme, between, &|c| c + 12 < n, &questions).expect("resolved");
+        (found.courses, found.profile.expect("settled"))
+    }
+
+    fn orders(courses: &[Course]) -> Vec<Option<usize>> {
+        let order = |c: &Course| match c {
+            Course::Slope(s) => {
+                let order = -s - 0.5;
+                assert!((order - order.round()).abs() < 1e-6, "{s}");
+                Some(order.round() as usize)
+            }
+            Course::Unseen => None,
+            Course::Bends => panic!("bends: {courses:?}"),
+        };
+        courses.iter().map(order).collect()
+    }
+
+    const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
+
+    /// Section 9 of the method, by samples alone.
+    #[test]
+    fn published_verdicts() {
+        let p1p2 = ["0,0,0", "180,0,0"];
+        let (found, profile) = courses(&p1p2, "28.2", Carry::Platform, Between::Nothing);
+        let (zero, one, two) = (Some(0), Some(1), Some(2));
+        assert_eq!(
+            orders(&found),
+            [zero, None, zero, one, two, None, None, two, None, None, None, None, one, None, one]
+        );
+        assert_eq!(profile, [2, 6, 8]);
+        for (n, carry, expected) in [
+            (6, Carry::Platform, &[3, 14, 15][..]),
+            (6, Carry::Inertial, &[2, 14, 15]),
+            (6, Carry::Reset, &[12, 24, 30]),
+            (5, Carry::Platform, &[3, 13, 15]),
+            (4, Carry::Inertial, &[2, 10, 14]),
+        ] {
+            assert_eq!(courses(&S6[..n], "28.2", carry, Between::Nothing).1, expected, "{n} {carry}");
+        }
+        let (found, _) = courses(&S6[..5], "28.2", Carry::Platform, Between::Nothing);
+        assert_eq!(orders(&found), [vec![zero; 3], vec![two; 12]].concat());
+        // with dwells
+        let (found, _) = courses(&S6[..5], "28.2", Carry::Platform, Between::Dwell);
+        assert_eq!(orders(&found)[6..9], [one; 3]);
+        let (found, _) = courses(&S6[..4], "28.2", Carry::Platform, Between::Dwell);
+        assert_eq!(orders(&found)[..3], [one; 3]);
+    }
+}

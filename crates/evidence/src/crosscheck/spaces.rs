@@ -1,0 +1,244 @@
+//! Evidence a for what is no number: ranks, null space, combinations and partners, against what samples show as the
+//! dwell goes to zero.
+
+use obsdeg_core::degree::Status;
+
+use super::answer::{Agreement, Partners, SpaceCheck};
+use super::asymptotics::{Asymptotics, ROUNDED, functional};
+use super::precise::{Digits, Seen, add_up};
+use crate::prediction::{Combination, Prediction};
+
+/// Pivots of rows and columns of unit size above the first are there, below the second are rounding of doubles.
+const CLEAR: [f64; 2] = [1e-7, 1e-12];
+
+/// The checks of what derivatives determine as a whole; `is_psi` says which unknowns are no drifts.
+pub(super) fn spaces(
+    prediction: &Prediction,
+    shown: Option<&Asymptotics>,
+    is_psi: &dyn Fn(usize) -> bool,
+) -> Vec<SpaceCheck> {
+    let profile = |p: &[usize]| p.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    let measured = shown.and_then(|s| s.profile.as_ref());
+    vec![
+        SpaceCheck {
+            what: "rank profile".into(),
+            predicted: profile(&prediction.rank_profile),
+            measured: measured.map(|p| profile(p)).unwrap_or_default(),
+            outcome: measured.map_or(Agreement::NotResolvable, |p| {
+                Agreement::of(same_profile(&prediction.rank_profile, p))
+            }),
+        },
+        null_space(prediction, shown, is_psi),
+        combinations(prediction, shown, is_psi),
+    ]
+}
+
+/// Orders at which nothing is added at the end do not count.
+fn same_profile(predicted: &[usize], measured: &[usize]) -> bool {
+    let at = |p: &[usize], k: usize| p.get(k).or(p.last()).copied().unwrap_or(0);
+    (0..predicted.len().max(measured.len())).all(|k| at(predicted, k) == at(measured, k))
+}
+
+/// The null space: so many vectors as are not seen, independent, each seen by nothing.
+fn null_space(
+    prediction: &Prediction,
+    shown: Option<&Asymptotics>,
+    is_psi: &dyn Fn(usize) -> bool,
+) -> SpaceCheck {
+    let silent = prediction.unknowns.iter().filter(|u| u.status == Status::NotExcited).count();
+    let mut out = SpaceCheck {
+        what: "null space (not excited left out): independent directions that are not seen".into(),
+        predicted: String::new(),
+        measured: String::new(),
+        outcome: Agreement::NotTested,
+    };
+    let Some(vectors) = &prediction.unseen_by_derivatives else { return out };
+    out.predicted = vectors.len().to_string();
+    let Some(Asymptotics { seen, .. }) = shown else {
+        out.outcome = Agreement::NotResolvable;
+        return out;
+    };
+    let (free, rows) = seen.reduced();
+    let unseen = |v: &Combination| {
+        // a change of drift in units of the earth rate
+        let v = functional(seen.digits(), &|c| is_psi(c), v, true);
+        let entry = |c: usize| v.iter().filter(move |(d, _)| *d == c).map(|(_, x)| x);
+        let alone = |c: usize| entry(c).map(|x| (None, x)).collect::<Vec<_>>();
+        seen.pivots.iter().zip(&rows).all(|(&pivot, row)| {
+            let moved = free.iter().zip(row).flat_map(|(&f, r)| entry(f).map(move |x| (Some(r), x)));
+            add_up(seen.digits(), alone(pivot).into_iter().chain(moved)) <= ROUNDED[0]
+        })
+    };
+    let hidden = vectors.iter().filter(|v| unseen(v)).count();
+    let on_free: Vec<Vec<f64>> = vectors.iter().map(|v| dense(v, &free, is_psi, true)).collect();
+    let rank = rank(on_free);
+    let unexcited = seen.excited.iter().filter(|e| !**e).count();
+    out.measured = match rank {
+        Some(r) => format!("{} ({hidden} of those listed are not seen, {r} independent)", free.len()),
+        None => format!("{} ({hidden} of those listed are not seen)", free.len()),
+    };
+    let agree = hidden == vectors.len() && vectors.len() == free.len() && silent == unexcited;
+    out.outcome = match rank {
+        Some(r) => Agreement::of(agree && r == vectors.len()),
+        None if agree => Agreement::NotResolvable,
+        None => Agreement::Disagrees,
+    };
+    out
+}
+
+/// The combinations: with the unknowns of degree up to k they span what is seen with k derivatives, and each adds
+/// a direction to those before it.
+fn combinations(
+    prediction: &Prediction,
+    shown: Option<&Asymptotics>,
+    is_psi: &dyn Fn(usize) -> bool,
+) -> SpaceCheck {
+    let basis: Vec<_> = prediction.combinations.iter().filter(|c| !c.requested).collect();
+    let mut out = SpaceCheck {
+        what: "combinations: span what is seen, degree by degree, and are independent".into(),
+        predicted: basis.len().to_string(),
+        measured: String::new(),
+        outcome: Agreement::NotTested,
+    };
+    if !prediction.all_combinations {
+        return out;
+    }
+    let Some(Asymptotics { seen, profile: Some(profile), .. }) = shown else {
+        out.outcome = Agreement::NotResolvable;
+        return out;
+    };
+    out.outcome = Agreement::Agrees;
+    let mut spanned = Vec::new();
+    for (k, &dimension) in profile.iter().enumerate() {
+        let pivots = &seen.pivots[..dimension.min(seen.pivots.len())];
+        let unit = |c: usize| dense(&[(c, 1.0)], pivots, is_psi, false);
+        let singles =
+            (0..prediction.unknowns.len()).filter(|&c| prediction.unknowns[c].degree.is_some_and(|d| d <= k));
+        let before: Vec<Vec<f64>> = singles
+            .map(unit)
+            .chain(
+                basis
+                    .iter()
+                    .filter(|c| c.degree.is_some_and(|d| d < k))
+                    .map(|c| dense(&c.terms, pivots, is_psi, false)),
+            )
+            .collect();
+        let new: Vec<Vec<f64>> = basis
+            .iter()
+            .filter(|c| c.degree == Some(k))
+            .map(|c| dense(&c.terms, pivots, is_psi, false))
+            .collect();
+        let added = new.len();
+        match (rank(before.clone()), rank(before.into_iter().chain(new).collect())) {
+            (Some(without), Some(with)) => {
+                spanned.push(with.to_string());
+                if with != dimension || without + added != with {
+                    out.outcome = Agreement::Disagrees;
+                }
+            }
+            _ => {
+                spanned.push("?".into());
+                if out.outcome == Agreement::Agrees {
+                    out.outcome = Agreement::NotResolvable;
+                }
+            }
+        }
+    }
+    let dimensions: Vec<String> = profile.iter().map(ToString::to_string).collect();
+    out.measured = format!("they span {} of {}", spanned.join(" "), dimensions.join(" "));
+    out
+}
+
+/// Entries at some columns, drifts in units of the earth rate: of a change of the unknowns, or of a functional.
+fn dense(
+    terms: &[(usize, f64)],
+    columns: &[usize],
+    is_psi: &dyn Fn(usize) -> bool,
+    change: bool,
+) -> Vec<f64> {
+    let d = Digits { bits: 64 };
+    let scaled = functional(d, is_psi, terms, change);
+    let entry =
+        |c: &usize| scaled.iter().filter(|(k, _)| k == c).map(|(_, x)| super::precise::double(x)).sum();
+    columns.iter().map(entry).collect()
+}
+
+/// The rank of rows, by elimination with the largest pivot; `None` where a pivot is neither there nor rounding.
+fn rank(mut rows: Vec<Vec<f64>>) -> Option<usize> {
+    let size = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0f64, |m, x| m.max(x.abs()));
+    let columns = rows.first().map_or(0, Vec::len);
+    for row in &mut rows {
+        let m = size(&mut row.iter().copied());
+        row.iter_mut().for_each(|x| *x /= if m > 0.0 { m } else { 1.0 });
+    }
+    for c in 0..columns {
+        let m = size(&mut rows.iter().map(|r| r[c]));
+        rows.iter_mut().for_each(|r| r[c] /= if m > 0.0 { m } else { 1.0 });
+    }
+    let mut rank = 0;
+    loop {
+        let left = (rank..rows.len()).flat_map(|i| (0..columns).map(move |c| (i, c)));
+        let largest = left.max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs()));
+        let Some((i, c)) = largest else { return Some(rank) };
+        let pivot = rows[i][c];
+        if pivot.abs() < CLEAR[1] {
+            return Some(rank);
+        }
+        if pivot.abs() < CLEAR[0] {
+            return None;
+        }
+        rows.swap(rank, i);
+        let (top, below) = rows.split_at_mut(rank + 1);
+        for row in below {
+            let factor = row[c] / pivot;
+            row.iter_mut().zip(&top[rank]).for_each(|(x, y)| *x -= factor * y);
+            row[c] = 0.0;
+        }
+        rank += 1;
+    }
+}
+
+/// Of every unknown those that share a direction with it that is not seen and holds no shorter one. These are the connected parts of
+/// the graph that joins a pivot to the free unknowns which move it, whatever the pivots are.
+pub(super) fn partners(seen: &Seen) -> Vec<Vec<usize>> {
+    let n = seen.excited.len();
+    let (free, rows) = seen.reduced();
+    let mut part: Vec<usize> = (0..n).collect();
+    for (&pivot, row) in seen.pivots.iter().zip(&rows) {
+        for (&f, _) in free.iter().zip(row).filter(|(_, x)| !x.is_zero()) {
+            let (from, to) = (part[f], part[pivot]);
+            part.iter_mut().filter(|p| **p == from).for_each(|p| *p = to);
+        }
+    }
+    (0..n).map(|c| (0..n).filter(|&d| d != c && part[d] == part[c]).collect()).collect()
+}
+
+/// The partners of an unknown, by name.
+pub(super) fn named(predicted: &[usize], measured: Option<&[usize]>, names: &[String]) -> Partners {
+    let words = |list: &[usize]| list.iter().map(|&c| names[c].clone()).collect::<Vec<_>>();
+    let sorted = |list: &[usize]| {
+        let mut list = list.to_vec();
+        list.sort_unstable();
+        list
+    };
+    Partners {
+        predicted: words(predicted),
+        measured: measured.map(words),
+        outcome: measured.map_or(Agreement::NotResolvable, |m| Agreement::of(sorted(predicted) == sorted(m))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_of_doubles() {
+        let rows = |r: &[[f64; 3]]| r.iter().map(|x| x.to_vec()).collect::<Vec<_>>();
+        assert_eq!(rank(rows(&[[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 1e-20]])), Some(2));
+        assert_eq!(rank(rows(&[[1.0, 2.0, 3.0], [0.1, 0.2, 0.3]])), Some(1));
+        assert_eq!(rank(rows(&[[1.0, 1.0, 0.0], [1.0, 1.0 + 1e-9, 0.0]])), None);
+        assert_eq!(rank(vec![]), Some(0));
+        assert!(same_profile(&[2, 6, 8, 8], &[2, 6, 8]) && !same_profile(&[2, 6, 8], &[2, 6]));
+    }
+}
