@@ -329,7 +329,11 @@ fn null_evidence(
         let own = lengths.iter().zip(units).filter(|(_, u)| (**u == "rad") == (unit == "rad"));
         own.map(|(x, _)| *x).fold(0.0, f64::max)
     };
-    let norm = |(x, unit): (&f64, &&str)| if *x > NOTHING * largest(unit) { *x } else { 1.0 };
+    let norm = |(x, unit): (&f64, &&str)| match largest(unit) {
+        0.0 => 1.0,
+        most if *x <= NOTHING * most => most,
+        _ => *x,
+    };
     let norms: Vec<f64> = lengths.iter().zip(units).map(norm).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| root.root()[(i, j)] / norms[j]);
     let (values, _) = singular_values(&scaled)?;
