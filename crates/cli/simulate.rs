@@ -21,7 +21,7 @@ Examples:
 
 Left to itself it is the paper's run: psi(0) 0.1 deg each, D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g, random
 drift 0.01 deg/h, noise 1e-5 g, steps of 10 s, 1000 s a position. With -o it writes summary.json, series.csv,
-series.parquet and a figure per unknown as SVG and PNG.
+series.parquet and, as SVG and PNG, two figures per unknown (estimate, .error), all in one, and those of the paper.
 Exit codes: 0 done (whatever the verdict), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]

@@ -441,9 +441,21 @@ fn the_folder_of_a_crosscheck() {
     expected.sort();
     assert_eq!(names, expected);
     let slopes = std::fs::read_to_string(folder.join("slopes.svg")).expect("readable");
-    for text in ["slope -0.5", "slope -1.5", "slope -2.5", "dwell of a position [s]", "sigma [deg/h/g]"] {
+    for text in ["slope -0.5", "slope -1.5", "slope -2.5", "dwell of a position [s]", "1 sigma [deg/h/g]"] {
         assert!(slopes.contains(text), "{text}");
     }
+    // no two curves alike, of one order or of several: colours and dashes; references are black and dotted
+    let value = |path: &str, key: &str| {
+        let rest = path.split_once(&format!(" {key}=\""))?.1;
+        rest.split_once('"').map(|(value, _)| value.to_string())
+    };
+    let paths = slopes.split("<path ").skip(1).filter_map(|p| p.split_once("/>").map(|(path, _)| path));
+    let styles: Vec<_> = paths
+        .map(|path| (value(path, "stroke"), value(path, "stroke-dasharray")))
+        .filter(|(color, _)| color.as_deref() != Some("#000000"))
+        .collect();
+    let different: std::collections::BTreeSet<_> = styles.iter().collect();
+    assert_eq!((styles.len(), different.len()), (8, 8), "{styles:?}");
 }
 
 /// What doubles at dwells of a platform do not show, many digits at short dwells do: positions that hardly differ, and a latitude close to

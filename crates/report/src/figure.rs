@@ -16,6 +16,8 @@ pub(crate) const BLUE: &str = "#0072B2";
 pub(crate) const SKY: &str = "#56B4E9";
 pub(crate) const ORANGE: &str = "#D55E00";
 pub(crate) const GREEN: &str = "#009E73";
+pub(crate) const PURPLE: &str = "#CC79A7";
+pub(crate) const AMBER: &str = "#E69F00";
 pub(crate) const GREY: &str = "#999999";
 
 /// A text in a picture, which is XML.
@@ -28,7 +30,15 @@ fn shown(text: &str) -> String {
 pub(crate) enum Stroke {
     Solid,
     Dashed,
+    DashDot,
     Dotted,
+}
+
+/// Colour and stroke of the `i`-th of many curves: 18 that differ, none of them black or dotted as references are.
+pub(crate) fn style(i: usize) -> (&'static str, Stroke) {
+    const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, SKY, PURPLE, AMBER];
+    let stroke = [Stroke::Solid, Stroke::Dashed, Stroke::DashDot][i / COLORS.len() % 3];
+    (COLORS[i % COLORS.len()], stroke)
 }
 
 /// A curve.
@@ -70,6 +80,10 @@ pub(crate) struct Figure {
 
 /// Width and height of one figure.
 const SIZE: (f64, f64) = (640.0, 400.0);
+/// Left and right of the axes: the labels of the axes are wider than the library takes them for.
+const MARGINS: (f64, f64) = (88.0, 28.0);
+/// Longer titles are broken.
+const TITLE: usize = 48;
 const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
 
 impl Figure {
@@ -87,6 +101,7 @@ impl Figure {
             let plot = match l.stroke {
                 Stroke::Solid => plot,
                 Stroke::Dashed => plot.with_dashed(),
+                Stroke::DashDot => plot.with_dashdot(),
                 Stroke::Dotted => plot.with_dotted(),
             };
             Plot::from(if l.label.is_empty() { plot } else { plot.with_legend(shown(&l.label)) })
@@ -102,12 +117,17 @@ impl Figure {
             .with_width(SIZE.0)
             .with_height(SIZE.1)
             .with_font_family(FONT)
-            .with_y_label_offset(-7.0, 0.0)
-            .with_legend_position(match self.lines.iter().filter(|l| !l.label.is_empty()).count() {
-                0..=4 => LegendPosition::OutsideBottomCenter,
-                _ => LegendPosition::OutsideRightTop,
-            })
+            .with_title_wrap(TITLE)
+            // powers of ten are narrower than the library takes them for, other numbers wider
+            .with_y_label_offset(if self.log || self.log_y { 7.0 } else { -7.0 }, 0.0)
             .with_legend_box(false);
+        layout.force_margin_left = Some(MARGINS.0);
+        if self.lines.iter().filter(|l| !l.label.is_empty()).count() > 4 {
+            layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
+        } else {
+            layout = layout.with_legend_position(LegendPosition::OutsideBottomCenter);
+            layout.force_margin_right = Some(MARGINS.1);
+        }
         // an axis without anything above zero has no logarithm
         let anything = |of: fn(&(f64, f64)) -> f64| {
             self.lines.iter().flat_map(|l| &l.points).any(|p| of(p) > 0.0 && of(p).is_finite())

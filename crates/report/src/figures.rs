@@ -2,8 +2,9 @@
 
 use obsdeg_evidence::simulation::{Series, Traces};
 
+use crate::document::number;
 use crate::figure::{
-    BLACK, BLUE, Band, Figure, FigureError, GREEN, GREY, Line, ORANGE, SKY, Stroke, grid, heat, png,
+    AMBER, BLACK, BLUE, Band, Figure, FigureError, Line, ORANGE, SKY, Stroke, grid, heat, png, style,
 };
 use obsdeg_evidence::crosscheck::{CrossCheck, HistoryPoint, SlopeCurve};
 
@@ -40,39 +41,130 @@ pub(crate) fn file_name(name: &str) -> String {
     name.replace(" - ", "-").replace('*', "").chars().map(plain).collect()
 }
 
-/// The curve of one series: truth, estimate and the band of three sigma around it (figures 2-10 of the paper).
+/// What the paper draws, figure 2 to figure 10.
+const PAPER: [&str; 9] = ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
+
+/// At most so many samples after the start, the last among them: the prior at the start would hide what the data say.
+fn settled(record: &Traces, most: usize) -> Vec<usize> {
+    let stride = record.time.len().div_ceil(most).max(1);
+    (1..record.time.len()).filter(|k| k % stride == 0 || k + 1 == record.time.len()).collect()
+}
+
+/// Where positions end.
+fn boundaries(record: &Traces) -> Vec<f64> {
+    (1..record.position.len())
+        .filter(|&k| record.position[k] != record.position[k - 1])
+        .map(|k| record.time[k - 1])
+        .collect()
+}
+
+fn bracketed(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" [{unit}]") }
+}
+
+fn line(label: impl Into<String>, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)>) -> Line {
+    Line { label: label.into(), color, stroke, points }
+}
+
+/// The curve of one series: truth, estimate and the band of three sigma around it.
 fn curve(record: &Traces, i: usize) -> Figure {
-    let (series, unit, scale) = (&record.series[i], &record.units[i], record.scales[i]);
-    let bracketed = |unit: &str| if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
-    let stride = record.time.len().div_ceil(POINTS);
-    let samples = || (0..record.time.len()).filter(|k| k % stride == 0 || k + 1 == record.time.len());
-    let points = |values: &[f64]| samples().map(|k| (record.time[k], values[k] / scale)).collect();
+    let (series, scale) = (&record.series[i], record.scales[i]);
+    let settled = settled(record, POINTS);
+    let points = |values: &[f64]| {
+        std::iter::once(0)
+            .chain(settled.iter().copied())
+            .map(|k| (record.time[k], values[k] / scale))
+            .collect()
+    };
     let estimate = &series.estimate;
-    // the prior would hide what the data say
-    let settled: Vec<usize> = samples().filter(|&k| k > 0).collect();
-    let span = |k: usize| {
+    let span = |&k: &usize| {
         let width = 3.0 * series.sigma[k] / scale;
         (record.time[k], estimate[k] / scale - width, estimate[k] / scale + width)
     };
-    let marks = (1..record.position.len())
-        .filter(|&k| record.position[k] != record.position[k - 1])
-        .map(|k| record.time[k - 1])
-        .collect();
-    let line = |label: &str, color, stroke, points| Line { label: label.into(), color, stroke, points };
+    // a long name is in the title alone
+    let name = &record.names[i];
+    let shown = if name.len() > 16 { "value" } else { name };
     Figure {
         title: series_title(record, i),
         x_label: format!("t{}", bracketed(&record.time_unit)),
-        y_label: format!("{}{}", record.names[i], bracketed(unit)),
-        bands: vec![Band { color: SKY, points: settled.into_iter().map(span).collect() }],
+        y_label: format!("{shown}{}", bracketed(&record.units[i])),
+        bands: vec![Band { color: SKY, points: settled.iter().map(span).collect() }],
         lines: vec![
             line("truth", BLACK, Stroke::Solid, points(&series.truth)),
-            line("estimate, band of 3 sigma", BLUE, Stroke::Dashed, points(estimate)),
+            line("estimate, band of +-3 sigma", BLUE, Stroke::Dashed, points(estimate)),
         ],
-        marks,
+        marks: boundaries(record),
         x_range: record.time.last().map(|&end| (0.0, end)),
         y_range: Some(window(series, scale)),
         ..Figure::default()
     }
+}
+
+/// The error of one series (estimate minus truth) with +-3 sigma around zero, that of the linear filter on the same
+/// measurements over it, and the offset that an unknown psi leaves. The axis is that of the second half of the last
+/// position: errors before it leave the picture.
+pub(crate) fn error_figure(record: &Traces, i: usize, most: usize) -> Figure {
+    let (scale, unit) = (record.scales[i], &record.units[i]);
+    let settled = settled(record, most);
+    let marks = boundaries(record);
+    let end = record.time.last().copied().unwrap_or(0.0);
+    let late = (marks.last().copied().unwrap_or(0.0) + end) / 2.0;
+    let (mut bands, mut lines, mut largest) = (Vec::new(), Vec::new(), 0.0f64);
+    let mut add = |series: &Series, label: &str, fill, color, stroke| {
+        let error = |k: usize| (series.estimate[k] - series.truth[k]) / scale;
+        let width = |k: usize| 3.0 * series.sigma[k] / scale;
+        let shown = settled.iter().filter(|&&k| record.time[k] >= late);
+        largest = shown.fold(largest, |most, &k| most.max(error(k).abs()).max(width(k)));
+        let span = |&k: &usize| (record.time[k], -width(k), width(k));
+        bands.push(Band { color: fill, points: settled.iter().map(span).collect() });
+        let points = settled.iter().map(|&k| (record.time[k], error(k))).collect();
+        lines.push(line(format!("{label}, band of +-3 sigma"), color, stroke, points));
+    };
+    match &record.linear {
+        Some(linear) => {
+            add(&record.series[i], "error of the filter", SKY, BLUE, Stroke::Solid);
+            add(&linear[i], "error of the linear filter", AMBER, ORANGE, Stroke::Dashed);
+        }
+        None => add(&record.series[i], "error", SKY, BLUE, Stroke::Solid),
+    }
+    if let Some((what, offset)) = offset(record, i) {
+        let label = format!("{what} = {} {unit}", number(offset));
+        lines.push(line(label, BLACK, Stroke::Dotted, vec![(0.0, offset), (end, offset)]));
+    }
+    let half = if largest > 0.0 { 1.2 * largest } else { 1.0 };
+    Figure {
+        title: format!("Error of {}", series_title(record, i)),
+        x_label: format!("t{}", bracketed(&record.time_unit)),
+        y_label: format!("error{}", bracketed(unit)),
+        bands,
+        lines,
+        marks,
+        x_range: Some((0.0, end)),
+        y_range: Some((-half, half)),
+        ..Figure::default()
+    }
+}
+
+/// The offset of an unknown that outputs determine only together with a psi: the error of that psi at the start, carried over
+/// by their combination. The paper's is D_FZ, off by `wN*psi_y(0)`.
+fn offset(record: &Traces, i: usize) -> Option<(String, f64)> {
+    if record.determined.get(i).copied().unwrap_or(true) {
+        return None;
+    }
+    let (j, sign, term) = record.names.iter().enumerate().find_map(|(j, name)| {
+        let rest = name.strip_prefix(&record.names[i])?;
+        let (sign, term) =
+            rest.strip_prefix(" - ").map(|t| ("", t)).or(rest.strip_prefix(" + ").map(|t| ("-", t)))?;
+        (record.determined.get(j).copied().unwrap_or(false) && !term.contains(' ')).then_some((j, sign, term))
+    })?;
+    let (factor, psi) =
+        term.rsplit_once('*').map_or((String::new(), term), |(f, psi)| (format!("{f}*"), psi));
+    let at_start = |j: usize| {
+        let s = &record.series[j];
+        Some((s.estimate.first()? - s.truth.first()?) / record.scales[i])
+    };
+    let offset = at_start(i)? - at_start(j)?;
+    psi.starts_with("psi_").then(|| (format!("{sign}{factor}(error of {psi} at t = 0)"), offset))
 }
 
 /// The truth and the estimate with some air: the band of the prior would hide them.
@@ -84,85 +176,84 @@ fn window(series: &Series, scale: f64) -> (f64, f64) {
     (low - air, high + air)
 }
 
-/// The name of a series, and whether it shows the prior alone.
+/// The name of a series, and whether it shows the prior alone; a filter with full attitudes may learn it from large angles.
 pub(crate) fn series_title(record: &Traces, i: usize) -> String {
     let determined = record.determined.get(i).copied().unwrap_or(false);
-    let prior = if determined { "" } else { ", known from the prior only" };
+    let prior = match (determined, &record.linear) {
+        (true, _) => "",
+        (false, None) => ", known from the prior only",
+        (false, Some(_)) => ", not determined at small angles",
+    };
     format!("{}{prior}", record.names[i])
 }
 
-/// A figure per unknown and combination, and all of them in one.
+/// Two figures per unknown and combination, the estimate and its error; those of all unknowns in one, and what the paper
+/// draws as figures 2 to 10, in its order.
 ///
 /// # Errors
 /// [`FigureError`].
 pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
-    let figures: Vec<Figure> = (0..record.names.len()).map(|i| curve(record, i)).collect();
+    let all = || 0..record.names.len();
+    let unknowns: Vec<usize> = all().filter(|&i| !record.names[i].contains(' ')).collect();
+    let count = unknowns.len();
+    let part = if count > GRID { format!(" (the first {GRID} of {count} unknowns)") } else { String::new() };
+    let papers: Option<Vec<usize>> =
+        PAPER.iter().map(|name| record.names.iter().position(|n| n == name)).collect();
+    let estimates: Vec<Figure> = all().map(|i| curve(record, i)).collect();
+    let errors: Vec<Figure> = all().map(|i| error_figure(record, i, POINTS)).collect();
     let mut files = Vec::new();
-    for (figure, name) in figures.iter().zip(&record.names) {
-        files.extend(picture(&file_name(name), figure.svg())?);
+    // a name of an unknown has no dot
+    for (figures, end, title) in [
+        (estimates, "", "Truth, estimate and +-3 sigma"),
+        (errors, ".error", "Error (estimate minus truth) and +-3 sigma"),
+    ] {
+        for (figure, name) in figures.iter().zip(&record.names) {
+            files.extend(picture(&format!("{}{end}", file_name(name)), figure.svg())?);
+        }
+        let some: Vec<Figure> = unknowns.iter().take(GRID).map(|&i| figures[i].clone()).collect();
+        files.extend(picture(&format!("all{end}"), grid(&some, 3, &format!("{title}{part}")))?);
+        let numbered = |(k, &i): (usize, &usize)| Figure {
+            title: format!("{}: {}", k + 2, figures[i].title),
+            ..figures[i].clone()
+        };
+        if let Some(papers) = &papers {
+            let some: Vec<Figure> = papers.iter().enumerate().map(numbered).collect();
+            let title = format!("{title}: the unknowns of the paper's figures 2 to 10");
+            files.extend(picture(&format!("figures-2-to-10{end}"), grid(&some, 3, &title))?);
+        }
     }
-    let unknowns = record.names.iter().filter(|n| !n.contains(' ')).count();
-    let part =
-        if unknowns > GRID { format!(" (the first {GRID} of {unknowns} unknowns)") } else { String::new() };
-    let title = format!("Truth, estimate and +-3 sigma{part}");
-    files.extend(picture("all", grid(&figures[..unknowns.min(GRID)], 3, &title))?);
     Ok(files)
 }
 
-/// Colours of the accuracy orders 0, 1, 2 and beyond, and of what is not observable.
-fn order_color(order: Option<usize>) -> &'static str {
-    match order {
-        Some(0) => GREEN,
-        Some(1) => BLUE,
-        Some(_) => ORANGE,
-        None => GREY,
-    }
-}
-
-/// Sigma against the dwell for unknowns of one unit, with a reference slope per order.
-pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str) -> Figure {
-    let mut orders: Vec<Option<usize>> = curves.iter().map(|c| c.accuracy_order).collect();
-    orders.sort_unstable();
-    orders.dedup();
-    let mut lines = Vec::new();
-    for &order in &orders {
-        for c in curves.iter().filter(|c| c.accuracy_order == order) {
-            let what = order.map_or_else(|| "not observable (prior)".into(), |d| format!("order {d}"));
-            lines.push(Line {
-                label: format!("{}, {what}", c.name),
-                color: order_color(order),
-                stroke: Stroke::Solid,
-                points: c.points.clone(),
-            });
-        }
-        // the reference goes through the middle of the first curve
-        let first = curves.iter().find(|c| c.accuracy_order == order).map(|c| &c.points);
-        if let (Some(d), Some(points)) = (order, first) {
-            let (t0, s0) = points[points.len() / 2];
-            let slope = -(d as f64 + 0.5);
-            let reference = points.iter().map(|&(t, _)| (t, 2.0 * s0 * (t / t0).powf(slope)));
-            lines.push(Line {
-                label: format!("slope {slope:.1}"),
-                color: BLACK,
-                stroke: Stroke::Dotted,
-                points: reference.collect(),
-            });
-        }
-    }
+/// Sigma against the dwell for unknowns of one unit, with a reference slope per order; the styles are those from `first` on.
+pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> Figure {
     // what stays at a diffuse prior would squeeze the rest
-    lines.retain(|l| l.color != GREY || lines_are_all_grey(curves));
+    let any = curves.iter().any(|c| c.accuracy_order.is_some());
+    let mut curves: Vec<&SlopeCurve> =
+        curves.iter().copied().filter(|c| c.accuracy_order.is_some() || !any).collect();
+    curves.sort_by_key(|c| c.accuracy_order);
+    let mut lines = Vec::new();
+    for (i, c) in curves.iter().enumerate() {
+        let what = c.accuracy_order.map_or_else(|| "not observable (prior)".into(), |d| format!("order {d}"));
+        let (color, stroke) = style(first + i);
+        lines.push(line(format!("{}, {what}", c.name), color, stroke, c.points.clone()));
+        let ends = curves.get(i + 1).is_none_or(|next| next.accuracy_order != c.accuracy_order);
+        let Some(d) = c.accuracy_order.filter(|_| ends) else { continue };
+        // beside the first curve of the order, at its middle
+        let Some(of) = curves.iter().find(|of| of.accuracy_order == c.accuracy_order) else { continue };
+        let (t0, s0) = of.points[of.points.len() / 2];
+        let slope = -(d as f64 + 0.5);
+        let reference = of.points.iter().map(|&(t, _)| (t, 2.0 * s0 * (t / t0).powf(slope))).collect();
+        lines.push(line(format!("slope {slope:.1}"), BLACK, Stroke::Dotted, reference));
+    }
     Figure {
         title: format!("Sigma against dwell [{unit}]"),
         x_label: "dwell of a position [s]".into(),
-        y_label: format!("sigma [{unit}]"),
+        y_label: format!("1 sigma [{unit}]"),
         lines,
         log: true,
         ..Figure::default()
     }
-}
-
-fn lines_are_all_grey(curves: &[&SlopeCurve]) -> bool {
-    curves.iter().all(|c| c.accuracy_order.is_none())
 }
 
 /// A mean over time with the bands in which a right filter's stays.
@@ -179,11 +270,10 @@ pub(crate) fn history_figure(
         (p.t_s, low, high)
     };
     let end = history.last().map_or(1.0, |p| p.t_s);
-    let line = |label: &str, color, stroke, points| Line { label: label.into(), color, stroke, points };
     Figure {
         title: title.into(),
         x_label: "t [s]".into(),
-        y_label: format!("mean {title}"),
+        y_label: format!("mean {title} [-]"),
         bands: vec![Band { color: SKY, points: history.iter().map(band).collect() }],
         lines: vec![
             line("expected, band of 95 %", BLACK, Stroke::Dotted, vec![(0.0, dof as f64), (end, dof as f64)]),
@@ -205,10 +295,11 @@ pub fn crosscheck_figures(c: &CrossCheck) -> Result<Vec<File>, FigureError> {
     units.dedup();
     units.sort_unstable();
     units.dedup();
-    let mut figures = Vec::new();
+    let (mut figures, mut before) = (Vec::new(), 0);
     for unit in units {
         let curves: Vec<&SlopeCurve> = c.slopes.iter().filter(|s| s.unit == unit).collect();
-        figures.push(slope_figure(&curves, unit));
+        figures.push(slope_figure(&curves, unit, before));
+        before += curves.iter().filter(|c| c.accuracy_order.is_some()).count();
     }
     files.extend(picture(
         "slopes",

@@ -190,6 +190,7 @@ fn curves(f: &Figure) -> Json {
         match l.stroke {
             Stroke::Solid => &[],
             Stroke::Dashed => &[8, 4],
+            Stroke::DashDot => &[8, 4, 2, 4],
             Stroke::Dotted => &[2, 3],
         }
     };

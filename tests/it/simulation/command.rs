@@ -80,16 +80,37 @@ fn the_folder_of_a_run() {
     let written = files(&one);
     assert_eq!(written, files(&two));
     let file = |name: &str| &written.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("{name}")).1;
-    // the paper's figures 2-10, the rest of the unknowns, and the grid
-    for name in ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ", "D_OX", "all"] {
+    // the paper's figures 2-10, the rest of the unknowns, and the grids; the errors of each
+    let papers = ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
+    let names = papers.iter().chain(&["D_OX", "D_FZ-wNpsi_y", "all", "figures-2-to-10"]);
+    for name in names.flat_map(|name| [name.to_string(), format!("{name}.error")]) {
         let svg = String::from_utf8_lossy(file(&format!("{name}.svg")));
         assert!(svg.starts_with("<svg") && svg.contains("[deg") && svg.contains("t [s]"), "{name}");
+        assert!(svg.contains("band of +-3 sigma"), "{name}");
+        if name.ends_with(".error") {
+            assert!(svg.contains("error [deg") && !svg.contains("linear filter"), "{name}");
+        }
         let png = file(&format!("{name}.png"));
         assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 10_000, "{name}");
     }
     let svg = String::from_utf8_lossy(file("D_FY.svg"));
     assert!(svg.contains("D_FY [deg/h]") && svg.contains("truth") && svg.contains("3 sigma"));
     assert!(svg.contains("stroke-dasharray"), "the estimate is dashed, boundaries are dotted");
+    for (end, label) in [("", "{}"), (".error", "Error of {}")] {
+        let svg = String::from_utf8_lossy(file(&format!("figures-2-to-10{end}.svg"))).into_owned();
+        let places: Vec<Option<usize>> = (papers.iter().enumerate())
+            .map(|(k, name)| svg.find(&format!(">{}: {}", k + 2, label.replace("{}", name))))
+            .collect();
+        assert!(places[0].is_some() && places.is_sorted(), "in the paper's order: {places:?}");
+    }
+    // the paper's offset of D_FZ: wN at 28.2 deg times psi_y(0) of 0.1 deg, 0.023 deg/h, which the estimate leaves out
+    let offset = -15.041_067 * 28.2f64.to_radians().cos() * 0.1f64.to_radians();
+    let label = format!("wN*(error of psi_y at t = 0) = {offset:.5} deg/h");
+    let errors: Vec<&str> = (written.iter())
+        .filter(|(n, bytes)| n.ends_with(".error.svg") && String::from_utf8_lossy(bytes).contains(&label))
+        .map(|(n, _)| n.as_str())
+        .collect();
+    assert_eq!(errors, ["D_FZ.error.svg", "all.error.svg", "figures-2-to-10.error.svg"], "{label}");
 
     let mut csv = csv::Reader::from_reader(&file("series.csv")[..]);
     let header: Vec<String> = csv.headers().expect("a header").iter().map(String::from).collect();
@@ -128,6 +149,32 @@ fn the_folder_of_a_run() {
     let nowhere = run(&[&P1P2[..], &["-o", &folder("no/such/place")]].concat());
     assert_eq!(nowhere.status.code(), Some(2));
     assert_eq!(std::fs::read_dir(place.path()).expect("the place").count(), 2, "nothing is left behind");
+}
+
+/// Where another filter runs, its errors and those of the linear one over each other; the axis shows both.
+#[test]
+fn errors_of_two_filters() {
+    let conditions = Conditions { truth: Truth::Exact, ..Conditions::default() };
+    let (_, record) = simulate(&paper(Carry::Platform), &conditions, 1).expect("simulated");
+    let files = obsdeg_report::simulation_figures(&record.traces).expect("figures");
+    let svg = |name: &str| {
+        let file = files.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("{name}"));
+        String::from_utf8_lossy(&file.bytes).into_owned()
+    };
+    for name in &record.traces.names[..15] {
+        let error = svg(&format!("{name}.error.svg"));
+        for label in
+            ["error of the filter, band of +-3 sigma", "error of the linear filter, band of +-3 sigma"]
+        {
+            assert!(error.contains(label), "{name}");
+        }
+        assert!(!error.contains("known from the prior only"), "{name}: large angles may tell");
+        assert!(!svg(&format!("{name}.svg")).contains("linear filter"), "{name}");
+    }
+    assert!(svg("D_OX.error.svg").contains("not determined at small angles"));
+    assert!(!svg("D_FX.error.svg").contains("not determined"));
+    // the linear filter is off by 10 deg/h where the other's +-3 sigma is 2.3
+    assert!(svg("D_FY.error.svg").contains(">-10<"));
 }
 
 #[test]

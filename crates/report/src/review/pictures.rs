@@ -8,8 +8,8 @@ use obsdeg_evidence::crosscheck::{CrossCheck, SlopeCurve};
 use obsdeg_evidence::simulation::Traces;
 
 use crate::document::{Block, Drawing, Picture};
-use crate::figure::{BLACK, BLUE, Band, Figure, GREEN, GREY, Line, ORANGE, SKY, Stroke, heat};
-use crate::figures::{file_name, history_figure, series_title, slope_figure};
+use crate::figure::{BLACK, BLUE, Figure, GREEN, Line, ORANGE, Stroke, heat, style};
+use crate::figures::{error_figure, file_name, history_figure, series_title, slope_figure};
 
 /// At most this many points a curve.
 const POINTS: usize = 160;
@@ -27,13 +27,6 @@ fn still(name: &str, caption: impl Into<String>, svg: String) -> Block {
 
 fn line(label: &str, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)>) -> Line {
     Line { label: label.into(), color, stroke, points }
-}
-
-/// Colours and strokes for many curves, told apart by both.
-fn style(i: usize) -> (&'static str, Stroke) {
-    const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, SKY, BLACK, GREY];
-    let stroke = [Stroke::Solid, Stroke::Dashed, Stroke::Dotted][i / COLORS.len() % 3];
-    (COLORS[i % COLORS.len()], stroke)
 }
 
 /// The rank over the order of derivatives, as steps.
@@ -135,7 +128,7 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
     let figure = Figure {
         title: "Predicted sigma against latitude".into(),
         x_label: "latitude [deg]".into(),
-        y_label: "sigma [deg/h, /g]".into(),
+        y_label: "1 sigma [deg/h, deg/h/g]".into(),
         x_range: Some((0.0, 90.0)),
         y_range: logarithmic_window(&lines),
         log_y: true,
@@ -163,7 +156,7 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
     let figure = Figure {
         title: "Predicted sigma against time".into(),
         x_label: "total time, all dwells scaled alike [s]".into(),
-        y_label: "sigma [deg/h, /g]".into(),
+        y_label: "1 sigma [deg/h, deg/h/g]".into(),
         lines,
         log: true,
         ..Figure::default()
@@ -204,7 +197,7 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
     let figure = Figure {
         title: "Pareto front".into(),
         x_label: "total time [s]".into(),
-        y_label: "largest sigma [deg/h, /g]".into(),
+        y_label: "largest 1 sigma [deg/h, deg/h/g]".into(),
         lines,
         log: true,
         ..Figure::default()
@@ -217,45 +210,14 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
 
 /// Errors of the estimate with the band of three sigma, a picture each.
 pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
-    let stride = traces.time.len().div_ceil(POINTS).max(1);
-    let samples: Vec<usize> =
-        (0..traces.time.len()).filter(|k| k % stride == 0 || k + 1 == traces.time.len()).collect();
-    let marks: Vec<f64> = (1..traces.position.len())
-        .filter(|&k| traces.position[k] != traces.position[k - 1])
-        .map(|k| traces.time[k - 1])
-        .collect();
-    let bracketed = |unit: &str| if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
+    let beside = traces.linear.as_ref().map_or("", |_| ", and of the linear filter on the same measurements");
     let of = |i: usize| {
-        let (series, scale, unit) = (&traces.series[i], traces.scales[i], &traces.units[i]);
-        let error = |k: usize| (series.estimate[k] - series.truth[k]) / scale;
-        let sigma = |k: usize| 3.0 * series.sigma[k] / scale;
-        let settled = || samples.iter().copied().filter(|&k| k > 0);
-        // the prior would hide what the data say
-        let largest = settled().map(|k| error(k).abs()).fold(0.0, f64::max);
-        let end = samples.last().map_or(0.0, |&k| sigma(k));
-        let half = (1.2 * largest.max(2.0 * end)).max(f64::MIN_POSITIVE);
-        let figure = Figure {
-            title: series_title(traces, i),
-            x_label: format!("t{}", bracketed(&traces.time_unit)),
-            y_label: format!("error of {}{}", traces.names[i], bracketed(unit)),
-            bands: vec![Band {
-                color: SKY,
-                points: settled().map(|k| (traces.time[k], -sigma(k), sigma(k))).collect(),
-            }],
-            lines: vec![line(
-                "error, band of 3 sigma",
-                BLUE,
-                Stroke::Solid,
-                settled().map(|k| (traces.time[k], error(k))).collect(),
-            )],
-            marks: marks.clone(),
-            x_range: traces.time.last().map(|&end| (0.0, end)),
-            y_range: Some((-half, half)),
-            ..Figure::default()
-        };
         let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
-        let caption = format!("Error of the estimate of {}, with +-3 sigma", series_title(traces, i));
-        curves(&name, caption, figure)
+        let caption = format!(
+            "Error of the estimate of {}, with +-3 sigma{beside}; the axis is that of the second half of the last position",
+            series_title(traces, i)
+        );
+        curves(&name, caption, error_figure(traces, i, POINTS))
     };
     (0..traces.names.len().min(ERRORS)).map(of).collect()
 }
@@ -269,7 +231,7 @@ pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {
         let caption = format!(
             "Sigma against the dwell for unknowns in {unit}, with reference slopes -(accuracy order + 1/2)"
         );
-        curves(&format!("{id}_slopes_{}", i + 1), caption, slope_figure(&curves_, unit))
+        curves(&format!("{id}_slopes_{}", i + 1), caption, slope_figure(&curves_, unit, 0))
     };
     units.iter().enumerate().map(of).collect()
 }
