@@ -33,6 +33,12 @@ pub enum EkfError {
         /// The input.
         what: &'static str,
     },
+    /// An estimate that has left what can be followed.
+    #[error("the filter diverges: {what}")]
+    Diverged {
+        /// What grew.
+        what: &'static str,
+    },
     /// Not symmetric.
     #[error("{what} is not symmetric: entries ({row},{column}) and ({column},{row}) differ")]
     NotSymmetric {

@@ -1,6 +1,6 @@
 //! The cross-check of exact verdicts and filter.
 
-use obsdeg_core::model::settings::Truth;
+use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_evidence::crosscheck::{
     Agreement, Check, Control, Counts, CrossCheck, NullEvidence, QuantityEvidence, Statistic,
 };
@@ -145,7 +145,9 @@ fn whole(c: &CrossCheck) -> Block {
         vec![format!("c. {}", d.name), "0".into(), format!("{:.1e}", d.difference), limit, mark(d.outcome)]
     }));
     rows.extend(c.monte_carlo.statistics.iter().map(|s: &Statistic| {
-        let name = format!("d. {}, {} runs", s.name, c.monte_carlo.runs);
+        let of = if c.monte_carlo.filter == FilterKind::Linear { "" } else { c.monte_carlo.filter.name() };
+        let of = if of.is_empty() { String::new() } else { format!(" of the {of} filter") };
+        let name = format!("d. {}, {} runs{of}", s.name, c.monte_carlo.runs);
         let bands = format!("{} (99.9 %: {})", band(s.band), band(s.wide_band));
         row(name, number(s.expected), number(s.measured), bands, s.pass)
     }));
@@ -210,7 +212,11 @@ impl Answer for CrossCheck {
         blocks.push(Block::list("Not tested by evidence", self.not_tested.clone()));
         blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
         let mut assumed = conditions(&self.conditions, &self.timeline);
-        assumed.push(format!("carry {}; seed {}; truths drawn from the prior", self.carry, self.seed));
+        let drawn = match self.monte_carlo.filter {
+            FilterKind::Linear => "truths drawn from the prior",
+            _ => "runs: the drifts of the scheme, initial estimates drawn about them with the prior",
+        };
+        assumed.push(format!("carry {}; seed {}; {drawn}", self.carry, self.seed));
         let wrong = self.filter.as_ref();
         assumed.extend(wrong.map(|filter| format!("the filter is wrong on purpose: {filter}")));
         assumed.push(format!("a prediction is wrong with probability below {:.0e}", self.error_bound));

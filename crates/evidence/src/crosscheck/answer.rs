@@ -2,6 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::Carry;
+use obsdeg_core::model::settings::FilterKind;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -273,8 +274,13 @@ pub struct Statistic {
 /// Monte Carlo evidence.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MonteCarlo {
+    /// Which filter: the linear one against truths drawn from the prior, any other against the scheme's own drifts from initial
+    /// estimates drawn about them.
+    pub filter: FilterKind,
     /// Number of runs.
     pub runs: usize,
+    /// Runs whose linearisations did not settle.
+    pub unsettled: usize,
     /// ANEES and NIS.
     pub statistics: Vec<Statistic>,
     /// Probability that white innovations have autocorrelations as large.

@@ -1,17 +1,24 @@
-//! Evidence d: many runs against truths drawn from the prior. The covariance pass runs once; a run is a truth and
-//! a state pass. Runs are summed in a fixed order, so that the result does not depend on the number of threads.
+//! Evidence d: many runs. Of the linear filter: against truths drawn from the prior; the covariance pass runs once, a run is a
+//! truth and a state pass. Of a filter with full attitudes: against the scheme's own drifts, exact, from initial estimates
+//! drawn about them, so that the errors are those that the prior says and the drifts those of the platform. Runs are summed
+//! in a fixed order, so that the result does not depend on the number of threads.
 
 use nalgebra::DMatrix;
+use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::consistency::{Nees, chi_square_band};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Form, Gains};
+use obsdeg_ekf::{Covariance, Form, Gains, Manifold, Update};
 use rayon::prelude::*;
 
 use super::answer::{HistoryPoint, Statistic};
 use crate::simulation::SimulationError;
+use crate::simulation::answer::Validity;
 use crate::simulation::conditions::Conditions;
+use crate::simulation::extended::Extended;
+use crate::simulation::iterated::iterated;
 use crate::simulation::plan::Plan;
-use crate::simulation::record::{RunStart, first_steps};
+use crate::simulation::record::{RunStart, choose, first_steps, largest_psi, sample};
+use crate::simulation::state::PlatformState;
 use crate::simulation::truth::{Noise, TruthModel, check_drifts};
 
 /// Times at which NEES is taken.
@@ -51,6 +58,8 @@ pub struct Totals {
     lagged: [f64; LAGS + 1],
     /// Largest `|psi|` of all runs.
     pub largest_psi: f64,
+    /// Runs whose linearisations did not settle, or that ended in numbers that are none.
+    pub unsettled: usize,
 }
 
 impl Totals {
@@ -62,11 +71,13 @@ impl Totals {
             nis: vec![0.0; checkpoints],
             lagged: [0.0; LAGS + 1],
             largest_psi: 0.0,
+            unsettled: 0,
         }
     }
 
     fn add(&mut self, other: &Self) {
         self.runs += other.runs;
+        self.unsettled += other.unsettled;
         let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         sum(&mut self.nees, &other.nees);
         sum(&mut self.nis, &other.nis);
@@ -88,6 +99,8 @@ pub struct Prepared<'a> {
     /// Of the observable subspace at the end: its basis (n x r) and the factor.
     observable: Option<(DMatrix<f64>, Nees)>,
     first_step: Vec<usize>,
+    /// Which filter runs.
+    kind: FilterKind,
 }
 
 impl<'a> Prepared<'a> {
@@ -104,6 +117,7 @@ impl<'a> Prepared<'a> {
         } else {
             RunStart::new(experiment.truth, conditions)?
         };
+        let kind = kind(&experiment, same)?;
         let unknowns = experiment.truth.unknowns();
         let first = unknowns - experiment.truth.platform.coefficients();
         let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).take(unknowns).skip(first);
@@ -123,7 +137,8 @@ impl<'a> Prepared<'a> {
             }
         })?;
         let nees = covariances.iter().map(Nees::of_covariance).collect::<Result<_, _>>()?;
-        let null_space = experiment.null_space.filter(|_| same);
+        // what the outputs do not see at small angles they may see at large ones
+        let null_space = experiment.null_space.filter(|_| same && kind == FilterKind::Linear);
         let basis = null_space.map(|null| observable_basis(&start.sigma, null));
         let observable = match (covariances.last(), basis) {
             (Some(p), Some(basis)) if basis.ncols() > 0 => {
@@ -133,7 +148,7 @@ impl<'a> Prepared<'a> {
             _ => None,
         };
         let first_step = first_steps(experiment.truth);
-        Ok(Self { experiment, gains, start, truth_start, checkpoints, nees, observable, first_step })
+        Ok(Self { experiment, gains, start, truth_start, checkpoints, nees, observable, first_step, kind })
     }
 
     /// Whether filter and truth have the same unknowns, so that errors can be taken.
@@ -159,8 +174,82 @@ impl<'a> Prepared<'a> {
         totals
     }
 
+    /// Which filter runs.
+    pub fn filter(&self) -> FilterKind {
+        self.kind
+    }
+
     /// The runs `from..to`, one after the other.
     pub fn chunk(&self, from: usize, to: usize) -> Totals {
+        if self.kind == FilterKind::Linear { self.linear(from, to) } else { self.exact(from, to) }
+    }
+
+    /// The runs `from..to` of a filter with full attitudes.
+    fn exact(&self, from: usize, to: usize) -> Totals {
+        let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
+        let mut totals = Totals::none(self.checkpoints.len());
+        let extended = Extended::new(filter, conditions, Update::default()).ok();
+        let constants = plan.constants();
+        let (mut start, mut z) = (self.start.clone(), Vec::new());
+        let mut truth = TruthModel::new(plan, conditions, self.truth_start.truth.clone());
+        for run in from..to {
+            let mut noise = Noise::new(*seed, run as u64 + 1);
+            // biases of gyros are drawn, everything else is what the scheme says
+            let mut from = self.truth_start.truth.clone();
+            let spread = from.iter_mut().zip(&self.truth_start.sigma).skip(plan.unknowns());
+            spread.for_each(|(x, sigma)| *x = sigma * noise.normal());
+            let unknowns = start.estimate.iter_mut().zip(&from).zip(&self.start.sigma);
+            for ((x, truth), sigma) in unknowns.take(plan.unknowns()) {
+                *x = truth + sigma * noise.normal();
+            }
+            truth.reset(&from);
+            let (mut states, mut taken) = (Vec::with_capacity(self.checkpoints.len()), 0);
+            sample(&mut truth, plan, &mut noise, &mut z, |x| {
+                // the first is the start
+                if taken > 0 && self.checkpoints.get(states.len()) == Some(&(taken - 1)) {
+                    states.push(PlatformState::of_unknowns(x, constants));
+                }
+                taken += 1;
+            });
+            let (mut next, mut whitened) = (0, Vec::new());
+            let mut nis = vec![0.0; self.checkpoints.len()];
+            let mut nees = vec![0.0; self.checkpoints.len()];
+            let on_step = |step: usize, x: &PlatformState, p: &Covariance, innovations: &[f64]| {
+                nis[next] += innovations.iter().map(|v| v * v).sum::<f64>();
+                whitened.extend_from_slice(innovations);
+                if self.checkpoints[next] == step {
+                    let of = |p: &Covariance| Nees::of_covariance(p)?.of(&mut states[next].local(x));
+                    nees[next] = of(p).unwrap_or(f64::NAN);
+                    next = (next + 1).min(self.checkpoints.len() - 1);
+                }
+            };
+            let ended = extended.as_ref().map(|filter| match self.kind {
+                FilterKind::Iterated => iterated(filter, &start, &z, on_step),
+                _ => filter.run(&start, &z, on_step),
+            });
+            totals.runs += 1;
+            totals.largest_psi = totals.largest_psi.max(truth.largest_psi);
+            let settled = matches!(&ended, Some(Ok(e)) if e.converged);
+            totals.unsettled += usize::from(!settled);
+            if !matches!(ended, Some(Ok(_))) {
+                // no run is left out
+                nis.fill(f64::NAN);
+                nees.fill(f64::NAN);
+            }
+            let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            sum(&mut totals.nis, &nis);
+            sum(&mut totals.nees, &nees);
+            let outputs = filter.components.len();
+            for (lag, sum) in totals.lagged.iter_mut().enumerate() {
+                let later = whitened.get(lag * outputs..).unwrap_or(&[]);
+                *sum += whitened.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+        totals
+    }
+
+    /// The runs `from..to` of the linear filter.
+    fn linear(&self, from: usize, to: usize) -> Totals {
         let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
         let mut totals = Totals::none(self.checkpoints.len());
         let mut drawn = self.truth_start.estimate.clone();
@@ -290,6 +379,19 @@ impl<'a> Prepared<'a> {
             .filter(|p| p.samples > 0)
             .collect()
     }
+}
+
+/// Which filter is held against the truth: the one that a single run would have.
+fn kind(experiment: &Experiment<'_>, same: bool) -> Result<FilterKind, SimulationError> {
+    let Experiment { filter, truth, conditions, seed, .. } = experiment;
+    // a filter that is wrong on purpose is wrong in its linear model
+    if conditions.truth != Truth::Exact || !same || filter.stages != truth.stages {
+        return Ok(FilterKind::Linear);
+    }
+    let start = RunStart::new(truth, conditions)?;
+    let psi = largest_psi(truth, conditions, &start, *seed)?;
+    let validity = Validity::of(truth, conditions, &start.truth, psi)?;
+    Ok(choose(filter, conditions, &validity)?.0)
 }
 
 fn statistic(name: &str, dof: usize, measured: f64, count: f64) -> Statistic {

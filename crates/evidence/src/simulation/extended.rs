@@ -63,6 +63,9 @@ fn drift(
     out
 }
 
+/// What drifts may turn a platform by in one step, in rad: far beyond what any run is good for.
+const MOST_TURN: f64 = 6.0;
+
 /// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at the start.
 #[derive(Clone)]
 struct Moving {
@@ -140,6 +143,11 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
         (0..3).for_each(|i| now.rows[i * width + i] = 1.0);
         let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
         let turn = drift_turn(d.iter().map(|d| d.abs()).sum::<f64>() + kick, dt);
+        if turn.is_nan() || turn > MOST_TURN {
+            return Err(EkfError::Diverged {
+                what: "the estimated drifts turn the platform by radians in one step",
+            });
+        }
         let substeps =
             self.plan.substeps(self.segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let h = dt / substeps as f64;
@@ -278,7 +286,7 @@ impl<'a> Extended<'a> {
     }
 
     /// The motion of a segment.
-    pub(super) fn motion(&self, segment: usize) -> PlatformMotion<'_> {
+    pub(crate) fn motion(&self, segment: usize) -> PlatformMotion<'_> {
         let (to_n, block) = &self.carried[self.plan.segments[segment].position];
         PlatformMotion {
             plan: self.plan,

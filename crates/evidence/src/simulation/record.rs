@@ -396,7 +396,7 @@ pub fn run(
 }
 
 /// Which filter runs, and why.
-fn choose(
+pub(crate) fn choose(
     plan: &Plan,
     conditions: &Conditions,
     validity: &Validity,
