@@ -20,6 +20,8 @@ pub(crate) const MAX_ITERATED_STEPS: usize = 100_000;
 const PASSES: usize = 40;
 /// The run has settled when the estimate at its end moves by less than this, in standard deviations of any combination.
 const SETTLED: f64 = 0.01;
+/// Squared innovations of this many times their number are poor.
+const POOR: f64 = 2.0;
 /// Halvings of a step that leads away.
 const HALVINGS: usize = 12;
 /// A step leads away when the sum of the squared innovations grows by more than this part of it, and this.
@@ -114,20 +116,14 @@ fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, Ek
     Ok(x)
 }
 
-/// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory that it found,
-/// until that stays.
-///
-/// # Errors
-/// [`EkfError`] when a number is none, or `z` is of another run.
-pub fn iterated(
+/// Linearises along the trajectory from `x0` again and again until the estimate at its end stays. Gives the start of the
+/// trajectory, the passes, whether it settled, and the sum of the squared whitened innovations.
+fn settle(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
-    on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
-) -> Result<Ended, EkfError> {
-    check_measurements(filter.plan(), z)?;
-    let once = filter.run(start, z, |_, _, _, _| {})?;
-    let mut x0 = back(filter, once.x)?;
+    mut x0: PlatformState,
+) -> Result<(PlatformState, usize, bool, f64), EkfError> {
     let mut best = pass(filter, start, z, &x0, |_, _, _, _| {})?;
     let (mut passes, mut converged) = (1, false);
     while passes < PASSES && !converged {
@@ -150,6 +146,37 @@ pub fn iterated(
         converged = Nees::of_covariance(&next.ended.1)?.of(&mut moved)? <= SETTLED * SETTLED;
         (x0, best) = (x, next);
     }
+    Ok((x0, passes, converged, best.misfit))
+}
+
+/// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory that it found,
+/// until that stays. Where it does not, or leaves innovations that are none, the initial estimate is tried as the start.
+///
+/// # Errors
+/// [`EkfError`] when a number is none, or `z` is of another run.
+pub fn iterated(
+    filter: &Extended<'_>,
+    start: &RunStart,
+    z: &[f64],
+    on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
+) -> Result<Ended, EkfError> {
+    check_measurements(filter.plan(), z)?;
+    let samples: usize = filter.plan().stages.iter().map(|s| s.steps * s.outputs.len()).sum();
+    let poor = |x: &(PlatformState, usize, bool, f64)| !x.2 || x.3 > POOR * samples as f64;
+    let once = filter.run(start, z, |_, _, _, _| {}).and_then(|once| back(filter, once.x));
+    let mut found = once.and_then(|x| settle(filter, start, z, x));
+    if found.as_ref().map_or(true, poor) {
+        let other = settle(filter, start, z, start.state(filter.plan()));
+        let better = |a: &(PlatformState, usize, bool, f64), b: &(PlatformState, usize, bool, f64)| {
+            (a.2, -a.3) > (b.2, -b.3)
+        };
+        found = match (found, other) {
+            (Ok(a), Ok(b)) => Ok(if better(&b, &a) { b } else { a }),
+            (Ok(a), Err(_)) | (Err(_), Ok(a)) => Ok(a),
+            (Err(e), Err(_)) => Err(e),
+        };
+    }
+    let (x0, passes, converged, _) = found?;
     let last = pass(filter, start, z, &x0, on_step)?;
     let (x, covariance) = last.ended;
     Ok(Ended { x, covariance, passes, converged })
