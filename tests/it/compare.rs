@@ -323,3 +323,26 @@ fn sigmas_with_slews_are_those_without_a_prior() {
     );
     assert_eq!((coupled["D_SY"], coupled["D_IX"]), (None, None));
 }
+
+/// Where the paper's drifts break the small-angle model, sigmas of full attitudes stand beside the predicted ones: for D_FX the
+/// 0.03 deg/h that an independent extended filter had, not 0.0003; at a thousandth of the drifts there are none.
+#[test]
+fn sigmas_at_the_schemes_own_drifts() {
+    let compared = |conditions: Conditions| {
+        let entry = Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions };
+        compare(&[entry], 1).expect("compared").schemes.remove(0)
+    };
+    let large = compared(Conditions::default());
+    let of = |r: &ComparedScheme, name: &str| r.quantities.iter().find(|q| q.name == name).expect("there").clone();
+    assert!(!large.validity.as_ref().expect("drifts").holds);
+    let d_fx = of(&large, "D_FX");
+    assert!((0.025..0.035).contains(&d_fx.sigma_extended.expect("beside")) && d_fx.sigma.expect("seen") < 5e-4);
+    assert!((0.6..0.9).contains(&of(&large, "D_FY").sigma_extended.expect("beside")));
+    assert_eq!(of(&large, "psi_x").sigma_extended, None);
+    let text = obsdeg_report::written(&compare(&[Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions: Conditions::default() }], 1).expect("compared"), Format::Table, Layout::default()).expect("text");
+    assert!(text.contains("Sigma at the scheme's own drifts") && text.contains("p1p2: at its own drifts |psi| reaches 11.81 deg"), "{text}");
+    let psi = Assignment { name: "psi".into(), value: 1e-4 };
+    let values = [Conditions::default().values, vec![psi]].concat();
+    let small = compared(Conditions { drift_scale: 1e-4, values, ..Conditions::default() });
+    assert!(small.validity.expect("drifts").holds && small.quantities.iter().all(|q| q.sigma_extended.is_none()));
+}

@@ -128,9 +128,42 @@ fn excitation(q: &Quantity) -> String {
     q.excitation.iter().map(short).collect::<Vec<_>>().join(" ")
 }
 
+/// Predicted sigmas beside those of full attitudes, where the small-angle model does not hold at the scheme's own drifts.
+pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
+    let large = || schemes.iter().filter(|r| r.validity.as_ref().is_some_and(|v| !v.holds));
+    let rows = large().flat_map(|r| {
+        let shown = r.quantities.iter().filter(|q| q.sigma_extended.is_some());
+        shown.map(|q| {
+            let [linear, full] = [q.sigma, q.sigma_extended].map(optional);
+            vec![q.name.clone(), r.name.clone(), linear, full, q.unit.clone()]
+        })
+    });
+    let rows: Vec<_> = rows.collect();
+    if rows.is_empty() {
+        return Vec::new();
+    }
+    let columns =
+        [left("unknown"), left("scheme"), right("predicted"), right("full attitudes"), left("unit")];
+    let reached = |r: &ComparedScheme| {
+        let v = r.validity.as_ref()?;
+        Some(format!(
+            "{}: at its own drifts |psi| reaches {} deg, and the small-angle model does NOT hold",
+            r.name,
+            number(v.largest_psi_deg)
+        ))
+    };
+    let means = "full attitudes: sigma at the end of a filter that carries them, with the prior, linearised along the run of \
+                 the scheme's own drifts; an unknown that is not determined at small angles may be seen by large ones";
+    vec![
+        Block::table("Sigma at the scheme's own drifts", columns, rows),
+        Block::list("What that is", large().filter_map(reached).chain([means.into()]).collect()),
+    ]
+}
+
 impl Answer for Comparison {
     fn document(&self) -> Document {
         let mut blocks = vec![overview(&self.schemes), by_unknown(&self.schemes)];
+        blocks.extend(at_own_drifts(&self.schemes));
         let drop_rows = self.schemes.iter().flat_map(|r| {
             r.drop_one.iter().map(|d| {
                 vec![

@@ -101,6 +101,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     evidence(blocks, s, id);
     blocks.push(section(level, "Validity of the small-angle model"));
     blocks.push(Block::list("", simulation::validity(&s.simulation.validity)));
+    blocks.extend(compare::at_own_drifts(std::slice::from_ref(review)));
     blocks.push(section(level, "Assumptions and certainty"));
     let mut assumed = words::assumptions(a);
     // carry, latitude and observation are said above

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::requirements::{Claim, Miss, Requirements};
 use crate::simulation::NoiseFloor;
-use crate::simulation::answer::MeasurementReport;
+use crate::simulation::answer::{MeasurementReport, Validity};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.comparison/1";
@@ -56,6 +56,9 @@ pub struct ComparedScheme {
     pub requirements: Requirements,
     /// Whether accuracy orders are computed: none are for rotating segments.
     pub has_accuracy_orders: bool,
+    /// Whether the small-angle model holds at the scheme's own drifts; null where they have no true values, or for very many
+    /// steps.
+    pub validity: Option<Validity>,
     /// What happens without each of the positions.
     pub drop_one: Vec<DropOne>,
     /// The worst sigma under other conditions.
@@ -89,6 +92,9 @@ pub struct Quantity {
     pub accuracy_order: Option<usize>,
     /// Standard deviation by the information of all samples, without prior and drift noise; null when these do not determine it.
     pub sigma: Option<f64>,
+    /// Of a coefficient, where the small-angle model does not hold for the scheme's own drifts: the standard deviation of a
+    /// filter with full attitudes at the end, with the prior.
+    pub sigma_extended: Option<f64>,
     /// The largest sigma allowed.
     pub requirement: Option<f64>,
     /// Requirement over sigma: above 1 is met.

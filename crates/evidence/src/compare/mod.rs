@@ -17,6 +17,7 @@ use crate::requirements::{Basis, Requirements};
 use crate::simulation::answer::MeasurementReport;
 use crate::simulation::batch::batch;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
+use crate::simulation::iterated::at_own_drifts;
 use crate::simulation::plan::MAX_UNKNOWNS;
 use crate::simulation::{Plan, SimulationError, no_prior, noise_floor, predict};
 
@@ -167,7 +168,14 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
     let judged = Judged::new(scheme, conditions, seed)?;
     conditions.concern(judged.platform())?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
-    let quantities = quantities(&judged, conditions, &drop_one)?;
+    let mut quantities = quantities(&judged, conditions, &drop_one)?;
+    let own = at_own_drifts(&judged.plan, conditions)?;
+    if let Some((_, sigmas)) = own.as_ref().filter(|(validity, _)| !validity.holds) {
+        // psi there is that of the end
+        for ((q, sigma), unit) in quantities.iter_mut().zip(sigmas).zip(judged.platform().units()) {
+            q.sigma_extended = (*unit != "rad").then(|| sigma / si_per_shown(unit));
+        }
+    }
     let requirements = required(&quantities, conditions);
     let slews = judged.plan.slews();
     let has_slews = judged.plan.slews().next().is_some();
@@ -184,6 +192,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         has_accuracy_orders: judged.prediction.has_accuracy_orders,
         quantities,
         worst: judged.worst(),
+        validity: own.map(|(validity, _)| validity),
         noise_floor: noise_floor(scheme, conditions, &judged.prediction)?,
         drop_one,
         sensitivity: sensitivity(scheme, conditions, &judged.determined(), has_slews, seed)?,
@@ -224,6 +233,7 @@ fn quantities(
             degree: u.degree,
             accuracy_order: u.accuracy_order,
             sigma,
+            sigma_extended: None,
             requirement,
             margin: None,
             excitation: excitation(c),

@@ -7,10 +7,14 @@
 //! estimate at the end stays (Bell 1994, doi:10.1137/0804035).
 
 use obsdeg_ekf::consistency::Nees;
-use obsdeg_ekf::linear::{filter_pass, smoothed_start};
-use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Measurement, Motion, ScalarOutput, Stage};
+use obsdeg_ekf::linear::{covariance_pass, filter_pass, smoothed_start};
+use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
 
+use super::SimulationError;
+use super::answer::Validity;
+use super::conditions::Conditions;
 use super::extended::{Ended, Extended, check_measurements};
+use super::plan::Plan;
 use super::record::RunStart;
 use super::state::PlatformState;
 
@@ -180,4 +184,36 @@ pub fn iterated(
     let last = pass(filter, start, z, &x0, on_step)?;
     let (x, covariance) = last.ended;
     Ok(Ended { x, covariance, passes, converged })
+}
+
+/// Validity of the small-angle model, and standard deviations at the end (SI units, by state), of a run at the drifts that
+/// `conditions` say, by equations of full attitudes linearised along it: with the prior, without noise of the drift. `None`
+/// where the unknowns are the drift itself, or for a run of too many steps.
+///
+/// # Errors
+/// [`SimulationError`] for conditions that cannot be, and numbers that are none.
+pub(crate) fn at_own_drifts(
+    plan: &Plan,
+    conditions: &Conditions,
+) -> Result<Option<(Validity, Vec<f64>)>, SimulationError> {
+    let steps = plan.segments.iter().map(|s| s.steps).sum::<usize>();
+    if !plan.has_coefficients() || steps > MAX_ITERATED_STEPS {
+        return Ok(None);
+    }
+    let start = RunStart::new(plan, conditions)?;
+    let filter = Extended::new(plan, conditions, Update::default())?;
+    let along = Along::new(&filter, PlatformState::of_unknowns(&start.truth, plan.constants()))?;
+    let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let psi = |x: &PlatformState| -> f64 {
+        let x = x.unknowns();
+        x[..x.len() - plan.constants()].chunks_exact(3).map(length).fold(0.0, f64::max)
+    };
+    let largest = along.states.iter().map(psi).fold(0.0, f64::max);
+    let mut sigmas = Vec::new();
+    covariance_pass(&along.stages, start.covariance(Form::Ud)?, |step, p| {
+        if step + 1 == along.stages.len() {
+            sigmas = p.sigmas();
+        }
+    })?;
+    Ok(Some((Validity::of(plan, conditions, &start.truth, largest)?, sigmas)))
 }
