@@ -27,9 +27,9 @@ const SAMPLES: i64 = 6;
 /// then makes are within half of it, and what is below the second is rounding. Between them nothing is certain.
 const CLEAR: f64 = 10.0 / 16.0;
 const ROUNDING_BELOW: f64 = 11.0 / 16.0;
-/// What is left of a functional whose coefficients are rounded, beside its largest coefficient (drifts in units of the earth rate), in bits: far
-/// above the dwells at which this is asked, far below all by which positions differ.
-const NEGLIGIBLE: f64 = -100.0;
+/// What is left of a functional whose coefficients are doubles, beside its largest coefficient (drifts in units of the earth rate), in bits: what
+/// their rounding spreads to other unknowns, and far below the 1e-11 by which positions differ at least.
+const NEGLIGIBLE: f64 = -46.0;
 
 /// Arithmetic of so many bits.
 #[derive(Debug, Clone, Copy)]
