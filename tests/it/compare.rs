@@ -7,9 +7,10 @@ use obsdeg_core::model::{Carry, Rotation, Scheme};
 use obsdeg_evidence::compare::{ComparedScheme, Entry, compare};
 use obsdeg_evidence::requirements::Miss;
 use obsdeg_evidence::simulation::{Conditions, simulate};
+use obsdeg_report::{Format, Layout};
 
 use crate::program::{json, run, stderr, stdout};
-use crate::schemes::{S6, scheme};
+use crate::schemes::{S6, paper, scheme};
 
 fn compared(arguments: &[&str]) -> Output {
     run(&[&["compare"], arguments].concat())
@@ -333,16 +334,38 @@ fn sigmas_at_the_schemes_own_drifts() {
         compare(&[entry], 1).expect("compared").schemes.remove(0)
     };
     let large = compared(Conditions::default());
-    let of = |r: &ComparedScheme, name: &str| r.quantities.iter().find(|q| q.name == name).expect("there").clone();
+    let of =
+        |r: &ComparedScheme, name: &str| r.quantities.iter().find(|q| q.name == name).expect("there").clone();
     assert!(!large.validity.as_ref().expect("drifts").holds);
     let d_fx = of(&large, "D_FX");
-    assert!((0.025..0.035).contains(&d_fx.sigma_extended.expect("beside")) && d_fx.sigma.expect("seen") < 5e-4);
+    assert!(
+        (0.025..0.035).contains(&d_fx.sigma_extended.expect("beside")) && d_fx.sigma.expect("seen") < 5e-4
+    );
     assert!((0.6..0.9).contains(&of(&large, "D_FY").sigma_extended.expect("beside")));
     assert_eq!(of(&large, "psi_x").sigma_extended, None);
-    let text = obsdeg_report::written(&compare(&[Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions: Conditions::default() }], 1).expect("compared"), Format::Table, Layout::default()).expect("text");
-    assert!(text.contains("Sigma at the scheme's own drifts") && text.contains("p1p2: at its own drifts |psi| reaches 11.81 deg"), "{text}");
+    let text = obsdeg_report::written(
+        &compare(
+            &[Entry {
+                name: "p1p2".into(),
+                scheme: paper(Carry::Platform),
+                conditions: Conditions::default(),
+            }],
+            1,
+        )
+        .expect("compared"),
+        Format::Table,
+        Layout::default(),
+    )
+    .expect("text");
+    assert!(
+        text.contains("Sigma at the scheme's own drifts")
+            && text.contains("p1p2: at its own drifts |psi| reaches 11.81 deg"),
+        "{text}"
+    );
     let psi = Assignment { name: "psi".into(), value: 1e-4 };
     let values = [Conditions::default().values, vec![psi]].concat();
     let small = compared(Conditions { drift_scale: 1e-4, values, ..Conditions::default() });
-    assert!(small.validity.expect("drifts").holds && small.quantities.iter().all(|q| q.sigma_extended.is_none()));
+    assert!(
+        small.validity.expect("drifts").holds && small.quantities.iter().all(|q| q.sigma_extended.is_none())
+    );
 }

@@ -35,7 +35,8 @@ pub(super) fn difference(
         let motion = filter.motion(segment);
         let phi = motion.advance(0.0, plan.segments[segment].dt, &mut zero.clone())?.0.matrix();
         let linear = stage.transition.matrix();
-        for j in 0..n {
+        // biases of gyros are no part of the verdicts
+        for j in 0..plan.unknowns() {
             let scale = linear.column(j).amax().max(phi.column(j).amax());
             add((phi.column(j) - linear.column(j)).amax() / scale);
         }
