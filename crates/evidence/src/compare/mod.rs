@@ -169,7 +169,11 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
     conditions.concern(judged.platform())?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
     let mut quantities = quantities(&judged, conditions, &drop_one)?;
-    let own = at_own_drifts(&judged.plan, conditions)?;
+    let own = match at_own_drifts(&judged.plan, conditions) {
+        // drifts that no run can have say nothing of the scheme
+        Err(e) if e.is_numeric() => None,
+        own => own?,
+    };
     if let Some((_, sigmas)) = own.as_ref().filter(|(validity, _)| !validity.holds) {
         // psi there is that of the end
         for ((q, sigma), unit) in quantities.iter_mut().zip(sigmas).zip(judged.platform().units()) {

@@ -64,7 +64,7 @@ fn drift(
 }
 
 /// What drifts may turn a platform by in one step, in rad: far beyond what any run is good for.
-const MOST_TURN: f64 = 6.0;
+const MOST_TURN: f64 = 100.0;
 
 /// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at the start.
 #[derive(Clone)]
@@ -145,7 +145,7 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
         let turn = drift_turn(d.iter().map(|d| d.abs()).sum::<f64>() + kick, dt);
         if turn.is_nan() || turn > MOST_TURN {
             return Err(EkfError::Diverged {
-                what: "the estimated drifts turn the platform by radians in one step",
+                what: "the estimated drifts turn the platform by a hundred radians in one step",
             });
         }
         let substeps =
