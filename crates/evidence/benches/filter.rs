@@ -1,7 +1,7 @@
 //! The paper's run, 15 states and 200 steps: the whole of it, its parts, and a thousand of them.
 
 use divan::{Bencher, black_box};
-use obsdeg_core::model::settings::Truth;
+use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
 use obsdeg_ekf::Form;
 use obsdeg_ekf::linear::covariance_pass;
@@ -15,7 +15,7 @@ fn main() {
 fn paper(truth: Truth) -> (Plan, Conditions) {
     let attitudes = ["0,0,0", "180,0,0"].map(|a| parse_attitude(a).expect("an attitude"));
     let scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };
-    let conditions = Conditions { truth, ..Conditions::default() };
+    let conditions = Conditions { truth, filter: Some(FilterKind::Linear), ..Conditions::default() };
     (Plan::new(&scheme, &conditions).expect("a plan"), conditions)
 }
 
@@ -50,6 +50,25 @@ fn one_more_run(bencher: Bencher<'_, '_>, truth: &Truth) {
     let (plan, conditions) = paper(*truth);
     let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
     bencher.bench(|| black_box(prepared.chunk(0, 1)));
+}
+
+/// One more run against exact truth at the paper's drifts by a filter with full attitudes: once, and linearised again along the
+/// whole run.
+#[divan::bench(args = [FilterKind::Extended, FilterKind::Iterated])]
+fn full_attitudes(bencher: Bencher<'_, '_>, filter: &FilterKind) {
+    let (plan, conditions) = paper(Truth::Exact);
+    let conditions = Conditions { filter: Some(*filter), ..conditions };
+    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    bencher.bench(|| black_box(prepared.chunk(0, 1)));
+}
+
+/// A thousand of them on all cores.
+#[divan::bench(sample_count = 5)]
+fn monte_carlo_extended(bencher: Bencher<'_, '_>) {
+    let (plan, conditions) = paper(Truth::Exact);
+    let conditions = Conditions { filter: Some(FilterKind::Extended), ..conditions };
+    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    bencher.bench(|| black_box(prepared.run(1000, &|_| true)));
 }
 
 /// Monte Carlo on all cores.

@@ -3,6 +3,7 @@
 mod command;
 mod floor;
 mod gyro_noise;
+mod quaternion;
 
 use std::collections::BTreeMap;
 

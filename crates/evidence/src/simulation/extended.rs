@@ -152,10 +152,13 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
             self.plan.substeps(self.segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let h = dt / substeps as f64;
         let mut by_d = Vec::with_capacity(d.len());
+        let add = |y: &mut Moving, k: &Moving, h: f64| {
+            y.e.iter_mut().flatten().zip(k.e.iter().flatten()).for_each(|(x, k)| *x += h * k);
+            y.rows.iter_mut().zip(&k.rows).for_each(|(x, k)| *x += h * k);
+        };
         let moved = |y: &Moving, k: &Moving, h: f64| {
             let mut out = y.clone();
-            out.e.iter_mut().flatten().zip(k.e.iter().flatten()).for_each(|(x, k)| *x += h * k);
-            out.rows.iter_mut().zip(&k.rows).for_each(|(x, k)| *x += h * k);
+            add(&mut out, k, h);
             out
         };
         for i in 0..substeps {
@@ -166,7 +169,7 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
             let k3 = slope(t + h / 2.0, &moved(&now, &k2, h / 2.0));
             let k4 = slope(t + h, &moved(&now, &k3, h));
             for (k, weight) in [(k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)] {
-                now = moved(&now, &k, h * weight / 6.0);
+                add(&mut now, &k, h * weight / 6.0);
             }
             now.e = orthonormal(&now.e);
         }
