@@ -806,7 +806,8 @@ fn schemes_drawn_at_random_agree() {
     sweep(1000..1010, true);
 }
 
-/// Minutes: `cargo test --test it -- --ignored many_schemes --nocapture`.
+/// Minutes: `cargo test --test it -- --ignored many_schemes --nocapture`. It stops at seed 1060, the one that is left to be understood: under
+/// reset carry at a pole the prior inflation of psi_z^n@p2, in doubles, is 9.989 instead of 1.
 #[test]
 #[ignore = "minutes"]
 fn many_schemes_drawn_at_random_agree() {

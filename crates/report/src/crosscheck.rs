@@ -145,8 +145,10 @@ fn whole(c: &CrossCheck) -> Block {
         vec![format!("c. {}", d.name), "0".into(), format!("{:.1e}", d.difference), limit, mark(d.outcome)]
     }));
     rows.extend(c.monte_carlo.statistics.iter().map(|s: &Statistic| {
-        let of = if c.monte_carlo.filter == FilterKind::Linear { "" } else { c.monte_carlo.filter.name() };
-        let of = if of.is_empty() { String::new() } else { format!(" of the {of} filter") };
+        let of = match c.monte_carlo.filter {
+            FilterKind::Linear => String::new(),
+            other => format!(" of the {} filter", other.name()),
+        };
         let name = format!("d. {}, {} runs{of}", s.name, c.monte_carlo.runs);
         let bands = format!("{} (99.9 %: {})", band(s.band), band(s.wide_band));
         row(name, number(s.expected), number(s.measured), bands, s.pass)

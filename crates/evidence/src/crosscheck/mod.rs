@@ -47,7 +47,7 @@ const NOT_TESTED: [&str; 7] = [
     "the conditions on angles under which verdicts change",
     "verdicts under the other carries, at other latitudes and angles: a cross-check of those schemes does that",
     "that the bound on the probability of a wrong verdict is right",
-    "how the gyros are mounted, and the rotations (19): model and equations of direction cosines read them alike",
+    "that the equations of the paper, their signs and axes, are those of the platform: they are written here several times, as the paper has them",
 ];
 /// What is left of a column of unit length that others explain.
 const UNEXPLAINED: f64 = 1e-7;

@@ -85,6 +85,14 @@ impl Totals {
         self.nees_observable += other.nees_observable;
         self.largest_psi = self.largest_psi.max(other.largest_psi);
     }
+
+    /// Adds the products of the whitened innovations of a run, `outputs` per sample.
+    fn correlate(&mut self, whitened: &[f64], outputs: usize) {
+        for (lag, sum) in self.lagged.iter_mut().enumerate() {
+            let later = whitened.get(lag * outputs..).unwrap_or(&[]);
+            *sum += whitened.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
 }
 
 /// What all runs share: gains and the factors of the covariance at the checkpoints.
@@ -188,7 +196,8 @@ impl<'a> Prepared<'a> {
     fn exact(&self, from: usize, to: usize) -> Totals {
         let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
         let mut totals = Totals::none(self.checkpoints.len());
-        let extended = Extended::new(filter, conditions, Update::default()).ok();
+        let extended = Extended::new(filter, conditions, Update::default())
+            .expect("an exact truth has coefficients, and so has the filter of the same unknowns");
         let constants = plan.constants();
         let (mut start, mut z) = (self.start.clone(), Vec::new());
         let mut truth = TruthModel::new(plan, conditions, self.truth_start.truth.clone());
@@ -223,15 +232,15 @@ impl<'a> Prepared<'a> {
                     next = (next + 1).min(self.checkpoints.len() - 1);
                 }
             };
-            let ended = extended.as_ref().map(|filter| match self.kind {
-                FilterKind::Iterated => iterated(filter, &start, &z, on_step),
-                _ => filter.run(&start, &z, on_step),
-            });
+            let ended = match self.kind {
+                FilterKind::Iterated => iterated(&extended, &start, &z, on_step),
+                _ => extended.run(&start, &z, on_step),
+            };
             totals.runs += 1;
             totals.largest_psi = totals.largest_psi.max(truth.largest_psi);
-            let settled = matches!(&ended, Some(Ok(e)) if e.converged);
+            let settled = ended.as_ref().is_ok_and(|e| e.converged);
             totals.unsettled += usize::from(!settled);
-            if !matches!(ended, Some(Ok(_))) {
+            if ended.is_err() {
                 // no run is left out
                 nis.fill(f64::NAN);
                 nees.fill(f64::NAN);
@@ -239,11 +248,7 @@ impl<'a> Prepared<'a> {
             let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
             sum(&mut totals.nis, &nis);
             sum(&mut totals.nees, &nees);
-            let outputs = filter.components.len();
-            for (lag, sum) in totals.lagged.iter_mut().enumerate() {
-                let later = whitened.get(lag * outputs..).unwrap_or(&[]);
-                *sum += whitened.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
-            }
+            totals.correlate(&whitened, filter.components.len());
         }
         totals
     }
@@ -302,11 +307,7 @@ impl<'a> Prepared<'a> {
                     basis.column_iter().map(|c| c.iter().zip(errors()).map(|(a, e)| a * e).sum()).collect();
                 totals.nees_observable += nees.of(&mut projected).unwrap_or(f64::NAN);
             }
-            let outputs = filter.components.len();
-            for (lag, sum) in totals.lagged.iter_mut().enumerate() {
-                let later = whitened.get(lag * outputs..).unwrap_or(&[]);
-                *sum += whitened.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
-            }
+            totals.correlate(&whitened, filter.components.len());
             totals.largest_psi = totals.largest_psi.max(truth.borrow().largest_psi);
             totals.runs += 1;
         }

@@ -120,14 +120,30 @@ fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, Ek
     Ok(x)
 }
 
-/// Linearises along the trajectory from `x0` again and again until the estimate at its end stays. Gives the start of the
-/// trajectory, the passes, whether it settled, and the sum of the squared whitened innovations.
+/// Where the iteration ended.
+struct Settled {
+    /// The start of the trajectory.
+    x0: PlatformState,
+    passes: usize,
+    converged: bool,
+    /// The sum of the squared whitened innovations.
+    misfit: f64,
+}
+
+impl Settled {
+    /// Whether it is to be preferred: one that settled, then one that fits.
+    fn is_better_than(&self, other: &Self) -> bool {
+        (self.converged, -self.misfit) > (other.converged, -other.misfit)
+    }
+}
+
+/// Linearises along the trajectory from `x0` again and again until the estimate at its end stays.
 fn settle(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
     mut x0: PlatformState,
-) -> Result<(PlatformState, usize, bool, f64), EkfError> {
+) -> Result<Settled, EkfError> {
     let mut best = pass(filter, start, z, &x0, |_, _, _, _| {})?;
     let (mut passes, mut converged) = (1, false);
     while passes < PASSES && !converged {
@@ -150,11 +166,11 @@ fn settle(
         converged = Nees::of_covariance(&next.ended.1)?.of(&mut moved)? <= SETTLED * SETTLED;
         (x0, best) = (x, next);
     }
-    Ok((x0, passes, converged, best.misfit))
+    Ok(Settled { x0, passes, converged, misfit: best.misfit })
 }
 
 /// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory that it found,
-/// until that stays. Where it does not, or leaves innovations that are none, the initial estimate is tried as the start.
+/// until that stays. Where it does not, or fits poorly, the trajectory of the initial estimate is tried too.
 ///
 /// # Errors
 /// [`EkfError`] when a number is none, or `z` is of another run.
@@ -166,21 +182,21 @@ pub fn iterated(
 ) -> Result<Ended, EkfError> {
     check_measurements(filter.plan(), z)?;
     let samples: usize = filter.plan().stages.iter().map(|s| s.steps * s.outputs.len()).sum();
-    let poor = |x: &(PlatformState, usize, bool, f64)| !x.2 || x.3 > POOR * samples as f64;
+    let poor = |s: &Settled| !s.converged || s.misfit > POOR * samples as f64;
     let once = filter.run(start, z, |_, _, _, _| {}).and_then(|once| back(filter, once.x));
     let mut found = once.and_then(|x| settle(filter, start, z, x));
     if found.as_ref().map_or(true, poor) {
         let other = settle(filter, start, z, start.state(filter.plan()));
-        let better = |a: &(PlatformState, usize, bool, f64), b: &(PlatformState, usize, bool, f64)| {
-            (a.2, -a.3) > (b.2, -b.3)
-        };
         found = match (found, other) {
-            (Ok(a), Ok(b)) => Ok(if better(&b, &a) { b } else { a }),
+            (Ok(a), Ok(b)) => {
+                let passes = a.passes + b.passes;
+                Ok(Settled { passes, ..if b.is_better_than(&a) { b } else { a } })
+            }
             (Ok(a), Err(_)) | (Err(_), Ok(a)) => Ok(a),
             (Err(e), Err(_)) => Err(e),
         };
     }
-    let (x0, passes, converged, _) = found?;
+    let Settled { x0, passes, converged, .. } = found?;
     let last = pass(filter, start, z, &x0, on_step)?;
     let (x, covariance) = last.ended;
     Ok(Ended { x, covariance, passes, converged })
