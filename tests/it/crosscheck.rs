@@ -160,8 +160,7 @@ fn wrong_filters_are_found_out() {
 
 /// ANEES and NIS of many runs against exact truth at the paper's drifts. The iterated filter is what it believes; one that goes
 /// through the run once is not, since it linearised the first steps before it knew the drifts, nor is the linear one. With
-/// p1 p2 under inertial carry even the most probable run has an ANEES of about 16.5: what is left open bends by more than what
-/// is known (of sigma 5 deg/h/g and 0.7 deg), and no covariance is bent.
+/// p1 p2 the most probable run alone has an ANEES of 16.5 under inertial carry: what is left open bends by more than what is known.
 #[test]
 fn the_iterated_filter_is_what_it_believes() {
     let statistics = |scheme: &Scheme, filter: Option<FilterKind>, runs: usize| {
@@ -176,13 +175,11 @@ fn the_iterated_filter_is_what_it_believes() {
         (prepared.filter(), anees.clone(), nis.clone())
     };
     const SIX: [&str; 6] = ["0,0,0", "180,0,0", "90,0,0", "-90,0,0", "0,0,90", "0,0,-90"];
-    let six = [Carry::Platform, Carry::Inertial].map(|carry| (scheme(&SIX, carry), 100));
-    for (scheme, runs) in six.into_iter().chain([(paper(Carry::Platform), 200)]) {
-        let (filter, anees, nis) = statistics(&scheme, None, runs);
+    let carries = [Carry::Platform, Carry::Inertial];
+    for scheme in carries.map(|c| scheme(&SIX, c)).into_iter().chain(carries.map(paper)) {
+        let (filter, anees, nis) = statistics(&scheme, None, 200);
         assert!(filter == FilterKind::Iterated && anees.pass && nis.pass, "{anees:?} {nis:?}");
     }
-    let (_, anees, nis) = statistics(&paper(Carry::Inertial), None, 200);
-    assert!((16.0..17.5).contains(&anees.measured) && nis.pass, "{anees:?} {nis:?}");
     for carry in [Carry::Platform, Carry::Inertial] {
         let (_, anees, nis) = statistics(&paper(carry), Some(FilterKind::Extended), 50);
         assert!(anees.measured > 40.0 && nis.measured < 2.2, "{carry}: {anees:?} {nis:?}");

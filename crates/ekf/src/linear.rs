@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::{Covariance, Gain, ProcessNoise, ScalarOutput, check_step};
 use crate::error::{EkfError, check, check_column};
-use crate::transition::Transition;
+use crate::transition::{Transition, dot};
 
 /// Equal steps: predict, then update by scalar measurements.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,8 +166,18 @@ pub fn filter_pass(
     Ok(gains)
 }
 
+/// What all measurements of a run say of its start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SmoothedStart {
+    /// The correction of its prior mean (shape n).
+    pub correction: Vec<f64>,
+    /// Its covariance (n x n). What the measurements leave of a prior variance is a difference: below 1e-16 of the prior variance
+    /// it is rounding.
+    pub covariance: DMatrix<f64>,
+}
+
 /// The estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times what the
-/// innovations say of the start, summed backwards through the gains (Bryson, Frazier 1963; Bierman 1973,
+/// innovations say of the start, summed backwards through the gains, and its covariance alike (Bryson, Frazier 1963; Bierman 1973,
 /// doi:10.1016/0005-1098(73)90027-2). No covariance is inverted. `whitened` holds the innovations of the run divided
 /// by their standard deviations, in order.
 ///
@@ -178,7 +188,7 @@ pub fn smoothed_start(
     gains: &Gains,
     whitened: &[f64],
     p0: &DMatrix<f64>,
-) -> Result<Vec<f64>, EkfError> {
+) -> Result<SmoothedStart, EkfError> {
     let n = gains.n;
     check("P0", p0, (n, n))?;
     check_column("the innovations", whitened, gains.updates())?;
@@ -190,21 +200,41 @@ pub fn smoothed_start(
     for stage in stages {
         stage.check(n)?;
     }
-    let mut lambda = vec![0.0; n];
-    let mut update = updates;
+    let (mut lambda, mut information) = (vec![0.0; n], DMatrix::zeros(n, n));
+    let (mut update, mut against) = (updates, DVector::zeros(n));
     let mut scratch = Vec::with_capacity(n);
     for stage in stages.iter().rev() {
         for _ in 0..stage.steps {
             for output in stage.outputs.iter().rev() {
                 update -= 1;
+                let k = DVector::from_column_slice(&gains.k[update * n..(update + 1) * n]);
+                let inverse_root = gains.inverse_root[update];
                 // lambda <- (I - k h)^T lambda + h^T e/s
-                let k = &gains.k[update * n..(update + 1) * n];
-                let against: f64 = k.iter().zip(&lambda).map(|(k, l)| k * l).sum();
-                let seen = whitened[update] * gains.inverse_root[update] - against;
+                let seen = whitened[update] * inverse_root - dot(k.as_slice(), &lambda);
                 output.h.iter().for_each(|&(i, c)| lambda[i] += c * seen);
+                // Lambda <- (I - k h)^T Lambda (I - k h) + h^T h/s
+                against.gemv(1.0, &information, &k, 0.0);
+                let both = against.dot(&k) + inverse_root * inverse_root;
+                for &(i, c) in &output.h {
+                    information.column_mut(i).axpy(-c, &against, 1.0);
+                }
+                for &(i, c) in &output.h {
+                    (0..n).for_each(|j| information[(i, j)] -= c * against[j]);
+                    output.h.iter().for_each(|&(j, d)| information[(i, j)] += c * d * both);
+                }
             }
             stage.transition.apply_transposed(&mut lambda, &mut scratch);
+            for _ in 0..2 {
+                for column in information.as_mut_slice().chunks_exact_mut(n.max(1)) {
+                    stage.transition.apply_transposed(column, &mut scratch);
+                }
+                information.transpose_mut();
+            }
         }
     }
-    Ok((p0 * DVector::from_vec(lambda)).as_slice().to_vec())
+    let covariance = p0 - p0 * information * p0;
+    Ok(SmoothedStart {
+        correction: (p0 * DVector::from_vec(lambda)).as_slice().to_vec(),
+        covariance: (&covariance + covariance.transpose()) / 2.0,
+    })
 }

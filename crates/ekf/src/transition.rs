@@ -59,6 +59,17 @@ impl Transition {
         self.n
     }
 
+    /// With as many constants behind its states.
+    #[must_use]
+    pub fn widened(&self, constants: usize) -> Self {
+        let n = self.n + constants;
+        let mut rows = vec![0.0; n * self.active.len()];
+        for (a, row) in rows.chunks_exact_mut(n.max(1)).enumerate() {
+            row[..self.n].copy_from_slice(self.row(a));
+        }
+        Self { n, active: self.active.clone(), rows }
+    }
+
     /// The rows that differ from the identity.
     pub fn active(&self) -> &[usize] {
         &self.active

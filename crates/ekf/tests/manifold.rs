@@ -355,7 +355,8 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
     let gains = filter_pass(stages, prior.clone(), &mut x, fill, |_, _, _, w| whitened.extend_from_slice(w))
         .expect("run");
     let start = smoothed_start(stages, &gains, &whitened, &p0).expect("run");
-    assert!((0..2).all(|i| (x0[i] + start[i] - states[i]).abs() < 1e-10));
+    assert!((0..2).all(|i| (x0[i] + start.correction[i] - states[i]).abs() < 1e-10));
+    assert!((start.covariance - covariance.view((0, 0), (2, 2))).amax() < 1e-10);
     assert!((0..2).all(|i| (x[i] - states[n - 2 + i]).abs() < 1e-10));
     // both recursions at once are the two one after the other
     assert_eq!(gains, covariance_pass(stages, prior, |_, _| {}).expect("run"));

@@ -17,7 +17,8 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::slew::{apply, cross, rotation_vector, times, transpose};
 use obsdeg_core::model::{Carry, DriftTerm, Matrix3, SignedAxis};
 use obsdeg_ekf::{
-    Covariance, EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Transition, Update,
+    Covariance, EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Stage, Transition,
+    Update,
 };
 
 use super::SimulationError;
@@ -66,7 +67,8 @@ fn drift(
 /// What drifts may turn a platform by in one step, in rad: far beyond what any run is good for.
 const MOST_TURN: f64 = 100.0;
 
-/// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at the start.
+/// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at the start, or
+/// none where nobody asks.
 #[derive(Clone)]
 struct Moving {
     e: Matrix3<f64>,
@@ -112,9 +114,8 @@ impl PlatformMotion<'_> {
         let (omega, tilted) = (cross(&earth), times(&times(&c, &times(&drift.by_g, &back)), &cross(&G_N)));
         let a: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| tilted[i][j] - omega[i][j]));
         let width = 3 + d.len();
-        let mut rows = vec![0.0; 3 * width];
-        for i in 0..3 {
-            let row = &mut rows[i * width..(i + 1) * width];
+        let mut rows = vec![0.0; moving.rows.len()];
+        for (i, row) in rows.chunks_exact_mut(width).enumerate() {
             for (j, k) in a[i].iter().enumerate() {
                 let from = &moving.rows[j * width..(j + 1) * width];
                 row.iter_mut().zip(from).for_each(|(x, y)| *x += k * y);
@@ -127,20 +128,37 @@ impl PlatformMotion<'_> {
     }
 }
 
-impl Motion<PlatformState> for PlatformMotion<'_> {
-    fn advance(
+impl PlatformMotion<'_> {
+    /// What the segment is to a linear model.
+    pub(super) fn stage(&self) -> &Stage {
+        &self.plan.stages[self.segment]
+    }
+
+    /// Moves `x` on by `dt`, and nothing else.
+    ///
+    /// # Errors
+    /// As [`Motion::advance`].
+    pub(super) fn carry(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<(), EkfError> {
+        self.integrate(t, dt, x, Vec::new())?;
+        let behind = x.constants.len() - self.plan.biases.len();
+        for (bias, x) in self.plan.biases.iter().zip(&mut x.constants[behind..]) {
+            *x *= (-bias.process.decay * dt).exp();
+        }
+        Ok(())
+    }
+
+    /// Turns the psi of `x` that moves by `dt`, and the `rows` of local coordinates with it (in n, as [`Moving`] has them).
+    fn integrate(
         &self,
         t: f64,
         dt: f64,
         x: &mut PlatformState,
-    ) -> Result<(Transition, Cow<'_, ProcessNoise>), EkfError> {
+        rows: Vec<f64>,
+    ) -> Result<Vec<f64>, EkfError> {
         let (p, d) = (self.to_n, &x.constants[..]);
         let weights = self.weights(dt);
         let back = transpose(p);
-        let width = 3 + d.len();
-        let mut now =
-            Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows: vec![0.0; 3 * width] };
-        (0..3).for_each(|i| now.rows[i * width + i] = 1.0);
+        let mut now = Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
         let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
         let turn = drift_turn(d.iter().map(|d| d.abs()).sum::<f64>() + kick, dt);
         if turn.is_nan() || turn > MOST_TURN {
@@ -174,11 +192,27 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
             now.e = orthonormal(&now.e);
         }
         x.attitudes[self.block] = times(&back, &times(&now.e, p));
+        Ok(now.rows)
+    }
+}
+
+impl Motion<PlatformState> for PlatformMotion<'_> {
+    fn advance(
+        &self,
+        t: f64,
+        dt: f64,
+        x: &mut PlatformState,
+    ) -> Result<(Transition, Cow<'_, ProcessNoise>), EkfError> {
+        let width = 3 + x.constants.len();
+        let mut moved = vec![0.0; 3 * width];
+        (0..3).for_each(|i| moved[i * width + i] = 1.0);
+        let moved = self.integrate(t, dt, x, moved)?;
+        let (p, back) = (self.to_n, transpose(self.to_n));
         // into the axes of the unknowns
         let (n, first) = (x.dimension(), 3 * x.attitudes.len());
         let mut rows = vec![0.0; 3 * n];
         for (i, row) in rows.chunks_exact_mut(n).enumerate() {
-            let entry = |k: usize| (0..3).map(|r| back[i][r] * now.rows[r * width + k]).sum::<f64>();
+            let entry = |k: usize| (0..3).map(|r| back[i][r] * moved[r * width + k]).sum::<f64>();
             let local: [f64; 3] = std::array::from_fn(entry);
             for j in 0..3 {
                 row[3 * self.block + j] = (0..3).map(|r| local[r] * p[r][j]).sum();
@@ -197,7 +231,7 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
                 row[behind + k] = left;
             }
         }
-        let noise = Cow::Borrowed(&self.plan.stages[self.segment].noise);
+        let noise = Cow::Borrowed(&self.stage().noise);
         Ok((Transition::of_rows(n, active, rows)?, noise))
     }
 }

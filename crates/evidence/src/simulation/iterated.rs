@@ -1,19 +1,23 @@
-//! The filter that is linearised again along the whole run: Gauss and Newton for its most probable start.
+//! The filter that is linearised again along the whole run: Gauss and Newton for its most probable start, then the mean about it.
 //!
 //! A filter that goes through a run once linearises every step where the estimate was then, before the drifts were known;
 //! later steps cannot mend that, and iterating single updates cannot either, since it is the motion between them that is
 //! bent. So the run is linearised along one trajectory of the nonlinear equations, filtered with its process noise as a
 //! linear model, and what all measurements say of its start (`linear::smoothed_start`) moves the trajectory, until the
-//! estimate at the end stays (Bell 1994, doi:10.1137/0804035).
+//! estimate at the end stays (Bell 1994, doi:10.1137/0804035). Where what is left open bends the run, a last pass takes
+//! that into the estimate and its covariance (`curvature`).
+
+use std::borrow::Cow;
 
 use obsdeg_ekf::consistency::Nees;
-use obsdeg_ekf::linear::{covariance_pass, filter_pass, smoothed_start};
+use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
 
 use super::SimulationError;
 use super::answer::Validity;
 use super::conditions::Conditions;
-use super::extended::{Ended, Extended, check_measurements};
+use super::curvature::Curvature;
+use super::extended::{Ended, Extended, PlatformMotion, check_measurements};
 use super::plan::Plan;
 use super::record::RunStart;
 use super::state::PlatformState;
@@ -31,82 +35,126 @@ const HALVINGS: usize = 12;
 /// A step leads away when the sum of the squared innovations grows by more than this part of it, and this.
 const AWAY: (f64, f64) = (0.02, 10.0);
 
-/// A run linearised along one trajectory.
-struct Along {
-    /// One per step.
-    stages: Vec<Stage>,
-    /// The outputs of the trajectory, as many per step as there are.
-    outputs: Vec<f64>,
+/// A run without noise.
+pub(super) struct Trajectory {
+    /// Its outputs, as many per step as there are.
+    pub outputs: Vec<f64>,
     /// Its states after the steps.
-    states: Vec<PlatformState>,
+    pub states: Vec<PlatformState>,
 }
 
-impl Along {
-    /// Along the trajectory that starts from `x`.
-    fn new(filter: &Extended<'_>, mut x: PlatformState) -> Result<Self, EkfError> {
-        let plan = filter.plan();
-        let mut out = Self { stages: Vec::new(), outputs: Vec::new(), states: Vec::new() };
-        for (segment, s) in plan.segments.iter().enumerate() {
+impl Trajectory {
+    /// From `x`. `on_step` hears the segment, the time within it, how long the step is, and the state to be moved by it.
+    fn through(
+        filter: &Extended<'_>,
+        mut x: PlatformState,
+        mut on_step: impl FnMut(&PlatformMotion<'_>, f64, f64, &mut PlatformState) -> Result<(), EkfError>,
+    ) -> Result<Self, EkfError> {
+        let mut out = Self { outputs: Vec::new(), states: Vec::new() };
+        for (segment, s) in filter.plan().segments.iter().enumerate() {
             let motion = filter.motion(segment);
             for i in 0..s.steps {
-                let (transition, noise) = motion.advance(i as f64 * s.dt, s.dt, &mut x)?;
-                let rows = Measurement::jacobian(&motion, 0.0, &x);
-                let row = |(j, o): (usize, &ScalarOutput)| ScalarOutput {
-                    h: rows.row(j).iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect(),
-                    r: o.r,
-                };
-                let outputs = plan.stages[segment].outputs.iter().enumerate().map(row).collect();
-                out.stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
+                on_step(&motion, i as f64 * s.dt, s.dt, &mut x)?;
                 out.outputs.extend_from_slice(motion.h(0.0, &x).as_slice());
                 out.states.push(x.clone());
             }
         }
         Ok(out)
     }
+
+    /// From `x`.
+    pub(super) fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
+        Self::through(filter, x, |motion, t, dt, x| motion.carry(t, dt, x))
+    }
+}
+
+/// A run linearised along one trajectory.
+pub(super) struct Along {
+    /// One per step.
+    pub stages: Vec<Stage>,
+    /// Where it is linearised.
+    pub at: Trajectory,
+}
+
+impl Along {
+    /// Along the trajectory that starts from `x`.
+    fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
+        let mut stages = Vec::new();
+        let at = Trajectory::through(filter, x, |motion, t, dt, x| {
+            let (transition, noise) = motion.advance(t, dt, x)?;
+            let rows = Measurement::jacobian(motion, 0.0, x);
+            let row = |(j, o): (usize, &ScalarOutput)| ScalarOutput {
+                h: rows.row(j).iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect(),
+                r: o.r,
+            };
+            let outputs = motion.stage().outputs.iter().enumerate().map(row).collect();
+            stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
+            Ok(())
+        })?;
+        Ok(Self { stages, at })
+    }
 }
 
 /// What a pass over the run made of it.
 struct Pass {
     ended: (PlatformState, Covariance),
-    /// The correction of the start.
-    correction: Vec<f64>,
+    /// What the run says of its start, as a correction of `x0`.
+    start: SmoothedStart,
     /// The sum of the squared whitened innovations.
     misfit: f64,
 }
 
-/// One pass along the trajectory from `x0`.
+/// One pass along the trajectory from `x0`, which bends as `curvature` says.
 fn pass(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
     x0: &PlatformState,
+    curvature: Option<&Curvature>,
     mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
 ) -> Result<Pass, EkfError> {
-    let outputs = filter.plan().components.len();
-    let along = Along::new(filter, x0.clone())?;
-    let p0 = start.variances();
+    let Along { mut stages, at } = Along::new(filter, x0.clone())?;
+    let (n, m) = (x0.dimension(), filter.plan().components.len());
+    let mut p0 = start.variances();
+    let mut from = start.state(filter.plan()).local(x0);
+    if let Some(c) = curvature {
+        c.widen(&mut stages);
+        p0 = c.prior(&p0);
+        from.resize(p0.nrows(), 0.0);
+    }
     let prior = Covariance::new("P0", &p0, Form::Ud)?;
     let mut ended = (x0.clone(), prior.clone());
-    let from = start.state(filter.plan()).local(x0);
     let mut delta = from.clone();
     let mut whitened = Vec::with_capacity(z.len());
     let measure = |step: usize, _: usize, out: &mut [f64]| {
-        for (j, x) in out.iter_mut().enumerate() {
-            *x = z[step * outputs + j] - along.outputs[step * outputs + j];
+        for (row, x) in (step * m..).zip(out) {
+            *x = z[row] - at.outputs[row] - curvature.map_or(0.0, |c| c.mean_output(row));
         }
     };
-    let gains = filter_pass(&along.stages, prior, &mut delta, measure, |step, delta, p, innovations| {
+    let mut bent = Ok(());
+    let gains = filter_pass(&stages, prior, &mut delta, measure, |step, delta, p, innovations| {
         whitened.extend_from_slice(innovations);
-        let mut x = along.states[step].clone();
-        x.retract(delta);
-        on_step(step, &x, p, innovations);
-        if step + 1 == along.states.len() {
-            ended = (x, p.clone());
+        let (delta, p) = match curvature.map(|c| c.of_state(step, delta, p)).transpose() {
+            Ok(Some((delta, p))) => (Cow::Owned(delta), Cow::Owned(p)),
+            Ok(None) => (Cow::Borrowed(delta), Cow::Borrowed(p)),
+            Err(e) => {
+                bent = Err(e);
+                return;
+            }
+        };
+        let mut x = at.states[step].clone();
+        x.retract(&delta);
+        on_step(step, &x, &p, innovations);
+        if step + 1 == at.states.len() {
+            ended = (x, p.into_owned());
         }
     })?;
-    let mut correction = smoothed_start(&along.stages, &gains, &whitened, &p0)?;
-    correction.iter_mut().zip(&from).for_each(|(c, f)| *c += f);
-    Ok(Pass { ended, correction, misfit: whitened.iter().map(|w| w * w).sum() })
+    bent?;
+    let mut start = smoothed_start(&stages, &gains, &whitened, &p0)?;
+    start.correction.iter_mut().zip(&from).for_each(|(c, f)| *c += f);
+    start.correction.truncate(n);
+    start.covariance = start.covariance.view((0, 0), (n, n)).into_owned();
+    Ok(Pass { ended, start, misfit: whitened.iter().map(|w| w * w).sum() })
 }
 
 /// Where the trajectory starts that ends at `x`.
@@ -114,7 +162,7 @@ fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, Ek
     for (segment, s) in filter.plan().segments.iter().enumerate().rev() {
         let motion = filter.motion(segment);
         for i in (1..=s.steps).rev() {
-            motion.advance(i as f64 * s.dt, -s.dt, &mut x)?;
+            motion.carry(i as f64 * s.dt, -s.dt, &mut x)?;
         }
     }
     Ok(x)
@@ -144,17 +192,17 @@ fn settle(
     z: &[f64],
     mut x0: PlatformState,
 ) -> Result<Settled, EkfError> {
-    let mut best = pass(filter, start, z, &x0, |_, _, _, _| {})?;
+    let mut best = pass(filter, start, z, &x0, None, |_, _, _, _| {})?;
     let (mut passes, mut converged) = (1, false);
     while passes < PASSES && !converged {
-        let mut step = best.correction.clone();
+        let mut step = best.start.correction.clone();
         let mut found = None;
         for _ in 0..=HALVINGS {
             let mut x = x0.clone();
             x.retract(&step);
             passes += 1;
             // a trajectory far off may end in numbers that are none
-            let next = pass(filter, start, z, &x, |_, _, _, _| {}).ok();
+            let next = pass(filter, start, z, &x, None, |_, _, _, _| {}).ok();
             found = next.filter(|n| n.misfit <= best.misfit * (1.0 + AWAY.0) + AWAY.1).map(|n| (x, n));
             if found.is_some() {
                 break;
@@ -196,10 +244,26 @@ pub fn iterated(
             (Err(e), Err(_)) => Err(e),
         };
     }
-    let Settled { x0, passes, converged, .. } = found?;
-    let last = pass(filter, start, z, &x0, on_step)?;
-    let (x, covariance) = last.ended;
+    let Settled { mut x0, passes, converged, .. } = found?;
+    let curvature = if converged { bent(filter, start, z, &mut x0)? } else { None };
+    let (x, covariance) = pass(filter, start, z, &x0, curvature.as_ref(), on_step)?.ended;
     Ok(Ended { x, covariance, passes, converged })
+}
+
+/// How the run bends about its most probable start `x0`, which becomes the mean of the likely ones.
+fn bent(
+    filter: &Extended<'_>,
+    start: &RunStart,
+    z: &[f64],
+    x0: &mut PlatformState,
+) -> Result<Option<Curvature>, EkfError> {
+    let Along { stages, at } = Along::new(filter, x0.clone())?;
+    let p = pass(filter, start, z, x0, None, |_, _, _, _| {})?.start.covariance;
+    let curvature = Curvature::new(filter, x0, (&stages, &at), &p, &start.sigma)?;
+    if let Some(c) = &curvature {
+        x0.retract(&pass(filter, start, z, x0, Some(c), |_, _, _, _| {})?.start.correction);
+    }
+    Ok(curvature)
 }
 
 /// Validity of the small-angle model, and standard deviations at the end (SI units, by state), of a run at the drifts that
@@ -218,18 +282,17 @@ pub(crate) fn at_own_drifts(
     }
     let start = RunStart::new(plan, conditions)?;
     let filter = Extended::new(plan, conditions, Update::default())?;
-    let along = Along::new(&filter, PlatformState::of_unknowns(&start.truth, plan.constants()))?;
+    let mut x0 = PlatformState::of_unknowns(&start.truth, plan.constants());
+    let at = Trajectory::new(&filter, x0.clone())?;
     let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let psi = |x: &PlatformState| -> f64 {
         let x = x.unknowns();
         x[..x.len() - plan.constants()].chunks_exact(3).map(length).fold(0.0, f64::max)
     };
-    let largest = along.states.iter().map(psi).fold(0.0, f64::max);
-    let mut sigmas = Vec::new();
-    covariance_pass(&along.stages, start.covariance(Form::Ud)?, |step, p| {
-        if step + 1 == along.stages.len() {
-            sigmas = p.sigmas();
-        }
-    })?;
-    Ok(Some((Validity::of(plan, conditions, &start.truth, largest)?, sigmas)))
+    let largest = at.states.iter().map(psi).fold(0.0, f64::max);
+    // measured without noise, and known before as well as it will be
+    let known = RunStart { estimate: start.truth.clone(), ..start.clone() };
+    let curvature = bent(&filter, &known, &at.outputs, &mut x0)?;
+    let ended = pass(&filter, &known, &at.outputs, &x0, curvature.as_ref(), |_, _, _, _| {})?.ended;
+    Ok(Some((Validity::of(plan, conditions, &start.truth, largest)?, ended.1.sigmas())))
 }

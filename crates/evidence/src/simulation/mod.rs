@@ -4,6 +4,7 @@ pub(crate) mod answer;
 pub(crate) mod batch;
 pub(crate) mod conditions;
 pub(crate) mod consistency;
+mod curvature;
 pub(crate) mod extended;
 pub(crate) mod floor;
 pub(crate) mod gyro_noise;
