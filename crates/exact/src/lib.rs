@@ -13,12 +13,15 @@
 //! - [`series`]: truncated power series, and echelon form over them;
 //! - [`radical`]: numbers of `Q(sqrt 2, sqrt 3)` recovered from their images;
 //! - [`polynomial`]: roots of small polynomials in the field;
+//! - [`multivariate`], [`groebner`]: polynomials in several variables, and bases of their ideals;
 //! - [`certainty`]: the bound on the error probability.
 
 pub mod certainty;
 pub mod echelon;
 pub mod field;
 mod gcd;
+pub mod groebner;
+pub mod multivariate;
 pub mod polynomial;
 pub mod prime;
 pub mod radical;

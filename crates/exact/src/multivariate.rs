@@ -1,0 +1,172 @@
+//! Sparse polynomials in several variables over the field.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use crate::Field;
+
+/// A product of powers: `(variable, exponent)`, variables rising, no exponent zero.
+pub type Monomial = Vec<(u32, u32)>;
+
+/// A polynomial: its monomials with their coefficients, none of which is zero.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Polynomial {
+    terms: BTreeMap<Monomial, u64>,
+}
+
+fn product(a: &[(u32, u32)], b: &[(u32, u32)]) -> Monomial {
+    let (mut i, mut j) = (0, 0);
+    let mut out = Monomial::with_capacity(a.len() + b.len());
+    while i < a.len() && j < b.len() {
+        match a[i].0.cmp(&b[j].0) {
+            Ordering::Less => {
+                out.push(a[i]);
+                i += 1;
+            }
+            Ordering::Greater => {
+                out.push(b[j]);
+                j += 1;
+            }
+            Ordering::Equal => {
+                out.push((a[i].0, a[i].1 + b[j].1));
+                (i, j) = (i + 1, j + 1);
+            }
+        }
+    }
+    out.extend_from_slice(&a[i..]);
+    out.extend_from_slice(&b[j..]);
+    out
+}
+
+impl Polynomial {
+    /// A number.
+    pub fn constant(x: u64) -> Self {
+        Self { terms: (x != 0).then(|| (Monomial::new(), x)).into_iter().collect() }
+    }
+
+    /// A variable.
+    pub fn variable(f: &Field, v: u32) -> Self {
+        Self { terms: [(vec![(v, 1)], f.one())].into() }
+    }
+
+    /// The monomials with their coefficients.
+    pub fn terms(&self) -> impl DoubleEndedIterator<Item = (&Monomial, u64)> {
+        self.terms.iter().map(|(m, &c)| (m, c))
+    }
+
+    /// The number of terms.
+    pub fn len(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// Whether it is zero.
+    pub fn is_empty(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    /// The total degree; 0 of zero.
+    pub fn degree(&self) -> u32 {
+        self.terms.keys().map(|m| m.iter().map(|p| p.1).sum()).max().unwrap_or(0)
+    }
+
+    /// The number that it is, if it is one.
+    pub fn as_constant(&self) -> Option<u64> {
+        match self.terms.first_key_value() {
+            None => Some(0),
+            Some((m, &c)) if m.is_empty() && self.terms.len() == 1 => Some(c),
+            Some(_) => None,
+        }
+    }
+
+    /// In how many terms a variable occurs.
+    pub fn terms_with(&self, v: u32) -> usize {
+        self.terms.keys().filter(|m| m.iter().any(|p| p.0 == v)).count()
+    }
+
+    /// The coefficient of a monomial.
+    pub fn coefficient(&self, m: &[(u32, u32)]) -> u64 {
+        self.terms.get(m).copied().unwrap_or(0)
+    }
+
+    /// Adds a term.
+    pub(crate) fn put(&mut self, f: &Field, m: Monomial, c: u64) {
+        if c == 0 {
+            return;
+        }
+        match self.terms.entry(m) {
+            std::collections::btree_map::Entry::Vacant(e) => {
+                e.insert(c);
+            }
+            std::collections::btree_map::Entry::Occupied(mut e) => match f.add(*e.get(), c) {
+                0 => {
+                    e.remove();
+                }
+                sum => *e.get_mut() = sum,
+            },
+        }
+    }
+
+    /// `self += factor * other`.
+    pub fn add_scaled(&mut self, f: &Field, other: &Self, factor: u64) {
+        for (m, c) in other.terms() {
+            self.put(f, m.clone(), f.mul(c, factor));
+        }
+    }
+
+    /// `self += a b`.
+    pub fn add_product(&mut self, f: &Field, a: &Self, b: &Self) {
+        for (m, c) in a.terms() {
+            for (n, d) in b.terms() {
+                self.put(f, product(m, n), f.mul(c, d));
+            }
+        }
+    }
+
+    /// `factor * self`.
+    pub fn scaled(&self, f: &Field, factor: u64) -> Self {
+        let mut out = Self::default();
+        out.add_scaled(f, self, factor);
+        out
+    }
+
+    /// With `value` in place of a variable.
+    pub fn replaced(&self, f: &Field, v: u32, value: &Self) -> Self {
+        let mut powers = vec![Self::constant(f.one())];
+        let mut out = Self::default();
+        for (m, c) in self.terms() {
+            let Some(at) = m.iter().position(|p| p.0 == v) else {
+                out.put(f, m.clone(), c);
+                continue;
+            };
+            let mut rest = m.clone();
+            let exponent = rest.remove(at).1 as usize;
+            while powers.len() <= exponent {
+                let mut next = Self::default();
+                next.add_product(f, &powers[powers.len() - 1], value);
+                powers.push(next);
+            }
+            for (n, d) in powers[exponent].terms() {
+                out.put(f, product(&rest, n), f.mul(c, d));
+            }
+        }
+        out
+    }
+
+    /// With other names for its variables; `None` where one has none. Names must keep the variables apart.
+    pub fn renamed(&self, name: impl Fn(u32) -> Option<u32>) -> Option<Self> {
+        let monomial = |m: &Monomial| {
+            let mut m: Monomial = m.iter().map(|&(v, e)| Some((name(v)?, e))).collect::<Option<_>>()?;
+            m.sort_unstable();
+            Some(m)
+        };
+        let terms = self.terms.iter().map(|(m, &c)| Some((monomial(m)?, c))).collect::<Option<_>>()?;
+        Some(Self { terms })
+    }
+
+    /// The value at a point.
+    pub fn at(&self, f: &Field, point: &[u64]) -> u64 {
+        let value =
+            |m: &Monomial| m.iter().fold(f.one(), |x, &(v, e)| f.mul(x, f.pow(point[v as usize], e.into())));
+        self.terms().fold(0, |sum, (m, c)| f.add(sum, f.mul(c, value(m))))
+    }
+}
