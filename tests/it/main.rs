@@ -12,6 +12,7 @@ mod files;
 mod formulas;
 mod grammar;
 mod hostile;
+mod language;
 mod laws;
 mod models;
 mod program;

@@ -88,6 +88,12 @@ impl Answer for SystemAnalysis {
         if !self.known.is_empty() {
             assumed.push(format!("known starts: {}", self.known.join(", ")));
         }
+        if !self.constraints.is_empty() {
+            assumed.push(format!(
+                "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0",
+                self.constraints.join(", ")
+            ));
+        }
         assumed.push(if self.closed {
         format!(
             "generic point and inputs: the first order that adds nothing is the last; {} was looked at",

@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use obsdeg_exact::Field;
 
-pub use super::parser::{parse, parse_with};
+pub use super::parser::{Components, Shapes, parse, parse_components, parse_equation, parse_with};
+pub use super::vectors::{MAX_ENTRIES, Shape};
 
 /// Deepest nesting of brackets, signs and powers.
 pub const MAX_DEPTH: usize = 200;
@@ -41,6 +42,24 @@ pub enum Node {
     Multiply(usize, usize),
     Divide(usize, usize),
     Power(usize, usize),
+}
+
+impl Node {
+    /// The same operation on other operands.
+    pub(super) fn with(&self, place: &mut dyn FnMut(usize) -> usize) -> Self {
+        match self {
+            Self::Number { .. } | Self::Name(_) => self.clone(),
+            Self::Call { function, argument } => {
+                Self::Call { function: *function, argument: place(*argument) }
+            }
+            Self::Negate(a) => Self::Negate(place(*a)),
+            Self::Add(a, b) => Self::Add(place(*a), place(*b)),
+            Self::Subtract(a, b) => Self::Subtract(place(*a), place(*b)),
+            Self::Multiply(a, b) => Self::Multiply(place(*a), place(*b)),
+            Self::Divide(a, b) => Self::Divide(place(*a), place(*b)),
+            Self::Power(a, b) => Self::Power(place(*a), place(*b)),
+        }
+    }
 }
 
 /// Functions of one argument.
@@ -97,6 +116,16 @@ pub enum ExpressionError {
         /// Where.
         span: Range<usize>,
     },
+    /// Vectors and matrices that do not fit.
+    #[error("expected {expected}, found {found}")]
+    Shape {
+        /// What would fit.
+        expected: String,
+        /// What stands here.
+        found: String,
+        /// Where.
+        span: Range<usize>,
+    },
     /// A name without a meaning.
     #[error("`{name}` is not known here{}", hint.as_ref().map(|h| format!("; did you mean `{h}`?")).unwrap_or_default())]
     UnknownName {
@@ -120,6 +149,7 @@ impl ExpressionError {
     pub fn span(&self) -> Range<usize> {
         match self {
             Self::Syntax { span, .. }
+            | Self::Shape { span, .. }
             | Self::TooDeep { span }
             | Self::UnknownName { span, .. }
             | Self::DivisionByZero { span } => span.clone(),

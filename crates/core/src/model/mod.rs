@@ -20,6 +20,7 @@ pub mod scheme_file;
 pub mod settings;
 pub mod slew;
 pub(crate) mod symbols;
+pub(crate) mod vectors;
 
 pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
 pub use attitude::{

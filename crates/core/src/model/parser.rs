@@ -1,25 +1,42 @@
 //! The grammar of expressions, by winnow.
 
+use std::collections::HashMap;
+
 use winnow::Parser;
 use winnow::combinator::{Infix, Prefix, expression};
 use winnow::error::{ErrMode, ParserError};
 use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 
 use super::expression::{Expression, ExpressionError, Function, MAX_DEPTH, Names, Node};
+use super::vectors::{Made, Maker, Mismatch, Operation, Shape, Value, component, entry, list};
 
-type Input<'a> = Stateful<LocatingSlice<&'a str>, Expression>;
+/// The shapes of names that are no scalars.
+pub type Shapes = HashMap<String, Shape>;
 
-/// Where the grammar is violated, and what could stand there.
+/// What was read so far.
+#[derive(Debug, Clone)]
+struct Reading<'a> {
+    expression: Expression,
+    names: Names,
+    shapes: &'a Shapes,
+    /// Whether anything was no scalar.
+    vectors: bool,
+}
+
+type Input<'a> = Stateful<LocatingSlice<&'a str>, Reading<'a>>;
+
+/// Where the grammar is violated, and what could stand there; or shapes that do not fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Wrong {
     at: usize,
     expected: &'static str,
+    shape: Option<Box<ExpressionError>>,
 }
 
 impl ParserError<Input<'_>> for Wrong {
     type Inner = Self;
     fn from_input(input: &Input<'_>) -> Self {
-        Self { at: input.current_token_start(), expected: "something else" }
+        Self { at: input.current_token_start(), expected: "something else", shape: None }
     }
     fn into_inner(self) -> Result<Self, Self> {
         Ok(self)
@@ -29,7 +46,7 @@ impl ParserError<Input<'_>> for Wrong {
 type Parsed<T> = Result<T, ErrMode<Wrong>>;
 
 fn wrong<T>(input: &Input<'_>, expected: &'static str) -> Parsed<T> {
-    Err(ErrMode::Cut(Wrong { at: input.current_token_start(), expected }))
+    Err(ErrMode::Cut(Wrong { at: input.current_token_start(), expected, shape: None }))
 }
 
 /// Not this, perhaps something else.
@@ -66,15 +83,34 @@ fn operator(input: &mut Input<'_>) -> Option<char> {
     Some(found)
 }
 
-/// Adds an operation that ends here.
-fn push(input: &mut Input<'_>, node: Node, start: usize) -> usize {
+/// Adds an operation on scalars that ends here.
+fn push(input: &mut Input<'_>, node: Node, start: usize) -> Value {
     let end = input.previous_token_end();
-    input.state.nodes.push(node);
-    input.state.spans.push(start..end);
-    input.state.nodes.len() - 1
+    let expression = &mut input.state.expression;
+    expression.nodes.push(node);
+    expression.spans.push(start..end);
+    Value { shape: Shape::SCALAR, entries: vec![expression.nodes.len() - 1], start }
 }
 
-fn number(input: &mut Input<'_>) -> Parsed<usize> {
+/// Adds an operation that ends here and makes or takes vectors.
+fn push_vector(
+    input: &mut Input<'_>,
+    start: usize,
+    made: impl FnOnce(&mut Maker<'_>) -> Made,
+) -> Parsed<Value> {
+    let span = start..input.previous_token_end();
+    input.state.vectors = true;
+    let mut maker = Maker { expression: &mut input.state.expression, span: span.clone() };
+    match made(&mut maker) {
+        Ok((shape, entries)) => Ok(Value { shape, entries, start }),
+        Err(Mismatch { expected, found }) => {
+            let shape = ExpressionError::Shape { expected, found, span };
+            Err(ErrMode::Cut(Wrong { at: start, expected: "", shape: Some(Box::new(shape)) }))
+        }
+    }
+}
+
+fn number(input: &mut Input<'_>) -> Parsed<Value> {
     let start = input.current_token_start();
     let rest: &str = input.input.as_ref();
     let mut length = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
@@ -109,86 +145,153 @@ const fn functions(names: Names) -> &'static str {
     match names {
         Names::Platform => "a known function (sin, cos, sqrt) or an operator before `(`",
         Names::Plain => {
-            "a known function (sin, cos, tan, asin, acos, atan, exp, log, sqrt) or an operator before `(`"
+            "a known function (sin, cos, tan, asin, acos, atan, exp, log, sqrt; of vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator before `(`"
         }
     }
 }
 
-fn operand(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
+fn operand(input: &mut Input<'_>) -> Parsed<Value> {
     skip_blanks(input);
     let start = input.current_token_start();
-    match peek(input) {
+    let plain = input.state.names == Names::Plain;
+    let mut value = match peek(input) {
         Some(c) if c.is_ascii_digit() || c == '.' => {
             let literal: &str = input.input.as_ref();
             let value = number(input)?;
             let rest: &str = input.input.as_ref();
-            let behind = rest.strip_prefix(" deg").filter(|_| names == Names::Platform);
+            let behind = rest.strip_prefix(" deg").filter(|_| !plain);
             if behind.is_none_or(|b| b.starts_with(|c: char| c.is_alphanumeric() || c == '_')) {
                 return Ok(value);
             }
             // `20 deg` names an angle
             let name = literal[..literal.len() - rest.len() + " deg".len()].to_string();
             input.next_slice(" deg".len());
-            input.state.nodes.pop();
-            input.state.spans.pop();
-            Ok(push(input, Node::Name(name), start))
+            input.state.expression.nodes.pop();
+            input.state.expression.spans.pop();
+            return Ok(push(input, Node::Name(name), start));
         }
-        Some(c) if c.is_alphabetic() || c == '_' => {
-            let rest: &str = input.input.as_ref();
-            let more = |c: char| c.is_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);
-            let mut length = rest.find(|c| !more(c)).unwrap_or(rest.len());
-            if names == Names::Platform && rest[length..].starts_with("^n") {
-                length += 2;
-            }
-            let name = rest[..length].to_string();
-            input.next_slice(length);
-            let Some(function) = Function::named(&name) else {
-                return match peek(input) {
-                    Some('(') => Err(ErrMode::Cut(Wrong { at: start, expected: functions(names) })),
-                    _ => Ok(push(input, Node::Name(name), start)),
-                };
-            };
-            if symbol(input, "(").is_none() {
-                return wrong(input, "`(`");
-            }
-            let argument = sum(input, names)?;
-            if symbol(input, ")").is_none() {
-                return wrong(input, "an operator or `)`");
-            }
-            Ok(push(input, Node::Call { function, argument }, start))
-        }
+        Some(c) if c.is_alphabetic() || c == '_' => name(input, start)?,
         Some('(') => {
             symbol(input, "(");
-            let inner = sum(input, names)?;
+            let inner = sum(input)?;
             if symbol(input, ")").is_none() {
                 return wrong(input, "an operator or `)`");
             }
-            Ok(inner)
+            inner
         }
-        _ => other(input),
+        Some('[') if plain => {
+            symbol(input, "[");
+            let parts = values(input, "]", "an operator, `,` or `]`")?;
+            push_vector(input, start, |_| list(&parts))?
+        }
+        _ => return other(input),
+    };
+    while plain && symbol(input, "[").is_some() {
+        let mut index = Vec::new();
+        loop {
+            skip_blanks(input);
+            let rest: &str = input.input.as_ref();
+            let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+            let Ok(i) = rest[..digits].parse::<usize>() else {
+                return wrong(input, "an index: a whole number from 1 on");
+            };
+            input.next_slice(digits);
+            index.push(i);
+            match symbol(input, ",]") {
+                Some(',') => {}
+                Some(_) => break,
+                None => return wrong(input, "`,` or `]`"),
+            }
+        }
+        value = push_vector(input, start, |_| Ok((Shape::SCALAR, vec![entry(&value, &index)?])))?;
+    }
+    Ok(value)
+}
+
+/// Values between commas, until `end`.
+fn values(input: &mut Input<'_>, end: &str, expected: &'static str) -> Parsed<Vec<Value>> {
+    let mut out = Vec::new();
+    loop {
+        out.push(sum(input)?);
+        if symbol(input, ",").is_none() {
+            return if symbol(input, end).is_some() { Ok(out) } else { wrong(input, expected) };
+        }
     }
 }
 
-fn sum(input: &mut Input<'_>, names: Names) -> Parsed<usize> {
-    fn of(input: &mut Input<'_>, a: usize, b: usize, node: fn(usize, usize) -> Node) -> Parsed<usize> {
-        let start = input.state.spans[a].start;
-        Ok(push(input, node(a, b), start))
+/// A name, or a function with its arguments.
+fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
+    let names = input.state.names;
+    let rest: &str = input.input.as_ref();
+    let more = |c: char| c.is_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);
+    let mut length = rest.find(|c| !more(c)).unwrap_or(rest.len());
+    if names == Names::Platform && rest[length..].starts_with("^n") {
+        length += 2;
     }
-    expression(|input: &mut Input<'_>| operand(input, names))
+    let name = rest[..length].to_string();
+    input.next_slice(length);
+    if let Some(function) = Function::named(&name) {
+        if symbol(input, "(").is_none() {
+            return wrong(input, "`(`");
+        }
+        let argument = sum(input)?;
+        if symbol(input, ")").is_none() {
+            return wrong(input, "an operator or `)`");
+        }
+        if argument.shape != Shape::SCALAR {
+            let expected = format!("a scalar in `{name}`");
+            return push_vector(input, start, |_| Err(Mismatch::new(expected, argument.shape)));
+        }
+        return Ok(push(input, Node::Call { function, argument: argument.entries[0] }, start));
+    }
+    if peek(input) == Some('(') {
+        let Some(operation) = Operation::named(&name).filter(|_| names == Names::Plain) else {
+            return Err(ErrMode::Cut(Wrong { at: start, expected: functions(names), shape: None }));
+        };
+        symbol(input, "(");
+        let arguments = values(input, ")", "an operator, `,` or `)`")?;
+        return push_vector(input, start, |make| operation.apply(&arguments, make));
+    }
+    let Some(&shape) = input.state.shapes.get(&name) else { return Ok(push(input, Node::Name(name), start)) };
+    input.state.vectors = true;
+    let entries =
+        shape.names(&name).into_iter().flat_map(|n| push(input, Node::Name(n), start).entries).collect();
+    Ok(Value { shape, entries, start })
+}
+
+fn binary(input: &mut Input<'_>, sign: char, a: &Value, b: &Value) -> Parsed<Value> {
+    let node = match (sign, a.shape, b.shape) {
+        (_, Shape::SCALAR, Shape::SCALAR) => {
+            let (a, b) = (a.entries[0], b.entries[0]);
+            match sign {
+                '+' => Node::Add(a, b),
+                '-' => Node::Subtract(a, b),
+                '*' => Node::Multiply(a, b),
+                '/' => Node::Divide(a, b),
+                _ => Node::Power(a, b),
+            }
+        }
+        _ => return push_vector(input, a.start, |make| make.binary(sign, a, b)),
+    };
+    Ok(push(input, node, a.start))
+}
+
+fn sum(input: &mut Input<'_>) -> Parsed<Value> {
+    expression(operand)
         .prefix(|input: &mut Input<'_>| match symbol(input, "-+") {
-            Some('-') => Ok(Prefix(5, |input: &mut Input<'_>, a: usize| {
-                let start = input.state.spans[a].start;
-                Ok(push(input, Node::Negate(a), start))
+            Some('-') => Ok(Prefix(5, |input: &mut Input<'_>, a: Value| match a.shape {
+                Shape::SCALAR => Ok(push(input, Node::Negate(a.entries[0]), a.start)),
+                shape => push_vector(input, a.start, |make| Ok((shape, make.negative(&a)))),
             })),
-            Some(_) => Ok(Prefix(5, |_: &mut Input<'_>, a: usize| Ok(a))),
+            Some(_) => Ok(Prefix(5, |_: &mut Input<'_>, a: Value| Ok(a))),
             None => wrong(input, "a number, a name or `(`"),
         })
         .infix(|input: &mut Input<'_>| match operator(input) {
-            Some('+') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Add))),
-            Some('-') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Subtract))),
-            Some('*') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Multiply))),
-            Some('/') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Divide))),
-            Some(_) => Ok(Infix::Right(8, |i: &mut Input<'_>, a, b| of(i, a, b, Node::Power))),
+            Some('+') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| binary(i, '+', &a, &b))),
+            Some('-') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| binary(i, '-', &a, &b))),
+            Some('*') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| binary(i, '*', &a, &b))),
+            Some('/') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| binary(i, '/', &a, &b))),
+            Some(_) => Ok(Infix::Right(8, |i: &mut Input<'_>, a, b| binary(i, '^', &a, &b))),
             None => other(input),
         })
         .parse_next(input)
@@ -204,14 +307,16 @@ fn too_deep(text: &str) -> Option<usize> {
         let double = c == '*' && characters.next_if(|next| *next == (at + 1, '*')).is_some();
         let c = if double { '^' } else { c };
         match c {
-            '(' => brackets += 1,
-            ')' => brackets = brackets.saturating_sub(1),
+            '(' | '[' => brackets += 1,
+            ')' | ']' => brackets = brackets.saturating_sub(1),
             _ => {}
         }
         let sign = matches!(c, '+' | '-');
         signs = if sign { signs + 1 } else { 0 };
         // a sign behind ^ belongs to the exponent
-        if matches!(c, '*' | '/' | '(' | ')') || (sign && !matches!(before, '^' | '+' | '-')) {
+        if matches!(c, '*' | '/' | '(' | ')' | '[' | ']' | ',')
+            || (sign && !matches!(before, '^' | '+' | '-'))
+        {
             powers = 0;
         }
         powers += usize::from(c == '^');
@@ -231,27 +336,112 @@ pub fn parse(text: &str) -> Result<Expression, ExpressionError> {
     parse_with(text, Names::Platform)
 }
 
-/// Parses a whole text.
+/// Parses a whole text of scalars.
 ///
 /// # Errors
 /// [`ExpressionError`] with the place in the text.
 pub fn parse_with(text: &str, names: Names) -> Result<Expression, ExpressionError> {
+    let none = Shapes::new();
+    let (read, value) = read(text, names, &none, sum)?;
+    match (value.shape, read.vectors) {
+        // operands come first: the whole is the last
+        (Shape::SCALAR, false) => Ok(read.expression),
+        (Shape::SCALAR, true) => Ok(component(&read.expression, value.entries[0])),
+        (shape, _) => Err(ExpressionError::Shape {
+            expected: "a scalar".into(),
+            found: shape.to_string(),
+            span: 0..text.len(),
+        }),
+    }
+}
+
+/// An expression of any shape, component by component.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Components {
+    /// Rows and columns.
+    pub shape: Shape,
+    /// One for each entry, row by row.
+    pub entries: Vec<Expression>,
+}
+
+/// Parses a whole text in which some names are vectors or matrices.
+///
+/// # Errors
+/// [`ExpressionError`] with the place in the text.
+pub fn parse_components(text: &str, shapes: &Shapes) -> Result<Components, ExpressionError> {
+    let (read, value) = read(text, Names::Plain, shapes, sum)?;
+    Ok(components(read, &value))
+}
+
+/// Parses `a = b` as `a - b`; `norm(v) = c`, or `|v| = c`, as `dot(v, v) - c^2`, and so every root that stands alone on the left: it needs no root then.
+///
+/// # Errors
+/// [`ExpressionError`] with the place in the text.
+pub fn parse_equation(text: &str, shapes: &Shapes) -> Result<Components, ExpressionError> {
+    let (read, value) = read(text, Names::Plain, shapes, |input| {
+        let start = input.current_token_start();
+        let bars = symbol(input, "|").is_some();
+        let mut left = sum(input)?;
+        if bars {
+            if symbol(input, "|").is_none() {
+                return wrong(input, "an operator or `|`");
+            }
+            let of = [left];
+            left = push_vector(input, start, |make| Operation::Norm.apply(&of, make))?;
+        }
+        if symbol(input, "=").is_none() {
+            return wrong(input, "an operator or `=`");
+        }
+        let right = sum(input)?;
+        let root = match (left.shape, &input.state.expression.nodes[left.entries[0]]) {
+            (Shape::SCALAR, Node::Call { function: Function::Sqrt, argument }) => Some(*argument),
+            _ => None,
+        };
+        let Some(argument) = root.filter(|_| right.shape == Shape::SCALAR) else {
+            return binary(input, '-', &left, &right);
+        };
+        input.state.vectors = true;
+        let square = binary(input, '*', &right, &right)?;
+        binary(input, '-', &Value { entries: vec![argument], ..left }, &square)
+    })?;
+    Ok(components(read, &value))
+}
+
+fn components(read: Reading<'_>, value: &Value) -> Components {
+    let entries = match read.vectors {
+        false => vec![read.expression],
+        true => value.entries.iter().map(|&root| component(&read.expression, root)).collect(),
+    };
+    Components { shape: value.shape, entries }
+}
+
+/// Reads a whole text by a rule of the grammar.
+fn read<'a>(
+    text: &'a str,
+    names: Names,
+    shapes: &'a Shapes,
+    rule: impl FnOnce(&mut Input<'a>) -> Parsed<Value>,
+) -> Result<(Reading<'a>, Value), ExpressionError> {
     if let Some(at) = too_deep(text) {
         return Err(ExpressionError::TooDeep { span: at..at + 1 });
     }
-    let mut input = Stateful { input: LocatingSlice::new(text), state: Expression::default() };
-    let parsed = sum(&mut input, names).and_then(|root| {
+    let state = Reading { expression: Expression::default(), names, shapes, vectors: false };
+    let mut input = Stateful { input: LocatingSlice::new(text), state };
+    let parsed = rule(&mut input).and_then(|value| {
         skip_blanks(&mut input);
         match peek(&input) {
-            None => Ok(root),
+            None => Ok(value),
             Some(_) => wrong(&input, "an operator or the end of the expression"),
         }
     });
     match parsed {
-        // operands come first: the whole is the last
-        Ok(_) => Ok(input.state),
+        Ok(value) => Ok((input.state, value)),
         Err(error) => {
-            let wrong = error.into_inner().unwrap_or(Wrong { at: text.len(), expected: "an expression" });
+            let fallback = Wrong { at: text.len(), expected: "an expression", shape: None };
+            let wrong = error.into_inner().unwrap_or(fallback);
+            if let Some(shape) = wrong.shape {
+                return Err(*shape);
+            }
             let rest = &text[wrong.at..];
             let token = rest.find(|c: char| !c.is_alphanumeric() && c != '_' && c != '.');
             let length = match token {

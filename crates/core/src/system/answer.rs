@@ -36,6 +36,8 @@ pub struct SystemAnalysis {
     pub quantities: Vec<SystemQuantity>,
     /// States whose start is known.
     pub known: Vec<String>,
+    /// Equations that hold at the start; their differentials count as rows of order 0.
+    pub constraints: Vec<String>,
     /// Combinations that were asked for.
     pub combinations: Vec<SystemCombination>,
     /// The number of independent directions that no output sees.
@@ -176,17 +178,13 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             solution: None,
         }
     });
-    let equation = |name: &str, sign: &str, text: &str| format!("{name}{sign} = {text}");
-    let equations = (model.definitions.iter().map(|(n, e)| equation(n, "", &e.text)))
-        .chain(model.states.iter().map(|s| equation(&s.named.name, "'", &s.equation.text)))
-        .chain(model.outputs.iter().map(|(n, e)| equation(&n.name, "", &e.text)));
     let asked = model.combinations.iter().zip(&findings.asked);
     SystemAnalysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         name: model.name.clone(),
         description: model.description.clone(),
-        equations: equations.collect(),
+        equations: model.equations(),
         rank_profile: findings.degrees.rank_profile.clone(),
         rank: findings.degrees.rank(),
         unknowns: judged.layout.unknowns.len(),
@@ -194,6 +192,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         known: (model.states.iter().filter(|s| s.start != StateStart::Unknown))
             .map(|s| s.named.name.clone())
             .collect(),
+        constraints: model.constraint_texts(),
         combinations: asked
             .map(|(c, verdict)| SystemCombination { expression: c.text.clone(), degree: verdict.degree })
             .collect(),

@@ -64,6 +64,10 @@ impl SystemModel {
             formulas(&mut out, &mut s.carry.iter().map(|(name, f)| (name, f)));
         }
         out.extend(self.combinations.iter().map(text));
+        if !self.constraints.is_empty() {
+            out.push("constraints".into());
+            out.extend(self.constraints.iter().map(text));
+        }
         out
     }
 }

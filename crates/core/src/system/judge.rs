@@ -63,7 +63,8 @@ pub(crate) fn climb_at(
     field: Field,
     rng: &mut SplitMix64,
 ) -> Result<At, ModelError> {
-    let mut rows = SystemRows::new(model, compiled, layout, field, rng).map_err(|s| singular(compiled, s))?;
+    let mut rows =
+        SystemRows::new(model, compiled, layout, field, rng).map_err(|s| singular(model, compiled, s))?;
     let gradients = rows.combinations().to_vec();
     let mut found = vec![None; gradients.len()];
     let mut basis = Echelon::new(field, layout.unknowns.len());
@@ -88,8 +89,15 @@ pub(crate) fn climb_at(
     Ok(At { degrees, combinations, stairs, values })
 }
 
-fn singular(compiled: &Compiled, singular: Singular) -> ModelError {
+fn singular(model: &SystemModel, compiled: &Compiled, singular: Singular) -> ModelError {
     let (node, message) = match singular {
+        Singular::Constraint(c) => {
+            let (of, message) = (
+                &model.constraints[c],
+                "no point was found at which it holds; expected constraints that can be solved one by one, or together where all but one are linear",
+            );
+            return of.place.error(message.into(), 0..of.text.len());
+        }
         Singular::Division(node) => (node, "division by zero at every point that was tried"),
         Singular::Root(node) => {
             (node, "the root of zero, or of nothing that is a square, at every point that was tried")
@@ -121,7 +129,16 @@ pub fn judge_compiled(
     seed: u64,
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
-    let layout = Layout::new(model, bound);
+    let mut layout = Layout::new(model, bound);
+    if layout.closed && !compiled.constraints.is_empty() {
+        // a start on constraints that the motion keeps is generic among all of these; on others it is a special one
+        let mut rng = model.random(seed, "constraints");
+        let field = field_for(compiled, &mut rng);
+        let rows = SystemRows::new(model, compiled, &layout, field, &mut rng);
+        if !rows.map_err(|s| singular(model, compiled, s))?.keeps_constraints() {
+            layout = Layout::of(model, bound, false);
+        }
+    }
     let found = layout.unknowns.len();
     let refuse = |message: String| ModelError { what: "the model".into(), message, span: None };
     if found > MAX_UNKNOWNS {

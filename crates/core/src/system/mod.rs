@@ -6,12 +6,15 @@
 
 pub(crate) mod answer;
 mod canonical;
+pub(crate) mod constraints;
 pub(crate) mod dag;
 mod functions;
 pub mod json;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub mod model_file;
+mod nominal;
+mod reader;
 pub(crate) mod rows;
 mod solutions;
 pub(crate) mod symmetry;

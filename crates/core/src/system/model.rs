@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
+use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
 use crate::model::expression::{Expression, Function, nearest};
 
@@ -131,6 +132,8 @@ pub struct SystemModel {
     pub experiments: usize,
     /// Segments; none: one, as the model says.
     pub segments: Vec<Segment>,
+    /// What is zero at the start of every experiment: expressions of states, parameters and constants, with the equation as their text.
+    pub constraints: Vec<PlacedExpression>,
     /// Combinations to be judged.
     pub combinations: Vec<PlacedExpression>,
     /// Numbers for a simulation.
@@ -200,6 +203,8 @@ pub struct Compiled {
     pub constants: Vec<Option<usize>>,
     /// Per segment: nodes of constants and of carried states.
     pub segments: Vec<CompiledSegment>,
+    /// The nodes of the constraints: zero at the start.
+    pub constraints: Vec<usize>,
     /// The nodes of the combinations.
     pub combinations: Vec<usize>,
     /// Where each division and root was written first.
@@ -224,6 +229,33 @@ pub struct CompiledSegment {
 }
 
 impl SystemModel {
+    /// The equations as written, definitions first: `a = ...`, `x' = ...`, `y = ...`; what one text says of all entries of a vector
+    /// stands once.
+    pub(crate) fn equations(&self) -> Vec<String> {
+        let definitions = self.definitions.iter().map(|(n, e)| (n, "", e));
+        let states = self.states.iter().map(|s| (&s.named.name, "'", &s.equation));
+        let outputs = self.outputs.iter().map(|(n, e)| (&n.name, "", e));
+        let base = |name: &str| name.split('[').next().unwrap_or_default().to_string();
+        let mut out = Vec::new();
+        let all: Vec<_> = definitions.chain(states).chain(outputs).collect();
+        for (i, (name, sign, e)) in all.iter().enumerate() {
+            let same = |j: usize| all.get(j).is_some_and(|o| base(o.0) == base(name) && o.2.place == e.place);
+            match (i > 0 && same(i - 1), same(i + 1)) {
+                (true, _) => {}
+                (false, true) => out.push(format!("{}{sign} = {}", base(name), e.text)),
+                (false, false) => out.push(format!("{name}{sign} = {}", e.text)),
+            }
+        }
+        out
+    }
+
+    /// The constraints as written; one text may hold those of all entries of a vector.
+    pub(crate) fn constraint_texts(&self) -> Vec<String> {
+        let mut out: Vec<&PlacedExpression> = self.constraints.iter().collect();
+        out.dedup_by(|a, b| a.place == b.place);
+        out.into_iter().map(|c| c.text.clone()).collect()
+    }
+
     /// All names with their roles, in slot order.
     fn roles(&self) -> Vec<(String, Role)> {
         let mut out: Vec<(String, Role)> = Vec::new();
@@ -287,15 +319,19 @@ impl SystemModel {
         let mut seen: HashSet<String> = HashSet::new();
         let names = self.roles().into_iter().filter(|r| r.1 != Role::Time).map(|r| r.0);
         for name in names.chain(self.definitions.iter().map(|d| d.0.clone())) {
-            if Function::named(&name).is_some() {
+            if Function::named(name.split('[').next().unwrap_or_default()).is_some() {
                 return refuse(
                     format!("`{name}`"),
                     "the name of a function; expected a name of its own".into(),
                 );
             }
-            let plain = name.starts_with(|c: char| c.is_alphabetic() || c == '_')
-                && name.chars().all(|c| c.is_alphanumeric() || c == '_');
-            if !plain {
+            // entries of vectors are named v[1], C[1,2]
+            let (plain, index) = name.split_once('[').unwrap_or((&name, "1]"));
+            let number = |i: &str| !i.is_empty() && i.chars().all(|c| c.is_ascii_digit());
+            let index = index.strip_suffix(']').is_some_and(|i| i.split(',').all(number));
+            let plain = plain.starts_with(|c: char| c.is_alphabetic() || c == '_')
+                && plain.chars().all(|c| c.is_alphanumeric() || c == '_');
+            if !plain || !index {
                 return refuse(
                     format!("`{name}`"),
                     "not a name; expected a letter, then letters, digits and `_`".into(),
@@ -414,6 +450,12 @@ impl SystemModel {
             }
             segments.push(compiled);
         }
+        let mut constraints = Vec::new();
+        for formula in &self.constraints {
+            let made = node(&mut dag, formula, &names)?;
+            self.check_constraint(&dag, &roles, made, formula)?;
+            constraints.push(made);
+        }
         let mut combinations = Vec::new();
         for formula in &self.combinations {
             combinations.push(node(&mut dag, formula, &names)?);
@@ -426,8 +468,47 @@ impl SystemModel {
             starts,
             constants,
             segments,
+            constraints,
             combinations,
             places,
         })
+    }
+
+    /// A constraint is rational in states whose start is not given, parameters and constants, and can move.
+    fn check_constraint(
+        &self,
+        dag: &Dag,
+        roles: &[(String, Role)],
+        node: usize,
+        formula: &PlacedExpression,
+    ) -> Result<(), ModelError> {
+        let refuse = |message: String| Err(formula.place.error(message, 0..formula.text.len()));
+        if below(dag, node).into_iter().any(|i| matches!(dag.ops[i], Op::Primitive { .. })) {
+            return refuse(
+                "a function; expected + - * / and whole powers, or norm(v) = c, which is taken squared"
+                    .into(),
+            );
+        }
+        let mut moves = false;
+        for slot in slots_of(dag, node) {
+            let (name, role) = &roles[slot];
+            let kind = match role {
+                Role::State(i) if matches!(self.states[*i].start, StateStart::Value(_)) => {
+                    "a state whose start is given"
+                }
+                Role::State(_) | Role::Parameter(_) => {
+                    moves = true;
+                    continue;
+                }
+                Role::Constant(_) => continue,
+                Role::KnownInput(_) | Role::UnknownInput(_) => "an input",
+                Role::Time => "the time",
+            };
+            return refuse(format!("`{name}` is {kind}; expected states, parameters and constants"));
+        }
+        match moves {
+            true => Ok(()),
+            false => refuse("nothing unknown; expected states or parameters in it".into()),
+        }
     }
 }

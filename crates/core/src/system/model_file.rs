@@ -9,14 +9,19 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::model::{
-    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, PlacedExpression, Segment,
-    State, StateStart, SystemModel,
+    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, PlacedExpression, Segment, State,
+    StateStart, SystemModel,
 };
-use crate::model::expression::{Names, Node, nearest, parse_with};
+use super::nominal::nominal;
+use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
+use crate::model::expression::{Shape, Shapes, nearest};
 use crate::model::file_error::explain;
 
 /// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan exp log sqrt`
-/// and the names of the model; `t` is the time.
+/// and the names of the model; `t` is the time. A name such as `"p[3]"` declares a vector, `"C[3,3]"` a matrix: `p` stands for the whole
+/// and `p[1]`, `C[1,2]` for its entries, in expressions and in the answer. `[a, b]` makes a vector of scalars and a matrix of rows; `cross dot
+/// norm transpose skew`, of quaternions (w, x, y, z) `R qmul conj qdot`, and the turns `Rx Ry Rz` take them. Constants, definitions and outputs have the
+/// shape of their expression.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelFile {
@@ -45,7 +50,7 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     constants: BTreeMap<String, Spanned<Value>>,
-    /// Names for subexpressions.
+    /// Names for subexpressions, in any order.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     definitions: BTreeMap<String, Spanned<Value>>,
@@ -59,6 +64,11 @@ pub struct ModelFile {
     /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
     #[serde(default, rename = "segment")]
     segments: Vec<SegmentEntry>,
+    /// Equations that hold at the start of every experiment, as `norm(q) = 1`: what is random otherwise lies on them, and their
+    /// differentials are known.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    constraints: Vec<Spanned<String>>,
     /// Combinations to be judged.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
@@ -74,26 +84,27 @@ pub struct ModelFile {
 pub struct SimulationEntry {
     /// How long it runs.
     #[schemars(with = "Option<f64>")]
-    duration: Option<Spanned<f64>>,
+    pub(super) duration: Option<Spanned<f64>>,
     /// Between two samples.
     #[schemars(with = "Option<f64>")]
-    step: Option<Spanned<f64>>,
-    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants.
+    pub(super) step: Option<Spanned<f64>>,
+    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants; of a vector a list, or one
+    /// number for all entries.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, f64>")]
-    values: BTreeMap<String, Spanned<f64>>,
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub(super) values: BTreeMap<String, Spanned<Value>>,
     /// Standard deviations of the initial estimates; as large as the value when left out (1 for zero).
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, f64>")]
-    priors: BTreeMap<String, Spanned<f64>>,
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub(super) priors: BTreeMap<String, Spanned<Value>>,
     /// Standard deviation of the noise of a sample, by output.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, f64>")]
-    noise: BTreeMap<String, Spanned<f64>>,
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub(super) noise: BTreeMap<String, Spanned<Value>>,
     /// Generic known inputs as functions of the time t.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, String>")]
-    inputs: BTreeMap<String, Spanned<Value>>,
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub(super) inputs: BTreeMap<String, Spanned<Value>>,
 }
 
 /// A segment of the timeline.
@@ -110,53 +121,7 @@ pub struct SegmentEntry {
     carry: BTreeMap<String, Spanned<Value>>,
 }
 
-/// In the order of the file.
-fn in_order(map: &BTreeMap<String, Spanned<Value>>) -> Vec<(&String, &Spanned<Value>)> {
-    let mut out: Vec<_> = map.iter().collect();
-    out.sort_by_key(|(_, v)| v.span().start);
-    out
-}
-
-/// A file under way.
-struct Reader<'a> {
-    text: &'a str,
-}
-
 impl Reader<'_> {
-    fn at(&self, span: Range<usize>, what: String, message: String) -> ModelError {
-        ModelError { what, message, span: Some(span) }
-    }
-
-    /// The text of an expression: as written for a number, its contents for a string.
-    fn formula(
-        &self,
-        what: String,
-        value: &Value,
-        span: Range<usize>,
-    ) -> Result<PlacedExpression, ModelError> {
-        let within = &self.text[span.clone()];
-        let source = match value {
-            Value::String(s) => s.clone(),
-            Value::Integer(i) if within.contains(['{', '[']) => i.to_string(),
-            Value::Float(x) if within.contains(['{', '[']) => x.to_string(),
-            Value::Integer(_) | Value::Float(_) => within.replace('_', ""),
-            other => {
-                let message =
-                    format!("found a {}; expected an expression in quotes, or a number", other.type_str());
-                return Err(self.at(span, what, message));
-            }
-        };
-        // escapes aside, the expression stands in the file as it is
-        let offset = if source.is_empty() { None } else { within.find(&source).map(|o| span.start + o) };
-        let place = Place { what, offset: offset.or((source.is_empty()).then_some(span.start)) };
-        let expression = parse_with(&source, Names::Plain).map_err(|e| {
-            let mut error = place.error(e.to_string(), e.span());
-            error.span.get_or_insert(span.clone());
-            error
-        })?;
-        Ok(PlacedExpression { text: source, expression, place })
-    }
-
     /// A table's entry, and a check that there is nothing else in it.
     fn known_keys(
         &self,
@@ -180,28 +145,35 @@ impl Reader<'_> {
         Named { name: name.into(), unit: text("unit"), description: text("description") }
     }
 
-    fn state(&self, name: &str, value: &Spanned<Value>) -> Result<State, ModelError> {
+    /// Names of the entries of `name`, each with what the file says of the whole.
+    fn named_entries(&self, name: &str, table: Option<&toml::Table>) -> Vec<Named> {
+        self.entries(name).iter().map(|n| self.named(n, table)).collect()
+    }
+
+    fn states(&self, name: &str, value: &Spanned<Value>) -> Result<Vec<State>, ModelError> {
         let (what, span) = (format!("the equation of {name}"), value.span());
-        let Some(table) = value.get_ref().as_table() else {
-            let equation = self.formula(what, value.get_ref(), span)?;
-            return Ok(State { named: self.named(name, None), equation, start: StateStart::Unknown });
+        let table = value.get_ref().as_table();
+        let (mut equation, mut initial) = (value.get_ref(), None);
+        if let Some(table) = table {
+            self.known_keys(&what, table, &span, &["equation", "initial", "unit", "description"])?;
+            let none = || self.at(span.clone(), what.clone(), "no equation; expected one".into());
+            equation = table.get("equation").ok_or_else(none)?;
+            initial = table.get("initial");
+        }
+        let named = self.named_entries(name, table);
+        let starts = match initial {
+            None => vec![StateStart::Unknown; named.len()],
+            Some(Value::String(s)) if s == "known" => vec![StateStart::Known; named.len()],
+            Some(Value::String(s)) if s == "unknown" => vec![StateStart::Unknown; named.len()],
+            Some(value) => {
+                let what = format!("the initial value of {name}");
+                let found = self.fitted((name, &what), value, span.clone())?;
+                found.into_iter().map(StateStart::Value).collect()
+            }
         };
-        self.known_keys(&what, table, &span, &["equation", "initial", "unit", "description"])?;
-        let equation = table
-            .get("equation")
-            .ok_or_else(|| self.at(span.clone(), what.clone(), "no equation; expected one".into()))?;
-        let start = match table.get("initial") {
-            None => StateStart::Unknown,
-            Some(Value::String(s)) if s == "known" => StateStart::Known,
-            Some(Value::String(s)) if s == "unknown" => StateStart::Unknown,
-            Some(value) => StateStart::Value(self.formula(
-                format!("the initial value of {name}"),
-                value,
-                span.clone(),
-            )?),
-        };
-        let equation = self.formula(what, equation, span)?;
-        Ok(State { named: self.named(name, Some(table)), equation, start })
+        let equations = self.fitted((name, &what), equation, span)?;
+        let state = |((named, equation), start)| State { named, equation, start };
+        Ok(named.into_iter().zip(equations).zip(starts).map(state).collect())
     }
 
     /// `{ polynomial = 2 }`.
@@ -213,23 +185,24 @@ impl Reader<'_> {
     }
 
     /// The parameters, in the order of the file.
-    fn parameters(&self, entry: &Spanned<Value>) -> Result<Vec<Named>, ModelError> {
+    fn parameters(&mut self, entry: &Spanned<Value>) -> Result<Vec<Named>, ModelError> {
         let span = entry.span();
+        let mut out = Vec::new();
         match entry.get_ref() {
             Value::Array(list) => {
-                let name = |value: &Value| {
+                for value in list {
                     let text = value.as_str().ok_or_else(|| {
                         self.at(span.clone(), "parameters".into(), "expected names in quotes".into())
                     })?;
-                    Ok(self.named(text, None))
-                };
-                list.iter().map(name).collect()
+                    let name = self.declare(text, span.clone())?;
+                    out.extend(self.named_entries(name, None));
+                }
             }
             Value::Table(table) => {
                 // the line that the key begins, or its place in an inline table
                 let begins = |line: &str, name: &str| {
-                    let rest = line.trim_start().strip_prefix(name);
-                    rest.is_some_and(|r| r.trim_start().starts_with(['=', '.']))
+                    let rest = line.trim_start().trim_start_matches('"').strip_prefix(name);
+                    rest.is_some_and(|r| r.trim_start_matches('"').trim_start().starts_with(['=', '.']))
                 };
                 let place = |name: &str| {
                     let lines = self.text[span.start..].lines().position(|line| begins(line, name));
@@ -237,50 +210,57 @@ impl Reader<'_> {
                 };
                 let mut names: Vec<&String> = table.keys().collect();
                 names.sort_by_key(|n| place(n));
-                let parameter = |name: &String| {
-                    let what = format!("the parameter {name}");
-                    let Some(entry) = table.get(name).and_then(Value::as_table) else {
+                for key in names {
+                    let what = format!("the parameter {key}");
+                    let Some(entry) = table.get(key).and_then(Value::as_table) else {
                         let message = "expected a table, as in { unit = \"1/h\" }".into();
                         return Err(self.at(span.clone(), what, message));
                     };
                     self.known_keys(&what, entry, &span, &["unit", "description"])?;
-                    Ok(self.named(name, Some(entry)))
-                };
-                names.into_iter().map(parameter).collect()
+                    let name = self.declare(key, span.clone())?;
+                    out.extend(self.named_entries(name, Some(entry)));
+                }
             }
             _ => {
                 let message = "expected a list of names, or a table".into();
-                Err(self.at(span, "parameters".into(), message))
+                return Err(self.at(span, "parameters".into(), message));
             }
         }
+        Ok(out)
     }
 
-    fn known_input(&self, name: &str, value: &Spanned<Value>) -> Result<(Named, KnownInput), ModelError> {
+    fn known_inputs(
+        &self,
+        name: &str,
+        value: &Spanned<Value>,
+    ) -> Result<Vec<(Named, KnownInput)>, ModelError> {
         let (what, span) = (format!("the known input {name}"), value.span());
-        let kind = match value.get_ref() {
-            Value::String(s) if s == "generic" => KnownInput::Generic,
-            Value::String(s) if s == "constant" => KnownInput::Polynomial(0),
+        let named = self.named_entries(name, value.get_ref().as_table());
+        let kinds = match value.get_ref() {
+            Value::String(s) if s == "generic" => vec![KnownInput::Generic; named.len()],
+            Value::String(s) if s == "constant" => vec![KnownInput::Polynomial(0); named.len()],
             Value::Table(t) if t.contains_key("function") => {
                 self.known_keys(&what, t, &span, &["function", "unit", "description"])?;
-                KnownInput::Function(self.formula(what, &t["function"], span)?)
+                let functions = self.fitted((name, &what), &t["function"], span)?;
+                functions.into_iter().map(KnownInput::Function).collect()
             }
             Value::Table(t) => {
                 self.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
-                KnownInput::Polynomial(self.polynomial(&what, t, &span)?)
+                vec![KnownInput::Polynomial(self.polynomial(&what, t, &span)?); named.len()]
             }
             _ => {
                 let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \"sin(t)\" }";
                 return Err(self.at(span, what, message.into()));
             }
         };
-        Ok((self.named(name, value.get_ref().as_table()), kind))
+        Ok(named.into_iter().zip(kinds).collect())
     }
 
-    fn unknown_input(
+    fn unknown_inputs(
         &self,
         name: &str,
         value: &Spanned<Value>,
-    ) -> Result<(Named, Option<usize>), ModelError> {
+    ) -> Result<Vec<(Named, Option<usize>)>, ModelError> {
         let (what, span) = (format!("the unknown input {name}"), value.span());
         let degree = match value.get_ref() {
             Value::String(s) if s == "arbitrary" => None,
@@ -294,40 +274,48 @@ impl Reader<'_> {
                 return Err(self.at(span, what, message.into()));
             }
         };
-        Ok((self.named(name, value.get_ref().as_table()), degree))
+        let named = self.named_entries(name, value.get_ref().as_table());
+        Ok(named.into_iter().map(|n| (n, degree)).collect())
     }
 
-    fn constant(&self, name: &str, value: &Spanned<Value>) -> Result<(Named, Constant), ModelError> {
-        let what = format!("the constant {name}");
+    fn constants(&mut self, key: &str, value: &Spanned<Value>) -> Result<Vec<(Named, Constant)>, ModelError> {
+        let (what, span) = (format!("the constant {}", base(key)), value.span());
         let table = value.get_ref().as_table();
-        let kind = match (value.get_ref(), table) {
-            (Value::String(s), _) if s == "generic" => Constant::Generic,
-            (_, Some(t)) => {
-                self.known_keys(&what, t, &value.span(), &["value", "unit", "description"])?;
-                match t.get("value") {
-                    None => Constant::Generic,
-                    Some(inner) => Constant::Value(self.formula(what, inner, value.span())?),
-                }
-            }
-            (other, None) => Constant::Value(self.formula(what, other, value.span())?),
+        if let Some(t) = table {
+            self.known_keys(&what, t, &span, &["value", "unit", "description"])?;
+        }
+        let inner = match (value.get_ref(), table) {
+            (Value::String(s), _) if s == "generic" => None,
+            (_, Some(t)) => t.get("value"),
+            (other, None) => Some(other),
         };
-        Ok((self.named(name, table), kind))
+        let Some(inner) = inner else {
+            let name = self.declare(key, span)?;
+            return Ok(self.named_entries(name, table).into_iter().map(|n| (n, Constant::Generic)).collect());
+        };
+        let (name, values) = self.defined((key, &what), inner, span)?;
+        let values = values.into_iter().map(Constant::Value);
+        Ok(self.named_entries(name, table).into_iter().zip(values).collect())
     }
 
-    fn output(&self, name: &str, value: &Spanned<Value>) -> Result<(Named, PlacedExpression), ModelError> {
-        let (what, span) = (format!("the output {name}"), value.span());
+    /// The entries of an output. It may be named as the state it is: no expression can refer to it.
+    fn output(&self, key: &str, value: &Spanned<Value>) -> Result<(Vec<Named>, Formulas), ModelError> {
+        let (what, span) = (format!("the output {}", base(key)), value.span());
+        let (name, shape) = declared(key).map_err(|m| self.at(span.clone(), format!("`{key}`"), m))?;
         let table = value.get_ref().as_table();
-        let formula = match table {
-            None => self.formula(what, value.get_ref(), span)?,
-            Some(t) => {
-                self.known_keys(&what, t, &span, &["expression", "unit", "description"])?;
-                let inner = t.get("expression").ok_or_else(|| {
-                    self.at(span.clone(), what.clone(), "no expression; expected one".into())
-                })?;
-                self.formula(what, inner, span)?
-            }
-        };
-        Ok((self.named(name, table), formula))
+        let mut inner = value.get_ref();
+        if let Some(t) = table {
+            self.known_keys(&what, t, &span, &["expression", "unit", "description"])?;
+            let none = || self.at(span.clone(), what.clone(), "no expression; expected one".into());
+            inner = t.get("expression").ok_or_else(none)?;
+        }
+        let found = self.formulas(&what, inner, span.clone())?;
+        if let Some(shape) = shape.filter(|s| *s != found.shape) {
+            let message = format!("found {}; expected {shape}, as `{key}` declares it", found.shape);
+            return Err(self.at(span, what, message));
+        }
+        let named = found.shape.names(name).iter().map(|n| self.named(n, table)).collect();
+        Ok((named, found))
     }
 
     /// Segment `i`, counted from 0.
@@ -339,7 +327,8 @@ impl Reader<'_> {
         ] {
             for (name, value) in in_order(map) {
                 let what = format!("{kind} {name} of segment {}", i + 1);
-                list.push((name.clone(), self.formula(what, value.get_ref(), value.span())?));
+                let parts = self.fitted((name, &what), value.get_ref(), value.span())?;
+                list.extend(self.entries(name).into_iter().zip(parts));
             }
         }
         Ok(out)
@@ -360,7 +349,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let (message, span) = explain::<ModelFile>(text, &e);
         ModelError { what: "the model file".into(), message, span }
     })?;
-    let r = Reader { text };
+    let mut r = Reader { text, shapes: Shapes::new() };
     let mut model = SystemModel {
         name: file.name.clone().unwrap_or_default(),
         description: file.description,
@@ -374,36 +363,58 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
             return Err(r.at(experiments.span(), "experiments".into(), message));
         }
     }
-    for (name, value) in in_order(&file.states) {
-        model.states.push(r.state(name, value)?);
+    // sizes first: expressions may name what comes later
+    let (states, known, unknown) =
+        (in_order(&file.states), in_order(&file.known_inputs), in_order(&file.unknown_inputs));
+    for (key, value) in states.iter().chain(&known).chain(&unknown) {
+        r.declare(key, value.span())?;
     }
     if let Some(parameters) = &file.parameters {
         model.parameters = r.parameters(parameters)?;
     }
-    for (name, value) in in_order(&file.known_inputs) {
-        model.known_inputs.push(r.known_input(name, value)?);
+    let (constants, definitions) = (in_order(&file.constants), in_order(&file.definitions));
+    r.names_of_their_own(&[&states, &known, &unknown, &constants, &definitions], &model.parameters)?;
+    for (key, value) in r.by_use("the constant", &constants)? {
+        model.constants.extend(r.constants(key, value)?);
     }
-    for (name, value) in in_order(&file.unknown_inputs) {
-        model.unknown_inputs.push(r.unknown_input(name, value)?);
+    for (key, value) in r.by_use("the definition of", &definitions)? {
+        let what = format!("the definition of {}", base(key));
+        let (name, parts) = r.defined((key, &what), value.get_ref(), value.span())?;
+        model.definitions.extend(r.entries(name).into_iter().zip(parts));
     }
-    for (name, value) in in_order(&file.constants) {
-        model.constants.push(r.constant(name, value)?);
+    for (key, value) in states {
+        model.states.extend(r.states(base(key), value)?);
     }
-    for (name, value) in in_order(&file.definitions) {
-        let formula = r.formula(format!("the definition of {name}"), value.get_ref(), value.span())?;
-        model.definitions.push((name.clone(), formula));
+    for (key, value) in known {
+        model.known_inputs.extend(r.known_inputs(base(key), value)?);
     }
-    for (name, value) in in_order(&file.outputs) {
-        model.outputs.push(r.output(name, value)?);
+    for (key, value) in unknown {
+        model.unknown_inputs.extend(r.unknown_inputs(base(key), value)?);
+    }
+    let mut outputs = Shapes::new();
+    for (key, value) in in_order(&file.outputs) {
+        let (named, found) = r.output(key, value)?;
+        outputs.insert(base(key).into(), found.shape);
+        model.outputs.extend(named.into_iter().zip(found.parts));
     }
     for (i, segment) in file.segments.iter().enumerate() {
         model.segments.push(r.segment(i, segment)?);
     }
+    for c in &file.constraints {
+        model.constraints.extend(r.constraint(c)?);
+    }
     for c in &file.combinations {
         let what = format!("the combination {}", c.get_ref());
-        model.combinations.push(r.formula(what, &Value::String(c.get_ref().clone()), c.span())?);
+        let found = r.formulas(&what, &Value::String(c.get_ref().clone()), c.span())?;
+        let whole = format!("({})", c.get_ref().trim());
+        let texts = match found.shape {
+            Shape::SCALAR => vec![c.get_ref().clone()],
+            shape => shape.names(&whole),
+        };
+        let entries = found.parts.into_iter().zip(texts);
+        model.combinations.extend(entries.map(|(part, text)| PlacedExpression { text, ..part }));
     }
-    nominal(&r, &file.simulation, &mut model)?;
+    nominal(&r, &outputs, &file.simulation, &mut model)?;
     let placed =
         |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
     model.check().map_err(placed)?;
@@ -414,78 +425,4 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         return Err(r.at(0..text.chars().next().map_or(0, char::len_utf8), "the model file".into(), message));
     }
     Ok(model)
-}
-
-/// Numbers for a simulation: names that are known, numbers that can be.
-fn nominal(r: &Reader<'_>, entry: &SimulationEntry, model: &mut SystemModel) -> Result<(), ModelError> {
-    let names =
-        |list: &mut dyn Iterator<Item = &Named>| -> Vec<String> { list.map(|n| n.name.clone()).collect() };
-    let inputs = names(&mut model.unknown_inputs.iter().map(|u| &u.0));
-    let primes =
-        |name: &String| -> Vec<String> { (0..4).map(|k| format!("{name}{}", "'".repeat(k))).collect() };
-    let mut unknowns = names(&mut model.states.iter().map(|s| &s.named));
-    unknowns.extend(names(&mut model.parameters.iter()));
-    unknowns.extend(inputs.iter().flat_map(primes));
-    let mut values = unknowns.clone();
-    values.extend(names(&mut model.constants.iter().map(|c| &c.0)));
-    let outputs = names(&mut model.outputs.iter().map(|o| &o.0));
-    let known = |what: &str, name: &str, list: &[String], span: Range<usize>| {
-        if list.iter().any(|n| n == name) {
-            return Ok(());
-        }
-        let hint = nearest(name, list).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default();
-        Err(r.at(span, format!("{what} of the simulation"), format!("`{name}` is not known here{hint}")))
-    };
-    let nominal = &mut model.simulation;
-    for (what, map, list, target, positive) in [
-        ("values", &entry.values, &values, &mut nominal.values, false),
-        ("priors", &entry.priors, &unknowns, &mut nominal.priors, true),
-        ("noise", &entry.noise, &outputs, &mut nominal.noise, true),
-    ] {
-        for (name, value) in map {
-            known(what, name, list, value.span())?;
-            let x = *value.get_ref();
-            if !x.is_finite() || (positive && x <= 0.0) {
-                let message = if positive { "expected a number above 0" } else { "expected a number" };
-                return Err(r.at(value.span(), format!("{what} of {name}"), message.into()));
-            }
-            target.insert(name.clone(), x);
-        }
-    }
-    for (what, value, target) in
-        [("duration", &entry.duration, &mut nominal.duration), ("step", &entry.step, &mut nominal.step)]
-    {
-        if let Some(value) = value {
-            if !(value.get_ref().is_finite() && *value.get_ref() > 0.0) {
-                let message = "expected a number above 0".into();
-                return Err(r.at(value.span(), format!("{what} of the simulation"), message));
-            }
-            *target = Some(*value.get_ref());
-        }
-    }
-    let generic = names(&mut model.known_inputs.iter().map(|u| &u.0));
-    for (name, value) in &entry.inputs {
-        known("inputs", name, &generic, value.span())?;
-        let formula =
-            r.formula(format!("the input {name} of the simulation"), value.get_ref(), value.span())?;
-        let other = formula.expression.nodes.iter().position(|n| matches!(n, Node::Name(n) if n != "t"));
-        if let Some(i) = other {
-            let message = "expected a function of the time t alone".into();
-            return Err(formula.place.error(message, formula.expression.spans[i].clone()));
-        }
-        nominal.inputs.insert(name.clone(), formula);
-    }
-    Ok(())
-}
-
-/// Where a name in quotes (`` `x` ``) is last given: as a key, or in a list of names.
-fn last_mention(text: &str, quoted: &str) -> Option<Range<usize>> {
-    let name = quoted.strip_prefix('`')?.strip_suffix('`')?;
-    let given = |at: usize| {
-        let (before, after) = (&text[..at], text[at + name.len()..].trim_start());
-        let key = after.starts_with('=') && before.trim_end_matches([' ', '\t']).ends_with(['\n', '{', ',']);
-        key || (before.ends_with('"') && text[at + name.len()..].starts_with('"'))
-    };
-    let at = text.match_indices(name).map(|(at, _)| at).filter(|&at| given(at)).last()?;
-    Some(at..at + name.len())
 }

@@ -3,6 +3,7 @@
 use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Echelon, Field, SplitMix64, gcd};
 
+use super::constraints::hold;
 use super::dag::{FunctionStart, Op};
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Starts, Taylor};
@@ -41,7 +42,11 @@ impl Layout {
     pub fn new(model: &SystemModel, bound: Option<usize>) -> Self {
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
         let starts = model.states.iter().all(|s| s.start == StateStart::Unknown);
-        let closed = starts && !arbitrary;
+        Self::of(model, bound, starts && !arbitrary)
+    }
+
+    /// The same where it is known whether an order that adds nothing is the end.
+    pub(crate) fn of(model: &SystemModel, bound: Option<usize>, closed: bool) -> Self {
         let finite: usize = model.unknown_inputs.iter().map(|u| u.1.map_or(1, |d| d + 1)).sum();
         let n = model.states.len() + finite + model.parameters.len();
         let bound = bound.unwrap_or(if closed { n * model.experiments.max(1) } else { 2 * n + 4 });
@@ -101,6 +106,7 @@ pub(crate) struct SystemRows<'a> {
     runs: Vec<Run<'a>>,
     bound: usize,
     closed: bool,
+    kept: bool,
     single: bool,
     row: Vec<u64>,
 }
@@ -111,6 +117,8 @@ struct Run<'a> {
     /// Its own rank, where there are several runs.
     own: Echelon,
     stalled: bool,
+    /// Differentials of the constraints at the start of its experiment.
+    known: Vec<Vec<u64>>,
     /// Gradients of the combinations at its start.
     combinations: Vec<Vec<u64>>,
 }
@@ -174,9 +182,10 @@ impl<'a> SystemRows<'a> {
         let starts = Starts::random(&compiled.dag, &f, rng);
         let p = f.modulus();
         let mut random = || rng.below(p);
-        let parameters: Vec<u64> = model.parameters.iter().map(|_| random()).collect();
-        let constants: Vec<u64> = model.constants.iter().map(|_| random()).collect();
+        let mut parameters: Vec<u64> = model.parameters.iter().map(|_| random()).collect();
+        let mut constants: Vec<u64> = model.constants.iter().map(|_| random()).collect();
         let mut runs: Vec<Run<'a>> = Vec::new();
+        let mut kept = true;
         for experiment in 0..model.experiments.max(1) {
             let mut signals: Vec<Signal> = Vec::new();
             let mut initial: Vec<Option<Initial>> = vec![None; compiled.roles.len()];
@@ -221,6 +230,42 @@ impl<'a> SystemRows<'a> {
                     }
                 }
             }
+            if !compiled.constraints.is_empty() {
+                let mut values = vec![0; compiled.roles.len()];
+                let mut free = vec![false; compiled.roles.len()];
+                for (slot, role) in compiled.roles.iter().enumerate() {
+                    values[slot] = match (&signals[slot], &initial[slot]) {
+                        (Signal::Constant { value, .. }, _) => *value,
+                        (_, Some(start)) => start.0,
+                        _ => 0,
+                    };
+                    // what the experiments share is chosen in the first
+                    free[slot] = match *role {
+                        Role::State(_) => true,
+                        Role::Parameter(_) => experiment == 0,
+                        Role::Constant(c) => experiment == 0 && compiled.constants[c].is_none(),
+                        Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
+                    };
+                }
+                let mut own = SplitMix64::new(random());
+                hold(&compiled.dag, &compiled.constraints, &mut values, &free, &f, &mut own)
+                    .map_err(Singular::Constraint)?;
+                for (slot, role) in compiled.roles.iter().enumerate() {
+                    match *role {
+                        Role::State(_) => {
+                            if let Some(start) = &mut initial[slot] {
+                                start.0 = values[slot];
+                            }
+                        }
+                        Role::Parameter(i) => parameters[i] = values[slot],
+                        Role::Constant(c) => constants[c] = values[slot],
+                        Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => {}
+                    }
+                    if let Signal::Constant { value, .. } = &mut signals[slot] {
+                        *value = values[slot];
+                    }
+                }
+            }
             let set = |initial: &mut Vec<Option<Initial>>, seen: &Taylor<'_>, state: usize, node: usize| {
                 if let Some(slot) = slot_of(Role::State(state)) {
                     let duals = seen.dual(node, 0).iter().copied().enumerate().filter(|(_, x)| *x != 0);
@@ -234,6 +279,13 @@ impl<'a> SystemRows<'a> {
                         set(&mut initial, &seen, state, *node);
                     }
                 }
+            }
+            let mut known: Vec<Vec<u64>> = Vec::new();
+            if !compiled.constraints.is_empty() {
+                let mut seen = look(&signals, &initial)?;
+                known = compiled.constraints.iter().map(|&node| seen.dual(node, 0).to_vec()).collect();
+                seen.advance();
+                kept &= compiled.constraints.iter().all(|&node| seen.value(node, 1) == 0);
             }
             let whole = vec![super::model::CompiledSegment::default()];
             let segments = if compiled.segments.is_empty() { &whole } else { &compiled.segments };
@@ -258,7 +310,8 @@ impl<'a> SystemRows<'a> {
                     if dual.is_empty() { vec![0; lanes] } else { dual.to_vec() }
                 };
                 let combinations = compiled.combinations.iter().map(gradient).collect();
-                runs.push(Run { taylor, own: Echelon::new(f, lanes), stalled: false, combinations });
+                let known = known.clone();
+                runs.push(Run { taylor, own: Echelon::new(f, lanes), stalled: false, known, combinations });
             }
         }
         Ok(Self {
@@ -269,8 +322,14 @@ impl<'a> SystemRows<'a> {
             runs,
             bound: layout.bound,
             closed: layout.closed,
+            kept,
             row: vec![0; lanes],
         })
+    }
+
+    /// Whether the first derivatives of all constraints are zero here.
+    pub(crate) fn keeps_constraints(&self) -> bool {
+        self.kept
     }
 
     /// The gradients of the combinations at the start of the first run.
@@ -320,6 +379,11 @@ impl DerivativeRows for SystemRows<'_> {
                 run.taylor.advance();
             }
             let mut grew = false;
+            // a constraint is an output of which only the start is known
+            for row in run.known.iter().filter(|_| order == 0) {
+                sink(row);
+                run.own.insert(row);
+            }
             for &output in self.outputs {
                 let dual = run.taylor.dual(output, order);
                 let row = if dual.is_empty() { &self.row } else { dual };

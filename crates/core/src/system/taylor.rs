@@ -47,6 +47,8 @@ pub(crate) enum Singular {
     Division(usize),
     /// A root that this field does not have here, at this node.
     Root(usize),
+    /// Constraints that could not be solved here, this one among them.
+    Constraint(usize),
 }
 
 /// The series of one run.

@@ -54,8 +54,15 @@ pub(crate) fn symbol(name: &str) -> String {
     format!("{body}{frame}{position}")
 }
 
-/// A name of a model: `gamma` is Greek, `k21` and `k_on` have an index.
+/// A name of a model: `gamma` is Greek, `k21`, `k_on`, `v[1]` and `C[1,2]` have an index.
 fn name_of_model(name: &str) -> String {
+    if let Some((whole, index)) = name.strip_suffix(']').and_then(|n| n.split_once('[')) {
+        let whole = name_of_model(whole);
+        return match whole.contains('_') {
+            true => format!("{{{whole}}}_{{{index}}}"),
+            false => format!("{whole}_{{{index}}}"),
+        };
+    }
     let letter = |text: &str| match text {
         t if GREEK.contains(&t) => Some(format!("\\{t}")),
         t if t.len() == 1 => Some(t.to_string()),
@@ -248,6 +255,14 @@ impl Reader<'_> {
             name.push_str("^n");
             self.rest = rest;
             name.push_str(&self.word(|c| c == '\''));
+        }
+        // an entry of a vector
+        let index = |c: char| c.is_ascii_digit() || c == ',';
+        if let Some((inside, rest)) = self.rest.strip_prefix('[').and_then(|r| r.split_once(']'))
+            && inside.chars().all(index)
+        {
+            self.rest = rest;
+            name.push_str(&format!("[{inside}]"));
         }
         if let Some(rest) = self.rest.strip_prefix('@') {
             self.rest = rest;

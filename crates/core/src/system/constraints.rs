@@ -1,0 +1,229 @@
+//! Random points at which the constraints of a model hold, in a prime field.
+//!
+//! Constraints are solved block by block. A block is all that hold no value left to choose but those of one of them; all of its constraints but one
+//! must be linear in the values that are solved for. So they leave a line, and on it the last one is a polynomial in one unknown, of which
+//! a root in the field is drawn: as for `|q| = 1`, or the six conditions of a rotation matrix.
+
+use std::collections::BTreeSet;
+
+use obsdeg_exact::polynomial::{interpolate, root};
+use obsdeg_exact::{Echelon, Field, SplitMix64};
+
+use super::dag::{Dag, Op};
+
+/// Draws of a block: half of all quadratic equations have a root in a field.
+const TRIES: usize = 60;
+/// Highest degree of a constraint on a line.
+const MAX_DEGREE: usize = 64;
+
+/// The slots that a node depends on.
+pub(crate) fn slots_of(dag: &Dag, node: usize) -> BTreeSet<usize> {
+    let ops = below(dag, node).into_iter().map(|i| dag.ops[i]);
+    ops.filter_map(|op| if let Op::Slot(s) = op { Some(s) } else { None }).collect()
+}
+
+/// The nodes that a node is made of, and itself, in order.
+pub(crate) fn below(dag: &Dag, node: usize) -> BTreeSet<usize> {
+    let (mut out, mut left) = (BTreeSet::new(), vec![node]);
+    while let Some(i) = left.pop() {
+        if out.insert(i) {
+            match dag.ops[i] {
+                Op::Number { .. } | Op::Slot(_) => {}
+                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
+                    left.extend([a, b])
+                }
+                Op::Primitive { of, .. } => left.push(of),
+            }
+        }
+    }
+    out
+}
+
+/// A rational constraint of the graph.
+struct Constraint<'a> {
+    dag: &'a Dag,
+    f: &'a Field,
+    node: usize,
+    nodes: BTreeSet<usize>,
+}
+
+impl Constraint<'_> {
+    /// Numerator and denominator at values of the slots.
+    fn at(&self, values: &[u64]) -> (u64, u64) {
+        let f = self.f;
+        let mut out: Vec<(u64, u64)> = vec![(0, 0); self.node + 1];
+        for &i in &self.nodes {
+            out[i] = match self.dag.ops[i] {
+                Op::Number { mantissa, decimals } => {
+                    let ten = f.pow(f.from_u64(10), decimals.unsigned_abs().into());
+                    let m = crate::model::expression::from_i128(f, mantissa);
+                    if decimals < 0 { (f.mul(m, ten), f.one()) } else { (m, ten) }
+                }
+                Op::Slot(s) => (values[s], f.one()),
+                Op::Add(a, b) | Op::Subtract(a, b) => {
+                    let ((a, b), (c, d)) = (out[a], out[b]);
+                    let (left, right) = (f.mul(a, d), f.mul(c, b));
+                    let sum = if matches!(self.dag.ops[i], Op::Add(..)) {
+                        f.add(left, right)
+                    } else {
+                        f.sub(left, right)
+                    };
+                    (sum, f.mul(b, d))
+                }
+                Op::Multiply(a, b) => (f.mul(out[a].0, out[b].0), f.mul(out[a].1, out[b].1)),
+                Op::Divide(a, b) => (f.mul(out[a].0, out[b].1), f.mul(out[a].1, out[b].0)),
+                // refused before
+                Op::Primitive { .. } => (0, 0),
+            };
+        }
+        out[self.node]
+    }
+
+    /// Bounds on the degrees of numerator and denominator in some slots together.
+    fn degree(&self, slots: &[usize]) -> (usize, usize) {
+        let mut out: Vec<(usize, usize)> = vec![(0, 0); self.node + 1];
+        for &i in &self.nodes {
+            let plus = |a: usize, b: usize| a.saturating_add(b);
+            out[i] = match self.dag.ops[i] {
+                Op::Slot(s) => (usize::from(slots.contains(&s)), 0),
+                Op::Add(a, b) | Op::Subtract(a, b) => {
+                    let ((a, b), (c, d)) = (out[a], out[b]);
+                    (plus(a, d).max(plus(c, b)), plus(b, d))
+                }
+                Op::Multiply(a, b) => (plus(out[a].0, out[b].0), plus(out[a].1, out[b].1)),
+                Op::Divide(a, b) => (plus(out[a].0, out[b].1), plus(out[a].1, out[b].0)),
+                Op::Number { .. } | Op::Primitive { .. } => (0, 0),
+            };
+        }
+        out[self.node]
+    }
+
+    /// The coefficients of the numerator in some slots, then what is without them; `None` where it is not linear, as a random second
+    /// difference shows.
+    fn linear(&self, slots: &[usize], values: &[u64], rng: &mut SplitMix64) -> Option<Vec<u64>> {
+        let f = self.f;
+        if self.degree(slots).1 > 0 {
+            return None;
+        }
+        let mut values = values.to_vec();
+        let mut at = |point: &dyn Fn(usize) -> u64| {
+            for (k, &s) in slots.iter().enumerate() {
+                values[s] = point(k);
+            }
+            self.at(&values).0
+        };
+        let [a, b] = [0, 1].map(|_| slots.iter().map(|_| rng.below(f.modulus())).collect::<Vec<u64>>());
+        let zero = at(&|_| 0);
+        let sum = at(&|k| f.add(a[k], b[k]));
+        let (first, second) = (at(&|k| a[k]), at(&|k| b[k]));
+        if f.add(sum, zero) != f.add(first, second) {
+            return None;
+        }
+        let mut row: Vec<u64> =
+            (0..slots.len()).map(|j| f.sub(at(&|k| if k == j { f.one() } else { 0 }), zero)).collect();
+        row.push(zero);
+        Some(row)
+    }
+}
+
+/// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero: a random solution.
+///
+/// # Errors
+/// The constraint that could not be solved.
+pub(crate) fn hold(
+    dag: &Dag,
+    constraints: &[usize],
+    values: &mut [u64],
+    free: &[bool],
+    f: &Field,
+    rng: &mut SplitMix64,
+) -> Result<(), usize> {
+    let of = |&node: &usize| Constraint { dag, f, node, nodes: below(dag, node) };
+    let all: Vec<Constraint<'_>> = constraints.iter().map(of).collect();
+    // entries that mirror each other are one node
+    let first = |c: &usize| constraints[..*c].iter().all(|node| *node != constraints[*c]);
+    let mut open: Vec<(usize, BTreeSet<usize>)> = (all.iter().enumerate().filter(|(c, _)| first(c)))
+        .map(|(c, g)| (c, slots_of(dag, g.node).into_iter().filter(|&s| free[s]).collect()))
+        .collect();
+    while let Some((_, slots)) = open.iter().min_by_key(|(_, slots)| slots.len()) {
+        let slots: Vec<usize> = slots.iter().copied().collect();
+        let block: Vec<usize> =
+            (open.iter()).filter(|(_, s)| s.iter().all(|s| slots.contains(s))).map(|(c, _)| *c).collect();
+        let block_of: Vec<&Constraint<'_>> = block.iter().map(|&c| &all[c]).collect();
+        // where nothing is left to choose they hold or not
+        let holds = |values: &[u64]| block_of.iter().all(|g| matches!(g.at(values), (0, d) if d != 0));
+        let found = match slots.is_empty() {
+            true => holds(values),
+            false => (0..TRIES).any(|_| solve(&block_of, &slots, values, f, rng).is_some() && holds(values)),
+        };
+        if !found {
+            return Err(block[0]);
+        }
+        open.retain(|(c, _)| !block.contains(c));
+        for (_, left) in &mut open {
+            left.retain(|s| !slots.contains(s));
+        }
+    }
+    Ok(())
+}
+
+/// One attempt at a block: new values for `slots`, as many of them solved for as there are constraints.
+fn solve(
+    block: &[&Constraint<'_>],
+    slots: &[usize],
+    values: &mut [u64],
+    f: &Field,
+    rng: &mut SplitMix64,
+) -> Option<()> {
+    let m = block.len();
+    for &s in slots {
+        values[s] = rng.below(f.modulus());
+    }
+    // any m of the slots
+    let mut chosen = slots.to_vec();
+    for i in 0..chosen.len().min(m) {
+        let j = i + rng.below((chosen.len() - i) as u64) as usize;
+        chosen.swap(i, j);
+    }
+    let chosen = chosen.get(..m)?;
+    let mut line = Echelon::new(*f, m + 1);
+    let mut bent = None;
+    for (k, g) in block.iter().enumerate() {
+        let row = if m > 1 { g.linear(chosen, values, rng) } else { None };
+        match row {
+            // one is always left for the end
+            Some(row) if k + 1 < m || bent.is_some() => {
+                line.insert(&row);
+            }
+            _ if bent.is_some() => return None,
+            _ => bent = Some(g),
+        }
+    }
+    let bent = bent?;
+    let [first, second] = <[Vec<u64>; 2]>::try_from(line.null_space()).ok()?;
+    let (a, b) = (first[m], second[m]);
+    let weight = rng.below(f.modulus());
+    // a point of the line has 1 as its last entry, its direction 0
+    let height = f.add(a, f.mul(weight, b));
+    if height == 0 {
+        return None;
+    }
+    let scale = f.inv(height);
+    let point = |k: usize| f.mul(f.add(first[k], f.mul(weight, second[k])), scale);
+    let direction = |k: usize| f.sub(f.mul(first[k], b), f.mul(second[k], a));
+    let mut at = |t: u64| {
+        for (k, &s) in chosen.iter().enumerate() {
+            values[s] = f.add(point(k), f.mul(t, direction(k)));
+        }
+        bent.at(values).0
+    };
+    let degree = bent.degree(chosen).0;
+    if degree > MAX_DEGREE {
+        return None;
+    }
+    let samples: Vec<(u64, u64)> = (0..=degree as u64).map(|t| f.from_u64(t)).map(|t| (t, at(t))).collect();
+    let polynomial = interpolate(f, &samples);
+    let t = if polynomial.is_empty() { 0 } else { root(f, &polynomial, rng)? };
+    at(t);
+    Some(())
+}

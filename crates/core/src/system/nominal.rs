@@ -1,0 +1,115 @@
+//! The numbers for a simulation in a model file.
+
+use std::ops::Range;
+
+use toml::Value;
+
+use super::model::{ModelError, Named, SystemModel};
+use super::model_file::SimulationEntry;
+use super::reader::Reader;
+use crate::model::expression::{Node, Shapes, nearest};
+
+/// The numbers in a value, row by row; `None` where there is something else.
+fn numbers(value: &Value) -> Option<Vec<f64>> {
+    match value {
+        Value::Integer(i) => Some(vec![*i as f64]),
+        Value::Float(x) => Some(vec![*x]),
+        Value::Array(list) => list.iter().map(numbers).collect::<Option<Vec<_>>>().map(|l| l.concat()),
+        _ => None,
+    }
+}
+
+/// Numbers for a simulation: names that are known, numbers that can be.
+pub(super) fn nominal(
+    r: &Reader<'_>,
+    outputs: &Shapes,
+    entry: &SimulationEntry,
+    model: &mut SystemModel,
+) -> Result<(), ModelError> {
+    let names =
+        |list: &mut dyn Iterator<Item = &Named>| -> Vec<String> { list.map(|n| n.name.clone()).collect() };
+    let inputs = names(&mut model.unknown_inputs.iter().map(|u| &u.0));
+    let primes =
+        |name: &String| -> Vec<String> { (0..4).map(|k| format!("{name}{}", "'".repeat(k))).collect() };
+    let mut unknowns = names(&mut model.states.iter().map(|s| &s.named));
+    unknowns.extend(names(&mut model.parameters.iter()));
+    unknowns.extend(inputs.iter().flat_map(primes));
+    let mut values = unknowns.clone();
+    values.extend(names(&mut model.constants.iter().map(|c| &c.0)));
+    let outputs_known = names(&mut model.outputs.iter().map(|o| &o.0));
+    // `p` is all of p[1], p[2], ...
+    let entries = |name: &str, shapes: &Shapes| -> Vec<String> {
+        let plain = name.trim_end_matches('\'');
+        let primes = &name[plain.len()..];
+        let entries = shapes.get(plain).map_or_else(|| vec![plain.to_string()], |s| s.names(plain));
+        entries.into_iter().map(|n| format!("{n}{primes}")).collect()
+    };
+    let known = |what: &str, name: &str, entries: &[String], list: &[String], span: Range<usize>| {
+        if entries.iter().all(|e| list.contains(e)) {
+            return Ok(());
+        }
+        let hint = nearest(name, list).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default();
+        Err(r.at(span, format!("{what} of the simulation"), format!("`{name}` is not known here{hint}")))
+    };
+    let nominal = &mut model.simulation;
+    for (what, map, list, shapes, target, positive) in [
+        ("values", &entry.values, &values, &r.shapes, &mut nominal.values, false),
+        ("priors", &entry.priors, &unknowns, &r.shapes, &mut nominal.priors, true),
+        ("noise", &entry.noise, &outputs_known, outputs, &mut nominal.noise, true),
+    ] {
+        // an entry of its own comes behind the whole
+        let mut ordered: Vec<_> = map.iter().collect();
+        ordered.sort_by_key(|(name, _)| name.contains('['));
+        for (name, value) in ordered {
+            let entries = entries(name, shapes);
+            known(what, name, &entries, list, value.span())?;
+            let one = if positive { "a number above 0" } else { "a number" };
+            let refuse = |found: &str| {
+                let expected = match entries.len() {
+                    1 => one.to_string(),
+                    n => format!("{one}, or a list of {n}"),
+                };
+                r.at(value.span(), format!("{what} of {name}"), format!("{found}expected {expected}"))
+            };
+            let mut given = numbers(value.get_ref())
+                .ok_or_else(|| refuse(&format!("found a {}; ", value.get_ref().type_str())))?;
+            if given.iter().any(|x| !x.is_finite() || (positive && *x <= 0.0)) {
+                return Err(refuse(""));
+            }
+            if given.len() == 1 && !value.get_ref().is_array() {
+                given = vec![given[0]; entries.len()];
+            }
+            if given.len() != entries.len() {
+                return Err(refuse(&format!("found {} numbers; ", given.len())));
+            }
+            target.extend(entries.into_iter().zip(given));
+        }
+    }
+    for (what, value, target) in
+        [("duration", &entry.duration, &mut nominal.duration), ("step", &entry.step, &mut nominal.step)]
+    {
+        if let Some(value) = value {
+            if !(value.get_ref().is_finite() && *value.get_ref() > 0.0) {
+                let message = "expected a number above 0".into();
+                return Err(r.at(value.span(), format!("{what} of the simulation"), message));
+            }
+            *target = Some(*value.get_ref());
+        }
+    }
+    let generic = names(&mut model.known_inputs.iter().map(|u| &u.0));
+    for (name, value) in &entry.inputs {
+        let entries = entries(name, &r.shapes);
+        known("inputs", name, &entries, &generic, value.span())?;
+        let what = format!("the input {name} of the simulation");
+        let formulas = r.fitted((name, &what), value.get_ref(), value.span())?;
+        for (name, formula) in entries.into_iter().zip(formulas) {
+            let other = formula.expression.nodes.iter().position(|n| matches!(n, Node::Name(n) if n != "t"));
+            if let Some(i) = other {
+                let message = "expected a function of the time t alone".into();
+                return Err(formula.place.error(message, formula.expression.spans[i].clone()));
+            }
+            nominal.inputs.insert(name, formula);
+        }
+    }
+    Ok(())
+}
