@@ -3,7 +3,7 @@
 use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::solution::Frame;
-use obsdeg_core::system::{SystemOptions, analyze_system};
+use obsdeg_core::system::{COUNT_LIMIT, SystemOptions, analyze_system};
 
 use crate::arguments::{InputArguments, one_of};
 use crate::engine::EngineArguments;
@@ -36,7 +36,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(0..=1000))]
     order: Option<u16>,
 
-    /// Solving expressions; off never starts the symbolic engine
+    /// Limit of the work of counting the solutions of a model: millions of products at each of two points (30 ms each) [default: 3]
+    #[arg(long, value_name = "MILLIONS")]
+    count_limit: Option<u64>,
+
+    /// Solving expressions and numbers of solutions; off never starts the symbolic engine
     #[arg(long, value_name = "ON|OFF", default_value = "on", hide_possible_values = true, action = ArgAction::Set, value_parser = one_of([("on", true), ("off", false)]))]
     solutions: bool,
 
@@ -65,6 +69,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     if a.order.is_some() && a.input.model.is_none() {
         return Err(Failure::input("--order goes with --model: a scheme has a proven end".into()));
     }
+    if a.count_limit.is_some() && a.input.model.is_none() {
+        return Err(Failure::input(
+            "--count-limit goes with --model: a scheme is linear, and its solutions are unique".into(),
+        ));
+    }
     let (seed, solutions, quiet) = (a.seed, a.solutions, a.output.target.quiet);
     match a.input.read()? {
         Input::Scheme(scheme) => {
@@ -74,7 +83,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             a.output.write(&analysis)
         }
         Input::Model(file) => {
-            let options = SystemOptions { seed, solutions, order: a.order.map(Into::into) };
+            let options = SystemOptions {
+                seed,
+                solutions,
+                count_limit: a.count_limit.unwrap_or(COUNT_LIMIT),
+                order: a.order.map(Into::into),
+            };
             let analysis = a.engine.lend("judging the model", quiet, |worker| {
                 analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))
             })?;

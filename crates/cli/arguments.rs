@@ -10,8 +10,18 @@ use crate::failure::Failure;
 use crate::input::{Input, Source};
 
 /// Options that a model takes as well as a scheme, or a model alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 9] =
-    ["model", "order", "solutions", "symbolic_limit", "seed", "format", "output", "force", "quiet"];
+const OF_MODELS: [&str; 10] = [
+    "model",
+    "order",
+    "count_limit",
+    "solutions",
+    "symbolic_limit",
+    "seed",
+    "format",
+    "output",
+    "force",
+    "quiet",
+];
 
 /// What is judged: a scheme, or a model.
 #[derive(Debug, Args)]

@@ -58,6 +58,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "D_FX + 1",
         ],
         "order" => &["0", "1", "5", "40", "-1", "x"],
+        "count-limit" => &["0", "1", "18446744073709551615", "-1"],
         "solutions" => &["off", "maybe"],
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
@@ -203,8 +204,8 @@ fn folder() -> tempfile::TempDir {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 8] =
-        ["force", "format", "order", "output", "quiet", "seed", "solutions", "symbolic-limit"];
+    const TAKEN: [&str; 9] =
+        ["count-limit", "force", "format", "order", "output", "quiet", "seed", "solutions", "symbolic-limit"];
     let folder = folder();
     for command in ["analyze", "simulate", "crosscheck"] {
         let mut taken = Vec::new();

@@ -23,4 +23,5 @@ mod scheme_schema;
 mod schemes;
 mod second_path;
 mod simulation;
+mod solutions;
 mod structure;

@@ -14,7 +14,7 @@ use obsdeg_evidence::system::{Numeric, SystemEvidence, crosscheck_system, simula
 use serde_json::Value;
 
 /// The reference models: name, JSON, text.
-fn models() -> Vec<(String, Value, String)> {
+pub(crate) fn models() -> Vec<(String, Value, String)> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
     let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut files: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();

@@ -1,7 +1,9 @@
 //! Any system.
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::system::{POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity};
+use obsdeg_core::system::{
+    NumberOfSolutions, POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity,
+};
 use obsdeg_evidence::crosscheck::{Agreement, Check};
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
@@ -14,12 +16,47 @@ const READABLE: usize = 240;
 
 fn explanation(q: &SystemQuantity) -> String {
     match (q.status, q.degree) {
-        (Status::Observable, Some(0)) => "from the outputs themselves; local: finitely many solutions".into(),
-        (Status::Observable, _) if q.solution.is_some() => "one solution: see below".into(),
-        (Status::Observable, _) => "local: finitely many solutions".into(),
+        (Status::Observable, Some(0)) => format!("from the outputs themselves; {}", solutions(q)),
+        (Status::Observable, _) => solutions(q),
         (Status::Inseparable, _) => words::not_told_from(&q.partners),
         (Status::NotExcited, _) => "moves no output".into(),
     }
+}
+
+/// How many solutions an observable unknown has.
+fn solutions(q: &SystemQuantity) -> String {
+    let number = match q.number_of_solutions {
+        Some(NumberOfSolutions::OneByExpression) => return "one solution: see below".into(),
+        Some(NumberOfSolutions::Counted(1)) => "one solution".into(),
+        Some(NumberOfSolutions::Counted(k)) => format!("{k} solutions"),
+        Some(NumberOfSolutions::Undecided(_)) => "locally unique; number of solutions not decided".into(),
+        None => "local: finitely many solutions".into(),
+    };
+    if q.solution.is_some() { format!("{number}; in terms of others: see below") } else { number }
+}
+
+/// What the numbers of solutions rest on, and why some are missing.
+fn counting(a: &SystemAnalysis) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(order) = a.counting_order {
+        out.push(format!(
+            "solutions without an expression are counted by elimination, complex ones too, with derivatives up to order {order} at a random point modulo each prime; no bound on the probability of an error is derived"
+        ));
+    }
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for q in &a.quantities {
+        if let Some(NumberOfSolutions::Undecided(reason)) = &q.number_of_solutions {
+            match reasons.iter_mut().find(|r| r.0 == reason) {
+                Some((_, names)) => names.push(&q.name),
+                None => reasons.push((reason, vec![&q.name])),
+            }
+        }
+    }
+    let undecided = |(reason, names): (&str, Vec<&str>)| {
+        format!("the number of solutions of {} is not decided: {reason}", words::names(names))
+    };
+    out.extend(reasons.into_iter().map(undecided));
+    out
 }
 
 fn combinations(heading: &str, list: &[SystemCombination]) -> Block {
@@ -111,6 +148,7 @@ impl Answer for SystemAnalysis {
             "the verdict is local: an observable unknown has finitely many solutions near any generic point"
                 .into(),
         );
+        assumed.extend(counting(self));
         assumed.extend(self.note.clone());
         assumed.push(format!(
         "ranks modulo the random primes {} and {} at random points; wrong with probability below {:.0e}; seed {}",

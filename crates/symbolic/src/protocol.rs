@@ -107,6 +107,8 @@ pub struct RationalSystem {
     pub starts: Vec<(usize, String)>,
     /// The degree of every state, then of every parameter; what has a lower one may stand in its expression.
     pub degrees: Vec<Option<usize>>,
+    /// So many orders beyond its degree an expression may go: what has finitely many solutions there may have one.
+    pub beyond: usize,
     /// Parameters that may take any value, since a symmetry moves them: no expression of an observable unknown depends
     /// on it.
     pub free: Vec<usize>,

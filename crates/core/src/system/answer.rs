@@ -4,11 +4,15 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::fibre::{Count, values_taken};
 use super::judge::{Judgement, judge_compiled};
 use super::model::{ModelError, Role, StateStart, SystemModel};
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};
+
+/// Default of [`SystemOptions::count_limit`]: most reference models need less.
+pub const COUNT_LIMIT: u64 = 3;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
@@ -58,6 +62,8 @@ pub struct SystemAnalysis {
     pub rests_on_bound: bool,
     /// Why there are no solving expressions, if there are none.
     pub note: Option<String>,
+    /// The order of the derivatives with which solutions were counted by elimination; null when none were.
+    pub counting_order: Option<usize>,
     /// The two random primes, as text (61 bits).
     pub primes: [String; 2],
     /// Bound on the probability that a verdict is wrong.
@@ -83,9 +89,23 @@ pub struct SystemQuantity {
     pub degree: Option<usize>,
     /// Unknowns that it cannot be told from: those that share with it a direction that changes no output and that holds no shorter one.
     pub partners: Vec<String>,
-    /// What it is in outputs, inputs, their derivatives and unknowns of no higher degree, where it enters linearly; verified in both
-    /// fields.
+    /// What it is in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher degree,
+    /// where it enters linearly; verified in both fields.
     pub solution: Option<String>,
+    /// How many solutions it has; null where it is not observable, or where they were not sought.
+    pub number_of_solutions: Option<NumberOfSolutions>,
+}
+
+/// How many values an unknown takes among all points with the same outputs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NumberOfSolutions {
+    /// One: its solving expression rests on outputs, inputs, constants and unknowns that have one solution.
+    OneByExpression,
+    /// So many, complex ones counted: by elimination at a random point modulo each prime.
+    Counted(usize),
+    /// Finitely many. Why their number is not decided.
+    Undecided(String),
 }
 
 /// A combination.
@@ -111,15 +131,17 @@ pub struct SymmetryReport {
 pub struct SystemOptions {
     /// Seed of all random choices.
     pub seed: u64,
-    /// Whether solving expressions are wanted.
+    /// Whether solving expressions and the number of solutions are wanted.
     pub solutions: bool,
+    /// How much work counting solutions may take: millions of products of two coefficients, at each of two points.
+    pub count_limit: u64,
     /// The highest order of derivatives to look at; left out: n for each experiment where chains end by themselves, else 2n+4.
     pub order: Option<usize>,
 }
 
 impl Default for SystemOptions {
     fn default() -> Self {
-        Self { seed: 1, solutions: true, order: None }
+        Self { seed: 1, solutions: true, count_limit: COUNT_LIMIT, order: None }
     }
 }
 
@@ -140,17 +162,34 @@ pub fn analyze_system(
     if !options.solutions {
         return Ok(out);
     }
-    match solutions(model, &compiled, &judged, seed, worker) {
-        Ok(found) => {
-            for (u, solution) in judged.layout.unknowns.iter().zip(found) {
-                if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
-                    q.solution = solution;
-                }
-            }
+    let (counts, counting_order) =
+        values_taken(model, &compiled, &judged, seed, options.count_limit.saturating_mul(1_000_000));
+    let single: Vec<bool> = counts.iter().map(|c| *c == Some(Ok(1))).collect();
+    let found = solutions(model, &compiled, &judged, seed, worker, &single).unwrap_or_else(|reason| {
+        out.note = Some(reason.to_string());
+        vec![None; counts.len()]
+    });
+    for ((u, count), found) in judged.layout.unknowns.iter().zip(counts).zip(found) {
+        if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
+            let unique = found.as_ref().is_some_and(|e| e.unique);
+            q.solution = found.map(|e| e.text);
+            q.number_of_solutions = count.map(|count| number_of_solutions(count, unique));
         }
-        Err(reason) => out.note = Some(reason.to_string()),
     }
+    let counted = |q: &SystemQuantity| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(_)));
+    out.counting_order = out.quantities.iter().any(counted).then_some(counting_order);
     Ok(out)
+}
+
+fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
+    match (count, unique) {
+        (Ok(1) | Err(_), true) => NumberOfSolutions::OneByExpression,
+        (Ok(k), true) => NumberOfSolutions::Undecided(format!(
+            "one solution by its expression and {k} by elimination: please report this model"
+        )),
+        (Ok(k), false) => NumberOfSolutions::Counted(k),
+        (Err(e), false) => NumberOfSolutions::Undecided(e.to_string()),
+    }
 }
 
 /// The answer for a model that was judged.
@@ -176,6 +215,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             degree,
             partners: findings.partners[c].iter().map(|&p| name(p)).collect(),
             solution: None,
+            number_of_solutions: None,
         }
     });
     let asked = model.combinations.iter().zip(&findings.asked);
@@ -205,6 +245,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
         note: None,
+        counting_order: None,
         primes: findings.primes_as_text(),
         error_bound: findings.error_bound,
         seed: findings.seed,

@@ -8,6 +8,7 @@ pub(crate) mod answer;
 mod canonical;
 pub(crate) mod constraints;
 pub(crate) mod dag;
+mod fibre;
 mod functions;
 pub mod json;
 pub(crate) mod judge;

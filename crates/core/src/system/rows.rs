@@ -91,7 +91,7 @@ impl Layout {
         Self { unknowns, bound, closed }
     }
 
-    fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
+    pub(super) fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
         let own = |u: &Unknown| u.role == role && u.experiment.is_none_or(|e| e == experiment);
         self.unknowns.iter().position(own)
     }
@@ -345,6 +345,20 @@ impl<'a> SystemRows<'a> {
             run.taylor.advance();
         }
         (1..=order).fold(run.taylor.value(node, order), |x, k| f.mul(x, f.from_u64(k as u64)))
+    }
+
+    /// The Taylor coefficient of a node at the start of a run.
+    pub(super) fn coefficient(&mut self, run: usize, node: usize, order: usize) -> u64 {
+        let taylor = &mut self.runs[run].taylor;
+        while taylor.length <= order {
+            taylor.advance();
+        }
+        taylor.value(node, order)
+    }
+
+    /// Whether a node depends on no unknown in a run.
+    pub(super) fn is_known(&self, run: usize, node: usize) -> bool {
+        self.runs[run].taylor.is_known(node)
     }
 
     /// The value of every unknown at this point, then of every known constant (in the first segment).

@@ -17,6 +17,8 @@ use crate::model::expression::{Environment, Names, evaluate, parse_with};
 const UNKNOWNS: usize = 30;
 /// Highest order.
 const ORDER: usize = 16;
+/// Orders beyond its degree to which an expression may go: there what has finitely many solutions may have one.
+const BEYOND: usize = 2;
 /// Longest formula that is sent.
 const LENGTH: usize = 20_000;
 /// Longest expression that is kept.
@@ -60,7 +62,18 @@ pub(super) enum NoExpressions {
     Engine(WorkerError),
 }
 
-/// Expressions for the unknowns, in the order of the layout, or why there are none.
+/// What an unknown is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Expression {
+    /// In the names of the model.
+    pub(super) text: String,
+    /// Every unknown in it is known to have one solution, or has such an expression itself; in the end they rest on outputs,
+    /// inputs and constants: there is one solution.
+    pub(super) unique: bool,
+}
+
+/// Expressions for the unknowns, in the order of the layout, or why there are none; `single` says of which it is known
+/// otherwise that they have one solution.
 ///
 /// # Errors
 /// A sentence for the reader.
@@ -70,15 +83,16 @@ pub(super) fn solutions(
     judged: &Judgement,
     seed: u64,
     worker: Option<&mut Worker>,
-) -> Result<Vec<Option<String>>, NoExpressions> {
+    single: &[bool],
+) -> Result<Vec<Option<Expression>>, NoExpressions> {
     let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
     let n = judged.layout.unknowns.len();
     let Some(highest) = highest else { return Ok(vec![None; n]) };
     let worker = worker.ok_or(NoExpressions::NoEngine)?;
     let (request, symbols) = request(model, compiled, judged, highest)?;
     let (texts, _) = worker.ask(&request).map_err(NoExpressions::Engine)?;
-    let mut out = vec![None; n];
-    let Job::Unknowns { system } = &request.job else { return Ok(out) };
+    let mut out: Vec<Option<String>> = vec![None; n];
+    let Job::Unknowns { system } = &request.job else { return Ok(vec![None; n]) };
     let roles = (0..system.states.len()).map(Role::State).chain(roles_of_parameters(model));
     for (role, text) in roles.zip(&texts) {
         let lane = judged.layout.unknowns.iter().position(|u| u.role == role);
@@ -95,7 +109,39 @@ pub(super) fn solutions(
             }
         }
     }
-    Ok(out.into_iter().map(|text| text.map(|t| shown(&t, &symbols))).collect())
+    let unique = unique(judged, compiled, &symbols, &out, single);
+    let kept = |(text, unique): (Option<String>, bool)| {
+        text.map(|t| Expression { text: shown(&t, &symbols), unique })
+    };
+    Ok(out.into_iter().zip(unique).map(kept).collect())
+}
+
+/// Which expressions rest on nothing but what is `single` or has an expression that does, and not on themselves.
+fn unique(
+    judged: &Judgement,
+    compiled: &Compiled,
+    symbols: &[Symbol],
+    expressions: &[Option<String>],
+    single: &[bool],
+) -> Vec<bool> {
+    let lane_of = |word: &str| {
+        // of states, parameters and inputs that are unknown; an output may share the node of one
+        let symbol = symbols.iter().find(|s| s.raw == word && word.starts_with(['x', 'p', 'w']))?;
+        judged.layout.unknowns.iter().position(|u| compiled.node_of(u.role) == symbol.node)
+    };
+    let rests_on: Vec<Option<Vec<usize>>> =
+        expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(lane_of).collect())).collect();
+    let mut unique = vec![false; expressions.len()];
+    loop {
+        let before = unique.clone();
+        for (lane, on) in rests_on.iter().enumerate() {
+            unique[lane] =
+                on.as_ref().is_some_and(|on| on.iter().all(|&other| before[other] || single[other]));
+        }
+        if unique == before {
+            return unique;
+        }
+    }
 }
 
 /// Unknown constants: parameters, and unknown inputs that do not change.
@@ -158,8 +204,8 @@ fn request(
             Role::KnownInput(i) => {
                 let (named, kind) = &model.known_inputs[i];
                 let last = match kind {
-                    KnownInput::Polynomial(d) => (*d).min(highest + 1),
-                    _ => highest + 1,
+                    KnownInput::Polynomial(d) => (*d).min(highest + 1 + BEYOND),
+                    _ => highest + 1 + BEYOND,
                 };
                 let chain = (0..=last)
                     .map(|k| put(&mut symbols, format!("u_{i}_{k}"), derivative(&named.name, k), node, k))
@@ -179,7 +225,7 @@ fn request(
     let mut outputs = Vec::new();
     for (j, &node) in compiled.outputs.iter().enumerate() {
         let name = &model.outputs[j].0.name;
-        let chain = (0..=highest + 1)
+        let chain = (0..=highest + 1 + BEYOND)
             .map(|k| put(&mut symbols, format!("y_{j}_{k}"), derivative(name, k), Some(node), k))
             .collect();
         outputs.push((text(node)?, chain));
@@ -209,6 +255,7 @@ fn request(
         time,
         starts,
         degrees: roles.map(degree).collect(),
+        beyond: BEYOND,
         free,
     };
     let request = Request {

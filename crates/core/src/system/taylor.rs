@@ -261,6 +261,11 @@ impl<'a> Taylor<'a> {
         self.duals[a].get(k * self.lanes..(k + 1) * self.lanes).unwrap_or(&[])
     }
 
+    /// Whether a node depends on no unknown.
+    pub(crate) fn is_known(&self, a: usize) -> bool {
+        self.known[a]
+    }
+
     /// The value of a node at order 0.
     pub(crate) fn start(&self, a: usize) -> u64 {
         self.values[a][0]

@@ -200,12 +200,14 @@ impl Elimination<'_> {
         Ok(equations)
     }
 
-    /// The parameters that stand alone in the relations, at the lowest order.
+    /// The parameters that stand alone in the relations, at the lowest order. Beyond its degree a parameter counts as known at
+    /// first, since others may be solved by it, and then as open.
     fn parameters(&self, relations: Vec<Equation>) -> Result<Vec<Option<Scalar>>, JobError> {
         let n = self.system.states.len();
         let degrees = &self.system.degrees[n..];
         let mut found: Vec<Option<Scalar>> = vec![None; self.system.parameters.len()];
-        let highest = degrees.iter().flatten().copied().max().unwrap_or(0);
+        let beyond = self.system.beyond;
+        let highest = degrees.iter().flatten().copied().max().unwrap_or(0) + beyond;
         // by order; a relation is differentiated when its turn comes
         let mut waiting: Vec<(usize, Equation)> =
             relations.into_iter().map(|r| (self.order(&r.zero), r)).collect();
@@ -227,14 +229,19 @@ impl Elimination<'_> {
                 pool.push(equation.zero);
             }
             loop {
-                let open: Vec<usize> = (0..found.len())
-                    .filter(|&p| {
-                        found[p].is_none()
-                            && !self.system.free.contains(&p)
-                            && degrees[p].is_none_or(|d| d >= order)
-                    })
-                    .collect();
-                let new = self.standing_alone(&pool, &open)?;
+                let open = |beyond: usize| -> Vec<usize> {
+                    let left = |p: &usize| {
+                        found[*p].is_none()
+                            && !self.system.free.contains(p)
+                            && degrees[*p].is_none_or(|d| d + beyond >= order)
+                    };
+                    (0..found.len()).filter(left).collect()
+                };
+                let (now, more) = (open(0), open(beyond));
+                let mut new = self.standing_alone(&pool, &now)?;
+                if new.is_empty() && more != now {
+                    new = self.standing_alone(&pool, &more)?;
+                }
                 if new.is_empty() {
                     break;
                 }
@@ -323,8 +330,8 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// Whether an expression holds nothing of a higher degree than the unknown itself, and no unknown of the same that
-    /// waits for it.
+    /// Whether an expression holds no unknown of a higher degree than the unknown itself, and no derivative of an order
+    /// too far beyond it.
     fn is_solution(&self, unknown: usize, e: &Scalar) -> bool {
         let Some(degree) = self.system.degrees[unknown] else { return false };
         let names = self.system.states.iter().chain(&self.system.parameters);
@@ -332,7 +339,7 @@ impl Elimination<'_> {
             !(self.holds(&e.numerator, name) || self.holds(&e.denominator, name))
                 || d.is_some_and(|d| d <= degree)
         };
-        self.order(e) <= degree && names.zip(&self.system.degrees).all(fits)
+        self.order(e) <= degree + self.system.beyond && names.zip(&self.system.degrees).all(fits)
     }
 }
 

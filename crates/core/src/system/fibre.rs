@@ -1,0 +1,500 @@
+//! How many solutions there are for an unknown: the values it takes among all points with the same outputs.
+//!
+//! At a random point of a prime field the Taylor coefficients of the outputs are numbers. That they are these numbers is
+//! a system of polynomial equations in the unknowns and the coefficients of the states; an unknown that a symmetry moves
+//! keeps its value (nothing observable depends on it). A Groebner basis says how many values each observable unknown has
+//! over the algebraic closure: the degree of its minimal polynomial in the quotient ring.
+//!
+//! Which order is enough: let `L_k` be the field that the derivatives up to order k generate. If rank grows last at order
+//! h, `y^(h+1)` is algebraic over `L_h`; differentiating its minimal polynomial gives `y^(h+2)` in `L_(h+1)`, and so on: `L_(h+1)` holds
+//! all derivatives (the argument of Hong, Ovchinnikov, Pogudin, Yap 2020, doi:10.1002/cpa.21921). It needs a derivation
+//! of the unknowns, hence one segment, a generic start and no arbitrary input; elsewhere one solution is one, and more may
+//! become fewer. Orders beyond h+1 change nothing but make the equations easier to solve.
+
+use std::collections::BTreeSet;
+
+use obsdeg_exact::groebner::{Basis, OverLimit, Work};
+use obsdeg_exact::multivariate::{Monomial, Polynomial};
+use obsdeg_exact::{Field, SplitMix64, polynomial};
+
+use super::dag::Op;
+use super::judge::Judgement;
+use super::model::{Compiled, Role, SystemModel};
+use super::rows::{Layout, SystemRows, Unknown};
+
+/// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are decided.
+const BEYOND: usize = 3;
+/// Most solutions that are counted.
+const SOLUTIONS: usize = 64;
+/// Most unknowns: what has more is far beyond any limit of work, and its rows take memory.
+const UNKNOWNS: usize = 60;
+/// A polynomial of more terms is not formed.
+const TERMS: usize = 400;
+/// The least weight of a state; parameters have weight one.
+const STATE: u32 = 2;
+/// The work that one remainder by an unfinished basis may take.
+const REMAINDER: u64 = 100_000;
+
+/// Why the number of solutions is not decided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum NotCounted {
+    /// A function in an equation.
+    #[error("the system is not rational in its unknowns")]
+    NotRational,
+    /// Too many unknowns.
+    #[error("there are more than {UNKNOWNS} unknowns")]
+    TooLarge,
+    /// Too long an equation.
+    #[error("an equation has more than {TERMS} terms")]
+    TooLong,
+    /// Beyond the limit.
+    #[error("the elimination is beyond its limit of work")]
+    OverLimit,
+    /// More than counted.
+    #[error("there are more than {SOLUTIONS}")]
+    TooMany,
+    /// The start or an input is special.
+    #[error(
+        "starts, inputs or segments are not generic: there are several with the derivatives looked at, and those of a higher order may leave fewer"
+    )]
+    NotClosed,
+    /// Two points disagree.
+    #[error("two random points disagree")]
+    Disagree,
+    /// No point was found.
+    #[error("no random point could be used")]
+    NoPoint,
+}
+
+impl From<OverLimit> for NotCounted {
+    fn from(_: OverLimit) -> Self {
+        Self::OverLimit
+    }
+}
+
+/// The number of values of an unknown, or why it is not decided.
+pub(super) type Count = Result<usize, NotCounted>;
+
+/// The number of values that every unknown takes, in the order of the layout, as two random points in the two fields agree;
+/// with derivatives of the outputs up to the order that comes with it. At most `limit` products a point. What is not
+/// observable has no number.
+pub(super) fn values_taken(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    seed: u64,
+    limit: u64,
+) -> (Vec<Option<Count>>, usize) {
+    let degrees = &judged.findings.degrees;
+    let last = degrees.rank_profile.iter().position(|&r| r == degrees.rank()).unwrap_or(0);
+    let order =
+        (last + BEYOND).min(if judged.layout.closed { usize::MAX } else { judged.layout.bound.max(last) });
+    // a relation between derivatives that holds on one component of the constraints need not hold on another
+    let proven = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
+    let at = |i: usize| -> Vec<Count> {
+        if degrees.degree.len() > UNKNOWNS {
+            return vec![Err(NotCounted::TooLarge); degrees.degree.len()];
+        }
+        let mut rng = model.random(seed, &format!("solutions, field {i}"));
+        let mut work = Work { left: limit };
+        at_point(model, compiled, judged, (judged.fields[i], &mut rng), order, &mut work)
+            .unwrap_or_else(|e| vec![Err(e); degrees.degree.len()])
+    };
+    let first = at(0);
+    let second = if first.iter().any(Result::is_ok) { at(1) } else { first.clone() };
+    let agreed = first.into_iter().zip(second).map(|counts| match counts {
+        (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
+        (Ok(a), Ok(_)) if a > 1 && !proven => Err(NotCounted::NotClosed),
+        (Ok(a), Ok(_)) => Ok(a),
+        (Err(e), _) | (_, Err(e)) => Err(e),
+    });
+    let observable = agreed.zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
+    (observable.collect(), order)
+}
+
+/// The equations at a point.
+struct Equations<'a> {
+    f: Field,
+    compiled: &'a Compiled,
+    layout: &'a Layout,
+    rows: SystemRows<'a>,
+    work: &'a mut Work,
+    /// The value of every variable at the point.
+    values: Vec<u64>,
+    /// The weight of every variable.
+    weights: Vec<u32>,
+    /// The weight of every state.
+    state_weights: Vec<u32>,
+    /// What each unknown is.
+    lanes: Vec<Polynomial>,
+    /// What is zero.
+    zero: Vec<Polynomial>,
+    runs: Vec<Run>,
+}
+
+/// A segment of an experiment.
+struct Run {
+    experiment: usize,
+    /// The states at its start.
+    initial: Vec<Polynomial>,
+    /// `nodes[node][k]`, of the nodes that are needed.
+    nodes: Vec<Vec<Polynomial>>,
+}
+
+impl Equations<'_> {
+    fn variable(&mut self, value: u64, weight: u32) -> Polynomial {
+        self.values.push(value);
+        self.weights.push(weight);
+        Polynomial::variable(&self.f, self.values.len() as u32 - 1)
+    }
+
+    fn add_product(
+        &mut self,
+        sum: &mut Polynomial,
+        a: &Polynomial,
+        b: &Polynomial,
+    ) -> Result<(), NotCounted> {
+        self.work.take(1 + 8 * (a.len() * b.len()) as u64)?;
+        sum.add_product(&self.f, a, b);
+        if sum.len() > TERMS { Err(NotCounted::TooLong) } else { Ok(()) }
+    }
+
+    /// Coefficient `k` of the nodes that are `needed`, in a run that has those before.
+    fn extend(&mut self, r: usize, needed: &[bool], k: usize) -> Result<(), NotCounted> {
+        self.work.take(needed.len() as u64)?;
+        for (i, &needed) in needed.iter().enumerate() {
+            let p = if needed { self.coefficient(r, i, k)? } else { Polynomial::default() };
+            self.runs[r].nodes[i].push(p);
+        }
+        Ok(())
+    }
+
+    fn coefficient(&mut self, r: usize, i: usize, k: usize) -> Result<Polynomial, NotCounted> {
+        let f = self.f;
+        if self.rows.is_known(r, i) {
+            return Ok(Polynomial::constant(self.rows.coefficient(r, i, k)));
+        }
+        let minus = f.neg(f.one());
+        let of = |s: &Self, a: usize, j: usize| s.runs[r].nodes[a][j].clone();
+        match self.compiled.dag.ops[i] {
+            Op::Number { .. } => Ok(Polynomial::default()),
+            Op::Slot(slot) => Ok(self.signal(r, self.compiled.roles[slot], k)),
+            Op::Add(a, b) => {
+                let mut sum = of(self, a, k);
+                sum.add_scaled(&f, &of(self, b, k), f.one());
+                Ok(sum)
+            }
+            Op::Subtract(a, b) => {
+                let mut sum = of(self, a, k);
+                sum.add_scaled(&f, &of(self, b, k), minus);
+                Ok(sum)
+            }
+            Op::Multiply(a, b) => {
+                let mut sum = Polynomial::default();
+                for j in 0..=k {
+                    let (x, y) = (of(self, a, j), of(self, b, k - j));
+                    self.add_product(&mut sum, &x, &y)?;
+                }
+                Ok(sum)
+            }
+            Op::Divide(a, b) => {
+                // c b = a
+                let below = of(self, b, 0);
+                let mut rest = of(self, a, k);
+                for j in 0..k {
+                    let (x, y) = (of(self, i, j).scaled(&f, minus), of(self, b, k - j));
+                    self.add_product(&mut rest, &x, &y)?;
+                }
+                let inverse = f.inv(below.at(&f, &self.values));
+                if inverse == 0 {
+                    return Err(NotCounted::NoPoint);
+                }
+                if below.as_constant().is_some() {
+                    return Ok(rest.scaled(&f, inverse));
+                }
+                if k == 0 {
+                    // nothing is divided by zero at a solution
+                    let z = self.variable(inverse, STATE);
+                    let mut zero = Polynomial::constant(minus);
+                    self.add_product(&mut zero, &z, &below)?;
+                    self.zero.push(zero);
+                }
+                let c = self.variable(f.mul(rest.at(&f, &self.values), inverse), STATE);
+                let mut zero = rest.scaled(&f, minus);
+                self.add_product(&mut zero, &c, &below)?;
+                self.zero.push(zero);
+                Ok(c)
+            }
+            Op::Primitive { .. } => Err(NotCounted::NotRational),
+        }
+    }
+
+    /// Coefficient `k` of what is not known and no operation.
+    fn signal(&mut self, r: usize, role: Role, k: usize) -> Polynomial {
+        let f = self.f;
+        let Role::State(s) = role else {
+            let experiment = self.runs[r].experiment;
+            let own = |u: &Unknown| {
+                u.role == role && u.derivative == k && u.experiment.is_none_or(|e| e == experiment)
+            };
+            let lane = self.layout.unknowns.iter().position(own);
+            return lane.map_or_else(Polynomial::default, |lane| self.lanes[lane].clone());
+        };
+        if k == 0 {
+            return self.runs[r].initial[s].clone();
+        }
+        let rate = self.runs[r].nodes[self.compiled.rates[s]][k - 1].scaled(&f, f.inv(f.from_u64(k as u64)));
+        if rate.degree() <= 1 {
+            return rate;
+        }
+        let x = self.variable(rate.at(&f, &self.values), self.state_weights[s]);
+        let mut zero = rate.scaled(&f, f.neg(f.one()));
+        zero.add_scaled(&f, &x, f.one());
+        self.zero.push(zero);
+        x
+    }
+
+    /// What a node is at the start of a run, from the states there.
+    fn start(&mut self, r: usize, node: usize) -> Result<Polynomial, NotCounted> {
+        let needed = reached(self.compiled, &[node], |_| None);
+        self.extend(r, &needed, 0)?;
+        let p = self.runs[r].nodes[node].pop();
+        self.runs[r].nodes.iter_mut().for_each(Vec::clear);
+        Ok(p.unwrap_or_default())
+    }
+
+    /// Gives states other values at the start of a run, in terms of those before.
+    fn jump(&mut self, r: usize, to: &[(usize, usize)]) -> Result<(), NotCounted> {
+        let found = to.iter().map(|&(s, node)| Ok((s, self.start(r, node)?)));
+        for (s, p) in found.collect::<Result<Vec<_>, NotCounted>>()? {
+            self.runs[r].initial[s] = p;
+        }
+        Ok(())
+    }
+
+    /// Takes variables out that an affine equation gives, the latest first.
+    fn solve(&mut self) -> Result<(), NotCounted> {
+        let f = self.f;
+        while let Some(e) = self.zero.iter().position(|p| p.degree() <= 1) {
+            let p = self.zero.swap_remove(e);
+            let Some(v) = p.terms().filter_map(|(m, _)| m.first().map(|x| x.0)).max() else {
+                if p.is_empty() { continue } else { return Err(NotCounted::NoPoint) }
+            };
+            let mut value = p.scaled(&f, f.neg(f.inv(p.coefficient(&[(v, 1)]))));
+            value.add_scaled(&f, &Polynomial::variable(&f, v), f.one());
+            let nodes = self.runs.iter_mut().flat_map(|r| r.nodes.iter_mut().flatten().chain(&mut r.initial));
+            for q in nodes.chain(&mut self.lanes).chain(&mut self.zero) {
+                self.work.take(1 + q.len() as u64 / 4)?;
+                if q.terms_with(v) > 0 {
+                    self.work.take(8 * (q.len() * value.len()) as u64)?;
+                    *q = q.replaced(&f, v, &value);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The nodes that some nodes are made of; `follow` leads on from a state.
+fn reached(compiled: &Compiled, from: &[usize], follow: impl Fn(usize) -> Option<usize>) -> Vec<bool> {
+    let mut out = vec![false; compiled.dag.ops.len()];
+    let mut left = from.to_vec();
+    while let Some(i) = left.pop() {
+        if std::mem::replace(&mut out[i], true) {
+            continue;
+        }
+        match compiled.dag.ops[i] {
+            Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => left.extend([a, b]),
+            Op::Primitive { of, weight, .. } => left.extend([of, weight]),
+            Op::Slot(slot) => {
+                if let Role::State(s) = compiled.roles[slot] {
+                    left.extend(follow(s));
+                }
+            }
+            Op::Number { .. } => {}
+        }
+    }
+    out
+}
+
+/// How many derivatives of the outputs it takes until a state is in them at all, plus [`STATE`]: coefficients of a state weigh as
+/// much as the products that they are solved from.
+fn state_weights(compiled: &Compiled) -> Vec<u32> {
+    let mut weights = vec![0; compiled.rates.len()];
+    let mut from = compiled.outputs.clone();
+    for weight in STATE.. {
+        let nodes = reached(compiled, &from, |_| None);
+        from.clear();
+        for (op, _) in compiled.dag.ops.iter().zip(nodes).filter(|n| n.1) {
+            if let Op::Slot(slot) = *op
+                && let Role::State(s) = compiled.roles[slot]
+                && weights[s] == 0
+            {
+                weights[s] = weight;
+                from.push(compiled.rates[s]);
+            }
+        }
+        if from.is_empty() {
+            break;
+        }
+    }
+    weights
+}
+
+/// The equations at a random point, with derivatives of the outputs up to `order`.
+fn equations<'a>(
+    model: &SystemModel,
+    compiled: &'a Compiled,
+    judged: &'a Judgement,
+    (f, rng): (Field, &mut SplitMix64),
+    order: usize,
+    work: &'a mut Work,
+) -> Result<Equations<'a>, NotCounted> {
+    let layout = &judged.layout;
+    let mut rows = SystemRows::new(model, compiled, layout, f, rng).map_err(|_| NotCounted::NoPoint)?;
+    let segments = compiled.segments.len().max(1);
+    let experiments = model.experiments.max(1);
+    for e in 0..experiments {
+        // the values of unknown inputs are coefficients
+        let highest = layout.unknowns.iter().map(|u| u.derivative).max().unwrap_or(0);
+        rows.coefficient(e * segments, 0, highest);
+    }
+    let values = rows.values(compiled, layout, 0);
+    let free = |lane: usize| judged.stairs.last().is_none_or(|s| s.pivots().all(|p| p != lane));
+    let lane = |(lane, &value): (usize, &u64)| match free(lane) {
+        true => Polynomial::constant(value),
+        false => Polynomial::variable(&f, lane as u32),
+    };
+    let state_weights = state_weights(compiled);
+    let weight = |u: &Unknown| match u.role {
+        Role::State(s) => state_weights[s],
+        Role::Parameter(_) => 1,
+        _ => STATE,
+    };
+    let mut out = Equations {
+        f,
+        compiled,
+        layout,
+        rows,
+        work,
+        weights: layout.unknowns.iter().map(weight).collect(),
+        state_weights,
+        lanes: values.iter().enumerate().map(lane).collect(),
+        values,
+        zero: Vec::new(),
+        runs: Vec::new(),
+    };
+    for experiment in 0..experiments {
+        let mut initial = Vec::new();
+        for s in 0..model.states.len() {
+            initial.push(match layout.lane(Role::State(s), experiment) {
+                Some(lane) => out.lanes[lane].clone(),
+                None => {
+                    let node = compiled.node_of(Role::State(s)).ok_or(NotCounted::NoPoint)?;
+                    Polynomial::constant(out.rows.coefficient(experiment * segments, node, 0))
+                }
+            });
+        }
+        for segment in 0..segments {
+            let r = out.runs.len();
+            out.runs.push(Run { experiment, initial, nodes: vec![Vec::new(); compiled.dag.ops.len()] });
+            let given = compiled.starts.iter().enumerate().filter_map(|(s, node)| Some((s, (*node)?)));
+            let given: Vec<(usize, usize)> = given.filter(|_| segment == 0).collect();
+            let jumps = compiled.segments.get(segment).map_or(&[][..], |s| &s.carry);
+            out.jump(r, &given)?;
+            if segment == 0 {
+                for &node in &compiled.constraints {
+                    let p = out.start(r, node)?;
+                    out.zero.push(p);
+                }
+            }
+            out.jump(r, jumps)?;
+            initial = out.runs[r].initial.clone();
+        }
+    }
+    let needed = reached(compiled, &compiled.outputs, |s| Some(compiled.rates[s]));
+    for k in 0..=order {
+        for r in 0..out.runs.len() {
+            out.extend(r, &needed, k)?;
+            for &o in &compiled.outputs {
+                let mut p = out.runs[r].nodes[o][k].clone();
+                let value = Polynomial::constant(out.rows.coefficient(r, o, k));
+                p.add_scaled(&f, &value, f.neg(f.one()));
+                out.zero.push(p);
+            }
+        }
+        out.solve()?;
+    }
+    // the point itself is a solution
+    let holds = out.zero.iter().all(|p| p.at(&f, &out.values) == 0);
+    if holds { Ok(out) } else { Err(NotCounted::NoPoint) }
+}
+
+/// Drops equations that only say what a variable is that nothing else needs.
+fn without_lonely(mut zero: Vec<Polynomial>, variables: usize, wanted: &[Polynomial]) -> Vec<Polynomial> {
+    let held =
+        |p: &Polynomial| -> BTreeSet<u32> { p.terms().flat_map(|(m, _)| m.iter().map(|x| x.0)).collect() };
+    let mut users = vec![0; variables];
+    for p in zero.iter().chain(wanted) {
+        held(p).into_iter().for_each(|v| users[v as usize] += 1);
+    }
+    loop {
+        let before = zero.len();
+        zero.retain(|p| {
+            let alone =
+                |m: &Monomial| matches!(m[..], [(v, 1)] if users[v as usize] == 1 && p.terms_with(v) == 1);
+            let lonely = p.terms().any(|(m, _)| alone(m));
+            if lonely {
+                held(p).into_iter().for_each(|v| users[v as usize] -= 1);
+            }
+            !lonely
+        });
+        if zero.len() == before {
+            return zero;
+        }
+    }
+}
+
+/// The number of values of every unknown at one random point.
+fn at_point(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    (f, rng): (Field, &mut SplitMix64),
+    order: usize,
+    work: &mut Work,
+) -> Result<Vec<Count>, NotCounted> {
+    let Equations { zero, values, weights, lanes, .. } =
+        equations(model, compiled, judged, (f, rng), order, &mut *work)?;
+    let observable = judged.findings.degrees.degree.iter().map(Option::is_some);
+    let wanted: Vec<Polynomial> =
+        lanes.into_iter().zip(observable).map(|(p, o)| if o { p } else { Polynomial::default() }).collect();
+    let zero = without_lonely(zero, values.len(), &wanted);
+    // the latest variables are the largest: they go first
+    let used: Vec<usize> = (0..values.len())
+        .filter(|&v| zero.iter().chain(&wanted).any(|p| p.terms_with(v as u32) > 0))
+        .rev()
+        .collect();
+    let mut place = vec![None; values.len()];
+    for (i, &v) in used.iter().enumerate() {
+        place[v] = Some(i as u32);
+    }
+    let renamed = |list: Vec<Polynomial>| -> Option<Vec<Polynomial>> {
+        list.iter().map(|p| p.renamed(|v| place[v as usize])).collect()
+    };
+    let (Some(zero), Some(wanted)) = (renamed(zero), renamed(wanted)) else {
+        return Err(NotCounted::NoPoint);
+    };
+    let weights: Vec<u32> = used.iter().map(|&v| weights[v]).collect();
+    let mut basis = Basis::new(&f, &weights, &zero, work);
+    let count = |p: &Polynomial| -> Count {
+        if !basis.is_complete() {
+            // what is a number in an ideal is one in every larger one
+            let number = basis.remainder(p, &mut Work { left: REMAINDER })?.as_constant().is_some();
+            return if number { Ok(1) } else { Err(NotCounted::OverLimit) };
+        }
+        let minimal = basis.minimal_polynomial(p, SOLUTIONS, work)?.ok_or(NotCounted::TooMany)?;
+        Ok(polynomial::distinct_roots(&f, &minimal))
+    };
+    Ok(wanted.iter().map(count).collect())
+}

@@ -1,0 +1,312 @@
+//! How many solutions an observable unknown has, against published verdicts, by hand, and by trying all points of a small field.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use obsdeg_core::system::{
+    NumberOfSolutions, SystemAnalysis, SystemOptions, analyze_system, json, model_file,
+};
+use obsdeg_exact::SplitMix64;
+
+use crate::models::models;
+
+fn counted(text: &str) -> SystemAnalysis {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    analyze_system(&model, SystemOptions::default(), None).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// The number of solutions by name, of those that are observable and decided.
+fn numbers(a: &SystemAnalysis) -> BTreeMap<&str, usize> {
+    let number = |n: &NumberOfSolutions| match n {
+        NumberOfSolutions::OneByExpression => Some(1),
+        NumberOfSolutions::Counted(k) => Some(*k),
+        NumberOfSolutions::Undecided(_) => None,
+    };
+    a.quantities
+        .iter()
+        .filter_map(|q| Some((q.name.as_str(), number(q.number_of_solutions.as_ref()?)?)))
+        .collect()
+}
+
+/// What is published as global has one solution, what is local has several; all of it is decided.
+#[test]
+fn no_contradiction_with_published_verdicts() {
+    let (mut decided, mut open) = (0, Vec::new());
+    for (name, reference, text) in models() {
+        let Some(published) = reference["expected_global_published"].as_object() else { continue };
+        let model = json::read(&text).expect("a model");
+        let a = analyze_system(&model, SystemOptions::default(), None).expect("judged");
+        let numbers = numbers(&a);
+        for (unknown, verdict) in published {
+            let observable = a.quantities.iter().any(|q| q.name == *unknown && q.degree.is_some());
+            match (verdict.as_str().expect("a word"), numbers.get(unknown.as_str())) {
+                ("non", found) => assert!(!observable && found.is_none(), "{name}: {unknown}"),
+                ("global", Some(1)) | ("local", Some(2..)) => decided += 1,
+                (_, None) => open.push(format!("{name}: {unknown}")),
+                (verdict, found) => panic!("{name}: {unknown} is {verdict}, found {found:?}"),
+            }
+        }
+    }
+    assert_eq!((decided, open), (57, Vec::new()));
+}
+
+/// By hand. Complex solutions are counted: p^3 has three.
+#[test]
+fn numbers_by_hand() {
+    let of = |parameters: &[&str], outputs: &[&str]| {
+        let list = |names: &[&str]| names.iter().map(|p| format!("{p} = {{}}\n")).collect::<String>();
+        let y: String = outputs.iter().enumerate().map(|(i, y)| format!("y{i} = \"{y}\"\n")).collect();
+        let text = format!(
+            "name = \"m\"\n[states]\nx = \"-x\"\n[parameters]\n{}[outputs]\nz = \"x\"\n{y}",
+            list(parameters)
+        );
+        let a = counted(&text);
+        assert!(a.quantities.iter().all(|q| q.degree.is_none() == q.number_of_solutions.is_none()), "{a:?}");
+        numbers(&a).into_iter().filter(|n| n.0 != "x").map(|(n, k)| (n.to_string(), k)).collect::<Vec<_>>()
+    };
+    let is = |found: Vec<(String, usize)>, expected: &[(&str, usize)]| {
+        let expected: Vec<(String, usize)> = expected.iter().map(|(n, k)| (n.to_string(), *k)).collect();
+        assert_eq!(found, expected);
+    };
+    is(of(&["p"], &["p"]), &[("p", 1)]);
+    is(of(&["p"], &["p^2 + p"]), &[("p", 2)]);
+    is(of(&["p"], &["p^3"]), &[("p", 3)]);
+    is(of(&["p"], &["p^3", "p^2"]), &[("p", 1)]);
+    is(of(&["p"], &["p^4 - p", "p^6"]), &[("p", 1)]);
+    is(of(&["p", "q"], &["p + q", "p*q"]), &[("p", 2), ("q", 2)]);
+    is(of(&["p", "q", "r"], &["p + q + r", "p*q + q*r + r*p", "p*q*r"]), &[("p", 3), ("q", 3), ("r", 3)]);
+    // a sign that two share, a sign of each
+    is(of(&["p", "q"], &["p^2", "p*q"]), &[("p", 2), ("q", 2)]);
+    is(of(&["p", "q", "r"], &["p^2", "q^2", "p*q", "r^3 + p"]), &[("p", 2), ("q", 2), ("r", 6)]);
+    // fractions: p + 1/p; what vanishes below is no solution ((p-1)(p-q) = 0 has p = 1)
+    is(of(&["p"], &["p + 1/p"]), &[("p", 2)]);
+    is(of(&["p"], &["(p^2 - p)/(p - 1)"]), &[("p", 1)]);
+    is(of(&["p", "q"], &["(p^2 - p)/(p - q)", "q"]), &[("p", 2), ("q", 1)]);
+    // what a symmetry moves has no number, and does not spoil those of others
+    is(of(&["p", "q", "r"], &["p*q", "r^2 + p*q*r"]), &[("r", 2)]);
+    is(of(&["p", "q", "r"], &["p*q^2", "p*q^2*r"]), &[("r", 1)]);
+}
+
+/// Two compartments that may be swapped, and a third that may not; with states known or not.
+#[test]
+fn numbers_of_systems() {
+    let twins = "name = \"twins\"\nparameters = [\"a\", \"b\"]\n[states]\nu = \"-a*u\"\nv = \"-b*v\"\n[outputs]\ny = \"u + v\"\n";
+    let two = counted(twins);
+    assert_eq!(numbers(&two), BTreeMap::from([("u", 2), ("v", 2), ("a", 2), ("b", 2)]));
+    let three = twins.replace("[outputs]\ny = \"u + v\"", "w = \"-(a + b)*w\"\n[outputs]\ny = \"u + v + w\"");
+    // the three rates are a, b, a + b: only a and b can change places, as -1 has no use at generic rates
+    assert_eq!(numbers(&counted(&three)), BTreeMap::from([("u", 2), ("v", 2), ("w", 1), ("a", 2), ("b", 2)]));
+    // each seen once more
+    let told = twins.replace("[outputs]\n", "[outputs]\nz = \"a^2\"\n");
+    assert_eq!(numbers(&counted(&told)), BTreeMap::from([("u", 1), ("v", 1), ("a", 1), ("b", 1)]));
+    // in two experiments with the same rates all of it is swapped at once
+    let again = counted(&format!("experiments = 2\n{twins}"));
+    assert_eq!(numbers(&again).values().copied().collect::<Vec<_>>(), [2; 6]);
+    // a known jump of u tells them apart, and so does a constraint; one that is the same for both leaves it open
+    let jump = counted(&format!("{twins}[[segment]]\n[[segment]]\ncarry = {{u = \"u + 1\"}}\n"));
+    assert_eq!(numbers(&jump).values().copied().collect::<Vec<_>>(), [1; 4]);
+    let constrained =
+        |holds: &str| counted(&twins.replace("[states]", &format!("constraints = [\"{holds}\"]\n[states]")));
+    assert_eq!(numbers(&constrained("u - 2*v = 1")).values().copied().collect::<Vec<_>>(), [1; 4]);
+    assert_eq!(numbers(&constrained("u + v = 1")), BTreeMap::new());
+    // an unknown input that is constant, one that is a ramp
+    let pushed = "name = \"pushed\"\nparameters = [\"a\"]\nunknown_inputs = {w = \"constant\"}\n[states]\nx = \"-a*x + w^2\"\n[outputs]\ny = \"x\"\n";
+    assert_eq!(numbers(&counted(pushed)), BTreeMap::from([("a", 1), ("w", 2), ("x", 1)]));
+}
+
+/// Where derivatives have no proven end, more than one solution may become fewer: it is not said.
+#[test]
+fn special_starts_leave_it_open() {
+    let text = |start: &str| {
+        format!(
+            "name = \"s\"\nparameters = [\"a\", \"b\"]\n[states]\nx = {{equation = \"a^2 + b*x\"{start}}}\n[outputs]\ny = \"x\"\n"
+        )
+    };
+    assert_eq!(numbers(&counted(&text(""))), BTreeMap::from([("a", 2), ("b", 1), ("x", 1)]));
+    let known = counted(&text(", initial = 0"));
+    assert_eq!(numbers(&known), BTreeMap::from([("b", 1)]));
+    let a = known.quantities.iter().find(|q| q.name == "a").expect("a");
+    assert!(
+        matches!(&a.number_of_solutions, Some(NumberOfSolutions::Undecided(r)) if r.contains("not generic")),
+        "{a:?}"
+    );
+    // functions and work
+    let wave =
+        counted("name = \"f\"\nparameters = [\"a\"]\n[states]\nx = \"a*sin(x)\"\n[outputs]\ny = \"x\"\n");
+    let a = wave.quantities.iter().find(|q| q.name == "a").expect("a");
+    assert!(
+        matches!(&a.number_of_solutions, Some(NumberOfSolutions::Undecided(r)) if r.contains("not rational"))
+    );
+    let model = model_file::read(&text("")).expect("a model");
+    let options = SystemOptions { count_limit: 0, ..SystemOptions::default() };
+    let none = analyze_system(&model, options, None).expect("judged");
+    assert!(numbers(&none).is_empty() && none.counting_order.is_none());
+}
+
+/// A polynomial with small coefficients: `(coefficient, exponents)`.
+type Terms = Vec<(i64, Vec<u32>)>;
+
+/// A system over the field of `Q` elements, in unknowns of which the first are states.
+struct Tiny {
+    rates: Vec<Terms>,
+    outputs: Vec<Terms>,
+    unknowns: usize,
+}
+
+/// Larger than any order, so that it can be divided by.
+const Q: i64 = 37;
+
+impl Tiny {
+    fn draw(rng: &mut SplitMix64) -> Self {
+        let unknowns = 2 + rng.below(2) as usize;
+        let states = 1 + rng.below(2) as usize;
+        let mut terms = |count: u64, degree: u64| -> Terms {
+            let term = |rng: &mut SplitMix64| {
+                let mut exponents = vec![0; unknowns];
+                for _ in 0..1 + rng.below(degree) {
+                    exponents[rng.below(unknowns as u64) as usize] += 1;
+                }
+                ([-2, -1, 1, 2, 3][rng.below(5) as usize], exponents)
+            };
+            (0..1 + rng.below(count)).map(|_| term(rng)).collect()
+        };
+        let rates = (0..states).map(|_| terms(2, 2)).collect();
+        let outputs = (0..1 + states % 2).map(|_| terms(2, 3)).collect();
+        Self { rates, outputs, unknowns }
+    }
+
+    fn name(&self, i: usize) -> String {
+        if i < self.rates.len() { format!("x{i}") } else { format!("p{i}") }
+    }
+
+    fn text(&self) -> String {
+        let formula = |terms: &Terms| {
+            let term = |(c, exponents): &(i64, Vec<u32>)| {
+                let powers = exponents.iter().enumerate().filter(|e| *e.1 > 0);
+                let powers: Vec<String> = powers.map(|(i, e)| format!("{}^{e}", self.name(i))).collect();
+                format!("({c})*{}", powers.join("*"))
+            };
+            terms.iter().map(term).collect::<Vec<_>>().join(" + ")
+        };
+        let states: String =
+            self.rates.iter().enumerate().map(|(i, r)| format!("x{i} = \"{}\"\n", formula(r))).collect();
+        let parameters: String =
+            (self.rates.len()..self.unknowns).map(|i| format!("{} = {{}}\n", self.name(i))).collect();
+        let outputs: String =
+            self.outputs.iter().enumerate().map(|(i, y)| format!("y{i} = \"{}\"\n", formula(y))).collect();
+        format!("name = \"tiny\"\n[states]\n{states}[parameters]\n{parameters}[outputs]\n{outputs}")
+    }
+
+    /// Taylor coefficients of the outputs from a point, up to an order.
+    fn outputs(&self, point: &[i64], order: usize) -> Vec<i64> {
+        let mut series: Vec<Vec<i64>> = point.iter().map(|&x| vec![x]).collect();
+        let coefficient = |terms: &Terms, series: &[Vec<i64>], k: usize| {
+            let mut sum = 0;
+            for (c, exponents) in terms {
+                let mut product = vec![0; k + 1];
+                product[0] = c.rem_euclid(Q);
+                for (x, &e) in series.iter().zip(exponents) {
+                    for _ in 0..e {
+                        let mut next = vec![0; k + 1];
+                        for (i, a) in product.iter().enumerate() {
+                            for (j, b) in x.iter().enumerate().take(k + 1 - i) {
+                                next[i + j] = (next[i + j] + a * b) % Q;
+                            }
+                        }
+                        product = next;
+                    }
+                }
+                sum = (sum + product[k]) % Q;
+            }
+            sum
+        };
+        let inverse = |k: i64| (1..Q).find(|x| x * k % Q == 1).expect("a field");
+        let mut out = Vec::new();
+        for k in 0..=order {
+            if k > 0 {
+                let next: Vec<i64> = self
+                    .rates
+                    .iter()
+                    .map(|r| coefficient(r, &series, k - 1) * inverse(k as i64) % Q)
+                    .collect();
+                series.iter_mut().zip(next).for_each(|(x, c)| x.push(c));
+            }
+            out.extend(self.outputs.iter().map(|y| coefficient(y, &series, k)));
+        }
+        out
+    }
+}
+
+/// All points of a field of 37 elements are sorted by their outputs: of an unknown with k values hardly a point has more with it,
+/// and, for k up to 3, enough have all of them (all but special ones of 1 and 2, half of 3 by the density of primes that split).
+#[test]
+fn counts_are_those_of_all_points_of_a_small_field() {
+    let mut rng = SplitMix64::new(20);
+    let mut seen = BTreeMap::new();
+    for _ in 0..60 {
+        let tiny = Tiny::draw(&mut rng);
+        let a = counted(&tiny.text());
+        let numbers = numbers(&a);
+        if numbers.is_empty() {
+            continue;
+        }
+        let order = a.counting_order.expect("counted");
+        let mut fibres: BTreeMap<Vec<i64>, Vec<Vec<i64>>> = BTreeMap::new();
+        let all = Q.pow(tiny.unknowns as u32);
+        for at in 0..all {
+            let point: Vec<i64> = (0..tiny.unknowns as u32).map(|i| at / Q.pow(i) % Q).collect();
+            fibres.entry(tiny.outputs(&point, order)).or_default().push(point);
+        }
+        for i in 0..tiny.unknowns {
+            let Some(&k) = numbers.get(tiny.name(i).as_str()) else { continue };
+            *seen.entry(k).or_insert(0) += 1;
+            let (mut more, mut just) = (0, 0);
+            for points in fibres.values() {
+                let values = points.iter().map(|p| p[i]).collect::<BTreeSet<i64>>().len();
+                more += if values > k { points.len() } else { 0 };
+                just += if values == k { points.len() } else { 0 };
+            }
+            let share = |n: usize| n as f64 / all as f64;
+            let enough = [0.0, 0.7, 0.7, 0.35].get(k).copied().unwrap_or(0.0);
+            assert!(
+                share(more) < 0.25 && share(just) > enough,
+                "{}: {k} values of {}; more at {:.2}, all at {:.2} of the points",
+                tiny.text(),
+                tiny.name(i),
+                share(more),
+                share(just)
+            );
+        }
+    }
+    // enough of each kind
+    assert!([1, 2, 3].iter().all(|k| seen.get(k).is_some_and(|n| *n >= 5)), "{seen:?}");
+}
+
+/// An expression of an unknown is one solution only where all that it rests on has one.
+#[cfg(feature = "symbolica")]
+#[test]
+fn expressions_that_rest_on_what_is_local() {
+    let of = |name: &str| {
+        let file = format!("{}/tests/data/models/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        crate::program::json(&["analyze", "--format", "json", "--model", &file])
+    };
+    let number = |answer: &serde_json::Value, name: &str| {
+        let list = answer["quantities"].as_array().expect("quantities").clone();
+        let q = list.into_iter().find(|q| q["name"] == name).expect("an unknown");
+        (q["number_of_solutions"].clone(), q["solution"].is_string())
+    };
+    // S and E have a second solution, in which a and nu change places
+    let seir = of("seir_known_population");
+    for name in ["S", "E", "a", "nu"] {
+        assert_eq!(number(&seir, name).0, serde_json::json!({"counted": 2}), "{name}");
+    }
+    assert!(number(&seir, "S").1 && number(&seir, "E").1, "{seir}");
+    assert_eq!(number(&seir, "In"), ("one_by_expression".into(), true));
+    // beyond its degree an unknown may have an expression: a, c, d have degree 4
+    let prey = of("sian_lotka_volterra");
+    for name in ["x1", "a", "c", "d"] {
+        assert_eq!(number(&prey, name), ("one_by_expression".into(), true), "{name}");
+    }
+    let file = format!("{}/tests/data/models/seir_known_population.json", env!("CARGO_MANIFEST_DIR"));
+    let table = crate::program::stdout(&crate::program::run(&["analyze", "--model", &file]));
+    assert!(table.contains("2 solutions; in terms of others: see below"), "{table}");
+}
