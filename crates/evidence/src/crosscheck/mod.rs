@@ -250,7 +250,7 @@ fn against(
 fn filter_method() -> String {
     format!(
         "b: taken in doubles; what fails is not resolvable where a direction that is seen has, by many digits, a sigma of more than {} of the \
-         prior's; c: where rounding may make a tenth of the limit; f: where the filter is off by less than {OFF_DEG} deg, \
+         prior's, or where a sigma is below what rounding an attitude makes of the widest psi or drift; c: where rounding may make a tenth of the limit; f: where the filter is off by less than {OFF_DEG} deg, \
          or where what it cannot explain of the truths drawn need not show in {MANY_RUNS} runs",
         structure::WEAK
     )

@@ -84,12 +84,13 @@ pub(super) fn structure(
     let same = truth.platform.names() == filter.platform.names();
     let mut quantities = quantities(truth, &names, prediction, &functionals, &shown, &inflation.ratios);
     let mut null_space = null_space;
-    if weak {
-        let correlations = null_space.iter_mut().filter_map(|v| v.correlation.as_mut());
-        let checks = quantities.iter_mut().map(|q| &mut q.inflation).chain(correlations);
-        for check in checks.filter(|c| c.fails()) {
-            check.outcome = Agreement::NotResolvable;
-        }
+    let lost = functionals.iter().scan(inflation.lost.iter(), |lost, f| {
+        Some(f.is_some() && lost.next().is_some_and(|l| *l))
+    });
+    let inflations = quantities.iter_mut().map(|q| &mut q.inflation).zip(lost);
+    let correlations = null_space.iter_mut().filter_map(|v| v.correlation.as_mut()).map(|c| (c, false));
+    for (check, _) in inflations.chain(correlations).filter(|(c, lost)| c.fails() && (weak || *lost)) {
+        check.outcome = Agreement::NotResolvable;
     }
     Ok(Structure {
         quantities,
@@ -208,6 +209,8 @@ fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Opti
 struct Inflation {
     /// Of every functional: the factor on sigma.
     ratios: Vec<f64>,
+    /// Whether its sigma is lost in what rounding of attitudes makes of what is not seen.
+    lost: Vec<bool>,
     /// Correlation under the diffuse prior.
     correlation: DMatrix<f64>,
     /// Standard deviations of that.
@@ -224,11 +227,20 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let ratio = |c: &Combination| Ok((large.variance(c)? / small.variance(c)?).sqrt());
     let ratios = functionals.iter().map(ratio).collect::<Result<_, obsdeg_ekf::EkfError>>()?;
     let n = plan.unknowns();
+    let sigma = small.sigmas();
+    let is_psi = |i: usize| plan.platform.units()[i] == "rad";
+    let largest = |psi: bool| (0..n).filter(|&i| is_psi(i) == psi).map(|i| sigma[i]).fold(0.0, f64::max);
+    let lost = |c: &Combination| {
+        let coefficient = c.iter().map(|(_, k)| k.abs()).fold(0.0, f64::max);
+        let rounding = f64::EPSILON * coefficient * c.first().map_or(0.0, |&(i, _)| largest(is_psi(i)));
+        Ok(small.variance(c)?.sqrt() < rounding)
+    };
+    let lost = functionals.iter().map(lost).collect::<Result<_, obsdeg_ekf::EkfError>>()?;
     let small = small.matrix();
-    let sigma: Vec<f64> = (0..n).map(|i| small[(i, i)].sqrt()).collect();
     Ok(Inflation {
         prior,
         ratios,
+        lost,
         correlation: DMatrix::from_fn(n, n, |i, j| small[(i, j)] / (sigma[i] * sigma[j])),
     })
 }
