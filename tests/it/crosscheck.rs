@@ -566,11 +566,11 @@ fn wrong_verdicts_are_caught() {
         assert!(c.passed && c.counts.not_resolvable == 0, "{:?}", c.disagreements);
         let mut wrong: Vec<(String, Change)> = Vec::new();
         let mut add = |what: String, change: Change| wrong.push((what, change));
-        // of every kind of unknown the first: the others are judged alike
+        // of the second scheme the first of every kind: the others are judged alike
         let kind = |u: &PredictedUnknown| (u.status, u.degree, u.accuracy_order, u.order_at_end);
-        let firsts = (0..right.unknowns.len())
-            .filter(|&i| right.unknowns[..i].iter().all(|u| kind(u) != kind(&right.unknowns[i])));
-        for (i, u) in firsts.map(|i| (i, &right.unknowns[i])) {
+        let is_first = |i: usize| right.unknowns[..i].iter().all(|u| kind(u) != kind(&right.unknowns[i]));
+        let chosen = (0..right.unknowns.len()).filter(|&i| s.carry == Carry::Platform || is_first(i));
+        for (i, u) in chosen.map(|i| (i, &right.unknowns[i])) {
             if u.degree.is_some() {
                 add(
                     format!("degree {i} + 1"),
@@ -697,6 +697,21 @@ fn wrong_verdicts_are_caught() {
                 );
             }
         }
+        add("nothing unseen with dwells".into(), Box::new(|p| p.null_space.clear()));
+        for i in 0..right.null_space.len() {
+            add(format!("without {i} with dwells"), Box::new(move |p| drop(p.null_space.remove(i))));
+            add(
+                format!("{i} twice with dwells"),
+                Box::new(move |p| {
+                    let last = p.null_space.len() - 1;
+                    let other = if i == last { 0 } else { last };
+                    p.null_space[other] = p.null_space[i].clone();
+                    if last == 0 {
+                        p.null_space.push(p.null_space[0].clone());
+                    }
+                }),
+            );
+        }
         add("rank + 1".into(), Box::new(|p| p.rank += 1));
         for k in 0..right.rank_profile.len() {
             add(format!("dim V_{k}"), Box::new(move |p| p.rank_profile[k] += 1));
@@ -715,16 +730,31 @@ fn wrong_verdicts_are_caught() {
     }
 }
 
-/// The verdicts on another carry, another mounting (signs of S_i), other angles and another latitude are caught.
+/// The verdicts on another carry, another mounting (signs of S_i: two at a time, since axes stay right-handed), other angles and another
+/// latitude are caught.
 #[test]
 fn verdicts_on_something_else_are_caught() {
     let s = scheme(&["0,0,0", "90,0,0", "0,90,0"], Carry::Platform);
-    let axis = |text: &str| text.parse().expect("an axis");
-    let mut geometry = s.geometry;
-    (geometry.X.O, geometry.X.S) = (axis("+z"), axis("-y"));
+    let mounted = |gyro: usize, kept: usize| {
+        let mut geometry = s.geometry;
+        let gyro = [&mut geometry.X, &mut geometry.Y, &mut geometry.Z].into_iter().nth(gyro).expect("a gyro");
+        let axes = [&mut gyro.I, &mut gyro.O, &mut gyro.S];
+        axes.into_iter().enumerate().filter(|(k, _)| *k != kept).for_each(|(_, a)| a.negative ^= true);
+        Scheme { geometry, ..s.clone() }
+    };
+    let mut mountings = 0;
+    for other in (0..9).map(|k| mounted(k / 3, k % 3)) {
+        let (wrong, right) = (predicted(&other), predicted(&s));
+        // what is the same to every word is no wrong verdict
+        if wrong != right {
+            let c = held(&wrong, &s);
+            assert!(!c.passed && !c.verdicts_agree, "{other:?}");
+            mountings += 1;
+        }
+    }
+    assert!(mountings >= 6, "{mountings}");
     for other in [
         Scheme { carry: Carry::Inertial, ..s.clone() },
-        Scheme { geometry, ..s.clone() },
         scheme(&["0,0,0", "90,0,0", "0,90,30"], Carry::Platform),
         Scheme { latitude: "90".parse().ok(), ..s.clone() },
     ] {

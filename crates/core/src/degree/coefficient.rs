@@ -338,6 +338,7 @@ mod tests {
             (&["sqrt(2)/2", "wU^2"], "sqrt(2)/2*wU^2"),
             (&["wU/wN"], "wU/wN"),
             (&["1/2*wU/wN", "w@p1"], "wU*w@p1/(2*wN)"),
+            (&["1/2", "wU/3"], "wU/(2*3)"),
             (&["1/2/cos(alpha)^2", "wN"], "wN/(2*cos(alpha)^2)"),
             (&["1/2/(cos(a)*sin(a))", "wN"], "wN/(2*cos(a)*sin(a))"),
             (&["(1+sqrt(3))/cos(a + b)/wN"], "(1+sqrt(3))/(cos(a + b)*wN)"),
@@ -403,6 +404,13 @@ mod tests {
         assert_eq!(of(&symbolic("-sin(a)+1")), list(false, &["(-sin(a)+1)"]));
         assert_eq!(of(&symbolic("sin(a-b)")), list(false, &["sin(a-b)"]));
         assert_eq!(of(&symbolic("1")), list(false, &[]));
+        // zero has no sign
+        assert_eq!(of(&radical([ZERO; 4], [0, 0])), list(false, &["0"]));
+        assert_eq!(of(&coefficient(0.0, [0, 0])), list(false, &["0"]));
+        // all digits where they are asked for
+        let third = coefficient(-1.0 / 3.0, [1, 0]);
+        assert_eq!(third.sign_and_factors(), list(true, &["0.333333", "wN"]));
+        assert_eq!(third.precise_sign_and_factors(), list(true, &["0.3333333333333333", "wN"]));
     }
 
     #[test]
@@ -430,6 +438,10 @@ mod tests {
     fn long_roots_become_decimals_together() {
         let long = radical([(1234, 987), (-4321, 789), (77777, 1234), (1, 98765)], [1, 0]);
         assert!(long.without_rates().to_string().len() > READABLE && long.is_unreadable());
+        // as long as may be
+        let limit =
+            radical([(-1_234_567_890_123_456_789, 9_123_456_789_012_345_678), ZERO, ZERO, ZERO], [0, 0]);
+        assert!(limit.to_string().len() == READABLE && !limit.is_unreadable(), "{limit}");
         let half = radical([(1, 2), ZERO, ZERO, ZERO], [0, 0]);
         assert!(!half.is_unreadable() && !coefficient(1.0, [0, 0]).is_unreadable());
         assert_eq!(readable(vec![half.clone()]), vec![half.clone()]);
@@ -451,6 +463,7 @@ mod tests {
         let zero = Image { value: 0, rates };
         assert_eq!(rates_between(&f, zero, zero), Some([0, 0]));
         assert_eq!(rates_between(&f, zero, Image { value: 1, rates }), None);
+        assert_eq!(rates_between(&f, Image { value: 1, rates }, zero), None);
         // the simplest comes first, up to the second power of each
         let all = candidate_rates();
         assert_eq!((all.len(), &all[..5]), (25, &[[0, 0], [1, 0], [0, 1], [0, -1], [-1, 0]][..]));

@@ -132,4 +132,21 @@ mod tests {
         let generic = claimed(&[["alpha", "0", "0"]], None);
         assert_eq!((generic.row_degree, generic.decisions), (3 + 18, 48));
     }
+
+    /// Position by position under reset carry, or all at once: the same degrees.
+    #[test]
+    fn degrees_alone_are_those_of_the_staircase() {
+        let angles = [["0", "0", "0"], ["90", "0", "0"], ["0", "90", "30"]];
+        for carry in Carry::ALL {
+            // the drift itself is of one position
+            for (unknowns, positions) in [(Unknowns::default(), 3), (Unknowns::Drift, 1)] {
+                let angles = angles[..positions].iter().map(|a| a.map(|x| x.parse().expect("an angle")));
+                let scheme = Scheme { carry, unknowns: unknowns.clone(), ..Scheme::of_angles(angles) };
+                let platform = Platform::new(scheme).expect("a scheme");
+                let all = judge(&platform, 1).expect("verdicts").degrees;
+                assert_eq!(degrees(&platform, 1).expect("degrees"), all, "{carry} {unknowns:?}");
+                assert!(all.rank() > 3);
+            }
+        }
+    }
 }

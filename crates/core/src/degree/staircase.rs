@@ -55,3 +55,23 @@ pub fn climb(
 pub fn partners(unknowns: usize, stairs: &[Echelon]) -> Vec<Vec<usize>> {
     stairs.last().map_or_else(|| vec![Vec::new(); unknowns], Echelon::companions)
 }
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_exact::Field;
+
+    use super::*;
+
+    #[test]
+    fn who_goes_with_whom() {
+        let f = Field::new((1 << 60) + 33);
+        let mut basis = Echelon::new(f, 4);
+        // x0 + x1 is seen, and x2; nothing is of x3
+        basis.insert(&[1, 1, 0, 0]);
+        basis.insert(&[0, 0, 1, 0]);
+        assert_eq!(partners(4, &[basis]), [vec![1], vec![0], vec![], vec![]]);
+        assert_eq!(partners(2, &[]), [vec![], vec![]] as [Vec<usize>; 2]);
+        let degrees = Degrees { rank_profile: vec![2, 5, 7], ..Degrees::default() };
+        assert_eq!((degrees.rank(), Degrees::default().rank()), (7, 0));
+    }
+}

@@ -65,3 +65,17 @@ pub struct Difference {
     /// Under the other one.
     pub there: Verdict,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_degree_says() {
+        let of = |degree, excited| Status::of(degree, excited).to_string();
+        assert_eq!(
+            [of(Some(2), true), of(None, true), of(None, false)],
+            ["observable", "inseparable", "not excited"]
+        );
+    }
+}

@@ -93,7 +93,7 @@ impl Latitude {
     }
 
     /// Whether `wN = 0`.
-    pub(crate) fn is_pole(self) -> bool {
+    pub fn is_pole(self) -> bool {
         self.nanodeg.abs() == 90_000_000_000
     }
 

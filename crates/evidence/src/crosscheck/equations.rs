@@ -54,3 +54,48 @@ pub(super) fn difference(
         outcome: Agreement::of(largest <= LIMIT),
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_core::model::{Carry, Scheme, parse_attitude};
+    use obsdeg_ekf::Transition;
+
+    use super::*;
+
+    /// Every sign of the blocks and of the outputs is held: one after the other is changed.
+    #[test]
+    fn a_sign_that_is_wrong_shows() {
+        let attitudes = || ["10,25,40", "130,-50,70"].map(|a| parse_attitude(a).expect("an attitude"));
+        for carry in Carry::ALL {
+            let conditions = Conditions::default();
+            let plan =
+                Plan::new(&Scheme { carry, ..Scheme::of_angles(attitudes()) }, &conditions).expect("a plan");
+            let holds = |plan: &Plan| {
+                difference(plan, &conditions).expect("numbers").expect("coefficients").outcome
+                    == Agreement::Agrees
+            };
+            assert!(holds(&plan), "{carry}");
+            let mut changed = 0;
+            for (k, stage) in plan.stages.iter().enumerate() {
+                let phi = stage.transition.matrix();
+                let entries = (0..phi.nrows()).flat_map(|i| (0..phi.ncols()).map(move |j| (i, j)));
+                for (i, j) in entries.filter(|&(i, j)| i != j && phi[(i, j)].abs() > 1e-6) {
+                    let (mut wrong, mut turned) = (plan.clone(), phi.clone());
+                    turned[(i, j)] *= -1.0;
+                    wrong.stages[k].transition = Transition::new(&turned).expect("finite");
+                    assert!(!holds(&wrong), "{carry}: Phi {i} {j}");
+                    changed += 1;
+                }
+                for (i, output) in stage.outputs.iter().enumerate() {
+                    for j in 0..output.h.len() {
+                        let mut wrong = plan.clone();
+                        wrong.stages[k].outputs[i].h[j].1 *= -1.0;
+                        assert!(!holds(&wrong), "{carry}: H {i} {j}");
+                        changed += 1;
+                    }
+                }
+            }
+            assert!(changed > 40, "{carry}: {changed}");
+        }
+    }
+}

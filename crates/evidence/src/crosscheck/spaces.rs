@@ -86,6 +86,36 @@ fn null_space(
     out
 }
 
+/// The directions that are not seen with dwells either: as many as `hidden`, independent; `partial` where others are known to be there.
+/// That each is not seen, the filter's information says.
+pub(super) fn with_dwells(
+    prediction: &Prediction,
+    hidden: Option<usize>,
+    partial: bool,
+    is_psi: &dyn Fn(usize) -> bool,
+) -> SpaceCheck {
+    let listed = prediction.null_space.len();
+    let columns: Vec<usize> = (0..prediction.unknowns.len()).collect();
+    let vectors = prediction.null_space.iter();
+    let rank = rank(vectors.map(|v| dense(v, &columns, is_psi, true)).collect());
+    let measured = |n: usize| match rank {
+        Some(r) => format!("{n} ({r} independent)"),
+        None => n.to_string(),
+    };
+    let outcome = match (hidden, rank) {
+        (Some(n), _) if listed > n || (listed < n && !partial) => Agreement::Disagrees,
+        (_, Some(r)) if r < listed => Agreement::Disagrees,
+        (Some(_), Some(_)) => Agreement::Agrees,
+        _ => Agreement::NotResolvable,
+    };
+    SpaceCheck {
+        what: "directions listed that are not seen with dwells either".into(),
+        predicted: format!("{listed}{}", if partial { " of all" } else { "" }),
+        measured: hidden.map(measured).unwrap_or_default(),
+        outcome,
+    }
+}
+
 /// The combinations: with the unknowns of degree up to k they span what is seen with k derivatives, and each adds
 /// a direction to those before it.
 fn combinations(

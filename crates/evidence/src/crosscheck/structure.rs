@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::{Carry, Dwell, Scheme, Unknowns};
+use obsdeg_core::model::{Carry, Dwell, Latitude, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
@@ -84,21 +84,26 @@ pub(super) fn structure(
     let same = truth.platform.names() == filter.platform.names();
     let mut quantities = quantities(truth, &names, prediction, &functionals, &shown, &inflation.ratios);
     let mut null_space = null_space;
-    let lost = functionals.iter().scan(inflation.lost.iter(), |lost, f| {
-        Some(f.is_some() && lost.next().is_some_and(|l| *l))
-    });
+    let lost = functionals
+        .iter()
+        .scan(inflation.lost.iter(), |lost, f| Some(f.is_some() && lost.next().is_some_and(|l| *l)));
     let inflations = quantities.iter_mut().map(|q| &mut q.inflation).zip(lost);
     let correlations = null_space.iter_mut().filter_map(|v| v.correlation.as_mut()).map(|c| (c, false));
     for (check, _) in inflations.chain(correlations).filter(|(c, lost)| c.fails() && (weak || *lost)) {
         check.outcome = Agreement::NotResolvable;
     }
+    // at a pole drift moves psi that nobody sees, and directions without numbers are not listed
+    let pole = truth.platform.scheme().latitude.is_some_and(Latitude::is_pole);
+    let partial = pole || prediction.unseen_by_derivatives.is_none();
+    let hidden = shown.rank().map(|rank| filter.unknowns() - rank);
+    let mut spaces = Vec::new();
+    if same {
+        spaces.extend(spaces::spaces(prediction, shown.derivatives.as_ref(), &is_psi));
+        spaces.push(spaces::with_dwells(prediction, hidden, partial, &is_psi));
+    }
     Ok(Structure {
         quantities,
-        spaces: if same {
-            spaces::spaces(prediction, shown.derivatives.as_ref(), &is_psi)
-        } else {
-            Vec::new()
-        },
+        spaces,
         null_space,
         defect,
         slopes: curves(truth, prediction, &names, &functionals, &slopes(filter_scheme, conditions, &known)),
