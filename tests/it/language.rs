@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use obsdeg_core::model::expression::{Components, Shape, Shapes, evaluate_f64, parse_components};
 use obsdeg_core::system::{Judgement, ModelError, SystemModel, judge, model_file};
+use obsdeg_evidence::system::{crosscheck_system, simulate_system};
 use proptest::prelude::*;
 
 fn shapes() -> Shapes {
@@ -478,4 +479,136 @@ fn constraints_that_cannot_hold_are_named() {
         assert!(e.message.contains(message) && e.what.starts_with("the constraint"), "{constraints}: {e}");
         assert!(e.span.is_some(), "{constraints}: {e}");
     }
+}
+
+/// Experiments with constants and inputs of their own against one system in which each has states of its own.
+#[test]
+fn experiments_of_their_own() {
+    let several = judged(
+        "name='s'\nparameters=['k', 'b']\nknown_inputs={u='generic', 'z[2]'='generic'}\n[constants]\nm='2*d'\nd=1\n[definitions]\nforce='b*u*m'\n\
+         [states]\nx='-k*x + force + z[1]*z[2]'\n[outputs]\ny='d*x'\n[[experiment]]\nconstants={d=3}\nknown_inputs={u={function='t + d'}, z='constant'}\n\
+         [[experiment]]\nknown_inputs={u='constant'}\n[[experiment]]\nconstants={d='1/2'}\nknown_inputs={z={function=['t', 'd']}}\n",
+    );
+    let one = judged(
+        "name='o'\nparameters=['k', 'b']\nknown_inputs={u2='constant', u3='generic', z1='constant', z2='generic', z3='generic'}\n\
+         [states]\nx1='-k*x1 + b*(t + 3)*6 + z1'\nx2='-k*x2 + b*u2*2 + z2'\nx3='-k*x3 + b*u3 + t/2'\n[outputs]\ny1='3*x1'\ny2='x2'\ny3='x3/2'\n",
+    );
+    let names: Vec<String> = degrees(&several).into_iter().map(|d| d.0).collect();
+    assert_eq!(names, ["x@1", "x@2", "x@3", "k", "b"]);
+    let plain = |j: &Judgement| j.findings.degrees.degree.clone();
+    assert_eq!(plain(&several), plain(&one));
+    assert_eq!(several.findings.degrees.rank_profile[..2], one.findings.degrees.rank_profile[..2]);
+    // what tells them apart is that they differ
+    let doses = |own: &str| {
+        judged(&format!(
+            "name='d'\nparameters=['a', 'b']\n[constants]\nd=1\n[states]\nx='a + b*d'\n[outputs]\ny='x'\n{own}"
+        ))
+    };
+    let same = doses("[[experiment]]\n[[experiment]]\n");
+    let two = doses("[[experiment]]\n[[experiment]]\nconstants={d=2}\n");
+    assert_eq!((same.findings.degrees.rank(), two.findings.degrees.rank()), (3, 4));
+    assert_eq!(degrees(&two)[2], ("a".to_string(), Some(1)));
+}
+
+#[test]
+fn experiments_that_are_wrong_are_named() {
+    let error = |own: &str| {
+        let text = format!("name='d'\n{own}");
+        model_file::read(&text).and_then(|m| judge(&m, 1, None)).expect_err(own).to_string()
+    };
+    let rest = "parameters=['a']\nknown_inputs={u='generic'}\n[constants]\nd=1\ne='2*d'\n[states]\nx='a + u*d'\n[outputs]\ny='x'\n";
+    for (own, message) in [
+        ("[[experiment]]\nconstants={c=1}", "the constant c of experiment 1: `c` is no known constant"),
+        (
+            "[[experiment]]\n[[experiment]]\nconstants={a=1}",
+            "the constant a of experiment 2: `a` is no known constant",
+        ),
+        ("[[experiment]]\nconstants={d='a'}", "the constant d of experiment 1: `a` is not known here"),
+        ("[[experiment]]\nconstants={d='e'}", "the constant d of experiment 1: `e` is not known here"),
+        ("[[experiment]]\nconstants={d=[1, 2]}", "found a vector of 2; expected a scalar"),
+        (
+            "[[experiment]]\nknown_inputs={v='generic'}",
+            "`v` is no known input; expected one of [known_inputs]; did you mean `u`?",
+        ),
+        ("[[experiment]]\nknown_inputs={u='wild'}", "the known input u: expected \"generic\", \"constant\""),
+        ("[[experiment]]\nknown_inputs={u={function='sin(x)'}}", "`x` is not known here"),
+        ("[[experiment]]\nstates={x=1}", "unknown key `states`"),
+        ("[[experiment]]\n[[experiment]]\n[simulation]\nvalues={'x@3'=1}", "`x@3` is not known here"),
+    ] {
+        assert!(
+            error(&format!("{rest}{own}")).contains(message),
+            "{own}: {}",
+            error(&format!("{rest}{own}"))
+        );
+    }
+    let counted = error(&format!("experiments=3\n{rest}[[experiment]]\n[[experiment]]"));
+    assert!(counted.contains("3, and 2 [[experiment]]; expected as many, or no number"), "{counted}");
+    let many = error(&format!("{rest}{}", "[[experiment]]\n".repeat(21)));
+    assert!(many.contains("21 [[experiment]]; expected at most 20"), "{many}");
+}
+
+/// The information of several experiments, with segments, confirms the verdicts; inputs that are the same where they should differ refute them.
+#[test]
+fn evidence_of_several_experiments() {
+    let text = |second: &str| {
+        format!(
+            "name='e'\nparameters=['a', 'b']\nknown_inputs={{u='constant'}}\n[states]\nx='-a*x + b*u'\nc='-c'\n[outputs]\ny='x'\nz='c'\n[[experiment]]\n[[experiment]]\n\
+             [simulation]\nduration=2\nstep=0.05\nnoise={{y=0.01, z=0.01}}\nvalues={{x=1, 'x@2'=0.3, c=0.1, 'c@2'=-0.2, a=0.7, b=1.5}}\ninputs={{u='1', 'u@2'='{second}'}}\n"
+        )
+    };
+    let model = |second: &str| read(&text(second));
+    let e = crosscheck_system(&model("3"), 1).expect("evidence");
+    assert!(e.passed && e.orders.measured == e.orders.of && e.orders.of >= 5, "{e:?}");
+    let (run, traces) = simulate_system(&model("3"), 1).expect("a run");
+    assert!(run.consistency.consistent, "{run:?}");
+    assert_eq!(traces.names, ["x@1", "c@1", "x@2", "c@2", "a", "b"]);
+    assert_eq!((traces.time.len(), traces.time.last().copied()), (81, Some(4.0)));
+    // a state of the other experiment stands still
+    let x2 = &traces.series[2].truth;
+    assert!(x2[..=40].iter().all(|x| *x == 0.3) && x2[80] != 0.3);
+    for estimate in run.estimates.iter().filter(|e| e.is_determined()) {
+        assert!(
+            estimate.error_over_sigma.abs() < 4.0 && estimate.sigma < estimate.prior_sigma,
+            "{estimate:?}"
+        );
+    }
+    // segments within experiments: the time of each begins anew
+    let jumps = text("3").replace(
+        "[[experiment]]\n[[experiment]]\n",
+        "[[experiment]]\n[[experiment]]\n[[segment]]\n[[segment]]\ncarry={x='2*x'}\n",
+    );
+    let e = crosscheck_system(&read(&jumps), 1).expect("evidence");
+    assert!(e.passed && e.checks > 5, "{e:?}");
+    assert_eq!(simulate_system(&read(&jumps), 1).expect("a run").1.position.last(), Some(&3));
+    // one start and one input twice: nothing new
+    let twice = text("1").replace("'x@2'=0.3", "'x@2'=1").replace("'c@2'=-0.2", "'c@2'=0.1");
+    let refuted = crosscheck_system(&read(&twice), 1).expect("evidence");
+    assert!(!refuted.passed, "{refuted:?}");
+}
+
+/// A unit quaternion in filter and information: consistent, of the exact rank, and values off the sphere are refused.
+#[test]
+fn evidence_on_constraints() {
+    let text = std::fs::read_to_string(
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/gyro_and_field.toml"),
+    )
+    .expect("readable");
+    let e = crosscheck_system(&read(&text), 1).expect("evidence");
+    assert!(e.passed && e.orders.measured > 3, "{e:?}");
+    assert_eq!((e.defect.predicted, e.defect.measured), (0, 0));
+    let (run, _) = simulate_system(&read(&text), 1).expect("a run");
+    assert!(run.consistency.consistent, "{run:?}");
+    let q: Vec<f64> = run.estimates.iter().take(4).map(|e| e.estimate).collect();
+    assert!((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-3, "{q:?}");
+    let off = text.replace("q = [0.5, 0.5, 0.5, 0.5]", "q = [0.5, 0.5, 0.5, 0.6]");
+    let error = simulate_system(&read(&off), 1).map(|r| r.0).expect_err("off the sphere").to_string();
+    assert!(
+        error.contains("the constraint norm(q) = 1: the values under [simulation.values] miss it by 1.1e-1"),
+        "{error}"
+    );
+    // without the constraint its norm is an unknown more
+    let free = text.replace("constraints = [\"norm(q) = 1\"]\n", "");
+    assert_ne!(free, text);
+    let e = crosscheck_system(&read(&free), 1).expect("evidence");
+    assert!(e.passed, "{e:?}");
 }

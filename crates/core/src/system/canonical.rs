@@ -27,14 +27,14 @@ impl SystemModel {
         }
         count(&mut out, self.parameters.len());
         out.extend(self.parameters.iter().map(|p| p.name.clone()));
+        let kind_of = |input: &KnownInput| match input {
+            KnownInput::Generic => "generic".into(),
+            KnownInput::Polynomial(degree) => format!("polynomial {degree}"),
+            KnownInput::Function(f) => format!("={}", text(f)),
+        };
         count(&mut out, self.known_inputs.len());
         for (named, input) in &self.known_inputs {
-            let kind = match input {
-                KnownInput::Generic => "generic".into(),
-                KnownInput::Polynomial(degree) => format!("polynomial {degree}"),
-                KnownInput::Function(f) => format!("={}", text(f)),
-            };
-            out.extend([named.name.clone(), kind]);
+            out.extend([named.name.clone(), kind_of(input)]);
         }
         count(&mut out, self.unknown_inputs.len());
         for (named, degree) in &self.unknown_inputs {
@@ -64,6 +64,12 @@ impl SystemModel {
             formulas(&mut out, &mut s.carry.iter().map(|(name, f)| (name, f)));
         }
         out.extend(self.combinations.iter().map(text));
+        for own in &self.own {
+            out.push("experiment".into());
+            formulas(&mut out, &mut own.constants.iter().map(|(name, f)| (name, f)));
+            count(&mut out, own.known_inputs.len());
+            out.extend(own.known_inputs.iter().flat_map(|(name, input)| [name.clone(), kind_of(input)]));
+        }
         if !self.constraints.is_empty() {
             out.push("constraints".into());
             out.extend(self.constraints.iter().map(text));

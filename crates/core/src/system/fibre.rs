@@ -243,7 +243,8 @@ impl Equations<'_> {
         if k == 0 {
             return self.runs[r].initial[s].clone();
         }
-        let rate = self.runs[r].nodes[self.compiled.rates[s]][k - 1].scaled(&f, f.inv(f.from_u64(k as u64)));
+        let node = self.compiled.rates(self.runs[r].experiment)[s];
+        let rate = self.runs[r].nodes[node][k - 1].scaled(&f, f.inv(f.from_u64(k as u64)));
         if rate.degree() <= 1 {
             return rate;
         }
@@ -320,8 +321,9 @@ fn reached(compiled: &Compiled, from: &[usize], follow: impl Fn(usize) -> Option
 /// How many derivatives of the outputs it takes until a state is in them at all, plus [`STATE`]: coefficients of a state weigh as
 /// much as the products that they are solved from.
 fn state_weights(compiled: &Compiled) -> Vec<u32> {
-    let mut weights = vec![0; compiled.rates.len()];
-    let mut from = compiled.outputs.clone();
+    let mut weights = vec![0; compiled.rates(0).len()];
+    let experiments = 0..compiled.experiments.len();
+    let mut from: Vec<usize> = experiments.clone().flat_map(|e| compiled.outputs(e)).copied().collect();
     for weight in STATE.. {
         let nodes = reached(compiled, &from, |_| None);
         from.clear();
@@ -331,7 +333,7 @@ fn state_weights(compiled: &Compiled) -> Vec<u32> {
                 && weights[s] == 0
             {
                 weights[s] = weight;
-                from.push(compiled.rates[s]);
+                from.extend(experiments.clone().map(|e| compiled.rates(e)[s]));
             }
         }
         if from.is_empty() {
@@ -412,11 +414,14 @@ fn equations<'a>(
             initial = out.runs[r].initial.clone();
         }
     }
-    let needed = reached(compiled, &compiled.outputs, |s| Some(compiled.rates[s]));
+    let needed: Vec<Vec<bool>> = (0..experiments)
+        .map(|e| reached(compiled, compiled.outputs(e), |s| Some(compiled.rates(e)[s])))
+        .collect();
     for k in 0..=order {
         for r in 0..out.runs.len() {
-            out.extend(r, &needed, k)?;
-            for &o in &compiled.outputs {
+            let experiment = out.runs[r].experiment;
+            out.extend(r, &needed[experiment], k)?;
+            for &o in compiled.outputs(experiment) {
                 let mut p = out.runs[r].nodes[o][k].clone();
                 let value = Polynomial::constant(out.rows.coefficient(r, o, k));
                 p.add_scaled(&f, &value, f.neg(f.one()));

@@ -25,8 +25,8 @@ pub use answer::*;
 pub use dag::{Dag, DagError, FunctionStart, Op};
 pub use judge::{Judgement, judge, judge_compiled};
 pub use model::{
-    Compiled, CompiledSegment, Constant, KnownInput, ModelError, Named, Nominal, Place, PlacedExpression,
-    Role, Segment, State, StateStart, SystemModel,
+    Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, ModelError, Named,
+    Nominal, Place, PlacedExpression, Role, Segment, State, StateStart, SystemModel,
 };
 pub use rows::{Layout, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};

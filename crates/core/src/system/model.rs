@@ -90,6 +90,15 @@ pub struct Segment {
     pub carry: Vec<(String, PlacedExpression)>,
 }
 
+/// What one experiment has of its own.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Experiment {
+    /// Constants that take another value.
+    pub constants: Vec<(String, PlacedExpression)>,
+    /// Known inputs of another kind.
+    pub known_inputs: Vec<(String, KnownInput)>,
+}
+
 /// Numbers for a simulation, as far as the file gives them; in the units of the model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nominal {
@@ -130,6 +139,8 @@ pub struct SystemModel {
     pub outputs: Vec<(Named, PlacedExpression)>,
     /// Runs with starts of their own (and unknown inputs of their own); parameters are shared.
     pub experiments: usize,
+    /// What the experiments have of their own; none: nothing.
+    pub own: Vec<Experiment>,
     /// Segments; none: one, as the model says.
     pub segments: Vec<Segment>,
     /// What is zero at the start of every experiment: expressions of states, parameters and constants, with the equation as their text.
@@ -160,6 +171,19 @@ pub(crate) const MAX_EXPERIMENTS: usize = 20;
 pub(crate) const MAX_DEGREE: usize = 50;
 /// Most operations of a system.
 pub(crate) const MAX_NODES: usize = 200_000;
+
+impl Nominal {
+    /// What `map` says of `x@2`, or else of `x`.
+    pub fn named(&self, map: &BTreeMap<String, f64>, name: &str) -> Option<f64> {
+        let shared = name.split('@').next().unwrap_or_default();
+        map.get(name).or_else(|| map.get(shared)).copied()
+    }
+
+    /// The value of `name` in an experiment (counted from 0).
+    pub fn value(&self, name: &str, experiment: usize) -> Option<f64> {
+        self.named(&self.values, &format!("{name}@{}", experiment + 1))
+    }
+}
 
 impl Place {
     /// An error in the text of this place, at a range of it.
@@ -193,14 +217,10 @@ pub struct Compiled {
     pub dag: Dag,
     /// What every slot is.
     pub roles: Vec<Role>,
-    /// The node of every state's derivative.
-    pub rates: Vec<usize>,
-    /// The nodes of the outputs.
-    pub outputs: Vec<usize>,
+    /// The nodes that differ from experiment to experiment: one for each, or one for all.
+    pub experiments: Vec<CompiledExperiment>,
     /// The nodes of known starts, by state.
     pub starts: Vec<Option<usize>>,
-    /// The nodes of known constants, by constant.
-    pub constants: Vec<Option<usize>>,
     /// Per segment: nodes of constants and of carried states.
     pub segments: Vec<CompiledSegment>,
     /// The nodes of the constraints: zero at the start.
@@ -212,11 +232,38 @@ pub struct Compiled {
 }
 
 impl Compiled {
+    fn experiment(&self, i: usize) -> &CompiledExperiment {
+        &self.experiments[i.min(self.experiments.len() - 1)]
+    }
+
+    /// The node of every state's derivative in an experiment.
+    pub fn rates(&self, experiment: usize) -> &[usize] {
+        &self.experiment(experiment).rates
+    }
+
+    /// The nodes of the outputs in an experiment.
+    pub fn outputs(&self, experiment: usize) -> &[usize] {
+        &self.experiment(experiment).outputs
+    }
+
+    /// The nodes of known constants in an experiment, by constant.
+    pub fn constants(&self, experiment: usize) -> &[Option<usize>] {
+        &self.experiment(experiment).constants
+    }
+
     /// The node of what has this role; `None` where nothing uses it.
     pub(crate) fn node_of(&self, role: Role) -> Option<usize> {
         let slot = self.roles.iter().position(|r| *r == role)?;
         self.dag.ops.iter().position(|op| *op == Op::Slot(slot))
     }
+}
+
+/// An experiment as nodes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CompiledExperiment {
+    rates: Vec<usize>,
+    outputs: Vec<usize>,
+    constants: Vec<Option<usize>>,
 }
 
 /// A segment as nodes.
@@ -254,6 +301,23 @@ impl SystemModel {
         let mut out: Vec<&PlacedExpression> = self.constraints.iter().collect();
         out.dedup_by(|a, b| a.place == b.place);
         out.into_iter().map(|c| c.text.clone()).collect()
+    }
+
+    /// A known input in an experiment (counted from 0).
+    pub fn known_input(&self, experiment: usize, i: usize) -> &KnownInput {
+        let (named, kind) = &self.known_inputs[i];
+        let own = self.own.get(experiment).and_then(|e| e.known_inputs.iter().find(|u| u.0 == named.name));
+        own.map_or(kind, |u| &u.1)
+    }
+
+    /// A known constant in an experiment (counted from 0), before the first segment changes it: its own formula if it has one.
+    pub fn constant_formula(&self, experiment: usize, i: usize) -> Option<&PlacedExpression> {
+        let (named, constant) = &self.constants[i];
+        let own = self.own.get(experiment).and_then(|e| e.constants.iter().find(|c| c.0 == named.name));
+        match (own, constant) {
+            (Some((_, formula)), _) | (None, Constant::Value(formula)) => Some(formula),
+            (None, Constant::Generic) => None,
+        }
     }
 
     /// All names with their roles, in slot order.
@@ -382,35 +446,43 @@ impl SystemModel {
             Ok(node)
         };
         // what may stand in the value of a constant: other constants that come before
-        let mut constants = vec![None; self.constants.len()];
-        let mut constant_names: HashMap<String, usize> = HashMap::new();
-        for (i, (named, constant)) in self.constants.iter().enumerate() {
-            if let Constant::Value(formula) = constant {
-                constants[i] = Some(node(&mut dag, formula, &constant_names)?);
+        let constant_names: HashMap<String, usize> =
+            self.constants.iter().map(|(n, _)| (n.name.clone(), names[&n.name])).collect();
+        let shared = names.clone();
+        let mut experiments: Vec<CompiledExperiment> = Vec::new();
+        for experiment in 0..self.own.len().max(1) {
+            let mut own = CompiledExperiment::default();
+            let mut before: HashMap<String, usize> = HashMap::new();
+            for (i, (named, _)) in self.constants.iter().enumerate() {
+                let formula = self.constant_formula(experiment, i);
+                own.constants.push(formula.map(|f| node(&mut dag, f, &before)).transpose()?);
+                before.insert(named.name.clone(), names[&named.name]);
             }
-            constant_names.insert(named.name.clone(), names[&named.name]);
-        }
-        for (named, input) in &self.known_inputs {
-            if let KnownInput::Function(formula) = input {
-                let mut allowed = constant_names.clone();
-                if let Some(&t) = names.get("t").filter(|_| role_of.get("t") == Some(&Role::Time)) {
-                    allowed.insert("t".into(), t);
+            let mut inside = shared.clone();
+            for (i, (named, _)) in self.known_inputs.iter().enumerate() {
+                if let KnownInput::Function(formula) = self.known_input(experiment, i) {
+                    let mut allowed = constant_names.clone();
+                    if let Some(&t) = shared.get("t").filter(|_| role_of.get("t") == Some(&Role::Time)) {
+                        allowed.insert("t".into(), t);
+                    }
+                    let value = node(&mut dag, formula, &allowed)?;
+                    inside.insert(named.name.clone(), value);
                 }
-                let value = node(&mut dag, formula, &allowed)?;
-                names.insert(named.name.clone(), value);
             }
-        }
-        for (name, formula) in &self.definitions {
-            let value = node(&mut dag, formula, &names)?;
-            names.insert(name.clone(), value);
-        }
-        let mut rates = Vec::new();
-        for s in &self.states {
-            rates.push(node(&mut dag, &s.equation, &names)?);
-        }
-        let mut outputs = Vec::new();
-        for (_, formula) in &self.outputs {
-            outputs.push(node(&mut dag, formula, &names)?);
+            for (name, formula) in &self.definitions {
+                let value = node(&mut dag, formula, &inside)?;
+                inside.insert(name.clone(), value);
+            }
+            for s in &self.states {
+                own.rates.push(node(&mut dag, &s.equation, &inside)?);
+            }
+            for (_, formula) in &self.outputs {
+                own.outputs.push(node(&mut dag, formula, &inside)?);
+            }
+            if experiment == 0 {
+                names = inside;
+            }
+            experiments.push(own);
         }
         // a known start may depend on what is constant, and on states whose start is not given by a formula
         let mut start_names = constant_names.clone();
@@ -426,6 +498,12 @@ impl SystemModel {
                 StateStart::Value(formula) => Some(node(&mut dag, formula, &start_names)?),
                 _ => None,
             });
+        }
+        for (name, formula) in self.own.iter().flat_map(|e| &e.constants) {
+            if !matches!(role_of.get(name), Some(Role::Constant(_))) {
+                let message = format!("`{name}` is no known constant; expected one of the constants");
+                return Err(formula.place.error(message, 0..0));
+            }
         }
         let mut segments = Vec::new();
         for segment in &self.segments {
@@ -463,10 +541,8 @@ impl SystemModel {
         Ok(Compiled {
             dag,
             roles: roles.into_iter().map(|r| r.1).collect(),
-            rates,
-            outputs,
+            experiments,
             starts,
-            constants,
             segments,
             constraints,
             combinations,

@@ -9,8 +9,8 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::model::{
-    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, PlacedExpression, Segment, State,
-    StateStart, SystemModel,
+    Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, PlacedExpression,
+    Segment, State, StateStart, SystemModel,
 };
 use super::nominal::nominal;
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
@@ -61,6 +61,9 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "Option<usize>")]
     experiments: Option<Spanned<usize>>,
+    /// The experiments one by one, with what each has of its own.
+    #[serde(default, rename = "experiment")]
+    own: Vec<ExperimentEntry>,
     /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
     #[serde(default, rename = "segment")]
     segments: Vec<SegmentEntry>,
@@ -89,7 +92,7 @@ pub struct SimulationEntry {
     #[schemars(with = "Option<f64>")]
     pub(super) step: Option<Spanned<f64>>,
     /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants; of a vector a list, or one
-    /// number for all entries.
+    /// number for all entries; `x` in all experiments, or `"x@2"` in the second.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub(super) values: BTreeMap<String, Spanned<Value>>,
@@ -105,6 +108,20 @@ pub struct SimulationEntry {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub(super) inputs: BTreeMap<String, Spanned<Value>>,
+}
+
+/// An experiment.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentEntry {
+    /// Constants that take another value.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    constants: BTreeMap<String, Spanned<Value>>,
+    /// Known inputs of another kind.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    known_inputs: BTreeMap<String, Spanned<Value>>,
 }
 
 /// A segment of the timeline.
@@ -318,6 +335,34 @@ impl Reader<'_> {
         Ok((named, found))
     }
 
+    /// What experiment `i`, counted from 0, has of its own.
+    fn experiment(
+        &self,
+        i: usize,
+        entry: &ExperimentEntry,
+        model: &SystemModel,
+    ) -> Result<Experiment, ModelError> {
+        let mut out = Experiment::default();
+        let own = format!("of experiment {}", i + 1);
+        for (name, value) in in_order(&entry.constants) {
+            let what = format!("the constant {name} {own}");
+            let parts = self.fitted((name, &what), value.get_ref(), value.span())?;
+            out.constants.extend(self.entries(name).into_iter().zip(parts));
+        }
+        for (name, value) in in_order(&entry.known_inputs) {
+            let inputs = self.known_inputs(name, value)?;
+            let known = |n: &Named| model.known_inputs.iter().any(|u| u.0.name == n.name);
+            if !inputs.iter().all(|u| known(&u.0)) {
+                let all: Vec<String> = model.known_inputs.iter().map(|u| u.0.name.clone()).collect();
+                let hint = nearest(name, &all).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default();
+                let message = format!("`{name}` is no known input; expected one of [known_inputs]{hint}");
+                return Err(self.at(value.span(), format!("the known input {name} {own}"), message));
+            }
+            out.known_inputs.extend(inputs.into_iter().map(|(named, kind)| (named.name, kind)));
+        }
+        Ok(out)
+    }
+
     /// Segment `i`, counted from 0.
     fn segment(&self, i: usize, segment: &SegmentEntry) -> Result<Segment, ModelError> {
         let mut out = Segment::default();
@@ -363,6 +408,19 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
             return Err(r.at(experiments.span(), "experiments".into(), message));
         }
     }
+    if !file.own.is_empty() {
+        let (own, said) = (file.own.len(), file.experiments.as_ref());
+        if let Some(said) = said.filter(|n| *n.get_ref() != own) {
+            let message =
+                format!("{}, and {own} [[experiment]]; expected as many, or no number", said.get_ref());
+            return Err(r.at(said.span(), "experiments".into(), message));
+        }
+        if own > MAX_EXPERIMENTS {
+            let message = format!("{own} [[experiment]]; expected at most {MAX_EXPERIMENTS}");
+            return Err(ModelError { what: "experiments".into(), message, span: None });
+        }
+        model.experiments = own;
+    }
     // sizes first: expressions may name what comes later
     let (states, known, unknown) =
         (in_order(&file.states), in_order(&file.known_inputs), in_order(&file.unknown_inputs));
@@ -390,6 +448,9 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     }
     for (key, value) in unknown {
         model.unknown_inputs.extend(r.unknown_inputs(base(key), value)?);
+    }
+    for (i, own) in file.own.iter().enumerate() {
+        model.own.push(r.experiment(i, own, &model)?);
     }
     let mut outputs = Shapes::new();
     for (key, value) in in_order(&file.outputs) {

@@ -37,15 +37,26 @@ pub(super) fn nominal(
     let mut values = unknowns.clone();
     values.extend(names(&mut model.constants.iter().map(|c| &c.0)));
     let outputs_known = names(&mut model.outputs.iter().map(|o| &o.0));
-    // `p` is all of p[1], p[2], ...
+    // `p` is all of p[1], p[2], ..., `p@2` these in the second experiment
+    let experiments = model.experiments;
+    let in_one = |name: &str| {
+        name.split_once('@').map_or((name.to_string(), None), |(n, e)| (n.into(), Some(e.to_string())))
+    };
     let entries = |name: &str, shapes: &Shapes| -> Vec<String> {
+        let (name, experiment) = in_one(name);
         let plain = name.trim_end_matches('\'');
-        let primes = &name[plain.len()..];
+        let end =
+            format!("{}{}", &name[plain.len()..], experiment.map(|e| format!("@{e}")).unwrap_or_default());
         let entries = shapes.get(plain).map_or_else(|| vec![plain.to_string()], |s| s.names(plain));
-        entries.into_iter().map(|n| format!("{n}{primes}")).collect()
+        entries.into_iter().map(|n| format!("{n}{end}")).collect()
     };
     let known = |what: &str, name: &str, entries: &[String], list: &[String], span: Range<usize>| {
-        if entries.iter().all(|e| list.contains(e)) {
+        let one_of_them = |e: &String| e.parse().is_ok_and(|e: usize| (1..=experiments).contains(&e));
+        if entries
+            .iter()
+            .map(|e| in_one(e))
+            .all(|(n, e)| list.contains(&n) && e.as_ref().is_none_or(one_of_them))
+        {
             return Ok(());
         }
         let hint = nearest(name, list).map(|h| format!("; did you mean `{h}`?")).unwrap_or_default();

@@ -102,7 +102,6 @@ impl Layout {
 pub(crate) struct SystemRows<'a> {
     field: Field,
     lanes: usize,
-    outputs: &'a [usize],
     runs: Vec<Run<'a>>,
     bound: usize,
     closed: bool,
@@ -114,6 +113,7 @@ pub(crate) struct SystemRows<'a> {
 #[derive(Debug, Clone)]
 struct Run<'a> {
     taylor: Taylor<'a>,
+    outputs: &'a [usize],
     /// Its own rank, where there are several runs.
     own: Echelon,
     stalled: bool,
@@ -194,15 +194,15 @@ impl<'a> SystemRows<'a> {
                     Role::State(i) => {
                         let lane = layout.lane(*role, experiment);
                         initial[slot] = Some((random(), lane.map(|l| (l, f.one())).into_iter().collect()));
-                        Signal::State { rate: compiled.rates[i] }
+                        Signal::State { rate: compiled.rates(experiment)[i] }
                     }
                     Role::Parameter(i) => {
                         Signal::Constant { value: parameters[i], lane: layout.lane(*role, experiment) }
                     }
                     Role::Constant(i) => Signal::Constant { value: constants[i], lane: None },
                     Role::KnownInput(i) => Signal::Known {
-                        degree: match model.known_inputs[i].1 {
-                            KnownInput::Polynomial(d) => Some(d),
+                        degree: match model.known_input(experiment, i) {
+                            KnownInput::Polynomial(d) => Some(*d),
                             _ => None,
                         },
                     },
@@ -219,11 +219,12 @@ impl<'a> SystemRows<'a> {
             let look = |signals: &[Signal], initial: &[Option<Initial>]| {
                 Taylor::new(&compiled.dag, f, lanes, signals, initial, &starts, SplitMix64::new(seed))
             };
-            if compiled.constants.iter().any(Option::is_some) {
+            let given = compiled.constants(experiment);
+            if given.iter().any(Option::is_some) {
                 // a constant may use those before it
                 for _ in 0..model.constants.len() {
                     let seen = look(&signals, &initial)?;
-                    for (c, node) in compiled.constants.iter().enumerate() {
+                    for (c, node) in given.iter().enumerate() {
                         if let (Some(node), Some(slot)) = (node, slot_of(Role::Constant(c))) {
                             signals[slot] = Signal::Constant { value: seen.start(*node), lane: None };
                         }
@@ -243,7 +244,7 @@ impl<'a> SystemRows<'a> {
                     free[slot] = match *role {
                         Role::State(_) => true,
                         Role::Parameter(_) => experiment == 0,
-                        Role::Constant(c) => experiment == 0 && compiled.constants[c].is_none(),
+                        Role::Constant(c) => experiment == 0 && given[c].is_none(),
                         Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
                     };
                 }
@@ -311,13 +312,13 @@ impl<'a> SystemRows<'a> {
                 };
                 let combinations = compiled.combinations.iter().map(gradient).collect();
                 let known = known.clone();
-                runs.push(Run { taylor, own: Echelon::new(f, lanes), stalled: false, known, combinations });
+                let (own, outputs) = (Echelon::new(f, lanes), compiled.outputs(experiment));
+                runs.push(Run { taylor, outputs, own, stalled: false, known, combinations });
             }
         }
         Ok(Self {
             field,
             lanes,
-            outputs: &compiled.outputs,
             single: runs.len() == 1,
             runs,
             bound: layout.bound,
@@ -398,7 +399,7 @@ impl DerivativeRows for SystemRows<'_> {
                 sink(row);
                 run.own.insert(row);
             }
-            for &output in self.outputs {
+            for &output in run.outputs {
                 let dual = run.taylor.dual(output, order);
                 let row = if dual.is_empty() { &self.row } else { dual };
                 let new = sink(row);

@@ -223,7 +223,7 @@ fn request(
     let texts = texts(&compiled.dag, &names)?;
     let text = |node: usize| texts[node].clone().ok_or(NoExpressions::NotRational);
     let mut outputs = Vec::new();
-    for (j, &node) in compiled.outputs.iter().enumerate() {
+    for (j, &node) in compiled.outputs(0).iter().enumerate() {
         let name = &model.outputs[j].0.name;
         let chain = (0..=highest + 1 + BEYOND)
             .map(|k| put(&mut symbols, format!("y_{j}_{k}"), derivative(name, k), Some(node), k))
@@ -247,7 +247,7 @@ fn request(
     let free = roles_of_parameters(model).enumerate().filter(|(_, role)| role_is_free(*role));
     let free = free.map(|(p, _)| p).collect();
     let system = RationalSystem {
-        equations: compiled.rates.iter().map(|&r| text(r)).collect::<Result<_, _>>()?,
+        equations: compiled.rates(0).iter().map(|&r| text(r)).collect::<Result<_, _>>()?,
         states,
         parameters,
         outputs,

@@ -142,10 +142,11 @@ pub fn symmetries(
         let moved: Vec<usize> =
             (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
         let mut draw = || climb_at(model, compiled, &judged.layout, f, &mut rng);
-        // constants that every segment shares may be factors too
-        let shared = |name: &String| {
-            model.segments.iter().all(|s| s.constants.iter().all(|(changed, _)| changed != name))
-        };
+        // constants that every segment and experiment shares may be factors too
+        let changed =
+            model.segments.iter().map(|s| &s.constants).chain(model.own.iter().map(|e| &e.constants));
+        let changed: Vec<&String> = changed.flatten().map(|(name, _)| name).collect();
+        let shared = |name: &String| !changed.contains(&name);
         let constants = model.constants.iter().enumerate().filter(|(_, c)| shared(&c.0.name));
         let unknowns = if n <= MOVED { (0..n).collect() } else { moved.clone() };
         let factors: Vec<usize> = unknowns.into_iter().chain(constants.map(|(i, _)| n + i)).collect();

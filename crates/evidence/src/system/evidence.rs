@@ -59,7 +59,7 @@ pub struct SystemEvidence {
     pub checks: usize,
     /// Whether none failed.
     pub passed: bool,
-    /// The longest horizon, in the unit of the model.
+    /// The longest horizon, of every experiment, in the unit of the model.
     pub duration: f64,
     /// Bound on the probability that a verdict is wrong.
     pub error_bound: f64,
@@ -91,20 +91,23 @@ pub struct SymmetryEvidence {
     pub seen: Check,
 }
 
-/// The rows of all samples until `horizon`, as derivatives by the unknowns at the start.
+/// The rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start, and those of the constraints, each
+/// of which weighs as much as the best sample.
 fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
     let numeric = &setup.numeric;
     let n = numeric.states.len();
     let segments = numeric.segments();
+    let parts = segments * numeric.experiments();
     let outputs = setup.sigmas.len();
     let dt = horizon / (segments * SAMPLES) as f64;
-    let mut out = DMatrix::zeros(segments * SAMPLES * outputs, n);
+    let (_, constraints) = numeric.constraints(&setup.truth);
+    let mut out = DMatrix::zeros(parts * SAMPLES * outputs + constraints.nrows(), n);
     let (mut x, mut phi) = (setup.truth.clone(), DMatrix::identity(n, n));
-    for segment in 0..segments {
-        let begin = (segment * SAMPLES) as f64 * dt;
-        let (after, jump) = numeric.carry(segment, begin, &x);
+    for part in 0..parts {
+        let begin = (part % segments * SAMPLES) as f64 * dt;
+        let (after, jump) = numeric.carry(part, begin, &x);
         (x, phi) = (after, jump * phi);
-        let (process, measurement) = (numeric.process(segment), numeric.measurement(segment, &setup.sigmas));
+        let (process, measurement) = (numeric.process(part), numeric.measurement(part, &setup.sigmas));
         for k in 0..SAMPLES {
             let t = begin + k as f64 * dt;
             let next = runge_kutta(&process, t, &x, dt, SUBSTEPS).map_err(|error| RunError::Filter {
@@ -115,9 +118,18 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
             (x, phi) = (next.x, next.phi * phi);
             let h = measurement.jacobian(t + dt, &x) * &phi;
             for (i, sigma) in setup.sigmas.iter().enumerate() {
-                out.row_mut((segment * SAMPLES + k) * outputs + i).copy_from(&(h.row(i) / *sigma));
+                out.row_mut((part * SAMPLES + k) * outputs + i).copy_from(&(h.row(i) / *sigma));
             }
         }
+    }
+    let samples = parts * SAMPLES * outputs;
+    let weight = |row: usize, of: &DMatrix<f64>| {
+        of.row(row).iter().zip(&setup.prior).map(|(x, sigma)| (x * sigma).powi(2)).sum::<f64>().sqrt()
+    };
+    let best = (0..samples).map(|row| weight(row, &out)).fold(0.0, f64::max);
+    for c in 0..constraints.nrows() {
+        let own = weight(c, &constraints);
+        out.row_mut(samples + c).copy_from(&(constraints.row(c) * (best / own)));
     }
     match out.iter().all(|v| v.is_finite()) {
         true => Ok(out),
@@ -162,10 +174,11 @@ fn sigmas(rows: &DMatrix<f64>, columns: &[usize], rank: usize) -> Result<Option<
 
 /// The place of an unknown of the exact verdict among the states of the filter.
 fn place(numeric: &Numeric<'_>, u: &Unknown) -> Option<usize> {
+    let experiment = u.experiment.unwrap_or(0);
     let state = match u.role {
-        Role::State(i) => FilterState::State(i),
+        Role::State(i) => FilterState::State { experiment, i },
         Role::Parameter(i) => FilterState::Parameter(i),
-        Role::UnknownInput(i) => FilterState::Input(i, u.derivative),
+        Role::UnknownInput(i) => FilterState::Input { experiment, i, derivative: u.derivative },
         Role::KnownInput(_) | Role::Constant(_) | Role::Time => return None,
     };
     numeric.states.iter().position(|s| *s == state)

@@ -4,21 +4,22 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Measurement, Process};
 
 use obsdeg_core::model::expression::{Expression, Function, evaluate_f64};
-use obsdeg_core::system::{Compiled, Constant, FunctionStart, KnownInput, ModelError, Op, Role, SystemModel};
+use obsdeg_core::system::{Compiled, FunctionStart, KnownInput, ModelError, Named, Op, Role, SystemModel};
 
-/// A state of the filter.
+/// A state of the filter; what belongs to an experiment says to which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "said above")]
 pub enum FilterState {
     /// State i of the model.
-    State(usize),
+    State { experiment: usize, i: usize },
     /// Parameter i.
     Parameter(usize),
     /// A derivative of unknown input i.
-    Input(usize, usize),
+    Input { experiment: usize, i: usize, derivative: usize },
 }
 
-/// A model with numbers for what is known: states of the filter are the states of the model, its parameters, and the
-/// derivatives of its unknown inputs.
+/// A model with numbers for what is known: states of the filter are the states of the model and the derivatives of its unknown inputs,
+/// of every experiment, and its parameters. The parts of its timeline are the segments of the first experiment, then those of the next.
 #[derive(Debug, Clone)]
 pub struct Numeric<'a> {
     compiled: &'a Compiled,
@@ -28,84 +29,64 @@ pub struct Numeric<'a> {
     pub names: Vec<String>,
     /// The function of a node that is one.
     functions: Vec<Option<Function>>,
-    /// Known inputs as functions of time.
-    inputs: Vec<Option<Expression>>,
-    /// Known constants, of every segment.
+    /// Known inputs as functions of time, of every experiment.
+    inputs: Vec<Vec<Option<Expression>>>,
+    /// Known constants, of every part.
     constants: Vec<Vec<f64>>,
+    /// The state of the filter that a slot is, of every experiment.
+    columns: Vec<Vec<Option<usize>>>,
 }
 
 impl<'a> Numeric<'a> {
-    /// Numbers for `model`: `inputs` are the generic known inputs as functions of `t`, `values` the generic constants.
+    /// Numbers for `model`: known inputs that are generic as functions of `t`, generic constants as numbers, from `[simulation]`.
     ///
     /// # Errors
-    /// [`ModelError`] naming what has no number, and for several experiments and arbitrary unknown inputs.
+    /// [`ModelError`] naming what has no number, and for arbitrary unknown inputs.
     pub fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
         let refuse = |what: String, message: &str| ModelError { what, message: message.into(), span: None };
-        if model.experiments > 1 {
-            return Err(refuse("experiments".into(), "a simulation runs one; expected a model with one"));
+        let experiments = model.experiments.max(1);
+        let suffix = |experiment: usize| match experiments {
+            1 => String::new(),
+            _ => format!("@{}", experiment + 1),
+        };
+        let (mut states, mut names) = (Vec::new(), Vec::new());
+        for experiment in 0..experiments {
+            for (i, s) in model.states.iter().enumerate() {
+                states.push(FilterState::State { experiment, i });
+                names.push(format!("{}{}", s.named.name, suffix(experiment)));
+            }
         }
-        let mut states: Vec<FilterState> = (0..model.states.len()).map(FilterState::State).collect();
-        let mut names: Vec<String> = model.states.iter().map(|s| s.named.name.clone()).collect();
         states.extend((0..model.parameters.len()).map(FilterState::Parameter));
         names.extend(model.parameters.iter().map(|p| p.name.clone()));
-        for (i, (named, degree)) in model.unknown_inputs.iter().enumerate() {
-            let what = || format!("the unknown input {}", named.name);
-            let degree = degree
-                .ok_or_else(|| refuse(what(), "arbitrary; a simulation expects { polynomial = degree }"))?;
-            for k in 0..=degree {
-                states.push(FilterState::Input(i, k));
-                names.push(format!("{}{}", named.name, "'".repeat(k)));
-            }
-        }
-        let nominal = &model.simulation;
-        let mut inputs = Vec::new();
-        for (named, kind) in &model.known_inputs {
-            let own = nominal.inputs.get(&named.name).map(|f| f.expression.clone());
-            inputs.push(match kind {
-                // its value is a node of the graph
-                KnownInput::Function(_) => None,
-                _ => Some(own.ok_or_else(|| {
-                    refuse(
-                        format!("the known input {}", named.name),
-                        "no function of time; expected one under [simulation.inputs]",
-                    )
-                })?),
-            });
-        }
-        let mut whole: Vec<f64> = Vec::new();
-        for (named, constant) in &model.constants {
-            let at = |name: &str| {
-                let place = model.constants.iter().position(|c| c.0.name == name);
-                place.and_then(|p| whole.get(p)).copied().unwrap_or(f64::NAN)
-            };
-            let value = match constant {
-                Constant::Value(formula) => evaluate_f64(&formula.expression, &at),
-                Constant::Generic => nominal.values.get(&named.name).copied().ok_or_else(|| {
-                    refuse(
-                        format!("the constant {}", named.name),
-                        "no value; expected one under [simulation.values]",
-                    )
-                })?,
-            };
-            whole.push(value);
-        }
-        let mut constants = vec![whole];
-        if !model.segments.is_empty() {
-            let mut current = constants.remove(0);
-            for segment in &model.segments {
-                let mut next = current.clone();
-                for (name, formula) in &segment.constants {
-                    let place = |name: &str| model.constants.iter().position(|c| c.0.name == name);
-                    let at = |name: &str| place(name).map_or(f64::NAN, |p| current[p]);
-                    if let Some(p) = place(name) {
-                        next[p] = evaluate_f64(&formula.expression, &at);
-                    }
+        for experiment in 0..experiments {
+            for (i, (named, degree)) in model.unknown_inputs.iter().enumerate() {
+                let what = || format!("the unknown input {}", named.name);
+                let degree = degree.ok_or_else(|| {
+                    refuse(what(), "arbitrary; a simulation expects { polynomial = degree }")
+                })?;
+                for derivative in 0..=degree {
+                    states.push(FilterState::Input { experiment, i, derivative });
+                    names.push(format!("{}{}{}", named.name, "'".repeat(derivative), suffix(experiment)));
                 }
-                constants.push(next.clone());
-                current = next;
             }
         }
-        Ok(Self { compiled, states, names, functions: compiled.dag.functions_of_nodes(), inputs, constants })
+        let (mut inputs, mut constants, mut columns) = (Vec::new(), Vec::new(), Vec::new());
+        for experiment in 0..experiments {
+            inputs.push(inputs_of(model, experiment)?);
+            constants.extend(constants_of(model, experiment)?);
+            let column = |role: &Role| {
+                let state = match *role {
+                    Role::State(i) => FilterState::State { experiment, i },
+                    Role::Parameter(i) => FilterState::Parameter(i),
+                    Role::UnknownInput(i) => FilterState::Input { experiment, i, derivative: 0 },
+                    Role::Constant(_) | Role::KnownInput(_) | Role::Time => return None,
+                };
+                states.iter().position(|s| *s == state)
+            };
+            columns.push(compiled.roles.iter().map(column).collect());
+        }
+        let functions = compiled.dag.functions_of_nodes();
+        Ok(Self { compiled, states, names, functions, inputs, constants, columns })
     }
 
     /// A known constant in the first segment.
@@ -113,26 +94,30 @@ impl<'a> Numeric<'a> {
         self.constants[0][k]
     }
 
-    /// The number of segments.
-    pub fn segments(&self) -> usize {
-        self.constants.len()
+    /// The number of experiments.
+    pub fn experiments(&self) -> usize {
+        self.columns.len()
     }
 
-    /// The values of all nodes at a time of a segment.
-    fn values(&self, segment: usize, t: f64, x: &[f64]) -> Vec<f64> {
+    /// The number of segments of an experiment.
+    pub fn segments(&self) -> usize {
+        self.constants.len() / self.experiments()
+    }
+
+    /// The values of all nodes at a time of a part.
+    fn values(&self, part: usize, t: f64, x: &[f64]) -> Vec<f64> {
         let dag = &self.compiled.dag;
-        let place = |state: FilterState| self.states.iter().position(|s| *s == state);
+        let experiment = part / self.segments();
         let mut values: Vec<f64> = Vec::with_capacity(dag.ops.len());
         for (i, op) in dag.ops.iter().enumerate() {
-            let own = |state| place(state).map_or(f64::NAN, |p| x[p]);
             let value = match *op {
                 Op::Number { mantissa, decimals } => mantissa as f64 / 10f64.powi(decimals),
                 Op::Slot(s) => match self.compiled.roles[s] {
-                    Role::State(k) => own(FilterState::State(k)),
-                    Role::Parameter(k) => own(FilterState::Parameter(k)),
-                    Role::UnknownInput(k) => own(FilterState::Input(k, 0)),
-                    Role::Constant(k) => self.constants[segment][k],
-                    Role::KnownInput(k) => self.inputs[k]
+                    Role::State(_) | Role::Parameter(_) | Role::UnknownInput(_) => {
+                        self.columns[experiment][s].map_or(f64::NAN, |c| x[c])
+                    }
+                    Role::Constant(k) => self.constants[part][k],
+                    Role::KnownInput(k) => self.inputs[experiment][k]
                         .as_ref()
                         .map_or(0.0, |e| evaluate_f64(e, &|name| if name == "t" { t } else { f64::NAN })),
                     Role::Time => t,
@@ -164,11 +149,11 @@ impl<'a> Numeric<'a> {
         values
     }
 
-    /// The derivatives of all nodes by the states of the filter, node by node, from their values.
-    fn duals(&self, values: &[f64]) -> Vec<f64> {
+    /// The derivatives of all nodes by the states of the filter, node by node, from their values in a part.
+    fn duals(&self, part: usize, values: &[f64]) -> Vec<f64> {
         let dag = &self.compiled.dag;
         let n = self.states.len();
-        let place = |state: FilterState| self.states.iter().position(|s| *s == state);
+        let columns = &self.columns[part / self.segments()];
         let mut duals = vec![0.0; dag.ops.len() * n];
         for (i, op) in dag.ops.iter().enumerate() {
             let (before, rest) = duals.split_at_mut(i * n);
@@ -183,13 +168,7 @@ impl<'a> Numeric<'a> {
             match *op {
                 Op::Number { .. } => {}
                 Op::Slot(s) => {
-                    let state = match self.compiled.roles[s] {
-                        Role::State(k) => place(FilterState::State(k)),
-                        Role::Parameter(k) => place(FilterState::Parameter(k)),
-                        Role::UnknownInput(k) => place(FilterState::Input(k, 0)),
-                        Role::Constant(_) | Role::KnownInput(_) | Role::Time => None,
-                    };
-                    if let Some(c) = state {
+                    if let Some(c) = columns[s] {
                         row[c] = 1.0;
                     }
                 }
@@ -215,25 +194,26 @@ impl<'a> Numeric<'a> {
         duals
     }
 
-    /// The rates of a segment as a process without noise.
-    pub fn process(&self, segment: usize) -> SystemProcess<'_> {
-        SystemProcess { numeric: self, segment }
+    /// The rates of a part as a process without noise.
+    pub fn process(&self, part: usize) -> SystemProcess<'_> {
+        SystemProcess { numeric: self, part }
     }
 
     /// The outputs with the standard deviations of their noise.
-    pub fn measurement<'b>(&'b self, segment: usize, sigmas: &'b [f64]) -> SystemMeasurement<'b> {
-        SystemMeasurement { numeric: self, segment, sigmas }
+    pub fn measurement<'b>(&'b self, part: usize, sigmas: &'b [f64]) -> SystemMeasurement<'b> {
+        SystemMeasurement { numeric: self, part, sigmas }
     }
 
-    /// The states behind the jump into a segment, and their derivatives by those before.
-    pub fn carry(&self, segment: usize, t: f64, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    /// The states behind the jump into a part, and their derivatives by those before.
+    pub fn carry(&self, part: usize, t: f64, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.states.len();
         let (mut after, mut jacobian) = (x.clone(), DMatrix::identity(n, n));
+        let (experiment, segment) = (part / self.segments(), part % self.segments());
         let carry = self.compiled.segments.get(segment).map_or(&[][..], |s| &s.carry);
-        let values = self.values(segment, t, x.as_slice());
-        let duals = self.duals(&values);
-        for &(state, node) in carry {
-            if let Some(row) = self.states.iter().position(|s| *s == FilterState::State(state)) {
+        let values = self.values(part, t, x.as_slice());
+        let duals = self.duals(part, &values);
+        for &(i, node) in carry {
+            if let Some(row) = self.states.iter().position(|s| *s == FilterState::State { experiment, i }) {
                 after[row] = values[node];
                 for c in 0..n {
                     jacobian[(row, c)] = duals[node * n + c];
@@ -245,31 +225,116 @@ impl<'a> Numeric<'a> {
 
     /// The starts of states that are given by formulas, from the other values.
     pub(crate) fn set_known_starts(&self, x: &mut DVector<f64>) {
-        let values = self.values(0, 0.0, x.as_slice());
-        for (state, node) in self.compiled.starts.iter().enumerate() {
-            let row = self.states.iter().position(|s| *s == FilterState::State(state));
-            if let (Some(node), Some(row)) = (node, row) {
-                x[row] = values[*node];
+        for experiment in 0..self.experiments() {
+            let values = self.values(experiment * self.segments(), 0.0, x.as_slice());
+            for (i, node) in self.compiled.starts.iter().enumerate() {
+                let row = self.states.iter().position(|s| *s == FilterState::State { experiment, i });
+                if let (Some(node), Some(row)) = (node, row) {
+                    x[row] = values[*node];
+                }
             }
         }
     }
+
+    /// The values of the constraints at the start of every experiment, which should be zero, and their derivatives by the states of the
+    /// filter, a row each.
+    pub(crate) fn constraints(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
+        let nodes = &self.compiled.constraints;
+        let n = self.states.len();
+        let (mut found, mut rows) = (Vec::new(), DMatrix::zeros(nodes.len() * self.experiments(), n));
+        for experiment in 0..self.experiments() {
+            let part = experiment * self.segments();
+            let values = self.values(part, 0.0, x.as_slice());
+            let duals = self.duals(part, &values);
+            for &node in nodes {
+                for c in 0..n {
+                    rows[(found.len(), c)] = duals[node * n + c];
+                }
+                found.push(values[node]);
+            }
+        }
+        (found, rows)
+    }
 }
 
-/// The dynamics of a segment: parameters stay, the derivatives of an unknown input integrate each other.
+/// The known inputs of an experiment as functions of time; `None` for those whose value is a node of the graph.
+fn inputs_of(model: &SystemModel, experiment: usize) -> Result<Vec<Option<Expression>>, ModelError> {
+    let nominal = &model.simulation.inputs;
+    let of = |(k, (named, _)): (usize, &(Named, KnownInput))| {
+        let own = nominal.get(&format!("{}@{}", named.name, experiment + 1)).or(nominal.get(&named.name));
+        match (model.known_input(experiment, k), own) {
+            (KnownInput::Function(_), _) => Ok(None),
+            (_, Some(f)) => Ok(Some(f.expression.clone())),
+            (_, None) => Err(ModelError {
+                what: format!("the known input {}", named.name),
+                message: "no function of time; expected one under [simulation.inputs]".into(),
+                span: None,
+            }),
+        }
+    };
+    model.known_inputs.iter().enumerate().map(of).collect()
+}
+
+/// The known constants of every segment of an experiment.
+fn constants_of(model: &SystemModel, experiment: usize) -> Result<Vec<Vec<f64>>, ModelError> {
+    let place = |name: &str| model.constants.iter().position(|c| c.0.name == name);
+    let mut whole: Vec<f64> = Vec::new();
+    for (k, (named, _)) in model.constants.iter().enumerate() {
+        let at = |name: &str| place(name).and_then(|p| whole.get(p)).copied().unwrap_or(f64::NAN);
+        let value = match model.constant_formula(experiment, k) {
+            Some(formula) => evaluate_f64(&formula.expression, &at),
+            None => model.simulation.value(&named.name, experiment).ok_or_else(|| ModelError {
+                what: format!("the constant {}", named.name),
+                message: "no value; expected one under [simulation.values]".into(),
+                span: None,
+            })?,
+        };
+        whole.push(value);
+    }
+    if model.segments.is_empty() {
+        return Ok(vec![whole]);
+    }
+    let mut out = Vec::new();
+    for segment in &model.segments {
+        let mut next = whole.clone();
+        for (name, formula) in &segment.constants {
+            let at = |name: &str| place(name).map_or(f64::NAN, |p| whole[p]);
+            if let Some(p) = place(name) {
+                next[p] = evaluate_f64(&formula.expression, &at);
+            }
+        }
+        out.push(next.clone());
+        whole = next;
+    }
+    Ok(out)
+}
+
+/// The dynamics of a part: parameters and what belongs to other experiments stay, the derivatives of an unknown input integrate each other.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemProcess<'a> {
     numeric: &'a Numeric<'a>,
-    segment: usize,
+    part: usize,
 }
 
 impl SystemProcess<'_> {
-    /// The filter states that are derivatives of an unknown input, with the place of the next derivative.
+    /// The rows of states of this experiment, with the nodes of their rates.
+    fn moving(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let own = self.part / self.numeric.segments();
+        let rates = self.numeric.compiled.rates(own);
+        self.numeric.states.iter().enumerate().filter_map(move |(row, state)| match *state {
+            FilterState::State { experiment, i } if experiment == own => Some((row, rates[i])),
+            _ => None,
+        })
+    }
+
+    /// The filter states that are derivatives of an unknown input of this experiment, with the place of the next derivative.
     fn chained(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let states = &self.numeric.states;
+        let own = self.part / self.numeric.segments();
         states.iter().enumerate().filter_map(move |(row, state)| match *state {
-            FilterState::Input(i, k) => {
-                let next = states.iter().position(|s| *s == FilterState::Input(i, k + 1))?;
-                Some((row, next))
+            FilterState::Input { experiment, i, derivative } if experiment == own => {
+                let next = FilterState::Input { experiment, i, derivative: derivative + 1 };
+                Some((row, states.iter().position(|s| *s == next)?))
             }
             _ => None,
         })
@@ -282,13 +347,10 @@ impl Process for SystemProcess<'_> {
     }
 
     fn f(&self, t: f64, x: &DVector<f64>) -> DVector<f64> {
-        let numeric = self.numeric;
-        let values = numeric.values(self.segment, t, x.as_slice());
+        let values = self.numeric.values(self.part, t, x.as_slice());
         let mut f = DVector::zeros(x.len());
-        for (row, state) in numeric.states.iter().enumerate() {
-            if let FilterState::State(i) = *state {
-                f[row] = values[numeric.compiled.rates[i]];
-            }
+        for (row, node) in self.moving() {
+            f[row] = values[node];
         }
         for (row, next) in self.chained() {
             f[row] = x[next];
@@ -297,15 +359,12 @@ impl Process for SystemProcess<'_> {
     }
 
     fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64> {
-        let numeric = self.numeric;
         let n = x.len();
-        let duals = numeric.duals(&numeric.values(self.segment, t, x.as_slice()));
+        let duals = self.numeric.duals(self.part, &self.numeric.values(self.part, t, x.as_slice()));
         let mut jacobian = DMatrix::zeros(n, n);
-        for (row, state) in numeric.states.iter().enumerate() {
-            if let FilterState::State(i) = *state {
-                for c in 0..n {
-                    jacobian[(row, c)] = duals[numeric.compiled.rates[i] * n + c];
-                }
+        for (row, node) in self.moving() {
+            for c in 0..n {
+                jacobian[(row, c)] = duals[node * n + c];
             }
         }
         for (row, next) in self.chained() {
@@ -319,30 +378,35 @@ impl Process for SystemProcess<'_> {
     }
 }
 
-/// The outputs of a segment.
+/// The outputs of a part.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemMeasurement<'a> {
     numeric: &'a Numeric<'a>,
-    segment: usize,
+    part: usize,
     sigmas: &'a [f64],
+}
+
+impl SystemMeasurement<'_> {
+    fn nodes(&self) -> &[usize] {
+        self.numeric.compiled.outputs(self.part / self.numeric.segments())
+    }
 }
 
 impl Measurement for SystemMeasurement<'_> {
     fn outputs(&self) -> usize {
-        self.numeric.compiled.outputs.len()
+        self.nodes().len()
     }
 
     fn h(&self, t: f64, x: &DVector<f64>) -> DVector<f64> {
-        let values = self.numeric.values(self.segment, t, x.as_slice());
-        let outputs = &self.numeric.compiled.outputs;
-        DVector::from_iterator(outputs.len(), outputs.iter().map(|&node| values[node]))
+        let values = self.numeric.values(self.part, t, x.as_slice());
+        DVector::from_iterator(self.outputs(), self.nodes().iter().map(|&node| values[node]))
     }
 
     fn jacobian(&self, t: f64, x: &DVector<f64>) -> DMatrix<f64> {
         let n = self.numeric.states.len();
-        let duals = self.numeric.duals(&self.numeric.values(self.segment, t, x.as_slice()));
-        let outputs = &self.numeric.compiled.outputs;
-        DMatrix::from_fn(outputs.len(), n, |i, c| duals[outputs[i] * n + c])
+        let duals = self.numeric.duals(self.part, &self.numeric.values(self.part, t, x.as_slice()));
+        let nodes = self.nodes();
+        DMatrix::from_fn(nodes.len(), n, |i, c| duals[nodes[i] * n + c])
     }
 
     fn noise(&self, _: f64) -> DMatrix<f64> {

@@ -25,6 +25,13 @@ const SUBSTEPS: usize = 4;
 /// The standard deviation of a known start, as a part of its value (of 1 for zero): a covariance needs one.
 const KNOWN: f64 = 1e-9;
 
+/// How far true values may miss a constraint, as a part of the terms in it.
+const HELD: f64 = 1e-9;
+/// What is left of a standard deviation where a constraint leaves nothing: a factorisation needs some.
+const SINGULAR: f64 = 1e-7;
+/// Draws from the prior for what is left of a constraint beyond its differential.
+const DRAWS: usize = 64;
+
 /// A run of a system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemRun {
@@ -38,7 +45,7 @@ pub struct SystemRun {
     pub estimates: Vec<SystemEstimate>,
     /// Whether errors and innovations are what the filter believes.
     pub consistency: Consistency,
-    /// How long it ran, in the unit of the model.
+    /// How long every experiment ran, in the unit of the model.
     pub duration: f64,
     /// Between two samples.
     pub step: f64,
@@ -117,21 +124,32 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
     let n = numeric.states.len();
     let (mut truth, mut sigmas) = (DVector::zeros(n), vec![1.0; n]);
     let start = |state: &FilterState| match *state {
-        FilterState::State(i) => &model.states[i].start,
+        FilterState::State { i, .. } => &model.states[i].start,
         _ => &StateStart::Unknown,
     };
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
         if !matches!(start(state), StateStart::Value(_)) {
-            truth[c] = *nominal.values.get(name).ok_or_else(|| {
+            truth[c] = nominal.named(&nominal.values, name).ok_or_else(|| {
                 missing(&format!("`{name}`"), "no true value; expected one under [simulation.values]")
             })?;
         }
     }
     numeric.set_known_starts(&mut truth);
+    let (residuals, rows) = numeric.constraints(&truth);
+    for (k, residual) in residuals.iter().enumerate() {
+        let size: f64 = rows.row(k).iter().zip(truth.iter()).map(|(g, x)| (g * x).abs()).sum();
+        if residual.is_nan() || residual.abs() > HELD * size.max(f64::MIN_POSITIVE) {
+            let text = &model.constraints[k % model.constraints.len()].text;
+            let message = format!(
+                "the values under [simulation.values] miss it by {residual:.1e}; expected values that hold it"
+            );
+            return Err(missing(&format!("the constraint {text}"), &message));
+        }
+    }
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
         let size = if truth[c] == 0.0 { 1.0 } else { truth[c].abs() };
         sigmas[c] = match start(state) {
-            StateStart::Unknown => nominal.priors.get(name).copied().unwrap_or(size),
+            StateStart::Unknown => nominal.named(&nominal.priors, name).unwrap_or(size),
             StateStart::Known | StateStart::Value(_) => KNOWN * size,
         };
     }
@@ -168,6 +186,56 @@ impl<'a> Setup<'a> {
     }
 }
 
+/// An initial error drawn from the prior given that the constraints hold, and its covariance. A constraint is bent: what is left of it along its tangent space, as
+/// draws show, is its uncertainty.
+fn initial_error(
+    numeric: &Numeric<'_>,
+    truth: &DVector<f64>,
+    prior: &[f64],
+    noise: &mut Noise,
+) -> (DVector<f64>, DMatrix<f64>) {
+    let n = truth.len();
+    let diagonal = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
+    let (residuals, rows) = numeric.constraints(truth);
+    // each constraint in turn: its gain, with uncertainties `r` of all of them
+    let condition = |r: &[f64]| {
+        let (mut p, mut gains) = (diagonal.clone(), Vec::new());
+        for (k, r) in r.iter().enumerate() {
+            let g = rows.row(k).transpose();
+            let pg = &p * &g;
+            let s = g.dot(&pg) + r;
+            // one that repeats another leaves nothing to be known
+            if s > KNOWN * KNOWN * g.component_mul(&g).dot(&diagonal.diagonal()) {
+                p -= &pg * pg.transpose() / s;
+                gains.push((&pg / s, g));
+            }
+        }
+        (p, gains)
+    };
+    let draw = |gains: &[(DVector<f64>, DVector<f64>)], noise: &mut Noise| {
+        let mut e = DVector::from_iterator(n, (0..n).map(|c| prior[c] * noise.normal()));
+        for (gain, g) in gains {
+            e -= gain * g.dot(&e);
+        }
+        e
+    };
+    let (_, gains) = condition(&vec![0.0; residuals.len()]);
+    let mut left = vec![0.0; residuals.len()];
+    if !left.is_empty() {
+        for _ in 0..DRAWS {
+            let e = draw(&gains, noise);
+            for (sum, r) in left.iter_mut().zip(numeric.constraints(&(truth + e)).0) {
+                *sum += r * r / DRAWS as f64;
+            }
+        }
+    }
+    let (mut p, _) = condition(&left);
+    if !left.is_empty() {
+        p += &diagonal * (SINGULAR * SINGULAR);
+    }
+    (draw(&gains, noise), p)
+}
+
 /// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn from the prior, random numbers
 /// come from `seed`.
 ///
@@ -178,8 +246,9 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
     let judged = judge_compiled(model, &compiled, seed, None)?;
     let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
     let segments = numeric.segments();
+    let parts = segments * numeric.experiments();
     let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
-    if samples * segments as f64 > MAX_SAMPLES {
+    if samples * parts as f64 > MAX_SAMPLES {
         return Err(
             missing("the step of the simulation", "too short; expected at most 1000000 samples").into()
         );
@@ -187,8 +256,8 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
     let dt = duration / segments as f64 / samples;
     let mut noise = Noise::new(seed, 0);
     let n = truth.len();
-    let estimate = DVector::from_iterator(n, (0..n).map(|c| truth[c] + prior[c] * noise.normal()));
-    let p0 = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
+    let (error, p0) = initial_error(&numeric, &truth, &prior, &mut noise);
+    let estimate = &truth + error;
     let stopped = |time: f64| move |error| RunError::Filter { time, duration, error };
     let mut filter = Filter::new(estimate, &p0, Form::Ud).map_err(stopped(0.0))?;
     let mut traces = Traces {
@@ -198,9 +267,9 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         series: vec![Series::default(); n],
         ..Traces::default()
     };
-    let mut record = |time: f64, segment: usize, truth: &DVector<f64>, filter: &Filter| {
+    let mut record = |time: f64, part: usize, truth: &DVector<f64>, filter: &Filter| {
         traces.time.push(time);
-        traces.position.push(segment);
+        traces.position.push(part);
         let own = filter.covariance().sigmas();
         for (c, s) in traces.series.iter_mut().enumerate() {
             s.truth.push(truth[c]);
@@ -210,10 +279,12 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
     };
     record(0.0, 0, &truth, &filter);
     let mut whitened = Vec::new();
-    for segment in 0..segments {
-        let begin = segment as f64 * samples * dt;
-        let (behind, _) = numeric.carry(segment, begin, &truth);
-        let (x, phi) = numeric.carry(segment, begin, filter.x());
+    for part in 0..parts {
+        // the time of an experiment is its own
+        let begin = (part % segments) as f64 * samples * dt;
+        let before = (part / segments) as f64 * duration;
+        let (behind, _) = numeric.carry(part, begin, &truth);
+        let (x, phi) = numeric.carry(part, begin, filter.x());
         if behind != truth || x != *filter.x() {
             truth = behind;
             // a jump that forgets a state leaves its variance: as good as known
@@ -222,8 +293,8 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
                 DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| (KNOWN * s).powi(2))));
             filter = Filter::new(x, &(p + floor), Form::Ud).map_err(stopped(begin))?;
         }
-        let process = numeric.process(segment);
-        let measurement = numeric.measurement(segment, &sigmas);
+        let process = numeric.process(part);
+        let measurement = numeric.measurement(part, &sigmas);
         for k in 0..samples as usize {
             let t = begin + k as f64 * dt;
             truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?.x;
@@ -233,7 +304,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
                 *z += sigma * noise.normal();
             }
             whitened.extend(filter.update(&measurement, t + dt, &z).map_err(stopped(t + dt))?.whitened);
-            record(t + dt, segment, &truth, &filter);
+            record(before + t + dt, part, &truth, &filter);
         }
     }
     let estimates = estimates(model, &judged, &numeric, &traces);
@@ -264,10 +335,10 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
 
 fn unit(model: &SystemModel, state: &FilterState) -> String {
     match *state {
-        FilterState::State(i) => model.states[i].named.unit.clone(),
+        FilterState::State { i, .. } => model.states[i].named.unit.clone(),
         FilterState::Parameter(i) => model.parameters[i].unit.clone(),
-        FilterState::Input(i, 0) => model.unknown_inputs[i].0.unit.clone(),
-        FilterState::Input(..) => String::new(),
+        FilterState::Input { i, derivative: 0, .. } => model.unknown_inputs[i].0.unit.clone(),
+        FilterState::Input { .. } => String::new(),
     }
 }
 
