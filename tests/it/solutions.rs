@@ -198,42 +198,55 @@ impl Tiny {
 
     /// Taylor coefficients of the outputs from a point, up to an order.
     fn outputs(&self, point: &[i64], order: usize) -> Vec<i64> {
-        let mut series: Vec<Vec<i64>> = point.iter().map(|&x| vec![x]).collect();
-        let coefficient = |terms: &Terms, series: &[Vec<i64>], k: usize| {
-            let mut sum = 0;
-            for (c, exponents) in terms {
-                let mut product = vec![0; k + 1];
-                product[0] = c.rem_euclid(Q);
-                for (x, &e) in series.iter().zip(exponents) {
-                    for _ in 0..e {
-                        let mut next = vec![0; k + 1];
-                        for (i, a) in product.iter().enumerate() {
-                            for (j, b) in x.iter().enumerate().take(k + 1 - i) {
-                                next[i + j] = (next[i + j] + a * b) % Q;
-                            }
-                        }
-                        product = next;
-                    }
-                }
-                sum = (sum + product[k]) % Q;
-            }
-            sum
-        };
+        let mut series = vec![[0; ORDERS]; self.unknowns];
+        series.iter_mut().zip(point).for_each(|(x, &start)| x[0] = start);
+        // every term is multiplied out factor by factor, one coefficient at a time
+        let mut rates: Vec<Vec<Product>> = self.rates.iter().map(products).collect();
+        let mut outputs: Vec<Vec<Product>> = self.outputs.iter().map(products).collect();
         let inverse = |k: i64| (1..Q).find(|x| x * k % Q == 1).expect("a field");
         let mut out = Vec::new();
         for k in 0..=order {
             if k > 0 {
-                let next: Vec<i64> = self
-                    .rates
-                    .iter()
-                    .map(|r| coefficient(r, &series, k - 1) * inverse(k as i64) % Q)
-                    .collect();
-                series.iter_mut().zip(next).for_each(|(x, c)| x.push(c));
+                let factor = inverse(k as i64);
+                let next: Vec<i64> =
+                    rates.iter_mut().map(|r| coefficient(r, &series, k - 1) * factor % Q).collect();
+                series.iter_mut().zip(next).for_each(|(x, c)| x[k] = c);
             }
-            out.extend(self.outputs.iter().map(|y| coefficient(y, &series, k)));
+            out.extend(outputs.iter_mut().map(|y| coefficient(y, &series, k)));
         }
         out
     }
+}
+
+/// More than any order.
+const ORDERS: usize = 16;
+
+/// A term: its coefficient, its factors, and the series of the product of the first, of the first two, ...
+type Product = (i64, Vec<(usize, [i64; ORDERS])>);
+
+fn products(terms: &Terms) -> Vec<Product> {
+    let factors = |exponents: &[u32]| {
+        let repeated = exponents.iter().enumerate().flat_map(|(i, &e)| (0..e).map(move |_| i));
+        repeated.map(|i| (i, [0; ORDERS])).collect()
+    };
+    terms.iter().map(|(c, exponents)| (*c, factors(exponents))).collect()
+}
+
+/// Coefficient `k` of a sum of terms of which those before were asked for.
+fn coefficient(terms: &mut [Product], series: &[[i64; ORDERS]], k: usize) -> i64 {
+    let mut sum: i64 = 0;
+    for (c, factors) in terms {
+        for f in 0..factors.len() {
+            let x = &series[factors[f].0];
+            let value = match f {
+                0 => x[k],
+                _ => (0..=k).map(|j| factors[f - 1].1[j] * x[k - j]).sum::<i64>() % Q,
+            };
+            factors[f].1[k] = value;
+        }
+        sum += *c * factors.last().map_or(1, |f| f.1[k]);
+    }
+    sum.rem_euclid(Q)
 }
 
 /// All points of a field of 37 elements are sorted by their outputs: of an unknown with k values hardly a point has more with it,

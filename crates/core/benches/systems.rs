@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use obsdeg_core::system::{SystemModel, json, judge};
+use obsdeg_core::system::{SystemModel, SystemOptions, analyze_system, json, judge};
 
 fn main() {
     divan::main();
@@ -33,6 +33,15 @@ fn all_references(bencher: Bencher<'_, '_>) {
             black_box(judged.expect("judged").findings.degrees.rank());
         }
     });
+}
+
+/// All 141 with the numbers of solutions, by the default limit of work, without solving expressions.
+#[divan::bench(sample_count = 1, sample_size = 1)]
+fn all_references_counted() {
+    for text in references() {
+        let model = json::read(&text).expect("a model");
+        black_box(analyze_system(&model, SystemOptions::default(), None).expect("judged").counting_order);
+    }
 }
 
 /// MAPK (34 unknowns), the rail vehicle (89 unknowns), the largest others.
