@@ -167,6 +167,16 @@ fn whole(c: &CrossCheck) -> Block {
         String::new(),
         passed(c.ranking.pass),
     ]);
+    rows.extend(c.ranking.errors.map(|tau| {
+        let name = "e. Kendall tau-b of predicted orders and errors of the runs, in sigmas of the prior";
+        vec![
+            name.into(),
+            String::new(),
+            number(tau),
+            "at these dwells: decides nothing".into(),
+            String::new(),
+        ]
+    }));
     rows.extend(c.controls.iter().map(|k: &Control| {
         let name = format!("f. {}: failing checks of a, b; NIS", k.name);
         let found = format!("{} of {}; {}", k.failed, k.checks, number(k.nis));
@@ -214,9 +224,10 @@ impl Answer for CrossCheck {
         blocks.push(Block::list("Not tested by evidence", self.not_tested.clone()));
         blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
         let mut assumed = conditions(&self.conditions, &self.timeline);
-        let drawn = match self.monte_carlo.filter {
-            FilterKind::Linear => "truths drawn from the prior",
-            _ => "runs: the drifts of the scheme, initial estimates drawn about them with the prior",
+        let drawn = if self.monte_carlo.about_the_truth {
+            "runs: the drifts of the scheme, initial estimates drawn about them with the prior"
+        } else {
+            "truths drawn from the prior"
         };
         assumed.push(format!("carry {}; seed {}; {drawn}", self.carry, self.seed));
         let wrong = self.filter.as_ref();

@@ -274,9 +274,11 @@ pub struct Statistic {
 /// Monte Carlo evidence.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MonteCarlo {
-    /// Which filter: the linear one against truths drawn from the prior, any other against the scheme's own drifts from initial
-    /// estimates drawn about them.
+    /// Which filter.
     pub filter: FilterKind,
+    /// Whether all runs have the scheme's own truth, with initial estimates drawn about it from the prior; otherwise truths are drawn about the
+    /// initial estimate.
+    pub about_the_truth: bool,
     /// Number of runs.
     pub runs: usize,
     /// Runs whose linearisations did not settle.
@@ -311,6 +313,9 @@ pub struct Ranking {
     pub kendall_tau: Option<f64>,
     /// Whether it is 1 (or all are tied on both sides).
     pub pass: bool,
+    /// Of runs with full attitudes: Kendall's tau-b of the predicted orders at the end and the errors there, root mean square in sigmas of the
+    /// prior; null where the filter is linear. It decides nothing: orders are of short dwells, errors of those of the scheme.
+    pub errors: Option<f64>,
 }
 
 /// A filter that is wrong on purpose, and must be found out.

@@ -195,6 +195,7 @@ fn against(
     let whiteness_probability = prepared.whiteness(&totals);
     let monte_carlo = MonteCarlo {
         filter: prepared.filter(),
+        about_the_truth: prepared.is_about_the_truth(),
         runs: totals.runs,
         unsettled: totals.unsettled,
         statistics: prepared.statistics(&totals),
@@ -224,7 +225,7 @@ fn against(
         method: method().into_iter().chain([filter_method()]).collect(),
         not_tested: NOT_TESTED.map(String::from).to_vec(),
         spaces: structure.spaces,
-        ranking: ranking(&structure.quantities),
+        ranking: ranking(&structure.quantities, prediction, &totals.errors),
         slopes: structure.slopes,
         orders: Measured::count(structure.quantities.iter().map(|q| (&q.slope, q.accuracy_order.is_some()))),
         quantities: structure.quantities,
@@ -292,16 +293,24 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
     Ok(out)
 }
 
-/// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last.
-fn ranking(quantities: &[QuantityEvidence]) -> Ranking {
+/// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last; against the `errors` of runs.
+fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f64]) -> Ranking {
     const LAST: i64 = 1000;
+    let unknowns = prediction.unknowns.iter();
+    let at_end: Vec<i64> = unknowns.map(|u| u.order_at_end.map_or(LAST, |d| d as i64)).collect();
+    // ranks: errors within a tenth are alike
+    let found: Vec<i64> = errors.iter().map(|e| (e.ln() / 0.2).round() as i64).collect();
     // an order that no slope shows has no rank
     let ranked = || quantities.iter().filter(|q| q.slope.outcome.is_resolved());
     let predicted: Vec<i64> = ranked().map(|q| q.accuracy_order.map_or(LAST, |d| d as i64)).collect();
     let order = |slope: f64| if slope < -0.25 { (-slope - 0.5).round() as i64 } else { LAST };
     let measured: Vec<i64> = ranked().filter_map(|q| q.slope.measured).map(order).collect();
     let kendall_tau = kendall_tau_b(&predicted, &measured);
-    Ranking { kendall_tau, pass: kendall_tau.map_or(predicted == measured, |t| t > 1.0 - 1e-12) }
+    Ranking {
+        kendall_tau,
+        pass: kendall_tau.map_or(predicted == measured, |t| t > 1.0 - 1e-12),
+        errors: (!errors.is_empty()).then(|| kendall_tau_b(&at_end, &found)).flatten(),
+    }
 }
 
 /// Evidence f: filters with another carry, at another latitude, without a position, against the truth of the linear model:

@@ -1,6 +1,6 @@
-//! Evidence d: many runs. Of the linear filter: against truths drawn from the prior; the covariance pass runs once, a run is a
-//! truth and a state pass. Of a filter with full attitudes: against the scheme's own drifts, exact, from initial estimates
-//! drawn about them, so that the errors are those that the prior says and the drifts those of the platform. Runs are summed
+//! Evidence d: many runs. Linear truths are drawn from the prior. An exact truth is that of the scheme's own drifts, whatever the filter, and
+//! initial estimates are drawn about it, so that the errors are those that the prior says and the drifts those of the platform. Of the
+//! linear filter the covariance pass runs once, and a run is a truth and a state pass. Runs are summed
 //! in a fixed order, so that the result does not depend on the number of threads.
 
 use nalgebra::DMatrix;
@@ -60,6 +60,8 @@ pub struct Totals {
     pub largest_psi: f64,
     /// Runs whose linearisations did not settle, or that ended in numbers that are none.
     pub unsettled: usize,
+    /// Sums of the squares of the errors at the end, in units of the prior, per unknown; empty where the filter is linear.
+    pub errors: Vec<f64>,
 }
 
 impl Totals {
@@ -72,6 +74,7 @@ impl Totals {
             lagged: [0.0; LAGS + 1],
             largest_psi: 0.0,
             unsettled: 0,
+            errors: Vec::new(),
         }
     }
 
@@ -82,6 +85,8 @@ impl Totals {
         sum(&mut self.nees, &other.nees);
         sum(&mut self.nis, &other.nis);
         sum(&mut self.lagged, &other.lagged);
+        self.errors.resize(other.errors.len(), 0.0);
+        sum(&mut self.errors, &other.errors);
         self.nees_observable += other.nees_observable;
         self.largest_psi = self.largest_psi.max(other.largest_psi);
     }
@@ -187,6 +192,23 @@ impl<'a> Prepared<'a> {
         self.kind
     }
 
+    /// Whether runs have the scheme's own truth, from initial estimates about it: an exact truth, and a filter of its unknowns. Others have truths
+    /// drawn about the initial estimate.
+    pub fn is_about_the_truth(&self) -> bool {
+        self.experiment.conditions.truth == Truth::Exact && self.comparable()
+    }
+
+    /// The truth of a run, whose biases are drawn while everything else is what the scheme says, and an initial estimate about it.
+    fn draw_about_the_truth(&self, noise: &mut Noise, truth: &mut [f64], estimate: &mut [f64]) {
+        let unknowns = self.experiment.truth.unknowns();
+        truth.copy_from_slice(&self.truth_start.truth);
+        let biases = truth.iter_mut().zip(&self.truth_start.sigma).skip(unknowns);
+        biases.for_each(|(x, sigma)| *x = sigma * noise.normal());
+        for ((x, truth), sigma) in estimate.iter_mut().zip(&*truth).zip(&self.start.sigma).take(unknowns) {
+            *x = truth + sigma * noise.normal();
+        }
+    }
+
     /// The runs `from..to`, one after the other.
     pub fn chunk(&self, from: usize, to: usize) -> Totals {
         if self.kind == FilterKind::Linear { self.linear(from, to) } else { self.exact(from, to) }
@@ -199,19 +221,13 @@ impl<'a> Prepared<'a> {
         let extended = Extended::new(filter, conditions, Update::default())
             .expect("an exact truth has coefficients, and so has the filter of the same unknowns");
         let constants = plan.constants();
-        let (mut start, mut z) = (self.start.clone(), Vec::new());
+        let (mut start, mut from_truth, mut z) =
+            (self.start.clone(), self.truth_start.truth.clone(), Vec::new());
         let mut truth = TruthModel::new(plan, conditions, self.truth_start.truth.clone());
         for run in from..to {
             let mut noise = Noise::new(*seed, run as u64 + 1);
-            // biases of gyros are drawn, everything else is what the scheme says
-            let mut from = self.truth_start.truth.clone();
-            let spread = from.iter_mut().zip(&self.truth_start.sigma).skip(plan.unknowns());
-            spread.for_each(|(x, sigma)| *x = sigma * noise.normal());
-            let unknowns = start.estimate.iter_mut().zip(&from).zip(&self.start.sigma);
-            for ((x, truth), sigma) in unknowns.take(plan.unknowns()) {
-                *x = truth + sigma * noise.normal();
-            }
-            truth.reset(&from);
+            self.draw_about_the_truth(&mut noise, &mut from_truth, &mut start.estimate);
+            truth.reset(&from_truth);
             let (mut states, mut taken) = (Vec::with_capacity(self.checkpoints.len()), 0);
             sample(&mut truth, plan, &mut noise, &mut z, |x| {
                 // the first is the start
@@ -223,11 +239,14 @@ impl<'a> Prepared<'a> {
             let (mut next, mut whitened) = (0, Vec::new());
             let mut nis = vec![0.0; self.checkpoints.len()];
             let mut nees = vec![0.0; self.checkpoints.len()];
+            let mut error = vec![f64::NAN; plan.unknowns()];
             let on_step = |step: usize, x: &PlatformState, p: &Covariance, innovations: &[f64]| {
                 nis[next] += innovations.iter().map(|v| v * v).sum::<f64>();
                 whitened.extend_from_slice(innovations);
                 if self.checkpoints[next] == step {
-                    let of = |p: &Covariance| Nees::of_covariance(p)?.of(&mut states[next].local(x));
+                    let mut off = states[next].local(x);
+                    error.copy_from_slice(&off[..plan.unknowns()]);
+                    let mut of = |p: &Covariance| Nees::of_covariance(p)?.of(&mut off);
                     nees[next] = of(p).unwrap_or(f64::NAN);
                     next = (next + 1).min(self.checkpoints.len() - 1);
                 }
@@ -244,7 +263,11 @@ impl<'a> Prepared<'a> {
                 // no run is left out
                 nis.fill(f64::NAN);
                 nees.fill(f64::NAN);
+                error.fill(f64::NAN);
             }
+            let relative = error.iter().zip(&self.start.sigma).map(|(e, s)| (e / s).powi(2));
+            totals.errors.resize(error.len(), 0.0);
+            totals.errors.iter_mut().zip(relative).for_each(|(sum, e)| *sum += e);
             let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
             sum(&mut totals.nis, &nis);
             sum(&mut totals.nees, &nees);
@@ -264,13 +287,17 @@ impl<'a> Prepared<'a> {
         let mut whitened: Vec<f64> = Vec::new();
         for run in from..to {
             let mut noise = Noise::new(*seed, run as u64 + 1);
-            for ((x, mean), sigma) in
-                drawn.iter_mut().zip(&self.truth_start.estimate).zip(&self.truth_start.sigma)
-            {
-                *x = mean + sigma * noise.normal();
+            x.copy_from_slice(&self.start.estimate);
+            if self.is_about_the_truth() {
+                self.draw_about_the_truth(&mut noise, &mut drawn, &mut x);
+            } else {
+                for ((x, mean), sigma) in
+                    drawn.iter_mut().zip(&self.truth_start.estimate).zip(&self.truth_start.sigma)
+                {
+                    *x = mean + sigma * noise.normal();
+                }
             }
             truth.reset(&drawn);
-            x.copy_from_slice(&self.start.estimate);
             whitened.clear();
             let mut next = 0;
             let truth = std::cell::RefCell::new(&mut truth);

@@ -21,7 +21,7 @@ use super::iterated::Trajectory;
 use super::state::PlatformState;
 
 /// Most directions that bend: their products are columns.
-const MOST_DIRECTIONS: usize = 8;
+const MOST_DIRECTIONS: usize = 6;
 /// A direction may bend the run when the square of what it turns the platform by, and a column counts when its outputs, are
 /// more than this part of what all samples could tell from nothing.
 const SEEN: f64 = 0.1;

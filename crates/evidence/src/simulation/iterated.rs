@@ -44,16 +44,18 @@ pub(super) struct Trajectory {
 }
 
 impl Trajectory {
-    /// From `x`. `on_step` hears the segment, the time within it, how long the step is, and the state to be moved by it.
+    /// From `x`, of at most so many steps. `on_step` hears the segment, the time within it, how long the step is, and the state to be
+    /// moved by it.
     fn through(
         filter: &Extended<'_>,
+        most: usize,
         mut x: PlatformState,
         mut on_step: impl FnMut(&PlatformMotion<'_>, f64, f64, &mut PlatformState) -> Result<(), EkfError>,
     ) -> Result<Self, EkfError> {
         let mut out = Self { outputs: Vec::new(), states: Vec::new() };
         for (segment, s) in filter.plan().segments.iter().enumerate() {
             let motion = filter.motion(segment);
-            for i in 0..s.steps {
+            for i in 0..s.steps.min(most - out.states.len()) {
                 on_step(&motion, i as f64 * s.dt, s.dt, &mut x)?;
                 out.outputs.extend_from_slice(motion.h(0.0, &x).as_slice());
                 out.states.push(x.clone());
@@ -64,7 +66,7 @@ impl Trajectory {
 
     /// From `x`.
     pub(super) fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
-        Self::through(filter, x, |motion, t, dt, x| motion.carry(t, dt, x))
+        Self::through(filter, usize::MAX, x, |motion, t, dt, x| motion.carry(t, dt, x))
     }
 }
 
@@ -77,10 +79,10 @@ pub(super) struct Along {
 }
 
 impl Along {
-    /// Along the trajectory that starts from `x`.
-    fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
+    /// Along the trajectory that starts from `x`, of at most so many steps.
+    fn new(filter: &Extended<'_>, most: usize, x: PlatformState) -> Result<Self, EkfError> {
         let mut stages = Vec::new();
-        let at = Trajectory::through(filter, x, |motion, t, dt, x| {
+        let at = Trajectory::through(filter, most, x, |motion, t, dt, x| {
             let (transition, noise) = motion.advance(t, dt, x)?;
             let rows = Measurement::jacobian(motion, 0.0, x);
             let row = |(j, o): (usize, &ScalarOutput)| ScalarOutput {
@@ -104,7 +106,7 @@ struct Pass {
     misfit: f64,
 }
 
-/// One pass along the trajectory from `x0`, which bends as `curvature` says.
+/// One pass along the trajectory from `x0`, which bends as `curvature` says, over the steps that `z` is of.
 fn pass(
     filter: &Extended<'_>,
     start: &RunStart,
@@ -113,8 +115,8 @@ fn pass(
     curvature: Option<&Curvature>,
     mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
 ) -> Result<Pass, EkfError> {
-    let Along { mut stages, at } = Along::new(filter, x0.clone())?;
     let (n, m) = (x0.dimension(), filter.plan().components.len());
+    let Along { mut stages, at } = Along::new(filter, z.len() / m, x0.clone())?;
     let mut p0 = start.variances();
     let mut from = start.state(filter.plan()).local(x0);
     if let Some(c) = curvature {
@@ -217,8 +219,24 @@ fn settle(
     Ok(Settled { x0, passes, converged, misfit: best.misfit })
 }
 
+/// Settles on the first eighth of the run, from there on the first quarter, and so on: a trajectory that is known for a while is near
+/// enough to be known for longer.
+fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<Settled, EkfError> {
+    let outputs = filter.plan().components.len();
+    let mut x0 = start.state(filter.plan());
+    let mut passes = 0;
+    for part in [8, 4, 2] {
+        let steps = (z.len() / outputs).div_ceil(part);
+        let settled = settle(filter, start, &z[..steps * outputs], x0)?;
+        passes += settled.passes;
+        x0 = settled.x0;
+    }
+    let settled = settle(filter, start, z, x0)?;
+    Ok(Settled { passes: passes + settled.passes, ..settled })
+}
+
 /// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory that it found,
-/// until that stays. Where it does not, or fits poorly, the trajectory of the initial estimate is tried too.
+/// until that stays. Where it does not, or fits poorly, longer and longer parts of the run are tried from the initial estimate too.
 ///
 /// # Errors
 /// [`EkfError`] when a number is none, or `z` is of another run.
@@ -234,7 +252,7 @@ pub fn iterated(
     let once = filter.run(start, z, |_, _, _, _| {}).and_then(|once| back(filter, once.x));
     let mut found = once.and_then(|x| settle(filter, start, z, x));
     if found.as_ref().map_or(true, poor) {
-        let other = settle(filter, start, z, start.state(filter.plan()));
+        let other = settle_by_and_by(filter, start, z);
         found = match (found, other) {
             (Ok(a), Ok(b)) => {
                 let passes = a.passes + b.passes;
@@ -257,7 +275,7 @@ fn bent(
     z: &[f64],
     x0: &mut PlatformState,
 ) -> Result<Option<Curvature>, EkfError> {
-    let Along { stages, at } = Along::new(filter, x0.clone())?;
+    let Along { stages, at } = Along::new(filter, usize::MAX, x0.clone())?;
     let p = pass(filter, start, z, x0, None, |_, _, _, _| {})?.start.covariance;
     let curvature = Curvature::new(filter, x0, (&stages, &at), &p, &start.sigma)?;
     if let Some(c) = &curvature {

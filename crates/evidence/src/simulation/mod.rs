@@ -298,7 +298,11 @@ fn estimate(
     });
     let error = estimate - truth;
     let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
-    let reached = required_sigma.and_then(|r| series.sigma.iter().position(|s| meets(s / scale, r)));
+    // from when on sigma meets it to the end
+    let reached = required_sigma.and_then(|r| {
+        let missed = series.sigma.iter().rposition(|s| !meets(s / scale, r));
+        missed.map_or(Some(0), |i| (i + 1 < series.sigma.len()).then_some(i + 1))
+    });
     Estimate {
         name: name.into(),
         unit: shown_unit(unit).into(),

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use super::SimulationError;
 use super::conditions::Conditions;
 use super::gyro_noise::Gyros;
-use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
+use super::plan::{G_N, MAX_INTEGRATION, Plan, SegmentKind, integration_steps};
 use super::state::orthonormal;
 
 /// The stream of random numbers of one run.
@@ -153,20 +153,25 @@ impl<'a> TruthModel<'a> {
         if plan.segments[before].position != s.position {
             e = self.repositioned(&e, before, segment);
         }
-        // the drift noise of the step, in platform axes
-        let held = self.conditions.drift_noise.held_rad_s(s.dt);
-        let kick = [0; 3].map(|_| held * noise.normal());
+        // the drift noise, in platform axes: held for one step, of which a slew has several
+        let (parts, held) = self.held(segment);
+        let mut kick = [0; 3].map(|_| held * noise.normal());
         let kicked = kick.iter().map(|x| x * x).sum::<f64>().sqrt();
         let drifts = self.coefficients().iter().map(|d| d.abs()).sum::<f64>();
         // as many as have been counted before the run
         let turn = drift_turn(drifts + kicked + plan.random_rate(s.dt), s.dt);
         let substeps = plan.substeps(segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
+        let of_part = substeps.div_ceil(parts);
+        let substeps = parts * of_part;
         let h = s.dt / substeps as f64;
         let gyros = plan
             .is_noisy()
             .then(|| self.gyros.take().filter(|g| g.is_for(h)).unwrap_or_else(|| Gyros::new(plan, h)));
         for i in 0..substeps {
             let t = step as f64 * s.dt + i as f64 * h;
+            if i > 0 && i % of_part == 0 {
+                kick = [0; 3].map(|_| held * noise.normal());
+            }
             let mut drift = kick;
             if let Some(gyros) = &gyros {
                 gyros.draw(plan, &mut self.x[plan.unknowns()..], noise, &mut drift);
@@ -185,6 +190,18 @@ impl<'a> TruthModel<'a> {
         for (z, &component) in z.iter_mut().zip(&plan.components) {
             *z = if component == 2 { psi_n[1] } else { G_N[component - 1] - seen[component - 1] };
         }
+    }
+
+    /// How many draws of the drift noise a step of a segment has, and how large they are: as many steps as a slew would have, each
+    /// with its share of the angle that the filter allows for.
+    fn held(&self, segment: usize) -> (usize, f64) {
+        let s = &self.plan.segments[segment];
+        if !matches!(s.kind, SegmentKind::Slew(_)) {
+            return (1, self.conditions.drift_noise.held_rad_s(s.dt));
+        }
+        let dt = self.conditions.step_s.min(s.dt);
+        let parts = (s.dt / dt).ceil();
+        (parts as usize, self.conditions.drift_noise.held_rad_s(dt) * (dt * parts / s.dt).sqrt())
     }
 
     /// E after an instantaneous change of position, or the same before a slew.
