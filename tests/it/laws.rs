@@ -130,7 +130,9 @@ struct Scaled<R> {
     scale: Vec<u64>,
 }
 
-impl<R: DerivativeRows> DerivativeRows for Scaled<R> {
+impl<R: DerivativeRows<Field = Field>> DerivativeRows for Scaled<R> {
+    type Field = Field;
+
     fn field(&self) -> Field {
         self.inner.field()
     }

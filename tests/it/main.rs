@@ -10,6 +10,7 @@ mod examples;
 #[cfg(unix)]
 mod files;
 mod formulas;
+mod functions;
 mod grammar;
 mod hostile;
 mod language;

@@ -219,6 +219,8 @@ struct Matrices {
 }
 
 impl DerivativeRows for Matrices {
+    type Field = Field;
+
     fn field(&self) -> Field {
         self.field
     }

@@ -5,7 +5,8 @@ use obsdeg_symbolic::Worker;
 
 use crate::accuracy::{Accuracy, AccuracyError};
 use crate::degree::ensemble::{EnsembleError, Verdicts, judge};
-use crate::degree::findings::Findings;
+use crate::degree::findings::{ByPrimes, Findings};
+use crate::degree::staircase::partners;
 use crate::degree::status::{Status, Verdict};
 use crate::model::scheme::MAX_UNKNOWNS;
 use crate::model::{Platform, SchemeError};
@@ -41,6 +42,8 @@ pub struct Judged<'a> {
 pub struct SchemeFindings {
     /// The verdicts.
     pub verdicts: Findings,
+    /// How certain they are.
+    pub certainty: ByPrimes,
     /// Observable combinations beyond single unknowns, by degree, then those that the scheme asks for.
     pub combinations: Vec<CombinationFinding>,
     /// Basis of the directions that no derivative of Z sees (unknowns that are not excited left out).
@@ -129,12 +132,13 @@ impl<'a> Judged<'a> {
         let combinations = basis.chain(asked).collect();
         let primes = [0, 1].map(|i| verdicts.values[i].roots().field.modulus());
         SchemeFindings {
-            verdicts: Findings::of(
-                verdicts.degrees.clone(),
-                &verdicts.stairs,
-                requested.iter().map(|r| r.verdict).collect(),
-                (primes, verdicts.error_bound, *seed),
-            ),
+            verdicts: Findings {
+                partners: partners(verdicts.degrees.degree.len(), &verdicts.stairs),
+                degrees: verdicts.degrees.clone(),
+                asked: requested.iter().map(|r| r.verdict).collect(),
+                seed: *seed,
+            },
+            certainty: ByPrimes { primes, error_bound: verdicts.error_bound },
             combinations,
             null_space,
             accuracy,

@@ -150,9 +150,9 @@ impl Prediction {
             .filter_map(|v| numbers(v.components.as_ref()?))
             .chain(silent.map(|c| vec![(c, 1.0)]))
             .collect();
-        let Findings { degrees, error_bound, .. } = &found.verdicts;
+        let (Findings { degrees, .. }, error_bound) = (&found.verdicts, found.certainty.error_bound);
         let rank = accuracy.and_then(Accuracy::rank).unwrap_or_else(|| degrees.rank());
-        let error_bound = accuracy.map_or(*error_bound, |a| error_bound.max(a.error_bound));
+        let error_bound = accuracy.map_or(error_bound, |a| error_bound.max(a.error_bound));
         Ok(Self {
             unknowns,
             combinations,

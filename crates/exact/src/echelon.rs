@@ -218,21 +218,26 @@ impl Echelon {
     /// graph that joins a pivot to the free columns where its row is not zero: whatever the pivots are, the parts are
     /// the same.
     pub fn companions(&self) -> Vec<Vec<usize>> {
-        let mut part: Vec<usize> = (0..self.columns).collect();
-        for (i, pivot) in self.pivots().enumerate() {
-            let mut touched = vec![false; self.columns];
-            for (&p, _) in part.iter().zip(self.row(i)).filter(|(_, a)| **a != 0) {
-                touched[p] = true;
-            }
-            let name = part[pivot];
-            for p in part.iter_mut().filter(|p| touched[**p]) {
-                *p = name;
-            }
-        }
-        (0..self.columns)
-            .map(|c| (0..self.columns).filter(|&d| d != c && part[d] == part[c]).collect())
-            .collect()
+        let pattern = |i: usize| self.row(i).iter().map(|a| *a != 0).collect::<Vec<bool>>();
+        components(self.columns, self.pivots().enumerate().map(|(i, pivot)| (pivot, pattern(i))))
     }
+}
+
+/// The parts of the graph that joins the pivot of a row to the columns where the row is not zero, as the others of each
+/// column.
+pub(crate) fn components(columns: usize, rows: impl Iterator<Item = (usize, Vec<bool>)>) -> Vec<Vec<usize>> {
+    let mut part: Vec<usize> = (0..columns).collect();
+    for (pivot, pattern) in rows {
+        let mut touched = vec![false; columns];
+        for (&p, _) in part.iter().zip(&pattern).filter(|(_, differs)| **differs) {
+            touched[p] = true;
+        }
+        let name = part[pivot];
+        for p in part.iter_mut().filter(|p| touched[**p]) {
+            *p = name;
+        }
+    }
+    (0..columns).map(|c| (0..columns).filter(|&d| d != c && part[d] == part[c]).collect()).collect()
 }
 
 /// The columns, out of `n`, in which some row is not zero.

@@ -15,9 +15,17 @@
 //! - [`polynomial`]: roots of small polynomials in the field;
 //! - [`multivariate`], [`groebner`]: polynomials in several variables, and bases of their ideals;
 //! - [`certainty`]: the bound on the error probability.
+//!
+//! Transcendental functions have no image in a prime field. Where they take part, the same algorithms run over real
+//! numbers of many digits with error bounds:
+//! - [`scalars`]: what a field and a row space are to these algorithms;
+//! - [`ball`]: the numbers; `elementary`: their functions;
+//! - [`reals`]: row spaces over them, in which what is zero is told by a gap.
 
+pub mod ball;
 pub mod certainty;
 pub mod echelon;
+mod elementary;
 pub mod field;
 mod gcd;
 pub mod groebner;
@@ -25,14 +33,19 @@ pub mod multivariate;
 pub mod polynomial;
 pub mod prime;
 pub mod radical;
+pub mod reals;
 pub mod rng;
+pub mod scalars;
 pub mod series;
 pub mod turn;
 
+pub use ball::Ball;
 pub use echelon::Echelon;
 pub use field::Field;
 pub use gcd::gcd;
 pub use prime::{PrimeError, RootField};
 pub use radical::{Radical, Ratio};
+pub use reals::{Gap, RealSpace, Reals};
 pub use rng::SplitMix64;
+pub use scalars::{RowSpace, Scalars};
 pub use turn::Turn;

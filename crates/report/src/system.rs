@@ -2,7 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
-    NumberOfSolutions, POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity,
+    DigitsReport, NumberOfSolutions, POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity,
 };
 use obsdeg_evidence::crosscheck::{Agreement, Check};
 use obsdeg_evidence::simulation::Outcome;
@@ -20,6 +20,23 @@ fn explanation(q: &SystemQuantity) -> String {
         (Status::Observable, _) => solutions(q),
         (Status::Inseparable, _) => words::not_told_from(&q.partners),
         (Status::NotExcited, _) => "moves no output".into(),
+        (Status::NotSeen, _) => "a higher order may still solve it: no end is proven here".into(),
+    }
+}
+
+/// What verdicts rest on, in a sentence. Real numbers give no probability: a number that is not zero is proven to be so, one that holds
+/// zero is taken to be.
+fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
+    match (error_bound, digits) {
+        (Some(bound), _) => format!("a verdict is wrong with probability below {bound:.0e}; seed {seed}"),
+        (None, Some(d)) => {
+            let zero = d.zero_log10.map_or_else(|| "0".into(), |x| format!("10^{x:.0}"));
+            format!(
+                "functions by their true values at two random real points, with {} and {} digits, that agree: what counts as different from zero is proven to be (at least 10^{:.0} of its row), what counts as zero is less than {zero} of its row; a judgement by this gap, to which no probability belongs; seed {seed}",
+                d.digits[0], d.digits[1], d.nonzero_log10
+            )
+        }
+        (None, None) => format!("seed {seed}"),
     }
 }
 
@@ -78,7 +95,11 @@ impl Answer for SystemAnalysis {
             if units {
                 row.push(q.unit.clone());
             }
-            row.extend([q.status.to_string(), words::degree(q.degree), explanation(q)]);
+            let verdict = match q.status {
+                Status::NotSeen => format!("not seen up to order {}", self.last_order),
+                status => status.to_string(),
+            };
+            row.extend([verdict, words::degree(q.degree), explanation(q)]);
             if !q.description.is_empty() {
                 let last = row.len() - 1;
                 row[last] = format!("{} ({})", row[last], q.description);
@@ -141,8 +162,13 @@ impl Answer for SystemAnalysis {
             "starts, inputs or segments are not generic: orders up to the bound {} were looked at, and what is not observable rests on it (--order sets another)",
             self.bound
         )
-    } else {
+    } else if self.rank == self.unknowns {
         format!("everything is observable with derivatives up to order {}", self.last_order)
+    } else {
+        format!(
+            "starts, inputs, jumps or the time are special, yet no order above {} can add anything: the rank is that of a generic point, or nothing moves",
+            self.last_order
+        )
     });
         assumed.push(
             "the verdict is local: an observable unknown has finitely many solutions near any generic point"
@@ -150,10 +176,13 @@ impl Answer for SystemAnalysis {
         );
         assumed.extend(counting(self));
         assumed.extend(self.note.clone());
-        assumed.push(format!(
-        "ranks modulo the random primes {} and {} at random points; wrong with probability below {:.0e}; seed {}",
-        self.primes[0], self.primes[1], self.error_bound, self.seed
-    ));
+        assumed.push(match (&self.primes, self.error_bound) {
+            (Some([p, q]), Some(bound)) => format!(
+                "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {bound:.0e}; seed {}",
+                self.seed
+            ),
+            _ => certainty(self.error_bound, self.digits, self.seed),
+        });
         blocks.push(Block::list("Assumed", assumed));
         let profile = words::list(&self.rank_profile);
         let mut lead = vec![format!("rank {} of {}; rank profile {profile}", self.rank, self.unknowns)];
@@ -206,7 +235,7 @@ impl Answer for SystemRun {
             ),
             format!("noise of a sample: {}", noise.join(", ")),
             "the initial estimate is the truth plus an error drawn from the prior".into(),
-            format!("a verdict is wrong with probability below {:.0e}; seed {}", self.error_bound, self.seed),
+            certainty(self.error_bound, self.digits, self.seed),
         ];
         Document {
             title: format!("Simulation: {}", self.name),
@@ -277,7 +306,7 @@ impl Answer for SystemEvidence {
                 number(self.duration)
             ),
             "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is observable, 10 for what is not".into(),
-            format!("a verdict is wrong with probability below {:.0e}; seed {}", self.error_bound, self.seed),
+            certainty(self.error_bound, self.digits, self.seed),
         ],
     ));
         let verdict = match (self.passed, self.orders.measured < self.orders.of) {

@@ -106,8 +106,8 @@ pub fn analyze(
         frame: options.frame,
         certainty: Certainty {
             method: "exact ranks modulo two random 61-bit primes that agree".into(),
-            error_bound: findings.verdicts.error_bound,
-            primes: findings.verdicts.primes_as_text(),
+            error_bound: findings.certainty.error_bound,
+            primes: findings.certainty.primes_as_text(),
             seed: findings.verdicts.seed,
         },
         notes: printer.notes,

@@ -12,7 +12,7 @@ pub(crate) mod status;
 
 pub use coefficient::{Coefficient, Form, Number};
 pub use ensemble::{EnsembleError, Verdicts, judge, staircase};
-pub use findings::Findings;
+pub use findings::{ByPrimes, Findings};
 pub use platform_rows::{LocalRow, PlatformRows, local_chain};
 pub use rows::DerivativeRows;
 pub use staircase::{Degrees, climb, partners};

@@ -64,6 +64,8 @@ impl PlatformRows {
 }
 
 impl DerivativeRows for PlatformRows {
+    type Field = Field;
+
     fn field(&self) -> Field {
         self.field
     }

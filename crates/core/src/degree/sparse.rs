@@ -1,6 +1,6 @@
 //! Sparse bases of row spaces and null spaces: vectors of minimal support.
 
-use obsdeg_exact::{Echelon, Field};
+use obsdeg_exact::{RowSpace, Scalars};
 
 /// How many column orders are tried for short vectors, and up to how many columns that many.
 const ORDERS: usize = 16;
@@ -9,9 +9,9 @@ const SMALL: usize = 120;
 /// The rows of a reduced basis of the span of `rows` when columns are preferred as pivots in the
 /// order `columns`. Every such row is an elementary vector: no vector of the span has a smaller
 /// support inside its own.
-fn reduced(field: Field, rows: &[Vec<u64>], columns: &[usize]) -> Vec<Vec<u64>> {
-    let mut basis = Echelon::new(field, columns.len());
-    let mut permuted = vec![0; columns.len()];
+fn reduced<S: Scalars>(field: &S, rows: &[Vec<S::Element>], columns: &[usize]) -> Vec<Vec<S::Element>> {
+    let mut basis = <S::Space as RowSpace>::new(field.clone(), columns.len());
+    let mut permuted = vec![field.zero(); columns.len()];
     for row in rows {
         for (slot, &c) in permuted.iter_mut().zip(columns) {
             *slot = row[c];
@@ -20,7 +20,7 @@ fn reduced(field: Field, rows: &[Vec<u64>], columns: &[usize]) -> Vec<Vec<u64>> 
     }
     (0..basis.rank())
         .map(|i| {
-            let mut row = vec![0; columns.len()];
+            let mut row = vec![field.zero(); columns.len()];
             for (&x, &c) in basis.row(i).iter().zip(columns) {
                 row[c] = x;
             }
@@ -34,15 +34,23 @@ pub(crate) fn support(vector: &[u64]) -> Vec<usize> {
     (0..vector.len()).filter(|&c| vector[c] != 0).collect()
 }
 
+/// The same in any field.
+pub(crate) fn support_in<S: Scalars>(field: &S, vector: &[S::Element]) -> Vec<usize> {
+    (0..vector.len()).filter(|&c| !field.is_zero(&vector[c])).collect()
+}
+
 /// Elementary vectors of the span of `rows`, shortest first, that together with what `span` already
 /// holds are independent; `span` grows by them.
-pub(crate) fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> Vec<Vec<u64>> {
-    let field = span.field();
+pub(crate) fn extend_by_short_vectors<V: RowSpace>(
+    field: &V::Field,
+    rows: &[Vec<V::Element>],
+    span: &mut V,
+) -> Vec<Vec<V::Element>> {
     let n = span.columns();
-    let used: Vec<usize> = (0..n).filter(|&c| rows.iter().any(|r| r[c] != 0)).collect();
+    let used: Vec<usize> = (0..n).filter(|&c| rows.iter().any(|r| !field.is_zero(&r[c]))).collect();
     let orders = if used.len() <= SMALL { ORDERS } else { 2 };
     let step = used.len().div_ceil(orders / 2).max(1);
-    let mut candidates: Vec<Vec<u64>> = Vec::new();
+    let mut candidates: Vec<Vec<V::Element>> = Vec::new();
     for shift in (0..used.len()).step_by(step) {
         let mut order: Vec<usize> = (0..n).filter(|c| !used.contains(c)).collect();
         order.extend(used[shift..].iter().chain(&used[..shift]));
@@ -51,7 +59,7 @@ pub(crate) fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> 
         candidates.extend(reduced(field, rows, &order));
     }
     candidates.sort_by_cached_key(|v| {
-        let s = support(v);
+        let s = support_in(field, v);
         (s.len(), s)
     });
     candidates.retain(|v| span.insert(v));
@@ -61,6 +69,7 @@ pub(crate) fn extend_by_short_vectors(rows: &[Vec<u64>], span: &mut Echelon) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use obsdeg_exact::{Echelon, Field};
 
     #[test]
     fn finds_the_short_vectors_of_a_mixed_basis() {
@@ -69,7 +78,7 @@ mod tests {
         // span of (1,-1,0,0) and (0,0,1,2), given by mixed rows
         let rows = [row([1, -1, 3, 6]), row([2, -2, 1, 2])];
         let mut span = Echelon::new(f, 4);
-        let found = extend_by_short_vectors(&rows, &mut span);
+        let found = extend_by_short_vectors(&f, &rows, &mut span);
         let supports: Vec<Vec<usize>> = found.iter().map(|v| support(v)).collect();
         assert_eq!(supports, [vec![0, 1], vec![2, 3]]);
         assert_eq!(span.rank(), 2);
@@ -100,7 +109,7 @@ mod tests {
                     .collect::<Vec<u64>>()
             };
             let mixed: Vec<Vec<u64>> = (0..6).map(|_| mix(&mut rng)).collect();
-            let vectors = extend_by_short_vectors(&mixed, &mut Echelon::new(f, 12));
+            let vectors = extend_by_short_vectors(&f, &mixed, &mut Echelon::new(f, 12));
             found += vectors.iter().map(|v| support(v).len()).sum::<usize>();
         }
         // two orders of the columns find them within 2 %, sixteen find shorter ones still

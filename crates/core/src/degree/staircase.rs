@@ -1,6 +1,6 @@
 //! The staircase `V_0 < V_1 < ...` of spans of derivative rows.
 
-use obsdeg_exact::Echelon;
+use obsdeg_exact::{Echelon, RowSpace, Scalars};
 
 use super::rows::DerivativeRows;
 
@@ -24,10 +24,10 @@ impl Degrees {
 
 /// Climbs the staircase: rows of order 0, 1, 2, ... go into `basis` (cleared first) until every
 /// segment's chain has stalled or the rank is full; `on_order` sees the basis of `V_k` after each order.
-pub fn climb(
-    rows: &mut impl DerivativeRows,
-    basis: &mut Echelon,
-    mut on_order: impl FnMut(usize, &Echelon),
+pub fn climb<R: DerivativeRows>(
+    rows: &mut R,
+    basis: &mut <R::Field as Scalars>::Space,
+    mut on_order: impl FnMut(usize, &<R::Field as Scalars>::Space),
 ) -> Degrees {
     basis.clear();
     let mut degrees = Degrees { degree: vec![None; rows.columns()], ..Degrees::default() };

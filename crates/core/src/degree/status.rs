@@ -15,6 +15,9 @@ pub enum Status {
     Inseparable,
     /// It does not move Z at all.
     NotExcited,
+    /// No order up to the last that was looked at solves it, and a higher one may: of systems with special starts, jumps or
+    /// arbitrary inputs.
+    NotSeen,
 }
 
 impl Status {
@@ -34,6 +37,7 @@ impl std::fmt::Display for Status {
             Self::Observable => "observable",
             Self::Inseparable => "inseparable",
             Self::NotExcited => "not excited",
+            Self::NotSeen => "not seen",
         })
     }
 }

@@ -75,11 +75,14 @@ pub enum Function {
     Exp,
     Log,
     Sqrt,
+    Tanh,
+    Abs,
+    Sign,
 }
 
 impl Function {
     /// All of them, with their names.
-    pub const ALL: [(&'static str, Self); 9] = [
+    pub const ALL: [(&'static str, Self); 12] = [
         ("sin", Self::Sin),
         ("cos", Self::Cos),
         ("tan", Self::Tan),
@@ -89,7 +92,29 @@ impl Function {
         ("exp", Self::Exp),
         ("log", Self::Log),
         ("sqrt", Self::Sqrt),
+        ("tanh", Self::Tanh),
+        ("abs", Self::Abs),
+        ("sign", Self::Sign),
     ];
+
+    /// Its value in floating point; the sign of zero is zero.
+    pub fn value(self, x: f64) -> f64 {
+        match self {
+            Self::Sin => x.sin(),
+            Self::Cos => x.cos(),
+            Self::Tan => x.tan(),
+            Self::Asin => x.asin(),
+            Self::Acos => x.acos(),
+            Self::Atan => x.atan(),
+            Self::Exp => x.exp(),
+            Self::Log => x.ln(),
+            Self::Sqrt => x.sqrt(),
+            Self::Tanh => x.tanh(),
+            Self::Abs => x.abs(),
+            Self::Sign if x == 0.0 => 0.0,
+            Self::Sign => x.signum(),
+        }
+    }
 
     /// The function of a name.
     pub fn named(name: &str) -> Option<Self> {
@@ -314,27 +339,26 @@ pub fn from_i128(f: &Field, x: i128) -> u64 {
     if x < 0 { f.neg(image) } else { image }
 }
 
-/// The value of an expression in floating point, with the names' values from `at`.
+/// The constants that every model knows unless it gives the name another meaning: `pi`, and a degree in radians.
+pub fn constant(name: &str) -> Option<f64> {
+    match name {
+        "pi" => Some(std::f64::consts::PI),
+        "deg" => Some(std::f64::consts::PI / 180.0),
+        _ => None,
+    }
+}
+
+/// The value of an expression in floating point, with the names' values from `at`: NaN for a name that it does not know.
 pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     let mut values: Vec<f64> = Vec::with_capacity(e.nodes.len());
     for node in &e.nodes {
         let value = match node {
             Node::Number { mantissa, decimals } => *mantissa as f64 / 10f64.powi(*decimals),
-            Node::Name(n) => at(n),
-            Node::Call { function, argument } => {
-                let x = values[*argument];
-                match function {
-                    Function::Sin => x.sin(),
-                    Function::Cos => x.cos(),
-                    Function::Tan => x.tan(),
-                    Function::Asin => x.asin(),
-                    Function::Acos => x.acos(),
-                    Function::Atan => x.atan(),
-                    Function::Exp => x.exp(),
-                    Function::Log => x.ln(),
-                    Function::Sqrt => x.sqrt(),
-                }
-            }
+            Node::Name(n) => match (at(n), constant(n)) {
+                (x, Some(own)) if x.is_nan() => own,
+                (x, _) => x,
+            },
+            Node::Call { function, argument } => function.value(values[*argument]),
             Node::Negate(a) => -values[*a],
             Node::Add(a, b) => values[*a] + values[*b],
             Node::Subtract(a, b) => values[*a] - values[*b],

@@ -145,7 +145,7 @@ const fn functions(names: Names) -> &'static str {
     match names {
         Names::Platform => "a known function (sin, cos, sqrt) or an operator before `(`",
         Names::Plain => {
-            "a known function (sin, cos, tan, asin, acos, atan, exp, log, sqrt; of vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator before `(`"
+            "a known function (sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, tanh, abs, sign; of vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator before `(`"
         }
     }
 }
@@ -230,7 +230,10 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
     }
     let name = rest[..length].to_string();
     input.next_slice(length);
-    if let Some(function) = Function::named(&name) {
+    // of models only
+    let later = [Function::Tanh, Function::Abs, Function::Sign];
+    let known = |f: &Function| names == Names::Plain || !later.contains(f);
+    if let Some(function) = Function::named(&name).filter(known) {
         if symbol(input, "(").is_none() {
             return wrong(input, "`(`");
         }
@@ -243,6 +246,10 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
             return push_vector(input, start, |_| Err(Mismatch::new(expected, argument.shape)));
         }
         return Ok(push(input, Node::Call { function, argument: argument.entries[0] }, start));
+    }
+    if name == "atan2" && names == Names::Plain && symbol(input, "(").is_some() {
+        let arguments = values(input, ")", "an operator, `,` or `)`")?;
+        return angle(input, &arguments, start);
     }
     if peek(input) == Some('(') {
         let Some(operation) = Operation::named(&name).filter(|_| names == Names::Plain) else {
@@ -257,6 +264,25 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
     let entries =
         shape.names(&name).into_iter().flat_map(|n| push(input, Node::Name(n), start).entries).collect();
     Ok(Value { shape, entries, start })
+}
+
+/// `atan2(y, x)`, the angle of the point (x, y): `2 atan(y / (sqrt(x^2 + y^2) + x))`, off the negative x-axis, where it jumps.
+fn angle(input: &mut Input<'_>, arguments: &[Value], start: usize) -> Parsed<Value> {
+    let [Value { shape: Shape::SCALAR, entries: y, .. }, Value { shape: Shape::SCALAR, entries: x, .. }] =
+        arguments
+    else {
+        let found = arguments.iter().map(|a| a.shape.to_string()).collect::<Vec<_>>().join(", ");
+        return push_vector(input, start, |_| Err(Mismatch::new("two scalars in `atan2`", found)));
+    };
+    let (y, x) = (y[0], x[0]);
+    let call = |input: &mut Input<'_>, node: Node| push(input, node, start).entries[0];
+    let (xx, yy) = (call(input, Node::Multiply(x, x)), call(input, Node::Multiply(y, y)));
+    let square = call(input, Node::Add(xx, yy));
+    let radius = call(input, Node::Call { function: Function::Sqrt, argument: square });
+    let below = call(input, Node::Add(radius, x));
+    let tangent = call(input, Node::Divide(y, below));
+    let half = call(input, Node::Call { function: Function::Atan, argument: tangent });
+    Ok(push(input, Node::Add(half, half), start))
 }
 
 fn binary(input: &mut Input<'_>, sign: char, a: &Value, b: &Value) -> Parsed<Value> {

@@ -98,7 +98,7 @@ pub(crate) fn combinations(
             .map(|(i, _)| basis.row(i).to_vec())
             .collect();
         if span.rank() < basis.rank() {
-            chosen.extend(extend_by_short_vectors(&rows, &mut span).into_iter().map(|v| (v, k)));
+            chosen.extend(extend_by_short_vectors(&field, &rows, &mut span).into_iter().map(|v| (v, k)));
         }
     }
     let sum = |(vector, degree): (Vec<u64>, usize)| {
@@ -160,7 +160,7 @@ pub(crate) fn null_space(
     let vectors: Vec<Vec<u64>> =
         last.null_space().into_iter().filter(|v| support(v).iter().all(|&c| excited[c])).collect();
     let mut span = Echelon::new(field, platform.names().len());
-    let short = extend_by_short_vectors(&vectors, &mut span);
+    let short = extend_by_short_vectors(&field, &vectors, &mut span);
     short
         .into_iter()
         .map(|v| {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fibre::{Count, values_taken};
-use super::judge::{Judgement, judge_compiled};
+use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
 use super::model::{ModelError, Role, StateStart, SystemModel};
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
@@ -64,12 +64,25 @@ pub struct SystemAnalysis {
     pub note: Option<String>,
     /// The order of the derivatives with which solutions were counted by elimination; null when none were.
     pub counting_order: Option<usize>,
-    /// The two random primes, as text (61 bits).
-    pub primes: [String; 2],
-    /// Bound on the probability that a verdict is wrong.
-    pub error_bound: f64,
+    /// Of a rational model: the two random primes, as text (61 bits).
+    pub primes: Option<[String; 2]>,
+    /// Of a rational model: bound on the probability that a verdict is wrong.
+    pub error_bound: Option<f64>,
+    /// Of a model with functions: how clear its ranks were in real numbers.
+    pub digits: Option<DigitsReport>,
     /// Seed of all random choices.
     pub seed: u64,
+}
+
+/// How clear ranks were that real numbers of many digits decided, at two random points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct DigitsReport {
+    /// Decimal digits at the first point and at the second.
+    pub digits: [usize; 2],
+    /// Decimal logarithm of the smallest number, relative to its row, that counts as different from zero; it is proven to be.
+    pub nonzero_log10: f64,
+    /// Decimal logarithm of the widest error bound, relative to its row, of a number that counts as zero; null where all were exact.
+    pub zero_log10: Option<f64>,
 }
 
 /// One unknown.
@@ -83,7 +96,8 @@ pub struct SystemQuantity {
     pub unit: String,
     /// What it is, as the file says.
     pub description: String,
-    /// The verdict: locally observable (finitely many solutions), inseparable from its partners, or not excited.
+    /// The verdict: locally observable (finitely many solutions), inseparable from its partners, not excited, or not seen up to the
+    /// bound on the order.
     pub status: Status,
     /// The smallest order of derivatives that solves it.
     pub degree: Option<usize>,
@@ -126,6 +140,35 @@ pub struct SymmetryReport {
     pub unknowns: Vec<String>,
 }
 
+impl Judgement {
+    /// Of a rational model: the bound on the probability that a verdict is wrong.
+    pub fn error_bound(&self) -> Option<f64> {
+        match self.certainty {
+            SystemCertainty::Primes(primes) => Some(primes.error_bound),
+            SystemCertainty::Digits(_) => None,
+        }
+    }
+
+    /// Of a model with functions: how clear its ranks were.
+    pub fn digits(&self) -> Option<DigitsReport> {
+        match self.certainty {
+            SystemCertainty::Primes(_) => None,
+            SystemCertainty::Digits(digits) => Some(digits.into()),
+        }
+    }
+}
+
+impl From<ByDigits> for DigitsReport {
+    fn from(d: ByDigits) -> Self {
+        let round = |x: f64| (10.0 * x).round() / 10.0;
+        Self {
+            digits: d.digits,
+            nonzero_log10: round(d.nonzero),
+            zero_log10: d.zero.is_finite().then(|| round(d.zero)),
+        }
+    }
+}
+
 /// What is to be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SystemOptions {
@@ -135,7 +178,8 @@ pub struct SystemOptions {
     pub solutions: bool,
     /// How much work counting solutions may take: millions of products of two coefficients, at each of two points.
     pub count_limit: u64,
-    /// The highest order of derivatives to look at; left out: n for each experiment where chains end by themselves, else 2n+4.
+    /// The highest order of derivatives to look at; left out: n for each experiment where chains end by themselves, else 2n+4, and at
+    /// least 60 without arbitrary inputs.
     pub order: Option<usize>,
 }
 
@@ -205,7 +249,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             // no unknowns
             Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
         };
-        let Verdict { status, degree } = findings.verdict(c);
+        let Verdict { status, degree } = judged.verdict_on(c);
         SystemQuantity {
             name: u.name.clone(),
             kind: kind.into(),
@@ -218,7 +262,11 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             number_of_solutions: None,
         }
     });
-    let asked = model.combinations.iter().zip(&findings.asked);
+    let asked = model.combinations.iter().zip(judged.asked());
+    let primes = match judged.certainty {
+        SystemCertainty::Primes(primes) => Some(primes),
+        SystemCertainty::Digits(_) => None,
+    };
     SystemAnalysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -246,8 +294,9 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         rests_on_bound: judged.rests_on_bound,
         note: None,
         counting_order: None,
-        primes: findings.primes_as_text(),
-        error_bound: findings.error_bound,
+        primes: primes.map(|p| p.primes_as_text()),
+        error_bound: judged.error_bound(),
+        digits: judged.digits(),
         seed: findings.seed,
     }
 }

@@ -1,4 +1,4 @@
-//! Random points at which the constraints of a model hold, in a prime field.
+//! Random points at which the constraints of a model hold, in a prime field (in real numbers: `values`).
 //!
 //! Constraints are solved block by block. A block is all that hold no value left to choose but those of one of them; all of its constraints but one
 //! must be linear in the values that are solved for. So they leave a line, and on it the last one is a polynomial in one unknown, of which
@@ -28,7 +28,7 @@ pub(crate) fn below(dag: &Dag, node: usize) -> BTreeSet<usize> {
     while let Some(i) = left.pop() {
         if out.insert(i) {
             match dag.ops[i] {
-                Op::Number { .. } | Op::Slot(_) => {}
+                Op::Number { .. } | Op::Slot(_) | Op::Pi => {}
                 Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
                     left.extend([a, b])
                 }
@@ -73,7 +73,7 @@ impl Constraint<'_> {
                 Op::Multiply(a, b) => (f.mul(out[a].0, out[b].0), f.mul(out[a].1, out[b].1)),
                 Op::Divide(a, b) => (f.mul(out[a].0, out[b].1), f.mul(out[a].1, out[b].0)),
                 // refused before
-                Op::Primitive { .. } => (0, 0),
+                Op::Primitive { .. } | Op::Pi => (0, 0),
             };
         }
         out[self.node]
@@ -92,7 +92,7 @@ impl Constraint<'_> {
                 }
                 Op::Multiply(a, b) => (plus(out[a].0, out[b].0), plus(out[a].1, out[b].1)),
                 Op::Divide(a, b) => (plus(out[a].0, out[b].1), plus(out[a].1, out[b].0)),
-                Op::Number { .. } | Op::Primitive { .. } => (0, 0),
+                Op::Number { .. } | Op::Pi | Op::Primitive { .. } => (0, 0),
             };
         }
         out[self.node]

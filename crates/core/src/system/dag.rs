@@ -1,12 +1,8 @@
 //! Expressions as a graph of operations that are shared and never expanded.
 //!
-//! Transcendental functions are held by their differential equations: `dF = weight d(of)`. Before that, sums inside
-//! them are taken apart (`sin(a + b)`, `exp(2 a)`, `log(a b)`), so that what is left is algebraically independent and
-//! may take random values.
+//! A function holds its derivative as well: `dF = weight d(of)`, the weight being a node like any other.
 
 use std::collections::HashMap;
-
-use super::functions::Family;
 
 use crate::model::expression::{Expression, Function, Node};
 
@@ -30,32 +26,16 @@ pub enum Op {
     Multiply(usize, usize),
     /// `a / b`.
     Divide(usize, usize),
+    /// The half turn in radians.
+    Pi,
     /// A function F with `dF = weight d(of)`; the weight may come later and depend on F.
     Primitive {
-        /// Where it starts.
-        start: FunctionStart,
+        /// Which function.
+        function: Function,
         /// Its argument.
         of: usize,
         /// Its derivative by the argument.
         weight: usize,
-    },
-}
-
-/// The value of a function at a random point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum FunctionStart {
-    /// Any value: number `k` of them.
-    Free(usize),
-    /// The sine of a random angle: number `k` of them.
-    Sine(usize),
-    /// Its cosine.
-    Cosine(usize),
-    /// The power `numerator / denominator` of the argument.
-    Root {
-        /// Numerator of the exponent.
-        numerator: i64,
-        /// Denominator of the exponent.
-        denominator: i64,
     },
 }
 
@@ -79,41 +59,17 @@ pub struct Dag {
     /// Operations; operands come first, but for weights.
     pub ops: Vec<Op>,
     index: HashMap<Op, usize>,
-    /// Functions by kind and argument: for the circle `(sine, cosine)`.
-    pub(super) functions: HashMap<(Function, usize), (usize, usize)>,
-    /// The argument of an exponential.
-    pub(super) exponent_of: HashMap<usize, usize>,
-    /// The argument of a logarithm.
-    pub(super) logarithm_of: HashMap<usize, usize>,
-    /// Common denominators of the multiples of an argument that occur in functions.
-    pub(super) denominators: HashMap<(Family, usize), i64>,
-    /// Whether a denominator was met after the argument had been used with a smaller one.
-    pub outdated: bool,
-    /// How many free starts there are.
-    pub free: usize,
-    /// How many random angles there are.
-    pub angles: usize,
+    /// Functions by kind and argument.
+    pub(super) functions: HashMap<(Function, usize), usize>,
 }
 
 impl Dag {
-    /// An empty graph that knows the denominators of an earlier one.
-    pub fn again(&self) -> Self {
-        Self { denominators: self.denominators.clone(), ..Self::default() }
+    /// Whether there is no function in it, so that a prime field knows every value.
+    pub fn is_rational(&self) -> bool {
+        !self.ops.iter().any(|op| matches!(op, Op::Primitive { .. } | Op::Pi))
     }
 
-    /// For every node the function that it is, if it is one.
-    pub fn functions_of_nodes(&self) -> Vec<Option<Function>> {
-        let mut out = vec![None; self.ops.len()];
-        for (&(function, _), &(first, second)) in &self.functions {
-            out[first] = Some(function);
-            if function == Function::Sin {
-                out[second] = Some(Function::Cos);
-            }
-        }
-        out
-    }
-
-    fn add(&mut self, op: Op) -> usize {
+    pub(super) fn add(&mut self, op: Op) -> usize {
         if let Some(&i) = self.index.get(&op) {
             return i;
         }
@@ -186,7 +142,9 @@ impl Dag {
                 Node::Number { mantissa, decimals } => {
                     Ok(self.add(Op::Number { mantissa: *mantissa, decimals: *decimals }))
                 }
-                Node::Name(name) => names(name).ok_or_else(|| DagError::UnknownName(name.clone())),
+                Node::Name(name) => names(name)
+                    .or_else(|| self.constant(name))
+                    .ok_or_else(|| DagError::UnknownName(name.clone())),
                 Node::Call { function, argument } => self.call(*function, nodes[*argument]),
                 Node::Negate(a) => Ok(self.negative(nodes[*a])),
                 Node::Add(a, b) => Ok(self.sum(nodes[*a], nodes[*b])),

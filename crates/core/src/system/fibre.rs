@@ -92,12 +92,15 @@ pub(super) fn values_taken(
     // a relation between derivatives that holds on one component of the constraints need not hold on another
     let proven = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
     let at = |i: usize| -> Vec<Count> {
+        let Some(fields) = judged.fields else {
+            return vec![Err(NotCounted::NotRational); degrees.degree.len()];
+        };
         if degrees.degree.len() > UNKNOWNS {
             return vec![Err(NotCounted::TooLarge); degrees.degree.len()];
         }
         let mut rng = model.random(seed, &format!("solutions, field {i}"));
         let mut work = Work { left: limit };
-        at_point(model, compiled, judged, (judged.fields[i], &mut rng), order, &mut work)
+        at_point(model, compiled, judged, (fields[i], &mut rng), order, &mut work)
             .unwrap_or_else(|e| vec![Err(e); degrees.degree.len()])
     };
     let first = at(0);
@@ -117,7 +120,7 @@ struct Equations<'a> {
     f: Field,
     compiled: &'a Compiled,
     layout: &'a Layout,
-    rows: SystemRows<'a>,
+    rows: SystemRows<'a, Field>,
     work: &'a mut Work,
     /// The value of every variable at the point.
     values: Vec<u64>,
@@ -225,7 +228,7 @@ impl Equations<'_> {
                 self.zero.push(zero);
                 Ok(c)
             }
-            Op::Primitive { .. } => Err(NotCounted::NotRational),
+            Op::Primitive { .. } | Op::Pi => Err(NotCounted::NotRational),
         }
     }
 
@@ -312,7 +315,7 @@ fn reached(compiled: &Compiled, from: &[usize], follow: impl Fn(usize) -> Option
                     left.extend(follow(s));
                 }
             }
-            Op::Number { .. } => {}
+            Op::Number { .. } | Op::Pi => {}
         }
     }
     out
@@ -362,7 +365,7 @@ fn equations<'a>(
         rows.coefficient(e * segments, 0, highest);
     }
     let values = rows.values(compiled, layout, 0);
-    let free = |lane: usize| judged.stairs.last().is_none_or(|s| s.pivots().all(|p| p != lane));
+    let free = |lane: usize| judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane));
     let lane = |(lane, &value): (usize, &u64)| match free(lane) {
         true => Polynomial::constant(value),
         false => Polynomial::variable(&f, lane as u32),

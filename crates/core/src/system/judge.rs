@@ -1,15 +1,17 @@
-//! Verdicts on any system: degrees, agreed on by two random fields.
+//! Verdicts on any system: degrees, agreed on at two random points, modulo two primes or in many digits.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
-use obsdeg_exact::{Echelon, Field, SplitMix64};
+use obsdeg_exact::{Echelon, Field, Gap, Reals, RowSpace, SplitMix64};
 
 use super::dag::{Dag, Op};
 use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
-use super::rows::{Layout, SystemRows, field_for};
+use super::rows::{Layout, SystemRows, random_field};
 use super::taylor::Singular;
-use crate::degree::findings::Findings;
+use super::values::Values;
+use crate::degree::findings::{ByPrimes, Findings};
 use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
+use crate::model::expression::Function;
 
 /// Pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
@@ -21,12 +23,34 @@ pub struct Judgement {
     pub layout: Layout,
     /// The verdicts.
     pub findings: Findings,
-    /// The bases of `V_0, V_1, ...` in the first field.
-    pub stairs: Vec<Echelon>,
-    /// The two fields.
-    pub fields: [Field; 2],
+    /// What they rest on.
+    pub certainty: SystemCertainty,
+    /// The span of all rows in the first prime field, where there is one.
+    pub span: Option<Echelon>,
+    /// The two prime fields of a rational model.
+    pub fields: Option<[Field; 2]>,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
+}
+
+/// What the verdicts on a system rest on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SystemCertainty {
+    /// A rational model: two prime fields that agree.
+    Primes(ByPrimes),
+    /// A model with functions: two random real points that agree.
+    Digits(ByDigits),
+}
+
+/// How clear ranks were that real numbers decided. Decimal logarithms, relative to the largest entry of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ByDigits {
+    /// Decimal digits of the numbers at the first point and at the second.
+    pub digits: [usize; 2],
+    /// The smallest number that counts as different from zero: it is proven to be, by an error bound.
+    pub nonzero: f64,
+    /// The widest error bound of a number that holds zero and counts as zero.
+    pub zero: f64,
 }
 
 impl Judgement {
@@ -42,54 +66,128 @@ impl Judgement {
     /// The verdict on the unknown of a name, where it is spoken of.
     pub fn verdict(&self, model: &SystemModel, name: &str) -> Option<Verdict> {
         let unknown = self.layout.unknowns.iter().position(|u| u.name == name)?;
-        self.shown(model, unknown).then(|| self.findings.verdict(unknown))
+        self.shown(model, unknown).then(|| self.verdict_on(unknown))
+    }
+
+    /// The verdict on an unknown, as far as it is proven.
+    pub fn verdict_on(&self, unknown: usize) -> Verdict {
+        self.as_proven(self.findings.verdict(unknown))
+    }
+
+    /// The verdicts on the combinations that were asked for, as far as they are proven.
+    pub fn asked(&self) -> impl Iterator<Item = Verdict> + '_ {
+        self.findings.asked.iter().map(|v| self.as_proven(*v))
+    }
+
+    /// What is not observable may be so at a higher order, where no end is proven.
+    fn as_proven(&self, verdict: Verdict) -> Verdict {
+        match verdict.degree {
+            None if self.rests_on_bound => Verdict { status: Status::NotSeen, ..verdict },
+            _ => verdict,
+        }
     }
 }
 
 /// Degrees at one random point.
-pub(crate) struct At {
+pub(crate) struct At<S: Values> {
     pub(crate) degrees: Degrees,
     pub(crate) combinations: Vec<Verdict>,
-    pub(crate) stairs: Vec<Echelon>,
+    /// The span of all rows.
+    pub(crate) span: S::Space,
     /// The value of every unknown there, then of every known constant.
-    pub(crate) values: Vec<u64>,
+    pub(crate) values: Vec<S::Element>,
+    /// Whether the last order is proven to be the last.
+    ended: bool,
+    /// Whether the point is generic, so that an order that adds nothing is the last.
+    closed: bool,
+    gap: Gap,
+    steps: Steps<S>,
+}
+
+/// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
+struct Steps<S: Values> {
+    field: S,
+    rows: Vec<(usize, usize, Vec<S::Element>)>,
+}
+
+impl<S: Values> Steps<S> {
+    fn add(&mut self, order: usize, basis: &S::Space) {
+        let pivots = basis.pivot_columns();
+        for (i, &pivot) in pivots.iter().enumerate().skip(self.rows.len()) {
+            self.rows.push((order, pivot, basis.row(i).to_vec()));
+        }
+    }
+
+    /// The smallest k with a functional in `V_k`.
+    fn degree(&self, functional: &[S::Element]) -> Option<usize> {
+        let f = &self.field;
+        let mut rest = functional.to_vec();
+        let mut last = 0;
+        for (order, pivot, row) in &self.rows {
+            if f.is_zero(&rest[*pivot]) {
+                continue;
+            }
+            let factor = f.neg(&f.mul(&rest[*pivot], &f.inverse(&row[*pivot])?));
+            for (x, b) in rest.iter_mut().zip(row) {
+                *x = f.add(x, &f.mul(&factor, b));
+            }
+            last = *order;
+        }
+        rest.iter().all(|x| f.is_zero(x)).then_some(last)
+    }
+}
+
+impl<S: Values> At<S> {
+    /// The degree of a functional there.
+    pub(crate) fn degree(&self, functional: &[S::Element]) -> Option<usize> {
+        self.steps.degree(functional)
+    }
 }
 
 /// Climbs the staircase of a system at a random point of a field.
-pub(crate) fn climb_at(
+pub(crate) fn climb_at<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
     layout: &Layout,
-    field: Field,
+    field: S,
     rng: &mut SplitMix64,
-) -> Result<At, ModelError> {
-    let mut rows =
-        SystemRows::new(model, compiled, layout, field, rng).map_err(|s| singular(model, compiled, s))?;
+) -> Result<At<S>, ModelError> {
+    let mut rows = SystemRows::new(model, compiled, layout, field.clone(), rng)
+        .map_err(|s| singular::<S>(model, compiled, s))?;
     let gradients = rows.combinations().to_vec();
     let mut found = vec![None; gradients.len()];
-    let mut basis = Echelon::new(field, layout.unknowns.len());
-    let mut stairs = Vec::new();
+    let mut basis = <S::Space as RowSpace>::new(field.clone(), layout.unknowns.len());
+    let mut steps = Steps { field: field.clone(), rows: Vec::new() };
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
         for (degree, gradient) in found.iter_mut().zip(&gradients) {
             if degree.is_none() && basis.contains(gradient) {
                 *degree = Some(order);
             }
         }
-        stairs.push(basis.clone());
+        steps.add(order, basis);
     });
     let combinations = found
         .into_iter()
         .zip(&gradients)
         .map(|(degree, gradient)| {
-            let moves = gradient.iter().zip(&degrees.excited).any(|(x, excited)| *x != 0 && *excited);
+            let moves =
+                gradient.iter().zip(&degrees.excited).any(|(x, excited)| !field.is_zero(x) && *excited);
             Verdict { status: Status::of(degree, moves), degree }
         })
         .collect();
     let values = rows.values(compiled, layout, model.constants.len());
-    Ok(At { degrees, combinations, stairs, values })
+    let gap = basis.gap().and(rows.gap());
+    let (ended, closed) = (rows.is_done(), rows.is_generic());
+    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
-fn singular(model: &SystemModel, compiled: &Compiled, singular: Singular) -> ModelError {
+/// Where the model has no value, in words.
+fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singular) -> ModelError {
+    let points = S::ATTEMPTS;
+    let name = |function| {
+        let named = Function::ALL.iter().find(|(_, f)| *f == function);
+        named.map_or("a function", |(name, _)| *name)
+    };
     let (node, message) = match singular {
         Singular::Constraint(c) => {
             let (of, message) = (
@@ -98,19 +196,28 @@ fn singular(model: &SystemModel, compiled: &Compiled, singular: Singular) -> Mod
             );
             return of.place.error(message.into(), 0..of.text.len());
         }
-        Singular::Division(node) => (node, "division by zero at every point that was tried"),
-        Singular::Root(node) => {
-            (node, "the root of zero, or of nothing that is a square, at every point that was tried")
-        }
+        Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
+        Singular::Domain(node, function) => (
+            node,
+            format!("{} is not defined here at any of {points} points that were tried", name(function)),
+        ),
+        Singular::Kink(node, function) => (
+            node,
+            format!(
+                "{} of zero, where it has no derivative; expected an argument that is not zero",
+                name(function)
+            ),
+        ),
+        Singular::Unknown(node) => (node, "a number that no prime field holds".into()),
     };
     match compiled.places.get(&node) {
-        Some((place, span)) => place.error(message.into(), span.clone()),
-        None => ModelError { what: "the model".into(), message: message.into(), span: None },
+        Some((place, span)) => place.error(message, span.clone()),
+        None => ModelError { what: "the model".into(), message, span: None },
     }
 }
 
-/// Judges a model in two random fields, each of a stream of its own of `seed` and the model; `bound` overrides the
-/// highest order.
+/// Judges a model at two random points, each of a stream of its own of `seed` and the model: a rational one modulo two
+/// primes, one with functions in many digits. `bound` overrides the highest order.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -129,43 +236,24 @@ pub fn judge_compiled(
     seed: u64,
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
-    let mut layout = Layout::new(model, bound);
-    if layout.closed && !compiled.constraints.is_empty() {
-        // a start on constraints that the motion keeps is generic among all of these; on others it is a special one
-        let mut rng = model.random(seed, "constraints");
-        let field = field_for(compiled, &mut rng);
-        let rows = SystemRows::new(model, compiled, &layout, field, &mut rng);
-        if !rows.map_err(|s| singular(model, compiled, s))?.keeps_constraints() {
-            layout = Layout::of(model, bound, false);
-        }
+    if !compiled.dag.is_rational() {
+        return judge_in_digits(model, compiled, seed, bound);
     }
-    let found = layout.unknowns.len();
-    let refuse = |message: String| ModelError { what: "the model".into(), message, span: None };
-    if found > MAX_UNKNOWNS {
-        return Err(refuse(format!("{found} unknowns; expected at most {MAX_UNKNOWNS}")));
-    }
+    let layout = checked_layout(model, compiled, bound)?;
     for attempt in 0..ATTEMPTS {
         let judged = |i: usize| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
-            let field = field_for(compiled, &mut rng);
+            let field = random_field(&mut rng);
             climb_at(model, compiled, &layout, field, &mut rng).map(|at| (field, at))
         };
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
-        if first.degrees == second.degrees && first.combinations == second.combinations {
-            let full = first.degrees.rank() == found;
-            let error_bound = error_bound(&claim(&compiled.dag, &layout, &first.degrees), 2);
-            return Ok(Judgement {
-                rests_on_bound: !layout.closed && !full,
-                layout,
-                findings: Findings::of(
-                    first.degrees,
-                    &first.stairs,
-                    first.combinations,
-                    ([p, q].map(|f| f.modulus()), error_bound, seed),
-                ),
-                stairs: first.stairs,
-                fields: [p, q],
-            });
+        if first.agrees(&second) {
+            let error_bound = error_bound(&claim(compiled, &layout, &first.degrees), 2);
+            let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), error_bound };
+            let span = first.span.clone();
+            let certainty = SystemCertainty::Primes(primes);
+            let judged = Judgement::of(layout, first, certainty, seed);
+            return Ok(Judgement { span: Some(span), fields: Some([p, q]), ..judged });
         }
     }
     Err(refuse(format!(
@@ -173,31 +261,183 @@ pub fn judge_compiled(
     )))
 }
 
-/// What the error bound depends on. A node is a rational function of the random values, its degree and the size of its
-/// coefficients bounded by what it is made of; a derivative of order k multiplies by the right-hand sides k times.
-fn claim(dag: &Dag, layout: &Layout, degrees: &Degrees) -> Claim {
-    let mut size: Vec<(f64, f64)> = Vec::with_capacity(dag.ops.len());
+/// Judges a model by real numbers, whether it is rational or not: the other way to the same verdicts.
+///
+/// # Errors
+/// [`ModelError`]; of a model that no number of digits decides, with the reason.
+pub fn judge_in_digits(
+    model: &SystemModel,
+    compiled: &Compiled,
+    seed: u64,
+    bound: Option<usize>,
+) -> Result<Judgement, ModelError> {
+    let layout = checked_layout(model, compiled, bound)?;
+    let mut reason = String::new();
+    for pair in [pair::<4, 8>, pair::<8, 16>, pair::<16, 32>] {
+        match pair(model, compiled, &layout, seed)? {
+            Ok(judged) => return Ok(judged),
+            Err(why) => reason = why,
+        }
+    }
+    Err(refuse(format!("undecided, because {reason}")))
+}
+
+fn refuse(message: String) -> ModelError {
+    ModelError { what: "the model".into(), message, span: None }
+}
+
+fn checked_layout(
+    model: &SystemModel,
+    compiled: &Compiled,
+    bound: Option<usize>,
+) -> Result<Layout, ModelError> {
+    let layout = Layout::new(model, compiled, bound);
+    let found = layout.unknowns.len();
+    match found <= MAX_UNKNOWNS {
+        true => Ok(layout),
+        false => Err(refuse(format!("{found} unknowns; expected at most {MAX_UNKNOWNS}"))),
+    }
+}
+
+/// The verdicts at a point in `64 A` bits and at another in `64 B`, or why they decide nothing.
+fn pair<const A: usize, const B: usize>(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    seed: u64,
+) -> Result<Result<Judgement, String>, ModelError> {
+    let random = |i: usize| model.random(seed, &format!("verdicts, {A} and {B} words, point {i}"));
+    let first = climb_at(model, compiled, layout, Reals::<A>, &mut random(0))?;
+    let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1))?;
+    let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
+    let digits = [A, B].map(|n| decimal(64.0 * n as f64) as usize);
+    let clear = [first.gap.is_decisive(64 * A as i64), second.gap.is_decisive(64 * B as i64)];
+    if clear != [true, true] {
+        let gap = if clear[0] { second.gap } else { first.gap };
+        let digits = if clear[0] { digits[1] } else { digits[0] };
+        return Ok(Err(format!(
+            "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of the rest is 10^{:.0}",
+            decimal(gap.zero),
+            decimal(gap.nonzero)
+        )));
+    }
+    if !first.agrees(&second) {
+        return Ok(Err(format!("two random points disagree with {} and {} digits", digits[0], digits[1])));
+    }
+    let gap = first.gap.and(second.gap);
+    let certainty =
+        SystemCertainty::Digits(ByDigits { digits, nonzero: decimal(gap.nonzero), zero: decimal(gap.zero) });
+    Ok(Ok(Judgement::of(layout.clone(), first, certainty, seed)))
+}
+
+impl<S: Values> At<S> {
+    fn agrees<T: Values>(&self, other: &At<T>) -> bool {
+        (&self.degrees, &self.combinations, self.ended) == (&other.degrees, &other.combinations, other.ended)
+    }
+}
+
+impl Judgement {
+    fn of<S: Values>(layout: Layout, at: At<S>, certainty: SystemCertainty, seed: u64) -> Self {
+        let full = at.degrees.rank() == layout.unknowns.len();
+        Self {
+            rests_on_bound: !full && !at.ended,
+            findings: Findings {
+                partners: at.span.companions(),
+                degrees: at.degrees,
+                asked: at.combinations,
+                seed,
+            },
+            layout: Layout { closed: at.closed, ..layout },
+            certainty,
+            span: None,
+            fields: None,
+        }
+    }
+}
+
+/// What the error bound depends on: the degree and the coefficients of the polynomials that decide a rank (derivation:
+/// crates/README.md, *Certainty*).
+///
+/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`, where the degree of `P_k` grows by at most
+/// `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative and two products make of them.
+fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees) -> Claim {
+    let fractions = fractions(&compiled.dag);
+    let experiments = 0..compiled.experiments.len();
+    let used: Vec<Fraction> = experiments
+        .flat_map(|e| {
+            let given = compiled.constants(e).iter().flatten();
+            compiled.rates(e).iter().chain(compiled.outputs(e)).chain(given)
+        })
+        .chain(compiled.starts.iter().flatten())
+        .chain(
+            compiled.segments.iter().flat_map(|s| s.constants.iter().chain(&s.carry)).map(|(_, node)| node),
+        )
+        .map(|&node| fractions[node])
+        .collect();
+    // over the product of all denominators
+    let (below, below_bits) = used.iter().fold((0.0, 0.0), |(d, b), f| (d + f.below.0, b + f.below.1));
+    let above = |part: fn(&Fraction) -> f64| used.iter().map(part).fold(0.0, f64::max);
+    let (top, top_bits) = (above(|f| f.above.0) + below, above(|f| f.above.1) + below_bits);
+    let delta = top.max(below) + below;
+    let (orders, n) = (degrees.rank_profile.len() as f64, layout.unknowns.len() as f64);
+    // jets of inputs and states are variables too
+    let variables = (compiled.roles.len() as f64) * (orders + 1.0);
+    let degree = top + orders * delta + below;
+    let step =
+        (variables * (degree + (2.0 * orders + 1.0) * below).max(1.0)).log2() + 2.0 * (top_bits + below_bits);
+    let bits = top_bits + (orders + 1.0) * step + n.max(1.0).log2();
+    Claim {
+        unknowns: layout.unknowns.len(),
+        // a rank and every unit vector at each order, at points drawn anew up to so many times
+        decisions: ATTEMPTS
+            * (degrees.rank_profile.len() + 1)
+            * (2 + layout.unknowns.len() + compiled.combinations.len()),
+        order: 1,
+        row_degree: degree.min(1e18) as usize,
+        row_bits: bits,
+    }
+}
+
+/// Bounds of a quotient of polynomials: degree, and `log2` of the sum of the sizes of its coefficients.
+#[derive(Debug, Clone, Copy)]
+struct Fraction {
+    above: (f64, f64),
+    below: (f64, f64),
+}
+
+/// Every node of a rational graph as a quotient of polynomials in the slots, over the integers.
+fn fractions(dag: &Dag) -> Vec<Fraction> {
+    let times = |x: (f64, f64), y: (f64, f64)| (x.0 + y.0, x.1 + y.1);
+    let plus = |x: (f64, f64), y: (f64, f64)| (x.0.max(y.0), x.1.max(y.1) + 1.0);
+    let mut out: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
-        size.push(match *op {
+        let one = (0.0, 0.0);
+        out.push(match *op {
             Op::Number { mantissa, decimals } => {
-                let bits = (mantissa.unsigned_abs().max(1) as f64).log2() + f64::from(decimals.abs()) * 3.33;
-                (0.0, bits)
+                let digits = (mantissa.unsigned_abs().max(1) as f64).log2();
+                let ten = f64::from(decimals.abs()) * std::f64::consts::LOG2_10;
+                match decimals > 0 {
+                    true => Fraction { above: (0.0, digits), below: (0.0, ten) },
+                    false => Fraction { above: (0.0, digits + ten), below: one },
+                }
             }
-            Op::Slot(_) | Op::Primitive { .. } => (1.0, 1.0),
-            Op::Add(a, b) | Op::Subtract(a, b) => (size[a].0 + size[b].0, size[a].1 + size[b].1 + 1.0),
-            Op::Multiply(a, b) | Op::Divide(a, b) => (size[a].0 + size[b].0, size[a].1 + size[b].1),
+            Op::Slot(_) | Op::Primitive { .. } | Op::Pi => Fraction { above: (1.0, 0.0), below: one },
+            Op::Add(a, b) | Op::Subtract(a, b) => {
+                let (a, b) = (out[a], out[b]);
+                Fraction {
+                    above: plus(times(a.above, b.below), times(b.above, a.below)),
+                    below: times(a.below, b.below),
+                }
+            }
+            Op::Multiply(a, b) => {
+                let (a, b) = (out[a], out[b]);
+                Fraction { above: times(a.above, b.above), below: times(a.below, b.below) }
+            }
+            Op::Divide(a, b) => {
+                let (a, b) = (out[a], out[b]);
+                Fraction { above: times(a.above, b.below), below: times(a.below, b.above) }
+            }
         });
     }
-    let largest = |of: fn(&(f64, f64)) -> f64| size.iter().map(of).fold(1.0, f64::max);
-    let orders = degrees.rank_profile.len() as f64;
-    let n = layout.unknowns.len();
-    // every order adds a factor of f, its derivative and its denominator
-    let factor = 3.0 * (orders + 1.0);
-    Claim {
-        unknowns: n,
-        decisions: degrees.rank_profile.len() + 2 * n,
-        order: 1,
-        row_degree: (factor * largest(|s| s.0)).min(1e18) as usize,
-        row_bits: factor * (largest(|s| s.1) + (orders + 2.0).log2() * orders),
-    }
+    out
 }

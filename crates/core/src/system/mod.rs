@@ -20,10 +20,11 @@ pub(crate) mod rows;
 mod solutions;
 pub(crate) mod symmetry;
 pub(crate) mod taylor;
+pub(crate) mod values;
 
 pub use answer::*;
-pub use dag::{Dag, DagError, FunctionStart, Op};
-pub use judge::{Judgement, judge, judge_compiled};
+pub use dag::{Dag, DagError, Op};
+pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
 pub use model::{
     Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, ModelError, Named,
     Nominal, Place, PlacedExpression, Role, Segment, State, StateStart, SystemModel,

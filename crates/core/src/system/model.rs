@@ -251,6 +251,27 @@ impl Compiled {
         &self.experiment(experiment).constants
     }
 
+    /// Whether a rate or an output holds the time itself.
+    pub(crate) fn uses_time(&self) -> bool {
+        let mut seen = vec![false; self.dag.ops.len()];
+        let parts = self.experiments.iter().flat_map(|e| e.rates.iter().chain(&e.outputs));
+        let mut left: Vec<usize> = parts.copied().collect();
+        while let Some(i) = left.pop() {
+            if std::mem::replace(&mut seen[i], true) {
+                continue;
+            }
+            match self.dag.ops[i] {
+                Op::Slot(s) if self.roles[s] == Role::Time => return true,
+                Op::Number { .. } | Op::Slot(_) | Op::Pi => {}
+                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
+                    left.extend([a, b])
+                }
+                Op::Primitive { of, .. } => left.push(of),
+            }
+        }
+        false
+    }
+
     /// The node of what has this role; `None` where nothing uses it.
     pub(crate) fn node_of(&self, role: Role) -> Option<usize> {
         let slot = self.roles.iter().position(|r| *r == role)?;
@@ -349,17 +370,7 @@ impl SystemModel {
             let message = format!("{found} states and parameters; expected at most {MAX_UNKNOWNS} unknowns");
             return Err(ModelError { what: "the model".into(), message, span: None });
         }
-        let mut dag = Dag::default();
-        // fractions of arguments may be met late: then once more with what is known
-        for _ in 0..6 {
-            let compiled = self.compile_into(dag)?;
-            if !compiled.dag.outdated {
-                return Ok(compiled);
-            }
-            dag = compiled.dag.again();
-        }
-        let message = "functions of fractions of functions are nested too deeply".into();
-        Err(ModelError { what: self.name.clone(), message, span: None })
+        self.compile_into(Dag::default())
     }
 
     /// Checks what needs no graph: at least one state and output, names of their own.
@@ -559,7 +570,7 @@ impl SystemModel {
         formula: &PlacedExpression,
     ) -> Result<(), ModelError> {
         let refuse = |message: String| Err(formula.place.error(message, 0..formula.text.len()));
-        if below(dag, node).into_iter().any(|i| matches!(dag.ops[i], Op::Primitive { .. })) {
+        if below(dag, node).into_iter().any(|i| matches!(dag.ops[i], Op::Primitive { .. } | Op::Pi)) {
             return refuse(
                 "a function; expected + - * / and whole powers, or norm(v) = c, which is taken squared"
                     .into(),

@@ -17,7 +17,7 @@ use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
 use crate::model::expression::{Shape, Shapes, nearest};
 use crate::model::file_error::explain;
 
-/// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan exp log sqrt`
+/// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan atan2 exp log sqrt tanh abs sign`, `pi`, `deg`
 /// and the names of the model; `t` is the time. A name such as `"p[3]"` declares a vector, `"C[3,3]"` a matrix: `p` stands for the whole
 /// and `p[1]`, `C[1,2]` for its entries, in expressions and in the answer. `[a, b]` makes a vector of scalars and a matrix of rows; `cross dot
 /// norm transpose skew`, of quaternions (w, x, y, z) `R qmul conj qdot`, and the turns `Rx Ry Rz` take them. Constants, definitions and outputs have the

@@ -1,16 +1,15 @@
 //! Any system as a source of derivative rows: the duals of the Taylor coefficients of its outputs.
 
 use obsdeg_exact::prime::is_prime;
-use obsdeg_exact::{Echelon, Field, SplitMix64, gcd};
+use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
-use super::constraints::hold;
-use super::dag::{FunctionStart, Op};
-use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
-use super::taylor::{Initial, Signal, Singular, Starts, Taylor};
+use super::model::{Compiled, CompiledSegment, KnownInput, Role, StateStart, SystemModel};
+use super::taylor::{Initial, Signal, Singular, Taylor};
+use super::values::Values;
 use crate::degree::rows::DerivativeRows;
 
-/// Points that are tried before a division by zero or a missing root is taken to be there at every point.
-const ATTEMPTS: usize = 64;
+/// Orders that are followed where no end is proven, at least.
+const ORDERS: usize = 60;
 
 /// An unknown of a system.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,24 +31,23 @@ pub struct Layout {
     pub unknowns: Vec<Unknown>,
     /// The highest order that is looked at.
     pub bound: usize,
-    /// The point is generic and every input is, so that an order that adds nothing is the end. Otherwise only the bound
-    /// ends it.
+    /// The point is generic and every input is, so that an order that adds nothing is the end.
     pub closed: bool,
 }
 
 impl Layout {
     /// The unknowns of `model`; `bound` overrides the order at which it is given up.
-    pub fn new(model: &SystemModel, bound: Option<usize>) -> Self {
+    pub fn new(model: &SystemModel, compiled: &Compiled, bound: Option<usize>) -> Self {
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
         let starts = model.states.iter().all(|s| s.start == StateStart::Unknown);
-        Self::of(model, bound, starts && !arbitrary)
-    }
-
-    /// The same where it is known whether an order that adds nothing is the end.
-    pub(crate) fn of(model: &SystemModel, bound: Option<usize>, closed: bool) -> Self {
+        let jumps = model.segments.iter().any(|s| !s.carry.is_empty());
+        // whether the motion keeps constraints is seen at a point
+        let free = compiled.constraints.is_empty();
+        let closed = starts && !arbitrary && !jumps && !compiled.uses_time() && free;
         let finite: usize = model.unknown_inputs.iter().map(|u| u.1.map_or(1, |d| d + 1)).sum();
         let n = model.states.len() + finite + model.parameters.len();
-        let bound = bound.unwrap_or(if closed { n * model.experiments.max(1) } else { 2 * n + 4 });
+        let open = if arbitrary { 2 * n + 4 } else { ORDERS.max(2 * n + 4) };
+        let bound = bound.unwrap_or(if closed { n * model.experiments.max(1) } else { open });
         let mut unknowns = Vec::new();
         for experiment in 0..model.experiments.max(1) {
             let suffix = if model.experiments > 1 { format!("@{}", experiment + 1) } else { String::new() };
@@ -99,56 +97,331 @@ impl Layout {
 
 /// The rows of a system at one random point of one field.
 #[derive(Debug, Clone)]
-pub(crate) struct SystemRows<'a> {
-    field: Field,
+pub(crate) struct SystemRows<'a, S: Values> {
+    field: S,
     lanes: usize,
-    runs: Vec<Run<'a>>,
+    runs: Vec<Run<'a, S>>,
     bound: usize,
-    closed: bool,
-    kept: bool,
-    single: bool,
-    row: Vec<u64>,
+    row: Vec<S::Element>,
+    /// Of the ranks at generic points.
+    gap: Gap,
+}
+
+/// Why a run needs to be followed no further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// The point is generic: an order that adds nothing is the last.
+    Stagnation,
+    /// No rank beyond this one is possible: it is that at a generic point.
+    Rank(usize),
+    /// Nothing moves: the rows are `C A^k`, and by Cayley and Hamilton those of this order are the last that can add
+    /// anything.
+    Order(usize),
+    /// Nothing is known.
+    Open,
 }
 
 #[derive(Debug, Clone)]
-struct Run<'a> {
-    taylor: Taylor<'a>,
+struct Run<'a, S: Values> {
+    taylor: Taylor<'a, S>,
     outputs: &'a [usize],
-    /// Its own rank, where there are several runs.
-    own: Echelon,
-    stalled: bool,
+    /// Its own rank.
+    own: S::Space,
+    end: End,
+    done: bool,
     /// Differentials of the constraints at the start of its experiment.
-    known: Vec<Vec<u64>>,
+    known: Rows<S>,
     /// Gradients of the combinations at its start.
-    combinations: Vec<Vec<u64>>,
+    combinations: Rows<S>,
 }
 
-/// A random prime `2^60 < p < 2^61` in whose field the roots of a graph can be had.
-pub(crate) fn field_for(compiled: &Compiled, rng: &mut SplitMix64) -> Field {
-    let degrees: Vec<u64> = compiled
-        .dag
-        .ops
-        .iter()
-        .filter_map(|op| match op {
-            Op::Primitive { start: FunctionStart::Root { denominator, .. }, .. } => {
-                let mut odd = denominator.unsigned_abs();
-                while odd > 0 && odd.is_multiple_of(2) {
-                    odd /= 2;
-                }
-                Some(odd)
-            }
-            _ => None,
-        })
-        .collect();
+/// A random prime `2^60 < p < 2^61`.
+pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
     loop {
-        let p = (1 << 60) + rng.below(1 << 60) / 4 * 4 + 3;
-        if p < 1 << 61 && degrees.iter().all(|&q| q <= 1 || gcd(q, p - 1) == 1) && is_prime(p) {
+        let p = (1 << 60) + rng.below(1 << 60) / 2 * 2 + 1;
+        if p < 1 << 61 && is_prime(p) {
             return Field::new(p);
         }
     }
 }
 
-impl<'a> SystemRows<'a> {
+/// Rows over the unknowns.
+type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
+
+/// What the runs of one experiment share at a point.
+struct Point<S: Values> {
+    signals: Vec<Signal<S::Element>>,
+    initial: Vec<Option<Initial<S::Element>>>,
+    seed: u64,
+    experiment: usize,
+}
+
+/// Everything a point is made from.
+struct Maker<'a, 'b, S: Values> {
+    model: &'b SystemModel,
+    compiled: &'a Compiled,
+    layout: &'b Layout,
+    field: S,
+}
+
+impl<'a, S: Values> Maker<'a, '_, S> {
+    fn slot_of(&self, role: Role) -> Option<usize> {
+        self.compiled.roles.iter().position(|r| *r == role)
+    }
+
+    /// Random values of all that is not given; lanes of states as the layout has them, or counted through where every
+    /// state is one.
+    fn draw(
+        &self,
+        experiment: usize,
+        (parameters, constants): (&[S::Element], &[S::Element]),
+        time: S::Element,
+        rng: &mut SplitMix64,
+        attempt: usize,
+    ) -> Point<S> {
+        let (f, model) = (&self.field, self.model);
+        let mut random = || f.random(rng, attempt);
+        let mut signals = Vec::new();
+        let mut initial = vec![None; self.compiled.roles.len()];
+        for (slot, role) in self.compiled.roles.iter().enumerate() {
+            let lane = self.layout.lane(*role, experiment);
+            signals.push(match *role {
+                Role::State(i) => {
+                    initial[slot] = Some((random(), lane.map(|l| (l, f.one())).into_iter().collect()));
+                    Signal::State { rate: self.compiled.rates(experiment)[i] }
+                }
+                Role::Parameter(i) => Signal::Constant { value: parameters[i], lane },
+                Role::Constant(i) => Signal::Constant { value: constants[i], lane: None },
+                Role::KnownInput(i) => Signal::Known {
+                    value: random(),
+                    degree: match model.known_input(experiment, i) {
+                        KnownInput::Polynomial(d) => Some(*d),
+                        _ => None,
+                    },
+                },
+                Role::UnknownInput(i) => Signal::Unknown {
+                    value: random(),
+                    lane: lane.unwrap_or(0),
+                    count: model.unknown_inputs[i].1.unwrap_or(self.layout.bound) + 1,
+                },
+                Role::Time => Signal::Time { value: time },
+            });
+        }
+        Point { signals, initial, seed: rng.next_u64(), experiment }
+    }
+
+    /// Values and gradients of some nodes at a point, at order 0.
+    fn look(&self, point: &Point<S>, nodes: &[usize]) -> Result<Taylor<'a, S>, Singular> {
+        Taylor::new(
+            &self.compiled.dag,
+            self.field.clone(),
+            self.layout.unknowns.len(),
+            point.signals.clone(),
+            &point.initial,
+            nodes,
+            false,
+            SplitMix64::new(point.seed),
+        )
+    }
+
+    /// Gives constants the values of their formulas, one after the other: one may use those before it.
+    fn set_constants(
+        &self,
+        point: &mut Point<S>,
+        formulas: &[(usize, usize)],
+        at_once: bool,
+    ) -> Result<(), Singular> {
+        let mut values: Vec<(usize, S::Element)> = Vec::new();
+        for &(c, node) in formulas {
+            let value = self.look(point, &[node])?.start(node);
+            if at_once {
+                values.push((c, value));
+            } else {
+                self.set_constant(point, c, value);
+            }
+        }
+        for (c, value) in values {
+            self.set_constant(point, c, value);
+        }
+        Ok(())
+    }
+
+    fn set_constant(&self, point: &mut Point<S>, c: usize, value: S::Element) {
+        if let Some(slot) = self.slot_of(Role::Constant(c)) {
+            point.signals[slot] = Signal::Constant { value, lane: None };
+        }
+    }
+
+    /// Gives states the values of their formulas, all at once.
+    fn set_states(&self, point: &mut Point<S>, formulas: &[(usize, usize)]) -> Result<(), Singular> {
+        let nodes: Vec<usize> = formulas.iter().map(|f| f.1).collect();
+        let seen = self.look(point, &nodes)?;
+        for &(state, node) in formulas {
+            if let Some(slot) = self.slot_of(Role::State(state)) {
+                let lanes = seen.lanes_of(node).iter().map(|l| *l as usize);
+                let duals = lanes.zip(seen.dual(node, 0).iter().copied());
+                point.initial[slot] =
+                    Some((seen.start(node), duals.filter(|(_, x)| *x != self.field.zero()).collect()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves states, and in the first experiment what all share, to where the constraints hold.
+    fn hold_constraints(
+        &self,
+        point: &mut Point<S>,
+        first: bool,
+        rng: &mut SplitMix64,
+    ) -> Result<(), Singular> {
+        let compiled = self.compiled;
+        if compiled.constraints.is_empty() {
+            return Ok(());
+        }
+        let value = |slot: usize| match (&point.signals[slot], &point.initial[slot]) {
+            (Signal::Constant { value, .. }, _) => *value,
+            (_, Some(start)) => start.0,
+            _ => self.field.zero(),
+        };
+        let mut values: Vec<S::Element> = (0..compiled.roles.len()).map(value).collect();
+        let free = |role: &Role| match *role {
+            Role::State(_) => true,
+            Role::Parameter(_) => first,
+            Role::Constant(c) => first && compiled.constants(point.experiment)[c].is_none(),
+            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
+        };
+        let free: Vec<bool> = compiled.roles.iter().map(free).collect();
+        let mut own = SplitMix64::new(rng.next_u64());
+        self.field
+            .hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut own)
+            .map_err(Singular::Constraint)?;
+        for (slot, x) in values.into_iter().enumerate() {
+            match (&mut point.signals[slot], &mut point.initial[slot]) {
+                (Signal::Constant { value, .. }, _) => *value = x,
+                (_, Some(start)) => start.0 = x,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The differentials of the constraints, and whether their first derivatives are zero here: then the motion keeps them, and the
+    /// point is generic among those that hold them.
+    fn constraints(&self, point: &Point<S>) -> Result<(Rows<S>, bool), Singular> {
+        let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
+        if compiled.constraints.is_empty() {
+            return Ok((Vec::new(), true));
+        }
+        let mut seen = Taylor::new(
+            &compiled.dag,
+            f.clone(),
+            lanes,
+            point.signals.clone(),
+            &point.initial,
+            &compiled.constraints,
+            true,
+            SplitMix64::new(point.seed),
+        )?;
+        let row = |&node: &usize| dense(f, lanes, seen.lanes_of(node), seen.dual(node, 0));
+        let rows = compiled.constraints.iter().map(row).collect();
+        seen.advance();
+        let kept = compiled.constraints.iter().all(|&node| f.is_zero(&seen.value(node, 1)));
+        Ok((rows, kept))
+    }
+
+    /// The series of a run.
+    fn series(&self, point: &Point<S>, lanes: usize) -> Result<Taylor<'a, S>, Singular> {
+        let compiled = self.compiled;
+        let roots: Vec<usize> =
+            compiled.outputs(point.experiment).iter().chain(&compiled.combinations).copied().collect();
+        Taylor::new(
+            &compiled.dag,
+            self.field.clone(),
+            lanes,
+            point.signals.clone(),
+            &point.initial,
+            &roots,
+            true,
+            SplitMix64::new(point.seed),
+        )
+    }
+
+    /// The rank that the rows of a run cannot exceed: the one at a generic point, where every state is an unknown, the time is
+    /// anything, and the first order that adds nothing is the last; seen through the derivatives of the run's states by
+    /// the unknowns. A minor that is not zero at the run's own point is not zero there either.
+    fn generic_rank(
+        &self,
+        point: &Point<S>,
+        known: &[Vec<S::Element>],
+        rng: &mut SplitMix64,
+    ) -> Option<(usize, Gap)> {
+        let f = &self.field;
+        let unknowns = self.layout.unknowns.len();
+        let states: Vec<usize> =
+            (0..self.model.states.len()).filter_map(|i| self.slot_of(Role::State(i))).collect();
+        let lanes = unknowns + states.len();
+        for attempt in 0..S::ATTEMPTS {
+            let mut generic = Point {
+                signals: point.signals.clone(),
+                initial: point.initial.clone(),
+                seed: rng.next_u64(),
+                experiment: point.experiment,
+            };
+            for (k, &slot) in states.iter().enumerate() {
+                generic.initial[slot] = Some((f.random(rng, attempt), vec![(unknowns + k, f.one())]));
+            }
+            for signal in &mut generic.signals {
+                match signal {
+                    Signal::Time { value } | Signal::Known { value, .. } | Signal::Unknown { value, .. } => {
+                        *value = f.random(rng, attempt);
+                    }
+                    Signal::Constant { value, lane: Some(_) } => *value = f.random(rng, attempt),
+                    _ => {}
+                }
+            }
+            let Ok(mut taylor) = self.series(&generic, lanes) else { continue };
+            let mut whole = S::Space::new(f.clone(), lanes);
+            let mut seen = S::Space::new(f.clone(), unknowns);
+            for row in known {
+                seen.insert(row);
+            }
+            for order in 0..=lanes {
+                let mut grew = false;
+                while taylor.length <= order {
+                    taylor.advance();
+                }
+                for &output in self.compiled.outputs(point.experiment) {
+                    let row = dense(f, lanes, taylor.lanes_of(output), taylor.dual(output, order));
+                    grew |= whole.insert(&row);
+                    // by the unknowns themselves, and through the states
+                    let mut through = row[..unknowns].to_vec();
+                    for (x, &slot) in row[unknowns..].iter().zip(&states) {
+                        for (lane, d) in point.initial[slot].iter().flat_map(|s| &s.1) {
+                            through[*lane] = f.add(&through[*lane], &f.mul(x, d));
+                        }
+                    }
+                    seen.insert(&through);
+                }
+                if !grew {
+                    break;
+                }
+            }
+            return Some((seen.rank(), whole.gap().and(seen.gap())));
+        }
+        None
+    }
+}
+
+/// A row with zeros where it has no lanes.
+fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::Element]) -> Vec<S::Element> {
+    let mut out = vec![f.zero(); lanes];
+    for (&lane, x) in support.iter().zip(row) {
+        out[lane as usize] = *x;
+    }
+    out
+}
+
+impl<'a, S: Values> SystemRows<'a, S> {
     /// The rows of a system at a random point.
     ///
     /// # Errors
@@ -157,12 +430,13 @@ impl<'a> SystemRows<'a> {
         model: &SystemModel,
         compiled: &'a Compiled,
         layout: &Layout,
-        field: Field,
+        field: S,
         rng: &mut SplitMix64,
     ) -> Result<Self, Singular> {
         let mut last = Singular::Division(0);
-        for _ in 0..ATTEMPTS {
-            match Self::at(model, compiled, layout, field, rng) {
+        let maker = Maker { model, compiled, layout, field };
+        for attempt in 0..S::ATTEMPTS {
+            match Self::at(&maker, rng, attempt) {
                 Err(singular) => last = singular,
                 found => return found,
             }
@@ -170,191 +444,111 @@ impl<'a> SystemRows<'a> {
         Err(last)
     }
 
-    fn at(
-        model: &SystemModel,
-        compiled: &'a Compiled,
-        layout: &Layout,
-        field: Field,
-        rng: &mut SplitMix64,
-    ) -> Result<Self, Singular> {
-        let f = field;
-        let lanes = layout.unknowns.len();
-        let starts = Starts::random(&compiled.dag, &f, rng);
-        let p = f.modulus();
-        let mut random = || rng.below(p);
-        let mut parameters: Vec<u64> = model.parameters.iter().map(|_| random()).collect();
-        let mut constants: Vec<u64> = model.constants.iter().map(|_| random()).collect();
-        let mut runs: Vec<Run<'a>> = Vec::new();
-        let mut kept = true;
+    fn at(maker: &Maker<'a, '_, S>, rng: &mut SplitMix64, attempt: usize) -> Result<Self, Singular> {
+        let (model, compiled, f) = (maker.model, maker.compiled, &maker.field);
+        let lanes = maker.layout.unknowns.len();
+        let mut parameters: Vec<S::Element> =
+            model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
+        let mut constants: Vec<S::Element> = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
+        let given = |list: &[Option<usize>]| -> Vec<(usize, usize)> {
+            list.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).collect()
+        };
+        let whole = [CompiledSegment::default()];
+        let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
+        let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
+        let (mut runs, mut gap) = (Vec::new(), Gap::OPEN);
         for experiment in 0..model.experiments.max(1) {
-            let mut signals: Vec<Signal> = Vec::new();
-            let mut initial: Vec<Option<Initial>> = vec![None; compiled.roles.len()];
+            let mut point = maker.draw(experiment, (&parameters, &constants), f.zero(), rng, attempt);
+            maker.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
+            maker.hold_constraints(&mut point, experiment == 0, rng)?;
+            let value = |slot: usize| match &point.signals[slot] {
+                Signal::Constant { value, .. } => Some(*value),
+                _ => None,
+            };
             for (slot, role) in compiled.roles.iter().enumerate() {
-                signals.push(match *role {
-                    Role::State(i) => {
-                        let lane = layout.lane(*role, experiment);
-                        initial[slot] = Some((random(), lane.map(|l| (l, f.one())).into_iter().collect()));
-                        Signal::State { rate: compiled.rates(experiment)[i] }
-                    }
-                    Role::Parameter(i) => {
-                        Signal::Constant { value: parameters[i], lane: layout.lane(*role, experiment) }
-                    }
-                    Role::Constant(i) => Signal::Constant { value: constants[i], lane: None },
-                    Role::KnownInput(i) => Signal::Known {
-                        degree: match model.known_input(experiment, i) {
-                            KnownInput::Polynomial(d) => Some(*d),
-                            _ => None,
-                        },
-                    },
-                    Role::UnknownInput(i) => Signal::Unknown {
-                        lane: layout.lane(*role, experiment).unwrap_or(0),
-                        count: model.unknown_inputs[i].1.unwrap_or(layout.bound) + 1,
-                    },
-                    Role::Time => Signal::Time,
-                });
-            }
-            let seed = random();
-            let slot_of = |role: Role| compiled.roles.iter().position(|r| *r == role);
-            // constants and starts that are given by formulas are read off a first look at the point
-            let look = |signals: &[Signal], initial: &[Option<Initial>]| {
-                Taylor::new(&compiled.dag, f, lanes, signals, initial, &starts, SplitMix64::new(seed))
-            };
-            let given = compiled.constants(experiment);
-            if given.iter().any(Option::is_some) {
-                // a constant may use those before it
-                for _ in 0..model.constants.len() {
-                    let seen = look(&signals, &initial)?;
-                    for (c, node) in given.iter().enumerate() {
-                        if let (Some(node), Some(slot)) = (node, slot_of(Role::Constant(c))) {
-                            signals[slot] = Signal::Constant { value: seen.start(*node), lane: None };
-                        }
-                    }
+                match (*role, value(slot)) {
+                    (Role::Parameter(i), Some(value)) => parameters[i] = value,
+                    (Role::Constant(i), Some(value)) => constants[i] = value,
+                    _ => {}
                 }
             }
-            if !compiled.constraints.is_empty() {
-                let mut values = vec![0; compiled.roles.len()];
-                let mut free = vec![false; compiled.roles.len()];
-                for (slot, role) in compiled.roles.iter().enumerate() {
-                    values[slot] = match (&signals[slot], &initial[slot]) {
-                        (Signal::Constant { value, .. }, _) => *value,
-                        (_, Some(start)) => start.0,
-                        _ => 0,
-                    };
-                    // what the experiments share is chosen in the first
-                    free[slot] = match *role {
-                        Role::State(_) => true,
-                        Role::Parameter(_) => experiment == 0,
-                        Role::Constant(c) => experiment == 0 && given[c].is_none(),
-                        Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
-                    };
+            maker.set_states(&mut point, &given(&compiled.starts))?;
+            let (known, kept) = maker.constraints(&point)?;
+            let mut generic = kept && model.states.iter().all(|s| s.start == StateStart::Unknown);
+            for (number, segment) in segments.iter().enumerate() {
+                if number > 0
+                    && let Some(slot) = maker.slot_of(Role::Time)
+                {
+                    // when a later segment begins is not given
+                    point.signals[slot] = Signal::Time { value: f.random(rng, 0) };
                 }
-                let mut own = SplitMix64::new(random());
-                hold(&compiled.dag, &compiled.constraints, &mut values, &free, &f, &mut own)
-                    .map_err(Singular::Constraint)?;
-                for (slot, role) in compiled.roles.iter().enumerate() {
-                    match *role {
-                        Role::State(_) => {
-                            if let Some(start) = &mut initial[slot] {
-                                start.0 = values[slot];
-                            }
-                        }
-                        Role::Parameter(i) => parameters[i] = values[slot],
-                        Role::Constant(c) => constants[c] = values[slot],
-                        Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => {}
-                    }
-                    if let Signal::Constant { value, .. } = &mut signals[slot] {
-                        *value = values[slot];
-                    }
-                }
-            }
-            let set = |initial: &mut Vec<Option<Initial>>, seen: &Taylor<'_>, state: usize, node: usize| {
-                if let Some(slot) = slot_of(Role::State(state)) {
-                    let duals = seen.dual(node, 0).iter().copied().enumerate().filter(|(_, x)| *x != 0);
-                    initial[slot] = Some((seen.start(node), duals.collect()));
-                }
-            };
-            if compiled.starts.iter().any(Option::is_some) {
-                let seen = look(&signals, &initial)?;
-                for (state, node) in compiled.starts.iter().enumerate() {
-                    if let Some(node) = node {
-                        set(&mut initial, &seen, state, *node);
-                    }
-                }
-            }
-            let mut known: Vec<Vec<u64>> = Vec::new();
-            if !compiled.constraints.is_empty() {
-                let mut seen = look(&signals, &initial)?;
-                known = compiled.constraints.iter().map(|&node| seen.dual(node, 0).to_vec()).collect();
-                seen.advance();
-                kept &= compiled.constraints.iter().all(|&node| seen.value(node, 1) == 0);
-            }
-            let whole = vec![super::model::CompiledSegment::default()];
-            let segments = if compiled.segments.is_empty() { &whole } else { &compiled.segments };
-            for segment in segments {
-                if !segment.constants.is_empty() {
-                    let seen = look(&signals, &initial)?;
-                    for (c, node) in &segment.constants {
-                        if let Some(slot) = slot_of(Role::Constant(*c)) {
-                            signals[slot] = Signal::Constant { value: seen.start(*node), lane: None };
-                        }
-                    }
-                }
-                if !segment.carry.is_empty() {
-                    let seen = look(&signals, &initial)?;
-                    for (state, node) in &segment.carry {
-                        set(&mut initial, &seen, *state, *node);
-                    }
-                }
-                let taylor = look(&signals, &initial)?;
-                let gradient = |&node: &usize| {
-                    let dual = taylor.dual(node, 0);
-                    if dual.is_empty() { vec![0; lanes] } else { dual.to_vec() }
-                };
+                maker.set_constants(&mut point, &segment.constants, true)?;
+                maker.set_states(&mut point, &segment.carry)?;
+                generic &= segment.carry.is_empty();
+                let taylor = maker.series(&point, lanes)?;
+                let gradient = |&node: &usize| dense(f, lanes, taylor.lanes_of(node), taylor.dual(node, 0));
                 let combinations = compiled.combinations.iter().map(gradient).collect();
-                let known = known.clone();
-                let (own, outputs) = (Echelon::new(f, lanes), compiled.outputs(experiment));
-                runs.push(Run { taylor, outputs, own, stalled: false, known, combinations });
+                let end = match () {
+                    () if arbitrary => End::Open,
+                    () if generic && (number > 0 || !taylor.depends_on_time()) => End::Stagnation,
+                    () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
+                    () => match maker.generic_rank(&point, &known, rng) {
+                        None => End::Open,
+                        Some((rank, clear)) => {
+                            gap = gap.and(clear);
+                            End::Rank(rank)
+                        }
+                    },
+                };
+                let own = S::Space::new(f.clone(), lanes);
+                let outputs = compiled.outputs(experiment);
+                runs.push(Run { taylor, outputs, own, end, done: false, known: known.clone(), combinations });
             }
         }
-        Ok(Self {
-            field,
-            lanes,
-            single: runs.len() == 1,
-            runs,
-            bound: layout.bound,
-            closed: layout.closed,
-            kept,
-            row: vec![0; lanes],
-        })
-    }
-
-    /// Whether the first derivatives of all constraints are zero here.
-    pub(crate) fn keeps_constraints(&self) -> bool {
-        self.kept
+        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, row: vec![f.zero(); lanes], gap })
     }
 
     /// The gradients of the combinations at the start of the first run.
-    pub(crate) fn combinations(&self) -> &[Vec<u64>] {
+    pub(crate) fn combinations(&self) -> &[Vec<S::Element>] {
         self.runs.first().map_or(&[], |r| &r.combinations)
     }
 
+    /// How clear the ranks of single runs were.
+    pub(crate) fn gap(&self) -> Gap {
+        self.runs.iter().fold(self.gap, |gap, run| gap.and(run.own.gap()))
+    }
+
+    /// Whether every run starts at a generic point.
+    pub(crate) fn is_generic(&self) -> bool {
+        self.runs.iter().all(|r| r.end == End::Stagnation)
+    }
+
+    /// Whether the end of every run is proven, as far as its orders were asked for.
+    pub(crate) fn is_done(&self) -> bool {
+        self.runs.iter().all(|r| r.done)
+    }
+
     /// The derivative of this order of a node at the start of the first run.
-    pub(crate) fn derivative(&mut self, node: usize, order: usize) -> u64 {
-        let f = self.field;
-        let Some(run) = self.runs.first_mut() else { return 0 };
+    pub(crate) fn derivative(&mut self, node: usize, order: usize) -> S::Element {
+        let f = self.field.clone();
+        let Some(run) = self.runs.first_mut() else { return f.zero() };
         while run.taylor.length <= order {
             run.taylor.advance();
         }
-        (1..=order).fold(run.taylor.value(node, order), |x, k| f.mul(x, f.from_u64(k as u64)))
+        (1..=order).fold(run.taylor.value(node, order), |x, k| f.mul(&x, &f.integer(k as i64)))
     }
 
     /// The Taylor coefficient of a node at the start of a run.
-    pub(super) fn coefficient(&mut self, run: usize, node: usize, order: usize) -> u64 {
+    pub(super) fn coefficient(&mut self, run: usize, node: usize, order: usize) -> S::Element {
         let taylor = &mut self.runs[run].taylor;
         while taylor.length <= order {
             taylor.advance();
         }
-        taylor.value(node, order)
+        // of a jump into the run nothing takes part in it
+        match order {
+            0 => taylor.start_of(node).unwrap_or(self.field.zero()),
+            _ => taylor.value(node, order),
+        }
     }
 
     /// Whether a node depends on no unknown in a run.
@@ -363,7 +557,7 @@ impl<'a> SystemRows<'a> {
     }
 
     /// The value of every unknown at this point, then of every known constant (in the first segment).
-    pub(crate) fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<u64> {
+    pub(crate) fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<S::Element> {
         let segments = compiled.segments.len().max(1);
         let node_of = |role: Role| compiled.node_of(role);
         let value = |u: &Unknown| {
@@ -372,24 +566,27 @@ impl<'a> SystemRows<'a> {
         };
         let constant = |c: usize| Some(self.runs.first()?.taylor.start(node_of(Role::Constant(c))?));
         let unknowns = layout.unknowns.iter().map(value);
-        unknowns.chain((0..constants).map(constant)).map(|x| x.unwrap_or(0)).collect()
+        unknowns.chain((0..constants).map(constant)).map(|x| x.unwrap_or(self.field.zero())).collect()
     }
 }
 
-impl DerivativeRows for SystemRows<'_> {
-    fn field(&self) -> Field {
-        self.field
+impl<S: Values> DerivativeRows for SystemRows<'_, S> {
+    type Field = S;
+
+    fn field(&self) -> S {
+        self.field.clone()
     }
 
     fn columns(&self) -> usize {
         self.lanes
     }
 
-    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[u64]) -> bool) -> bool {
-        if order > self.bound || self.runs.iter().all(|r| r.stalled) {
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[S::Element]) -> bool) -> bool {
+        if order > self.bound || self.is_done() {
             return false;
         }
-        for run in self.runs.iter_mut().filter(|r| !r.stalled) {
+        let single = self.runs.len() == 1;
+        for run in self.runs.iter_mut().filter(|r| !r.done) {
             while run.taylor.length <= order {
                 run.taylor.advance();
             }
@@ -400,13 +597,23 @@ impl DerivativeRows for SystemRows<'_> {
                 run.own.insert(row);
             }
             for &output in run.outputs {
-                let dual = run.taylor.dual(output, order);
-                let row = if dual.is_empty() { &self.row } else { dual };
-                let new = sink(row);
+                let support = run.taylor.lanes_of(output);
+                for (&lane, x) in support.iter().zip(run.taylor.dual(output, order)) {
+                    self.row[lane as usize] = *x;
+                }
+                let new = sink(&self.row);
                 // where runs share the rank, each has to be followed until its own stalls
-                grew |= if self.single { new } else { run.own.insert(row) };
+                grew |= if single && run.end == End::Stagnation { new } else { run.own.insert(&self.row) };
+                for &lane in support {
+                    self.row[lane as usize] = self.field.zero();
+                }
             }
-            run.stalled = self.closed && !grew;
+            run.done = match run.end {
+                End::Stagnation => !grew,
+                End::Rank(rank) => run.own.rank() >= rank,
+                End::Order(last) => order >= last,
+                End::Open => false,
+            };
         }
         true
     }

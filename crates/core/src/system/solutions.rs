@@ -88,6 +88,9 @@ pub(super) fn solutions(
     let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
     let n = judged.layout.unknowns.len();
     let Some(highest) = highest else { return Ok(vec![None; n]) };
+    if judged.fields.is_none() {
+        return Err(NoExpressions::NotRational);
+    }
     let worker = worker.ok_or(NoExpressions::NoEngine)?;
     let (request, symbols) = request(model, compiled, judged, highest)?;
     let (texts, _) = worker.ask(&request).map_err(NoExpressions::Engine)?;
@@ -101,7 +104,7 @@ pub(super) fn solutions(
         }
     }
     let mut rng = model.random(seed, "solving expressions");
-    for field in judged.fields {
+    for field in judged.fields.into_iter().flatten() {
         let held = check(model, compiled, judged, field, &mut rng, &symbols, &out);
         for (slot, held) in out.iter_mut().zip(held) {
             if !held {
@@ -242,7 +245,7 @@ fn request(
     };
     let role_is_free = |role: Role| {
         let lane = judged.layout.unknowns.iter().position(|u| u.role == role);
-        lane.is_some_and(|lane| judged.stairs.last().is_some_and(|s| s.pivots().all(|p| p != lane)))
+        lane.is_some_and(|lane| judged.span.as_ref().is_some_and(|s| s.pivots().all(|p| p != lane)))
     };
     let free = roles_of_parameters(model).enumerate().filter(|(_, role)| role_is_free(*role));
     let free = free.map(|(p, _)| p).collect();
@@ -291,7 +294,7 @@ fn texts(dag: &Dag, names: &[String]) -> Result<Vec<Option<String>>, NoExpressio
             Op::Subtract(a, b) => two(a, b, "-"),
             Op::Multiply(a, b) => two(a, b, "*"),
             Op::Divide(a, b) => two(a, b, "/"),
-            Op::Primitive { .. } => None,
+            Op::Primitive { .. } | Op::Pi => None,
         };
         if text.as_ref().is_some_and(|t| t.len() > LENGTH) {
             return Err(NoExpressions::TooLong);

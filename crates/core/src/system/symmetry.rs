@@ -1,19 +1,18 @@
 //! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output sees, at
 //! any point.
 
-use obsdeg_exact::{Echelon, Field, Ratio};
+use obsdeg_exact::{Reals, RowSpace};
 
 use super::functions::gcd;
 use super::judge::{At, Judgement, climb_at};
 use super::model::{Compiled, ModelError, SystemModel};
-use crate::degree::sparse::{extend_by_short_vectors, support};
+use super::values::Values;
+use crate::degree::sparse::{extend_by_short_vectors, support_in};
 
 /// Points at which a direction must vanish, at most.
 const POINTS: usize = 8;
 /// Most unknowns among which directions that are polynomials in them are sought.
 const MOVED: usize = 16;
-/// Most coefficients of such a direction.
-const COEFFICIENTS: usize = 800;
 /// Points that these take, at most.
 const POLYNOMIAL_POINTS: usize = 400;
 /// Their highest degree.
@@ -67,10 +66,10 @@ pub struct Symmetries {
 }
 
 /// The vector as small rationals, one at its first entry.
-fn rationals(f: &Field, v: &[u64]) -> Option<Vec<(i64, i64)>> {
-    let lead = v.iter().find(|x| **x != 0)?;
-    let inverse = f.inv(*lead);
-    v.iter().map(|&x| Ratio::recover(f, f.mul(x, inverse)).map(|r| (r.num, r.den))).collect()
+fn rationals<S: Values>(f: &S, v: &[S::Element]) -> Option<Vec<(i64, i64)>> {
+    let lead = v.iter().find(|x| !f.is_zero(x))?;
+    let inverse = f.inverse(lead)?;
+    v.iter().map(|x| f.rational(&f.mul(x, &inverse))).collect()
 }
 
 /// Rationals times their common denominator.
@@ -81,11 +80,24 @@ fn integers(v: &[(i64, i64)]) -> Vec<i64> {
     scaled.iter().map(|x| x / divisor).collect()
 }
 
-/// The symmetries of a judged model.
+/// The symmetries of a judged model: of a rational one in a prime field, of one with functions in many digits.
 ///
 /// # Errors
 /// [`ModelError`] when a point cannot be had.
 pub fn symmetries(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    seed: u64,
+) -> Result<Symmetries, ModelError> {
+    match judged.fields {
+        Some([field, _]) => symmetries_in(field, model, compiled, judged, seed),
+        None => symmetries_in(Reals::<8>, model, compiled, judged, seed),
+    }
+}
+
+fn symmetries_in<S: Values>(
+    f: S,
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
@@ -98,26 +110,24 @@ pub fn symmetries(
     if defect == 0 {
         return Ok(Symmetries::default());
     }
-    let f = judged.fields[0];
     let mut rng = model.random(seed, "symmetries");
-    let mut basis = Echelon::new(f, 2 * n);
+    let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
+    let mut basis = space(2 * n);
     // an unknown that no output sees is said so by itself; an observable one never moves
     for c in (0..n).filter(|&c| !excited[c] || judged.findings.degrees.degree[c].is_some()) {
         for column in [c, n + c] {
-            let unit: Vec<u64> = (0..2 * n).map(|j| if j == column { f.one() } else { 0 }).collect();
+            let unit: Vec<_> = (0..2 * n).map(|j| if j == column { f.one() } else { f.zero() }).collect();
             basis.insert(&unit);
         }
     }
-    let (mut last, mut at): (usize, Option<At>) = (0, None);
+    let (mut last, mut at): (usize, Option<At<S>>) = (0, None);
     for point in 0..POINTS {
-        let here = climb_at(model, compiled, &judged.layout, f, &mut rng)?;
-        if let Some(span) = here.stairs.last() {
-            for i in 0..span.rank() {
-                let row = span.row(i);
-                let scaled = row.iter().zip(&here.values).map(|(&r, &x)| f.mul(r, x));
-                let both: Vec<u64> = scaled.chain(row.iter().copied()).collect();
-                basis.insert(&both);
-            }
+        let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng)?;
+        for i in 0..here.span.rank() {
+            let row = here.span.row(i);
+            let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
+            let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
+            basis.insert(&both);
         }
         at = Some(here);
         if point >= 2 && basis.rank() == last {
@@ -126,12 +136,14 @@ pub fn symmetries(
         last = basis.rank();
     }
     let Some(at) = at else { return Ok(Symmetries::default()) };
-    let mut span = Echelon::new(f, 2 * n);
-    let short = extend_by_short_vectors(&basis.null_space(), &mut span);
-    let mut tangents = Echelon::new(f, n);
+    let mut tangents = space(n);
     let mut out = Symmetries::default();
+    let short = match basis.gap().is_decisive(S::BITS) {
+        true => extend_by_short_vectors(&f, &basis.null_space(), &mut space(2 * n)),
+        false => Vec::new(),
+    };
     for v in short {
-        let tangent: Vec<u64> = (0..n).map(|c| f.add(f.mul(v[c], at.values[c]), v[n + c])).collect();
+        let tangent: Vec<_> = (0..n).map(|c| f.add(&f.mul(&v[c], &at.values[c]), &v[n + c])).collect();
         let Some(k) = rationals(&f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
         let terms = |half: &[(i64, i64)]| -> Vec<Term> {
             half.iter().copied().enumerate().filter(|(_, k)| k.0 != 0).collect()
@@ -141,7 +153,7 @@ pub fn symmetries(
     if out.found.len() < defect {
         let moved: Vec<usize> =
             (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
-        let mut draw = || climb_at(model, compiled, &judged.layout, f, &mut rng);
+        let mut draw = || climb_at(model, compiled, &judged.layout, f.clone(), &mut rng);
         // constants that every segment and experiment shares may be factors too
         let changed =
             model.segments.iter().map(|s| &s.constants).chain(model.own.iter().map(|e| &e.constants));
@@ -154,19 +166,18 @@ pub fn symmetries(
             let products = products(&factors, degree);
             if out.found.len() + out.polynomial.len() == defect
                 || moved.len() > MOVED
-                || moved.len() * products.len() > COEFFICIENTS
+                || moved.len() * products.len() > S::COEFFICIENTS
             {
                 break;
             }
             out.polynomial.extend(directions(&f, &moved, &products, &mut tangents, &at, &mut draw)?);
         }
     }
-    if out.found.len() + out.polynomial.len() < defect
-        && let Some(rows) = at.stairs.last()
-    {
-        let among_excited = |v: &Vec<u64>| support(v).iter().all(|&c| excited[c]);
-        let rest: Vec<Vec<u64>> = rows.null_space().into_iter().filter(among_excited).collect();
-        out.unexplained = extend_by_short_vectors(&rest, &mut tangents).iter().map(|v| support(v)).collect();
+    if out.found.len() + out.polynomial.len() < defect {
+        let among_excited = |v: &Vec<S::Element>| support_in(&f, v).iter().all(|&c| excited[c]);
+        let rest: Vec<Vec<S::Element>> = at.span.null_space().into_iter().filter(among_excited).collect();
+        let moving = extend_by_short_vectors(&f, &rest, &mut tangents);
+        out.unexplained = moving.iter().map(|v| support_in(&f, v)).collect();
     }
     out.invariants = invariants(&f, n, &out.found, &at);
     Ok(out)
@@ -191,25 +202,26 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
 
 /// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a
 /// linear system for the a_ij from rows at several points.
-fn directions(
-    f: &Field,
+fn directions<S: Values>(
+    f: &S,
     moved: &[usize],
     products: &[Vec<usize>],
-    tangents: &mut Echelon,
-    at: &At,
-    draw: &mut dyn FnMut() -> Result<At, ModelError>,
+    tangents: &mut S::Space,
+    at: &At<S>,
+    draw: &mut dyn FnMut() -> Result<At<S>, ModelError>,
 ) -> Result<Vec<PolynomialDirection>, ModelError> {
     let width = products.len();
-    let value = |at: &At, product: &Vec<usize>| product.iter().fold(f.one(), |x, &j| f.mul(x, at.values[j]));
-    let mut basis = Echelon::new(*f, moved.len() * width);
+    let value =
+        |at: &At<S>, product: &Vec<usize>| product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]));
+    let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
+    let mut basis = space(moved.len() * width);
     let (mut rank, mut still) = (0, 0);
     for _ in 0..POLYNOMIAL_POINTS {
         let here = draw()?;
-        let Some(span) = here.stairs.last() else { break };
-        let values: Vec<u64> = products.iter().map(|p| value(&here, p)).collect();
-        for i in 0..span.rank() {
-            let row = span.row(i);
-            let entries = moved.iter().flat_map(|&m| values.iter().map(move |&x| f.mul(row[m], x)));
+        let values: Vec<S::Element> = products.iter().map(|p| value(&here, p)).collect();
+        for i in 0..here.span.rank() {
+            let row = here.span.row(i);
+            let entries = moved.iter().flat_map(|&m| values.iter().map(move |x| f.mul(&row[m], x)));
             basis.insert(&entries.collect::<Vec<_>>());
         }
         still = if basis.rank() == rank { still + 1 } else { 0 };
@@ -218,16 +230,15 @@ fn directions(
         }
         rank = basis.rank();
     }
-    if still < 2 {
+    if still < 2 || !basis.gap().is_decisive(S::BITS) {
         return Ok(Vec::new());
     }
-    let here: Vec<u64> = products.iter().map(|p| value(at, p)).collect();
-    let mut span = Echelon::new(*f, moved.len() * width);
+    let here: Vec<S::Element> = products.iter().map(|p| value(at, p)).collect();
     let mut out = Vec::new();
-    for v in extend_by_short_vectors(&basis.null_space(), &mut span) {
-        let mut tangent = vec![0; tangents.columns()];
+    for v in extend_by_short_vectors(f, &basis.null_space(), &mut space(moved.len() * width)) {
+        let mut tangent = vec![f.zero(); tangents.columns()];
         for (part, &m) in v.chunks_exact(width).zip(moved) {
-            tangent[m] = f.dot(0, here.iter().zip(part).map(|(&x, &a)| (a, x)));
+            tangent[m] = f.dot(&f.zero(), part.iter().zip(&here));
         }
         let Some(k) = rationals(f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
         let component = |(part, &m): (&[(i64, i64)], &usize)| {
@@ -243,36 +254,35 @@ fn directions(
 
 /// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they are
 /// observable.
-fn invariants(f: &Field, n: usize, found: &[Symmetry], at: &At) -> Vec<Invariant> {
+fn invariants<S: Values>(f: &S, n: usize, found: &[Symmetry], at: &At<S>) -> Vec<Invariant> {
     let mut out = Vec::new();
     let scalings: Vec<&Symmetry> = found.iter().filter(|s| s.translation.is_empty()).collect();
     let translations: Vec<&Symmetry> = found.iter().filter(|s| s.scaling.is_empty()).collect();
     for (product, list) in [(true, scalings), (false, translations)] {
         let terms = |s: &Symmetry| if product { s.scaling.clone() } else { s.translation.clone() };
-        let mut rows = Echelon::new(*f, n);
+        let space = || <S::Space as RowSpace>::new(f.clone(), n);
+        let mut rows = space();
         let mut moved = vec![false; n];
         for s in &list {
-            let mut row = vec![0; n];
+            let mut row = vec![f.zero(); n];
             for (c, (p, q)) in terms(s) {
-                row[c] = f.from_ratio(p, q);
+                row[c] = f.inverse(&f.integer(q)).map_or(f.zero(), |below| f.mul(&f.integer(p), &below));
                 moved[c] = true;
             }
             rows.insert(&row);
         }
-        let kept: Vec<Vec<u64>> =
-            rows.null_space().into_iter().filter(|v| support(v).iter().all(|&c| moved[c])).collect();
         // the null vectors of what is not moved are units
-        let mut span = Echelon::new(*f, n);
-        for m in extend_by_short_vectors(&kept, &mut span) {
+        let kept: Vec<Vec<S::Element>> =
+            rows.null_space().into_iter().filter(|v| support_in(f, v).iter().all(|&c| moved[c])).collect();
+        for m in extend_by_short_vectors(f, &kept, &mut space()) {
             let Some(k) = rationals(f, &m) else { continue };
             let exponents = integers(&k);
             // d(prod x^m) = prod x^m sum m_i dx_i / x_i
-            let gradient: Vec<u64> = exponents
-                .iter()
-                .zip(&at.values)
-                .map(|(&m, &x)| f.mul(f.from_i64(m), if product { f.inv(x) } else { f.one() }))
+            let factor = |x| if product { f.inverse(x) } else { Some(f.one()) };
+            let gradient: Option<Vec<S::Element>> = (exponents.iter().zip(&at.values))
+                .map(|(&m, x)| if m == 0 { Some(f.zero()) } else { Some(f.mul(&f.integer(m), &factor(x)?)) })
                 .collect();
-            if let Some(degree) = at.stairs.iter().position(|v| v.contains(&gradient)) {
+            if let Some(degree) = gradient.and_then(|g| at.degree(&g)) {
                 let terms = exponents.iter().copied().enumerate().filter(|t| t.1 != 0).collect();
                 out.push(Invariant { terms, product, degree });
             }

@@ -1,14 +1,22 @@
 //! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a dual lane
-//! each), in a prime field.
+//! each), in any field.
+//!
+//! A node has lanes only for what it can depend on, and orders are kept only where a later one needs them: as a factor
+//! of a product of two that change.
 
-use obsdeg_exact::{Field, SplitMix64};
+use std::collections::HashMap;
+use std::sync::Arc;
 
-use super::dag::{Dag, FunctionStart, Op};
-use crate::model::expression::from_i128;
+use obsdeg_exact::SplitMix64;
+
+use super::constraints::below;
+use super::dag::{Dag, Op};
+use super::values::Values;
+use crate::model::expression::Function;
 
 /// What a slot holds in one run.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Signal {
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Signal<E> {
     /// A state: the node of its derivative.
     State {
         /// The right-hand side.
@@ -17,126 +25,120 @@ pub(crate) enum Signal {
     /// A number that does not change, with its lane if it is unknown.
     Constant {
         /// The value.
-        value: u64,
+        value: E,
         /// The unknown.
         lane: Option<usize>,
     },
-    /// A known input with random derivatives up to this order (`None`: all).
+    /// A known input that starts at a value and has random derivatives up to this order (`None`: all).
     Known {
+        /// The value at the start.
+        value: E,
         /// The order.
         degree: Option<usize>,
     },
-    /// An unknown input: the lane of its first Taylor coefficient, and how many there are.
+    /// An unknown input: its start, the lane of its first Taylor coefficient, and how many there are.
     Unknown {
+        /// The value at the start.
+        value: E,
         /// The first lane.
         lane: usize,
         /// The number of lanes.
         count: usize,
     },
-    /// Time.
-    Time,
+    /// Time, which starts here.
+    Time {
+        /// The time at the start.
+        value: E,
+    },
 }
 
 /// The start of a state: its value and its derivative by every unknown (lane, value).
-pub(crate) type Initial = (u64, Vec<(usize, u64)>);
+pub(crate) type Initial<E> = (E, Vec<(usize, E)>);
 
 /// Why there is no series at this point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Singular {
     /// A division by zero, at this node.
     Division(usize),
-    /// A root that this field does not have here, at this node.
-    Root(usize),
+    /// A function that is not defined here, at this node.
+    Domain(usize, Function),
+    /// A function that is defined but has no derivative here, at this node.
+    Kink(usize, Function),
+    /// A value that the field does not know, at this node.
+    Unknown(usize),
     /// Constraints that could not be solved here, this one among them.
     Constraint(usize),
 }
 
 /// The series of one run.
 #[derive(Debug, Clone)]
-pub(crate) struct Taylor<'a> {
+pub(crate) struct Taylor<'a, S: Values> {
     dag: &'a Dag,
-    f: Field,
+    f: S,
     lanes: usize,
-    signals: Vec<Signal>,
+    signals: Vec<Signal<S::Element>>,
     rng: SplitMix64,
+    /// What takes part.
+    needed: Vec<bool>,
     /// Whether a node is constant in time.
     constant: Vec<bool>,
     /// Whether a node depends on no unknown.
     known: Vec<bool>,
+    /// Whether every order of a node's duals is needed later; of the others two are kept.
+    kept: Vec<bool>,
+    /// The lanes that a node has, in order.
+    support: Vec<Arc<[u32]>>,
     /// `values[node][k]`.
-    values: Vec<Vec<u64>>,
-    /// `duals[node][k * lanes + lane]`.
-    duals: Vec<Vec<u64>>,
+    values: Vec<Vec<S::Element>>,
+    /// `duals[node][k * lanes of the node + i]`, k modulo 2 where they are not kept.
+    duals: Vec<Vec<S::Element>>,
     /// Inverses of small integers.
-    inverses: Vec<u64>,
+    inverses: Vec<S::Element>,
     /// Coefficients that are computed.
     pub length: usize,
-    sums: Vec<u128>,
+    sums: Vec<S::Sum>,
 }
 
-/// Random starts of functions, shared by all runs at one point.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Starts {
-    free: Vec<u64>,
-    /// `(cos, sin)`.
-    circle: Vec<(u64, u64)>,
-}
-
-impl Starts {
-    /// Random values for all functions of a graph.
-    pub(crate) fn random(dag: &Dag, f: &Field, rng: &mut SplitMix64) -> Self {
-        let p = f.modulus();
-        let free = (0..dag.free).map(|_| 1 + rng.below(p - 1)).collect();
-        let circle = (0..dag.angles)
-            .map(|_| {
-                loop {
-                    let t = rng.below(p);
-                    let square = f.mul(t, t);
-                    let below = f.add(f.one(), square);
-                    if below != 0 {
-                        let inverse = f.inv(below);
-                        let cos = f.mul(f.sub(f.one(), square), inverse);
-                        break (cos, f.mul(f.add(t, t), inverse));
-                    }
-                }
-            })
-            .collect();
-        Self { free, circle }
-    }
-}
-
-impl<'a> Taylor<'a> {
-    /// The series at order 0: `initial` gives every state's start (by slot).
+impl<'a, S: Values> Taylor<'a, S> {
+    /// The series at order 0 of the nodes `roots` and what they are made of: `initial` gives every state's start (by
+    /// slot). Rates take part when `moving`.
     ///
     /// # Errors
     /// [`Singular`] when the point is none.
+    #[allow(clippy::too_many_arguments, reason = "all of a run")]
     pub(crate) fn new(
         dag: &'a Dag,
-        f: Field,
+        f: S,
         lanes: usize,
-        signals: &[Signal],
-        initial: &[Option<Initial>],
-        starts: &Starts,
+        signals: Vec<Signal<S::Element>>,
+        initial: &[Option<Initial<S::Element>>],
+        roots: &[usize],
+        moving: bool,
         rng: SplitMix64,
     ) -> Result<Self, Singular> {
         let n = dag.ops.len();
         let mut out = Self {
             dag,
-            f,
             lanes,
-            signals: signals.to_vec(),
+            signals,
             rng,
+            needed: vec![false; n],
             constant: vec![false; n],
             known: vec![false; n],
+            kept: vec![false; n],
+            support: Vec::new(),
             values: vec![Vec::new(); n],
             duals: vec![Vec::new(); n],
-            inverses: vec![0],
+            inverses: vec![f.zero()],
             length: 0,
-            sums: Vec::new(),
+            sums: vec![f.no_sum(); lanes],
+            f,
         };
         out.classify();
-        out.start_values(initial, starts)?;
-        out.start_duals(initial);
+        out.need(roots, moving);
+        out.start_values(initial)?;
+        out.find_support(initial, moving);
+        out.start_duals(initial)?;
         out.length = 1;
         Ok(out)
     }
@@ -145,13 +147,13 @@ impl<'a> Taylor<'a> {
     fn classify(&mut self) {
         for (i, op) in self.dag.ops.iter().enumerate() {
             let (constant, known) = match *op {
-                Op::Number { .. } => (true, true),
+                Op::Number { .. } | Op::Pi => (true, true),
                 Op::Slot(s) => match &self.signals[s] {
                     Signal::State { .. } => (false, false),
                     Signal::Constant { lane, .. } => (true, lane.is_none()),
-                    Signal::Known { degree } => (*degree == Some(0), true),
+                    Signal::Known { degree, .. } => (*degree == Some(0), true),
                     Signal::Unknown { count, .. } => (*count == 1, false),
-                    Signal::Time => (false, true),
+                    Signal::Time { .. } => (false, true),
                 },
                 Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
                     (self.constant[a] && self.constant[b], self.known[a] && self.known[b])
@@ -162,103 +164,266 @@ impl<'a> Taylor<'a> {
         }
     }
 
-    fn start_values(&mut self, initial: &[Option<Initial>], starts: &Starts) -> Result<(), Singular> {
-        let f = self.f;
-        for (i, op) in self.dag.ops.iter().enumerate() {
-            let value = |a: usize| self.values[a][0];
-            let x = match *op {
-                Op::Number { mantissa, decimals } => {
-                    let ten = f.pow(f.from_u64(10), decimals.unsigned_abs().into());
-                    f.mul(from_i128(&f, mantissa), if decimals < 0 { ten } else { f.inv(ten) })
-                }
-                Op::Slot(s) => match &self.signals[s] {
-                    Signal::Constant { value, .. } => *value,
-                    Signal::State { .. } => initial[s].as_ref().map_or(0, |x| x.0),
-                    _ => self.rng.below(f.modulus()),
-                },
-                Op::Add(a, b) => f.add(value(a), value(b)),
-                Op::Subtract(a, b) => f.sub(value(a), value(b)),
-                Op::Multiply(a, b) => f.mul(value(a), value(b)),
-                Op::Divide(_, b) if value(b) == 0 => return Err(Singular::Division(i)),
-                Op::Divide(a, b) => f.mul(value(a), f.inv(value(b))),
-                Op::Primitive { start, of, .. } => match start {
-                    FunctionStart::Free(k) => starts.free[k],
-                    FunctionStart::Cosine(k) => starts.circle[k].0,
-                    FunctionStart::Sine(k) => starts.circle[k].1,
-                    FunctionStart::Root { denominator, .. } => {
-                        root(&f, value(of), denominator).ok_or(Singular::Root(i))?
+    /// Marks what takes part. The derivative of a function of known constants is nowhere used: at the ends of its range it
+    /// need not exist.
+    fn need(&mut self, roots: &[usize], moving: bool) {
+        let mut left = roots.to_vec();
+        while let Some(i) = left.pop() {
+            if std::mem::replace(&mut self.needed[i], true) {
+                continue;
+            }
+            match self.dag.ops[i] {
+                Op::Number { .. } | Op::Pi => {}
+                Op::Slot(s) => {
+                    if let Signal::State { rate } = self.signals[s]
+                        && moving
+                    {
+                        left.push(rate);
                     }
+                }
+                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
+                    left.extend([a, b]);
+                }
+                Op::Primitive { of, weight, .. } => {
+                    left.push(of);
+                    if !(self.constant[of] && self.known[of]) {
+                        left.push(weight);
+                    }
+                }
+            }
+        }
+        for i in (0..self.dag.ops.len()).filter(|&i| self.needed[i]) {
+            match self.dag.ops[i] {
+                Op::Multiply(a, b) if !self.constant[a] && !self.constant[b] => {
+                    (self.kept[a], self.kept[b]) = (true, true);
+                }
+                Op::Divide(_, b) if !self.constant[b] => (self.kept[i], self.kept[b]) = (true, true),
+                Op::Primitive { of, weight, .. } if !self.constant[of] => {
+                    (self.kept[of], self.kept[weight]) = (true, true);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn start_values(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
+        for (i, op) in self.dag.ops.iter().enumerate() {
+            // what a slot holds is asked for even where nothing uses it
+            let x = match *op {
+                Op::Slot(s) => match &self.signals[s] {
+                    Signal::State { .. } => initial[s].as_ref().map_or(self.f.zero(), |x| x.0),
+                    Signal::Constant { value, .. }
+                    | Signal::Known { value, .. }
+                    | Signal::Unknown { value, .. }
+                    | Signal::Time { value } => *value,
                 },
+                _ if self.needed[i] => self.start_value(i)?,
+                _ => continue,
             };
             self.values[i].push(x);
         }
         Ok(())
     }
 
-    fn start_duals(&mut self, initial: &[Option<Initial>]) {
-        let f = self.f;
+    /// The start of an operation from those of its operands.
+    fn start_value(&self, i: usize) -> Result<S::Element, Singular> {
+        let f = &self.f;
+        let value = |a: usize| &self.values[a][0];
+        Ok(match self.dag.ops[i] {
+            Op::Number { mantissa, decimals } => f.number(mantissa, decimals),
+            Op::Pi => f.pi().ok_or(Singular::Unknown(i))?,
+            Op::Slot(_) => self.start(i),
+            Op::Add(a, b) => f.add(value(a), value(b)),
+            Op::Subtract(a, b) => f.sub(value(a), value(b)),
+            Op::Multiply(a, b) => f.mul(value(a), value(b)),
+            Op::Divide(a, b) => {
+                let inverse = f.inverse(value(b)).ok_or(Singular::Division(i))?;
+                f.mul(value(a), &inverse)
+            }
+            Op::Primitive { function, of, .. } => {
+                let argument = value(of);
+                let bends = matches!(function, Function::Abs | Function::Sign);
+                if bends && f.is_zero(argument) && !(self.constant[of] && self.known[of]) {
+                    return Err(Singular::Kink(i, function));
+                }
+                f.function(function, argument).ok_or(Singular::Domain(i, function))?
+            }
+        })
+    }
+
+    /// The start of a node that may not take part.
+    pub(crate) fn start_of(&mut self, node: usize) -> Result<S::Element, Singular> {
+        for i in below(self.dag, node) {
+            if self.values[i].is_empty() {
+                let x = self.start_value(i)?;
+                self.values[i].push(x);
+            }
+        }
+        Ok(self.start(node))
+    }
+
+    /// Which lanes a node can depend on, at any order.
+    fn find_support(&mut self, initial: &[Option<Initial<S::Element>>], moving: bool) {
+        let n = self.dag.ops.len();
+        let words = self.lanes.div_ceil(64);
+        let mut sets = vec![0u64; n * words];
+        let mut own = |i: usize, lane: usize| sets[i * words + lane / 64] |= 1 << (lane % 64);
+        for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
+            let Op::Slot(s) = *op else { continue };
+            match &self.signals[s] {
+                Signal::State { .. } => {
+                    initial[s].iter().flat_map(|x| &x.1).for_each(|(lane, _)| own(i, *lane));
+                }
+                Signal::Constant { lane: Some(lane), .. } => own(i, *lane),
+                Signal::Unknown { lane, count, .. } => (*lane..lane + count).for_each(|lane| own(i, lane)),
+                _ => {}
+            }
+        }
+        // what a node is made of, until nothing is added
+        loop {
+            let mut grew = false;
+            for i in (0..n).filter(|&i| self.needed[i]) {
+                let parts = match self.dag.ops[i] {
+                    Op::Number { .. } | Op::Pi => continue,
+                    Op::Slot(s) => match self.signals[s] {
+                        Signal::State { rate } if moving => [rate, rate],
+                        _ => continue,
+                    },
+                    Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => [a, b],
+                    Op::Primitive { of, .. } => [of, of],
+                };
+                for part in parts {
+                    for w in 0..words {
+                        let new = sets[part * words + w] & !sets[i * words + w];
+                        sets[i * words + w] |= new;
+                        grew |= new != 0;
+                    }
+                }
+            }
+            if !grew {
+                break;
+            }
+        }
+        let mut lists: HashMap<&[u64], Arc<[u32]>> = HashMap::new();
+        self.support = sets
+            .chunks(words.max(1))
+            .map(|set| {
+                let list = || {
+                    let lanes = (0..self.lanes as u32).filter(|l| set[*l as usize / 64] >> (l % 64) & 1 == 1);
+                    lanes.collect()
+                };
+                Arc::clone(lists.entry(set).or_insert_with(list))
+            })
+            .collect();
+        self.support.resize(n, Arc::from([]));
+    }
+
+    fn start_duals(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
+        let f = self.f.clone();
         for i in 0..self.dag.ops.len() {
-            if self.known[i] {
+            if self.known[i] || !self.needed[i] {
                 continue;
             }
-            let mut row = vec![0; self.lanes];
-            let mut add = |a: usize, factor: u64| {
-                for (x, &y) in row.iter_mut().zip(&self.duals[a]) {
-                    *x = f.add(*x, f.mul(factor, y));
-                }
-            };
-            let value = |a: usize| self.values[a][0];
-            match self.dag.ops[i] {
-                Op::Number { .. } => {}
-                Op::Slot(s) => match &self.signals[s] {
-                    Signal::State { .. } => {
-                        for &(lane, x) in initial[s].iter().flat_map(|x| &x.1) {
-                            row[lane] = x;
+            let mut sums = std::mem::take(&mut self.sums);
+            let mut pending = 0;
+            let mut own: Vec<(usize, S::Element)> = Vec::new();
+            {
+                let mut add =
+                    |a: usize, factor: &S::Element| self.gather(&mut sums, &mut pending, a, 0, factor);
+                let value = |a: usize| &self.values[a][0];
+                match self.dag.ops[i] {
+                    Op::Number { .. } | Op::Pi => {}
+                    Op::Slot(s) => match &self.signals[s] {
+                        Signal::State { .. } => own.extend(initial[s].iter().flat_map(|x| &x.1).copied()),
+                        Signal::Constant { lane: Some(lane), .. } | Signal::Unknown { lane, .. } => {
+                            own.push((*lane, f.one()));
                         }
+                        _ => {}
+                    },
+                    Op::Add(a, b) => {
+                        add(a, &f.one());
+                        add(b, &f.one());
                     }
-                    Signal::Constant { lane: Some(lane), .. } | Signal::Unknown { lane, .. } => {
-                        row[*lane] = f.one();
+                    Op::Subtract(a, b) => {
+                        add(a, &f.one());
+                        add(b, &f.neg(&f.one()));
                     }
-                    _ => {}
-                },
-                Op::Add(a, b) => {
-                    add(a, f.one());
-                    add(b, f.one());
+                    Op::Multiply(a, b) => {
+                        add(a, value(b));
+                        add(b, value(a));
+                    }
+                    Op::Divide(a, b) => {
+                        let inverse = f.inverse(value(b)).ok_or(Singular::Division(i))?;
+                        add(a, &inverse);
+                        add(b, &f.neg(&f.mul(value(i), &inverse)));
+                    }
+                    Op::Primitive { of, weight, .. } => add(of, value(weight)),
                 }
-                Op::Subtract(a, b) => {
-                    add(a, f.one());
-                    add(b, f.neg(f.one()));
-                }
-                Op::Multiply(a, b) => {
-                    add(a, value(b));
-                    add(b, value(a));
-                }
-                Op::Divide(a, b) => {
-                    let inverse = f.inv(value(b));
-                    add(a, inverse);
-                    add(b, f.neg(f.mul(value(i), inverse)));
-                }
-                Op::Primitive { of, weight, .. } => add(of, value(weight)),
             }
-            self.duals[i] = row;
+            self.store(i, 0, &mut sums, None, &own);
+            self.sums = sums;
+        }
+        Ok(())
+    }
+
+    /// Writes the sums (times a factor) as the duals of order k, with what is added to single lanes, and clears them.
+    fn store(
+        &mut self,
+        i: usize,
+        k: usize,
+        sums: &mut [S::Sum],
+        factor: Option<&S::Element>,
+        own: &[(usize, S::Element)],
+    ) {
+        let f = &self.f;
+        let support = &self.support[i];
+        let start = if self.kept[i] { k } else { k % 2 } * support.len();
+        let row = &mut self.duals[i];
+        if row.len() < start + support.len() {
+            row.resize(start + support.len(), f.zero());
+        }
+        for (x, &lane) in row[start..].iter_mut().zip(support.iter()) {
+            let sum = &mut sums[lane as usize];
+            *x = f.reduce(sum);
+            if let Some(factor) = factor {
+                *x = f.mul(x, factor);
+            }
+            *sum = f.no_sum();
+        }
+        for (lane, value) in own {
+            if let Ok(place) = support.binary_search(&(*lane as u32)) {
+                let x = &mut row[start + place];
+                *x = f.add(x, value);
+            }
         }
     }
 
-    fn inverse(&mut self, k: usize) -> u64 {
+    fn inverse(&mut self, k: usize) {
         while self.inverses.len() <= k {
-            self.inverses.push(self.f.inv(self.f.from_u64(self.inverses.len() as u64)));
+            let next = self.f.integer(self.inverses.len() as i64);
+            // no integer as small as an order is zero
+            self.inverses.push(self.f.inverse(&next).unwrap_or(self.f.zero()));
         }
-        self.inverses[k]
     }
 
     /// The coefficient of a node at order k; zero beyond the start of what is constant.
-    pub(crate) fn value(&self, a: usize, k: usize) -> u64 {
-        self.values[a].get(k).copied().unwrap_or(0)
+    pub(crate) fn value(&self, a: usize, k: usize) -> S::Element {
+        self.values[a].get(k).copied().unwrap_or(self.f.zero())
     }
 
-    /// The derivative of a node at order k by every unknown; empty when it is zero.
-    pub(crate) fn dual(&self, a: usize, k: usize) -> &[u64] {
-        self.duals[a].get(k * self.lanes..(k + 1) * self.lanes).unwrap_or(&[])
+    /// The derivative of a node at order k by the unknowns of [`Taylor::lanes_of`]; empty when it is zero. Of orders before
+    /// the last, only those that are needed again are there.
+    pub(crate) fn dual(&self, a: usize, k: usize) -> &[S::Element] {
+        if k > 0 && self.constant[a] {
+            return &[];
+        }
+        let (width, place) = (self.support[a].len(), if self.kept[a] { k } else { k % 2 });
+        self.duals[a].get(place * width..(place + 1) * width).unwrap_or(&[])
+    }
+
+    /// The unknowns that a node can depend on.
+    pub(crate) fn lanes_of(&self, a: usize) -> &[u32] {
+        &self.support[a]
     }
 
     /// Whether a node depends on no unknown.
@@ -267,8 +432,32 @@ impl<'a> Taylor<'a> {
     }
 
     /// The value of a node at order 0.
-    pub(crate) fn start(&self, a: usize) -> u64 {
-        self.values[a][0]
+    pub(crate) fn start(&self, a: usize) -> S::Element {
+        self.value(a, 0)
+    }
+
+    /// Whether a node takes part and depends on the time itself.
+    pub(crate) fn depends_on_time(&self) -> bool {
+        let is_time = |s: usize| matches!(self.signals[s], Signal::Time { .. });
+        self.dag
+            .ops
+            .iter()
+            .zip(&self.needed)
+            .any(|(op, needed)| *needed && matches!(*op, Op::Slot(s) if is_time(s)))
+    }
+
+    /// Whether nothing moves: every rate is zero and every signal constant.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.dag.ops.iter().zip(&self.needed).all(|(op, needed)| match *op {
+            Op::Slot(s) if *needed => match self.signals[s] {
+                Signal::State { rate } => self.f.is_zero(&self.start(rate)),
+                Signal::Constant { .. } => true,
+                Signal::Known { degree, .. } => degree == Some(0),
+                Signal::Unknown { count, .. } => count == 1,
+                Signal::Time { .. } => false,
+            },
+            _ => true,
+        })
     }
 
     /// Computes the coefficient of the next order of all nodes.
@@ -276,172 +465,131 @@ impl<'a> Taylor<'a> {
         let k = self.length;
         self.inverse(k);
         for i in 0..self.dag.ops.len() {
-            if !self.constant[i] {
+            if self.needed[i] && !self.constant[i] {
                 let x = self.next_value(i, k);
                 self.values[i].push(x);
             }
         }
         for i in 0..self.dag.ops.len() {
-            if !self.constant[i] && !self.known[i] {
+            if self.needed[i] && !self.constant[i] && !self.known[i] {
                 self.next_dual(i, k);
             }
         }
         self.length += 1;
     }
 
-    fn next_value(&mut self, i: usize, k: usize) -> u64 {
-        let f = self.f;
+    fn next_value(&mut self, i: usize, k: usize) -> S::Element {
+        let f = &self.f;
         let of = |a: usize, j: usize| self.value(a, j);
         match self.dag.ops[i] {
-            Op::Number { .. } => 0,
+            Op::Number { .. } | Op::Pi => f.zero(),
             Op::Slot(s) => match self.signals[s] {
-                Signal::State { rate } => f.mul(of(rate, k - 1), self.inverses[k]),
-                Signal::Constant { .. } => 0,
-                Signal::Known { degree } if degree.is_some_and(|d| k > d) => 0,
-                Signal::Unknown { count, .. } if k >= count => 0,
-                Signal::Known { .. } | Signal::Unknown { .. } => self.rng.below(f.modulus()),
-                Signal::Time => u64::from(k == 1) * f.one(),
+                Signal::State { rate } => f.mul(&of(rate, k - 1), &self.inverses[k]),
+                Signal::Constant { .. } => f.zero(),
+                Signal::Known { degree, .. } if degree.is_some_and(|d| k > d) => f.zero(),
+                Signal::Unknown { count, .. } if k >= count => f.zero(),
+                Signal::Known { .. } | Signal::Unknown { .. } => f.coefficient(&mut self.rng),
+                Signal::Time { .. } if k == 1 => f.one(),
+                Signal::Time { .. } => f.zero(),
             },
-            Op::Add(a, b) => f.add(of(a, k), of(b, k)),
-            Op::Subtract(a, b) => f.sub(of(a, k), of(b, k)),
+            Op::Add(a, b) => f.add(&of(a, k), &of(b, k)),
+            Op::Subtract(a, b) => f.sub(&of(a, k), &of(b, k)),
             Op::Multiply(a, b) => {
                 let (a, b) = if self.constant[b] { (b, a) } else { (a, b) };
                 if self.constant[a] {
-                    return f.mul(of(a, 0), of(b, k));
+                    return f.mul(&of(a, 0), &of(b, k));
                 }
-                f.dot(0, (0..=k).map(|j| (self.values[a][j], self.values[b][k - j])))
+                f.dot(&f.zero(), (0..=k).map(|j| (&self.values[a][j], &self.values[b][k - j])))
             }
             Op::Divide(a, b) => {
                 // c b = a
-                let inverse = f.inv(of(b, 0));
+                let inverse = self.reciprocal(b);
                 if self.constant[b] {
-                    return f.mul(of(a, k), inverse);
+                    return f.mul(&of(a, k), &inverse);
                 }
-                let sum = f.dot(0, (0..k).map(|j| (self.values[i][j], self.values[b][k - j])));
-                f.mul(f.sub(of(a, k), sum), inverse)
+                let sum = f.dot(&f.zero(), (0..k).map(|j| (&self.values[i][j], &self.values[b][k - j])));
+                f.mul(&f.sub(&of(a, k), &sum), &inverse)
             }
             Op::Primitive { of: u, weight, .. } => {
                 // F' = weight u'
-                let terms = (1..=k).map(|j| (f.mul(f.from_u64(j as u64), of(u, j)), of(weight, k - j)));
-                f.mul(f.dot(0, terms), self.inverses[k])
+                let weights = &self.values[weight];
+                let changes: Vec<S::Element> =
+                    (1..=k).map(|j| f.mul(&f.integer(j as i64), &of(u, j))).collect();
+                let terms = changes.iter().zip((0..k).rev()).filter_map(|(x, j)| Some((x, weights.get(j)?)));
+                f.mul(&f.dot(&f.zero(), terms), &self.inverses[k])
             }
         }
     }
 
+    /// One over the start of a node: it is not zero, or there were no series.
+    fn reciprocal(&self, b: usize) -> S::Element {
+        self.f.inverse(&self.values[b][0]).unwrap_or(self.f.zero())
+    }
+
     /// Adds `factor * dual(a, j)` to the sums.
-    fn gather(&self, sums: &mut [u128], pending: &mut usize, a: usize, j: usize, factor: u64) {
+    fn gather(&self, sums: &mut [S::Sum], pending: &mut usize, a: usize, j: usize, factor: &S::Element) {
         let row = self.dual(a, j);
-        if factor == 0 || row.is_empty() {
-            return;
-        }
-        if *pending == Field::LAZY {
-            sums.iter_mut().for_each(|s| *s = self.f.settle(*s));
-            *pending = 0;
-        }
-        *pending += 1;
-        for (s, &x) in sums.iter_mut().zip(row) {
-            *s += self.f.lazy(factor, x);
+        if !row.is_empty() && *factor != self.f.zero() {
+            self.f.gather(sums, pending, factor, &self.support[a], row);
         }
     }
 
     fn next_dual(&mut self, i: usize, k: usize) {
-        let f = self.f;
+        let f = self.f.clone();
         let mut sums = std::mem::take(&mut self.sums);
-        sums.clear();
-        sums.resize(self.lanes, 0);
         let mut pending = 0;
         let of = |a: usize, j: usize| self.value(a, j);
-        let minus = |x: u64| f.neg(x);
-        let mut lane_of_input = None;
+        let (one, minus) = (f.one(), f.neg(&f.one()));
+        let mut own: Option<(usize, S::Element)> = None;
         let mut scale = None;
         match self.dag.ops[i] {
-            Op::Number { .. } => {}
+            Op::Number { .. } | Op::Pi => {}
             Op::Slot(s) => match self.signals[s] {
-                Signal::State { rate } => self.gather(&mut sums, &mut pending, rate, k - 1, self.inverses[k]),
-                Signal::Unknown { lane, count } if k < count => lane_of_input = Some(lane + k),
+                Signal::State { rate } => {
+                    self.gather(&mut sums, &mut pending, rate, k - 1, &self.inverses[k])
+                }
+                Signal::Unknown { lane, count, .. } if k < count => own = Some((lane + k, one)),
                 _ => {}
             },
             Op::Add(a, b) => {
-                self.gather(&mut sums, &mut pending, a, k, f.one());
-                self.gather(&mut sums, &mut pending, b, k, f.one());
+                self.gather(&mut sums, &mut pending, a, k, &one);
+                self.gather(&mut sums, &mut pending, b, k, &one);
             }
             Op::Subtract(a, b) => {
-                self.gather(&mut sums, &mut pending, a, k, f.one());
-                self.gather(&mut sums, &mut pending, b, k, minus(f.one()));
+                self.gather(&mut sums, &mut pending, a, k, &one);
+                self.gather(&mut sums, &mut pending, b, k, &minus);
             }
             Op::Multiply(a, b) => {
                 for (a, b) in [(a, b), (b, a)] {
                     // a_j db_(k-j); what is constant has order 0 only
                     let js = if self.constant[a] { 0..=0 } else { 0..=k };
                     for j in js.filter(|j| !self.constant[b] || *j == k) {
-                        self.gather(&mut sums, &mut pending, b, k - j, of(a, j));
+                        self.gather(&mut sums, &mut pending, b, k - j, &of(a, j));
                     }
                 }
             }
             Op::Divide(a, b) => {
                 // dc_k b_0 = da_k - sum_{j<k} dc_j b_(k-j) - sum_j c_j db_(k-j)
-                self.gather(&mut sums, &mut pending, a, k, f.one());
+                self.gather(&mut sums, &mut pending, a, k, &one);
                 if !self.constant[b] {
                     for j in 0..k {
-                        self.gather(&mut sums, &mut pending, i, j, minus(of(b, k - j)));
-                        self.gather(&mut sums, &mut pending, b, k - j, minus(of(i, j)));
+                        self.gather(&mut sums, &mut pending, i, j, &f.neg(&of(b, k - j)));
+                        self.gather(&mut sums, &mut pending, b, k - j, &f.neg(&of(i, j)));
                     }
                 }
-                self.gather(&mut sums, &mut pending, b, 0, minus(of(i, k)));
-                scale = Some(f.inv(of(b, 0)));
+                self.gather(&mut sums, &mut pending, b, 0, &f.neg(&of(i, k)));
+                scale = Some(self.reciprocal(b));
             }
             Op::Primitive { of: u, weight, .. } => {
                 for j in 1..=k {
-                    let count = f.from_u64(j as u64);
-                    self.gather(&mut sums, &mut pending, u, j, f.mul(count, of(weight, k - j)));
-                    self.gather(&mut sums, &mut pending, weight, k - j, f.mul(count, of(u, j)));
+                    let count = f.integer(j as i64);
+                    self.gather(&mut sums, &mut pending, u, j, &f.mul(&count, &of(weight, k - j)));
+                    self.gather(&mut sums, &mut pending, weight, k - j, &f.mul(&count, &of(u, j)));
                 }
                 scale = Some(self.inverses[k]);
             }
         }
-        let scale = scale.unwrap_or(f.one());
-        let one = f.one();
-        self.duals[i].extend(sums.iter().map(|&s| if s == 0 { 0 } else { f.reduce(s) }));
-        if scale != one {
-            for x in &mut self.duals[i][k * self.lanes..] {
-                *x = f.mul(*x, scale);
-            }
-        }
-        if let Some(lane) = lane_of_input {
-            self.duals[i][k * self.lanes + lane] = one;
-        }
+        self.store(i, k, &mut sums, scale.as_ref(), own.as_slice());
         self.sums = sums;
     }
-}
-
-/// A q-th root of `x`; in a field with p = 3 mod 4 whose p - 1 has no odd factor of q: unique up to sign, and of a
-/// square for every factor of two.
-fn root(f: &Field, x: u64, q: i64) -> Option<u64> {
-    let p = f.modulus();
-    let (mut odd, mut twos) = (q.unsigned_abs(), 0);
-    while odd.is_multiple_of(2) {
-        odd /= 2;
-        twos += 1;
-    }
-    if x == 0 || odd == 0 {
-        return None;
-    }
-    let mut out = x;
-    for _ in 0..twos {
-        let r = f.pow(out, (p + 1) / 4);
-        if f.mul(r, r) != out {
-            return None;
-        }
-        // of the two roots the one that is a square
-        let square = f.pow(r, (p - 1) / 2) == f.one();
-        out = if square { r } else { f.neg(r) };
-    }
-    if odd > 1 {
-        // odd * e = 1 mod p - 1
-        let m = u128::from(p - 1);
-        let e = (1..odd).find(|t| (m * u128::from(*t) + 1).is_multiple_of(u128::from(odd)))?;
-        let e = (m * u128::from(e) + 1) / u128::from(odd);
-        out = f.pow(out, e as u64);
-    }
-    Some(out)
 }

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::system::{
-    ModelError, PolynomialDirection, Role, StateStart, Symmetry, SystemModel, Unknown, judge_compiled,
-    symmetries, symmetry_reports,
+    DigitsReport, ModelError, PolynomialDirection, Role, StateStart, Symmetry, SystemModel, Unknown,
+    judge_compiled, symmetries, symmetry_reports,
 };
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::integrate::runge_kutta;
@@ -61,8 +61,10 @@ pub struct SystemEvidence {
     pub passed: bool,
     /// The longest horizon, of every experiment, in the unit of the model.
     pub duration: f64,
-    /// Bound on the probability that a verdict is wrong.
-    pub error_bound: f64,
+    /// Of a rational model: bound on the probability that a verdict is wrong.
+    pub error_bound: Option<f64>,
+    /// Of a model with functions: how clear its ranks were in real numbers.
+    pub digits: Option<DigitsReport>,
     /// Seed of all random choices.
     pub seed: u64,
 }
@@ -214,7 +216,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         .iter()
         .enumerate()
         .map(|(c, u)| {
-            let Verdict { status, degree } = judged.findings.verdict(c);
+            let Verdict { status, degree } = judged.verdict_on(c);
             // of what has no degree nothing is measured that could be learnt
             let measured = slopes[c].filter(|_| degree.is_some());
             SystemQuantityEvidence {
@@ -261,7 +263,8 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         checks: counts.agree + counts.disagree,
         passed: counts.disagree == 0,
         duration: setup.duration,
-        error_bound: judged.findings.error_bound,
+        error_bound: judged.error_bound(),
+        digits: judged.digits(),
         seed,
     })
 }

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Measurement, Process};
 
-use obsdeg_core::model::expression::{Expression, Function, evaluate_f64};
-use obsdeg_core::system::{Compiled, FunctionStart, KnownInput, ModelError, Named, Op, Role, SystemModel};
+use obsdeg_core::model::expression::{Expression, evaluate_f64};
+use obsdeg_core::system::{Compiled, KnownInput, ModelError, Named, Op, Role, SystemModel};
 
 /// A state of the filter; what belongs to an experiment says to which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,8 +27,6 @@ pub struct Numeric<'a> {
     pub states: Vec<FilterState>,
     /// Their names.
     pub names: Vec<String>,
-    /// The function of a node that is one.
-    functions: Vec<Option<Function>>,
     /// Known inputs as functions of time, of every experiment.
     inputs: Vec<Vec<Option<Expression>>>,
     /// Known constants, of every part.
@@ -85,8 +83,7 @@ impl<'a> Numeric<'a> {
             };
             columns.push(compiled.roles.iter().map(column).collect());
         }
-        let functions = compiled.dag.functions_of_nodes();
-        Ok(Self { compiled, states, names, functions, inputs, constants, columns })
+        Ok(Self { compiled, states, names, inputs, constants, columns })
     }
 
     /// A known constant in the first segment.
@@ -109,7 +106,7 @@ impl<'a> Numeric<'a> {
         let dag = &self.compiled.dag;
         let experiment = part / self.segments();
         let mut values: Vec<f64> = Vec::with_capacity(dag.ops.len());
-        for (i, op) in dag.ops.iter().enumerate() {
+        for op in &dag.ops {
             let value = match *op {
                 Op::Number { mantissa, decimals } => mantissa as f64 / 10f64.powi(decimals),
                 Op::Slot(s) => match self.compiled.roles[s] {
@@ -126,23 +123,8 @@ impl<'a> Numeric<'a> {
                 Op::Subtract(a, b) => values[a] - values[b],
                 Op::Multiply(a, b) => values[a] * values[b],
                 Op::Divide(a, b) => values[a] / values[b],
-                Op::Primitive { start: FunctionStart::Root { numerator, denominator }, of, .. } => {
-                    values[of].powf(numerator as f64 / denominator as f64)
-                }
-                Op::Primitive { of, .. } => {
-                    let u = values[of];
-                    match self.functions[i] {
-                        Some(Function::Sin) => u.sin(),
-                        Some(Function::Cos) => u.cos(),
-                        Some(Function::Exp) => u.exp(),
-                        Some(Function::Log) => u.ln(),
-                        Some(Function::Asin) => u.asin(),
-                        Some(Function::Acos) => u.acos(),
-                        Some(Function::Atan) => u.atan(),
-                        // taken apart into those above
-                        Some(Function::Tan | Function::Sqrt) | None => f64::NAN,
-                    }
-                }
+                Op::Pi => std::f64::consts::PI,
+                Op::Primitive { function, of, .. } => function.value(values[of]),
             };
             values.push(value);
         }
@@ -159,14 +141,14 @@ impl<'a> Numeric<'a> {
             let (before, rest) = duals.split_at_mut(i * n);
             let row = &mut rest[..n];
             let mut add = |a: usize, factor: f64| {
-                if factor != 0.0 {
-                    for (x, y) in row.iter_mut().zip(&before[a * n..(a + 1) * n]) {
-                        *x += factor * y;
-                    }
+                // what depends on nothing has no derivative, where that of its function is infinite too
+                let others = before[a * n..(a + 1) * n].iter().filter(|_| factor != 0.0);
+                for (x, y) in row.iter_mut().zip(others).filter(|(_, y)| **y != 0.0) {
+                    *x += factor * y;
                 }
             };
             match *op {
-                Op::Number { .. } => {}
+                Op::Number { .. } | Op::Pi => {}
                 Op::Slot(s) => {
                     if let Some(c) = columns[s] {
                         row[c] = 1.0;

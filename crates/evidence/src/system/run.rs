@@ -3,7 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::FilterKind;
-use obsdeg_core::system::{Compiled, Judgement, ModelError, StateStart, SystemModel, judge_compiled};
+use obsdeg_core::system::{
+    Compiled, DigitsReport, Judgement, ModelError, StateStart, SystemModel, judge_compiled,
+};
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
 use schemars::JsonSchema;
@@ -51,8 +53,10 @@ pub struct SystemRun {
     pub step: f64,
     /// Standard deviation of the noise of a sample, by output.
     pub noise: Vec<(String, f64)>,
-    /// Bound on the probability that a verdict is wrong.
-    pub error_bound: f64,
+    /// Of a rational model: bound on the probability that a verdict is wrong.
+    pub error_bound: Option<f64>,
+    /// Of a model with functions: how clear its ranks were in real numbers.
+    pub digits: Option<DigitsReport>,
     /// Seed of the noise and of the initial errors.
     pub seed: u64,
 }
@@ -326,7 +330,8 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             duration,
             step: dt,
             noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
-            error_bound: judged.findings.error_bound,
+            error_bound: judged.error_bound(),
+            digits: judged.digits(),
             seed,
         },
         traces,

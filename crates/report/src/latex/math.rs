@@ -12,7 +12,7 @@ pub(crate) const GREEK: [&str; 21] = [
 ];
 
 /// Functions by their names in program notation, and their commands.
-pub(crate) const FUNCTIONS: [(&str, &str); 8] = [
+pub(crate) const FUNCTIONS: [(&str, &str); 9] = [
     ("sin", "sin"),
     ("cos", "cos"),
     ("tan", "tan"),
@@ -21,6 +21,7 @@ pub(crate) const FUNCTIONS: [(&str, &str); 8] = [
     ("atan", "arctan"),
     ("exp", "exp"),
     ("log", "log"),
+    ("tanh", "tanh"),
 ];
 
 /// Deepest nesting of brackets that is set as a formula.

@@ -1,0 +1,226 @@
+//! What a model's numbers and functions are worth in a field, and random points there.
+
+use obsdeg_exact::{Ball, Field, RealSpace, Reals, RowSpace, Scalars, SplitMix64};
+
+use super::constraints::hold;
+use super::dag::Dag;
+use super::taylor::{Signal, Taylor};
+use crate::model::expression::{Function, from_i128};
+
+/// A field in which a model has values.
+pub(crate) trait Values: Scalars {
+    /// How many points are tried before what is not defined there is taken to be so everywhere.
+    const ATTEMPTS: usize;
+    /// Bits of a number, where what is zero is told by a gap.
+    const BITS: i64;
+    /// Most coefficients of a direction that is sought among polynomials.
+    const COEFFICIENTS: usize;
+
+    /// `mantissa / 10^decimals`.
+    fn number(&self, mantissa: i128, decimals: i32) -> Self::Element;
+    /// The half turn, if the field knows it.
+    fn pi(&self) -> Option<Self::Element>;
+    /// The true value of a function; `None` where it is not defined.
+    fn function(&self, function: Function, x: &Self::Element) -> Option<Self::Element>;
+    /// A random value of something generic at the given attempt to find a point.
+    fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Self::Element;
+    /// A random Taylor coefficient of a generic signal.
+    fn coefficient(&self, rng: &mut SplitMix64) -> Self::Element;
+    /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero.
+    ///
+    /// # Errors
+    /// The constraint that could not be solved.
+    fn hold(
+        &self,
+        dag: &Dag,
+        constraints: &[usize],
+        values: &mut [Self::Element],
+        free: &[bool],
+        rng: &mut SplitMix64,
+    ) -> Result<(), usize>;
+}
+
+impl Values for Field {
+    const ATTEMPTS: usize = 64;
+    const BITS: i64 = 64;
+    const COEFFICIENTS: usize = 800;
+
+    fn number(&self, mantissa: i128, decimals: i32) -> u64 {
+        let ten = self.pow(self.from_u64(10), decimals.unsigned_abs().into());
+        let factor = if decimals < 0 { ten } else { self.inv(ten) };
+        Field::mul(self, from_i128(self, mantissa), factor)
+    }
+
+    /// It is transcendental.
+    fn pi(&self) -> Option<u64> {
+        None
+    }
+
+    /// Nothing in a prime field knows the value of a function.
+    fn function(&self, _: Function, _: &u64) -> Option<u64> {
+        None
+    }
+
+    fn random(&self, rng: &mut SplitMix64, _: usize) -> u64 {
+        rng.below(self.modulus())
+    }
+
+    fn coefficient(&self, rng: &mut SplitMix64) -> u64 {
+        rng.below(self.modulus())
+    }
+
+    fn hold(
+        &self,
+        dag: &Dag,
+        constraints: &[usize],
+        values: &mut [u64],
+        free: &[bool],
+        rng: &mut SplitMix64,
+    ) -> Result<(), usize> {
+        hold(dag, constraints, values, free, self, rng)
+    }
+}
+
+/// Attempts at points of positive numbers near one, where most models are at home; later ones look further.
+const NEAR: usize = 8;
+
+impl<const N: usize> Values for Reals<N> {
+    const ATTEMPTS: usize = 2000;
+    const BITS: i64 = Ball::<N>::BITS;
+    const COEFFICIENTS: usize = 200;
+
+    fn number(&self, mantissa: i128, decimals: i32) -> Ball<N> {
+        let mut ten = Ball::from_i64(1);
+        for _ in 0..decimals.unsigned_abs() {
+            ten = ten.mul(&Ball::from_i64(10));
+        }
+        let whole = Ball::from_i128(mantissa);
+        if decimals < 0 { whole.mul(&ten) } else { whole.div(&ten).unwrap_or(Ball::ZERO) }
+    }
+
+    fn pi(&self) -> Option<Ball<N>> {
+        Some(Ball::pi())
+    }
+
+    fn function(&self, function: Function, x: &Ball<N>) -> Option<Ball<N>> {
+        let one = Ball::from_i64(1);
+        // the other side of the right triangle with this one and the hypotenuse 1
+        let side = || one.sub(&x.mul(x)).sqrt();
+        match function {
+            Function::Sin => Some(x.sin_cos()?.0),
+            Function::Cos => Some(x.sin_cos()?.1),
+            Function::Tan => {
+                let (s, c) = x.sin_cos()?;
+                s.div(&c)
+            }
+            Function::Asin => Ball::atan2(x, &side()?),
+            Function::Acos => {
+                // on the cut of the angle, but defined
+                if x.add(&one).is_exactly_zero() { self.pi() } else { Ball::atan2(&side()?, x) }
+            }
+            Function::Atan => Ball::atan2(x, &one),
+            Function::Exp => x.exp(),
+            Function::Log => x.ln(),
+            Function::Sqrt => x.sqrt(),
+            Function::Tanh => {
+                // (1 - e)/(1 + e), e = exp(-2|x|)
+                let e = x.abs().shifted(1).neg().exp()?;
+                let size = one.sub(&e).div(&one.add(&e))?;
+                Some(if x.is_negative() { size.neg() } else { size })
+            }
+            Function::Abs => Some(if x.is_negative() { x.neg() } else { *x }),
+            Function::Sign if x.is_zero() && !x.is_exactly_zero() => None,
+            Function::Sign => Some(Ball::from_i64(i64::from(x.is_positive()) - i64::from(x.is_negative()))),
+        }
+    }
+
+    /// A rational number of 60 bits: of the first attempts in (1/4, 5/4); then of either sign, the larger the later.
+    fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Ball<N> {
+        let digits = Ball::from_i64((rng.next_u64() >> 4) as i64).shifted(-60);
+        let size = digits.add(&Ball::from_i64(1).shifted(-2));
+        if attempt < NEAR {
+            return size;
+        }
+        let places = 3 + (attempt / 100) as u64;
+        let place = rng.below(2 * places) as i64 - (places as i64).min(4);
+        let far = size.shifted(place);
+        if rng.below(2) == 0 { far } else { far.neg() }
+    }
+
+    fn coefficient(&self, rng: &mut SplitMix64) -> Ball<N> {
+        self.random(rng, 0)
+    }
+
+    fn hold(
+        &self,
+        dag: &Dag,
+        constraints: &[usize],
+        values: &mut [Ball<N>],
+        free: &[bool],
+        _: &mut SplitMix64,
+    ) -> Result<(), usize> {
+        hold_by_newton(dag, constraints, values, free)
+    }
+}
+
+/// Steps of Newton's method to a point where constraints hold: they double the digits.
+const STEPS: usize = 60;
+
+/// The nearest point at which constraints hold, about: Newton's steps of least length, from the random values. What is left of the constraints
+/// is in the error of the values.
+fn hold_by_newton<const N: usize>(
+    dag: &Dag,
+    constraints: &[usize],
+    values: &mut [Ball<N>],
+    free: &[bool],
+) -> Result<(), usize> {
+    let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
+    for _ in 0..STEPS {
+        let signal = |s: usize| Signal::Constant {
+            value: values[s],
+            lane: places.iter().position(|place| *place == s),
+        };
+        let signals = (0..values.len()).map(signal).collect();
+        let starts = vec![None; values.len()];
+        let seed = SplitMix64::new(0);
+        let at = Taylor::new(dag, Reals::<N>, places.len(), signals, &starts, constraints, false, seed)
+            .map_err(|_| 0usize)?;
+        // independent rows (J | -g): those that add to the rank of J
+        let (mut rank, mut rows) = (RealSpace::new(Reals, places.len()), Vec::new());
+        let mut off = f64::NEG_INFINITY;
+        for &node in constraints {
+            let mut row = vec![Ball::ZERO; places.len()];
+            for (&lane, x) in at.lanes_of(node).iter().zip(at.dual(node, 0)) {
+                row[lane as usize] = x.midpoint();
+            }
+            off = off.max(at.start(node).midpoint().size_log2());
+            if rank.insert(&row) {
+                rows.push((row, at.start(node).midpoint().neg()));
+            }
+        }
+        let done = -(Ball::<N>::BITS as f64) + 24.0;
+        if off <= done {
+            for &s in &places {
+                values[s] = values[s].midpoint().widened(done);
+            }
+            return Ok(());
+        }
+        // the step J' y with J J' y = -g
+        let (m, dot) = (rows.len(), |a: &[Ball<N>], b: &[Ball<N>]| Reals.dot(&Ball::ZERO, a.iter().zip(b)));
+        let mut system = RealSpace::new(Reals, m + 1);
+        for (row, g) in &rows {
+            let mut line: Vec<Ball<N>> = rows.iter().map(|(other, _)| dot(row, other)).collect();
+            line.push(g.neg());
+            system.insert(&line);
+        }
+        let solution = system.null_space();
+        let [y] = solution.as_slice() else { return Err(0) };
+        let scale = y[m].inverse().ok_or(0usize)?;
+        for (k, &s) in places.iter().enumerate() {
+            for ((row, _), weight) in rows.iter().zip(y) {
+                values[s] = values[s].add(&row[k].mul(weight).mul(&scale)).midpoint();
+            }
+        }
+    }
+    Err(0)
+}

@@ -1,0 +1,569 @@
+//! Real numbers of many digits with a bound on their error.
+
+use std::cmp::Ordering;
+
+/// A real number `+-mantissa 2^(exponent - 64 N)`, known up to `error` units of its last place.
+///
+/// Every operation bounds what it loses, so that a ball that does not hold zero is a number that is not zero. A ball
+/// that holds zero is kept as zero with that error: whether it *is* zero nobody can say from one ball, and
+/// [`Ball::radius_log2`] says below what. Midpoint-radius arithmetic (van der Hoeven 2010, "Ball arithmetic").
+///
+/// ```
+/// use obsdeg_exact::Ball;
+/// let third = Ball::<4>::from_i64(3).inverse().expect("not zero");
+/// let one = third.mul(&Ball::from_i64(3));
+/// assert!(one.sub(&Ball::from_i64(1)).is_zero());
+/// assert!(one.sub(&Ball::from_i64(1)).radius_log2() < -245.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball<const N: usize> {
+    negative: bool,
+    /// The number is in `[2^(exponent - 1), 2^exponent)`; of zero, the place of the error.
+    exponent: i64,
+    /// Least limb first; the highest bit is set, or all are zero.
+    mantissa: [u64; N],
+    /// In units of `2^(exponent - 64 N)`.
+    error: f64,
+}
+
+/// What rounding adds to a sum of error terms at most: each is a handful of operations on doubles.
+const SLACK: f64 = 1.0 + 1e-12;
+
+/// `2^k`, zero or infinite beyond the doubles.
+const fn power(k: i64) -> f64 {
+    match k {
+        ..=-1023 => 0.0,
+        -1022..=1023 => f64::from_bits(((k + 1023) as u64) << 52),
+        _ => f64::INFINITY,
+    }
+}
+
+impl<const N: usize> Ball<N> {
+    /// Bits of a mantissa.
+    pub const BITS: i64 = 64 * N as i64;
+    /// Zero, exactly.
+    pub const ZERO: Self = Self { negative: false, exponent: 0, mantissa: [0; N], error: 0.0 };
+
+    /// An integer.
+    pub fn from_i64(x: i64) -> Self {
+        Self::from_i128(x.into())
+    }
+
+    /// An integer. (A ball has at least two limbs.)
+    pub fn from_i128(x: i128) -> Self {
+        const { assert!(N >= 2) };
+        let size = x.unsigned_abs();
+        if size == 0 {
+            return Self::ZERO;
+        }
+        let shifted = size << size.leading_zeros();
+        let mut mantissa = [0; N];
+        (mantissa[N - 1], mantissa[N - 2]) = ((shifted >> 64) as u64, shifted as u64);
+        Self { negative: x < 0, exponent: 128 - i64::from(size.leading_zeros()), mantissa, error: 0.0 }
+    }
+
+    /// Zero with an error of up to `2^log2`.
+    fn zero_within(log2: f64) -> Self {
+        if log2 == f64::NEG_INFINITY {
+            return Self::ZERO;
+        }
+        Self { exponent: log2.ceil() as i64 + Self::BITS, error: 1.0, ..Self::ZERO }
+    }
+
+    /// A double, exactly; zero for what is not finite.
+    pub fn from_f64(x: f64) -> Self {
+        if x == 0.0 || !x.is_finite() {
+            return Self::ZERO;
+        }
+        let bits = x.abs().to_bits();
+        let (raw, fraction) = ((bits >> 52) as i64, bits & ((1 << 52) - 1));
+        let (integer, place) = if raw == 0 { (fraction, -1074) } else { (fraction | 1 << 52, raw - 1075) };
+        let whole = Self::from_i64(integer as i64).shifted(place);
+        if x < 0.0 { whole.neg() } else { whole }
+    }
+
+    /// The nearest double, about; infinite or zero beyond them.
+    pub fn to_f64(&self) -> f64 {
+        let top = self.mantissa[N - 1] as f64;
+        let size = if top == 0.0 { 0.0 } else { top * power(-64) };
+        let half = self.exponent / 2;
+        let value = size * power(half) * power(self.exponent - half);
+        if self.negative { -value } else { value }
+    }
+
+    /// `self 2^k`, exactly.
+    pub fn shifted(&self, k: i64) -> Self {
+        if self.is_exactly_zero() { Self::ZERO } else { Self { exponent: self.exponent + k, ..*self } }
+    }
+
+    /// The same midpoint, without an error.
+    pub fn midpoint(&self) -> Self {
+        if self.is_zero() { Self::ZERO } else { Self { error: 0.0, ..*self } }
+    }
+
+    /// Whether the ball holds zero.
+    pub fn is_zero(&self) -> bool {
+        self.mantissa[N - 1] == 0
+    }
+
+    /// Whether it is zero without an error.
+    pub fn is_exactly_zero(&self) -> bool {
+        self.is_zero() && self.error == 0.0
+    }
+
+    /// Whether every number of the ball is above zero.
+    pub fn is_positive(&self) -> bool {
+        !self.is_zero() && !self.negative
+    }
+
+    /// Whether every number of the ball is below zero.
+    pub fn is_negative(&self) -> bool {
+        !self.is_zero() && self.negative
+    }
+
+    /// `log2` of the midpoint's size, rounded up; minus infinity for zero.
+    pub fn size_log2(&self) -> f64 {
+        if self.is_zero() { f64::NEG_INFINITY } else { self.exponent as f64 }
+    }
+
+    /// `log2` of the error; minus infinity for what is exact.
+    pub fn radius_log2(&self) -> f64 {
+        match self.error {
+            0.0 => f64::NEG_INFINITY,
+            e => (self.exponent - Self::BITS) as f64 + e.log2(),
+        }
+    }
+
+    /// Widens the error by `2^log2`.
+    pub fn widened(&self, log2: f64) -> Self {
+        if log2 == f64::NEG_INFINITY {
+            return *self;
+        }
+        let here = (self.exponent - Self::BITS) as f64;
+        if self.is_exactly_zero() {
+            return Self::zero_within(log2);
+        }
+        let added = (log2 - here + 1e-9).min(2000.0).exp2();
+        Self { error: (self.error + added) * SLACK, ..*self }.settled()
+    }
+
+    /// A ball that holds zero is zero with an error.
+    fn settled(self) -> Self {
+        if self.is_zero() {
+            return self;
+        }
+        let size = self.mantissa_f64();
+        if size > self.error {
+            return self;
+        }
+        Self { negative: false, mantissa: [0; N], error: (self.error + size) * SLACK, ..self }
+    }
+
+    /// The mantissa as a double; infinite where it is beyond them.
+    fn mantissa_f64(&self) -> f64 {
+        // rounded down, so that an error is never taken to be smaller
+        (self.mantissa[N - 1] as f64) * (1.0 - 1e-15) * power(Self::BITS - 64)
+    }
+
+    /// The mantissa over `2^(64 N)`, rounded up.
+    fn fraction(&self) -> f64 {
+        ((self.mantissa[N - 1] as f64) * power(-64) * SLACK).min(1.0)
+    }
+
+    /// `-self`.
+    pub fn neg(&self) -> Self {
+        Self { negative: !self.negative && !self.is_zero(), ..*self }
+    }
+
+    /// The absolute value, of the midpoint.
+    pub fn abs(&self) -> Self {
+        Self { negative: false, ..*self }
+    }
+
+    /// `self + other`.
+    pub fn add(&self, other: &Self) -> Self {
+        if self.is_exactly_zero() {
+            return *other;
+        }
+        if other.is_exactly_zero() {
+            return *self;
+        }
+        let (x, y) = if self.exponent >= other.exponent { (self, other) } else { (other, self) };
+        // a zero has no digits to align with
+        if x.is_zero() && !y.is_zero() {
+            return y.with_error_of(x);
+        }
+        if y.is_zero() {
+            return x.with_error_of(y);
+        }
+        let apart = x.exponent - y.exponent;
+        let mut error = x.error + y.error * power(-apart);
+        let small = if apart >= Self::BITS {
+            error += 1.0;
+            [0; N]
+        } else {
+            let (small, lost) = shifted_right(&y.mantissa, apart as usize);
+            error += f64::from(lost);
+            small
+        };
+        let mut out = Self { negative: x.negative, exponent: x.exponent, mantissa: x.mantissa, error };
+        if x.negative == y.negative {
+            if add_to(&mut out.mantissa, &small) {
+                let (half, lost) = shifted_right(&out.mantissa, 1);
+                out.mantissa = half;
+                out.mantissa[N - 1] |= 1 << 63;
+                out.exponent += 1;
+                out.error = out.error / 2.0 + f64::from(lost);
+            }
+            out.error *= SLACK;
+            return out.settled();
+        }
+        match compare(&x.mantissa, &small) {
+            Ordering::Equal => {
+                return match error {
+                    0.0 => Self::ZERO,
+                    _ => Self { negative: false, mantissa: [0; N], error: error * SLACK, ..out },
+                };
+            }
+            Ordering::Greater => subtract_from(&mut out.mantissa, &small),
+            Ordering::Less => {
+                out.mantissa = small;
+                subtract_from(&mut out.mantissa, &x.mantissa);
+                out.negative = !x.negative;
+            }
+        }
+        out.normalised(error * SLACK)
+    }
+
+    /// Digits of any height, and their error in units of the last place there.
+    fn normalised(mut self, error: f64) -> Self {
+        let top = (0..N).rev().find(|&i| self.mantissa[i] != 0);
+        let Some(top) = top else {
+            return Self { negative: false, error, ..self };
+        };
+        // a lower bound of what is left, to be held against the error before it is scaled
+        let size = (self.mantissa[top] as f64) * (1.0 - 1e-15) * power(64 * top as i64);
+        if size <= error {
+            let whole = (self.mantissa[top] as f64 + 1.0) * SLACK * power(64 * top as i64);
+            return Self { negative: false, mantissa: [0; N], error: (error + whole) * SLACK, ..self };
+        }
+        let bits = self.mantissa[top].leading_zeros() as usize + 64 * (N - 1 - top);
+        if bits > 0 {
+            self.mantissa = shifted_left(&self.mantissa, bits);
+            self.exponent -= bits as i64;
+        }
+        self.error = if error == 0.0 { 0.0 } else { error * power(bits as i64) };
+        self
+    }
+
+    /// The same, less certain by the error of a zero.
+    fn with_error_of(&self, zero: &Self) -> Self {
+        let apart = zero.exponent - self.exponent;
+        let out = Self { error: (self.error + zero.error * power(apart)) * SLACK, ..*self };
+        if out.error.is_finite() {
+            return out.settled();
+        }
+        Self::zero_within(self.bound_log2().max(zero.radius_log2()) + 1.0)
+    }
+
+    /// `self - other`.
+    pub fn sub(&self, other: &Self) -> Self {
+        self.add(&other.neg())
+    }
+
+    /// `self other`.
+    pub fn mul(&self, other: &Self) -> Self {
+        let (x, y) = (self, other);
+        if x.is_exactly_zero() || y.is_exactly_zero() {
+            return Self::ZERO;
+        }
+        if x.is_zero() || y.is_zero() {
+            return Self::zero_within(x.bound_log2() + y.bound_log2());
+        }
+        let exponent = x.exponent + y.exponent;
+        // the error of one, as a part of 2^exponent, times that of the other: in parts that doubles hold
+        let part = power(-Self::BITS / 4);
+        let both = ((x.error * part) * (y.error * part)) * part * part;
+        let error = x.fraction() * y.error + y.fraction() * x.error + both;
+        if !error.is_finite() {
+            return Self::zero_within(x.bound_log2() + y.bound_log2());
+        }
+        let (mut mantissa, next) = product(&x.mantissa, &y.mantissa);
+        let mut out_exponent = exponent;
+        let mut error = error;
+        if mantissa[N - 1] >> 63 == 0 {
+            mantissa = shifted_left(&mantissa, 1);
+            mantissa[0] |= next >> 63;
+            out_exponent -= 1;
+            error *= 2.0;
+        }
+        // what lies below the last place, and what the product left out there
+        error = if error == 0.0 && next == 0 { exact_tail(&x.mantissa, &y.mantissa) } else { error + 2.0 };
+        Self { negative: x.negative != y.negative, exponent: out_exponent, mantissa, error: error * SLACK }
+            .settled()
+    }
+
+    /// `1 / self`; `None` for a ball that holds zero, or nearly does.
+    pub fn inverse(&self) -> Option<Self> {
+        if self.is_zero() {
+            return None;
+        }
+        let middle = self.midpoint();
+        // 1/m for the mantissa in [1/2, 1), then Newton's y (2 - m y), which doubles the digits
+        let scaled = middle.shifted(-middle.exponent).abs();
+        let mut y = Self::from_f64(1.0 / scaled.to_f64());
+        let mut digits = 48;
+        let one = Self::from_i64(1);
+        while digits < Self::BITS + 8 {
+            let e = one.sub(&scaled.mul(&y)).midpoint();
+            y = y.add(&y.mul(&e)).midpoint();
+            digits *= 2;
+        }
+        let mut y = y.shifted(-middle.exponent);
+        y.negative = self.negative;
+        // 1/x = y (1 + e + e^2/(1 - e)), e = 1 - x y
+        let e = one.sub(&self.mul(&y));
+        let size = e.bound_log2();
+        if size > -1.5 {
+            return None;
+        }
+        let out = y.add(&y.mul(&e));
+        Some(out.widened(y.size_log2() + 2.0 * size + 1.0))
+    }
+
+    /// `self / other`; `None` for a divisor that may be zero.
+    pub fn div(&self, other: &Self) -> Option<Self> {
+        Some(self.mul(&other.inverse()?))
+    }
+
+    /// `log2` of a bound on the size of every number of the ball.
+    pub fn bound_log2(&self) -> f64 {
+        let (size, radius) = (self.size_log2(), self.radius_log2());
+        match size.max(radius) {
+            f64::NEG_INFINITY => f64::NEG_INFINITY,
+            larger => larger + 1.0,
+        }
+    }
+
+    /// The square root; `None` for a ball that holds what is not positive. Zero without an error has the root zero.
+    pub fn sqrt(&self) -> Option<Self> {
+        if self.is_exactly_zero() {
+            return Some(Self::ZERO);
+        }
+        if !self.is_positive() {
+            return None;
+        }
+        // r = 1/sqrt(m) for m in [1/4, 1) by Newton's r (3 - m r^2) / 2
+        let even = self.exponent + self.exponent.rem_euclid(2);
+        let scaled = self.shifted(-even);
+        let middle = scaled.midpoint();
+        let one = Self::from_i64(1);
+        let mut r = Self::from_f64(1.0 / middle.to_f64().sqrt());
+        let mut digits = 48;
+        while digits < Self::BITS + 8 {
+            let e = one.sub(&middle.mul(&r.mul(&r))).midpoint();
+            r = r.add(&r.mul(&e).shifted(-1)).midpoint();
+            digits *= 2;
+        }
+        // sqrt m = m r (1 - e)^(-1/2), e = 1 - m r^2
+        let e = one.sub(&scaled.mul(&r.mul(&r)));
+        let size = e.bound_log2();
+        if size > -2.0 {
+            return None;
+        }
+        let factor = one.add(&e.shifted(-1)).widened(2.0 * size);
+        Some(scaled.mul(&r).mul(&factor).shifted(even / 2))
+    }
+
+    /// The nearest integer to the midpoint, if it is a small one.
+    pub fn nearest_integer(&self) -> Option<i64> {
+        if self.is_zero() {
+            return Some(0);
+        }
+        if self.exponent > 62 {
+            return None;
+        }
+        let half = Self::from_i64(1).shifted(-1);
+        let up = self.abs().midpoint().add(&half);
+        let whole = match up.exponent {
+            e if e <= 0 => 0,
+            e => (up.mantissa[N - 1] >> (64 - e)) as i64,
+        };
+        Some(if self.negative { -whole } else { whole })
+    }
+}
+
+/// The high N limbs of a product and the limb below them; what is left out lies below a unit of the last place.
+fn product<const N: usize>(a: &[u64; N], b: &[u64; N]) -> ([u64; N], u64) {
+    let mut out = [0; N];
+    // columns from N - 2 on: those below add less than N / 2^64 units of the last place
+    let mut below = 0;
+    let (mut sum, mut over) = (0u128, 0u64);
+    for column in N - 2..2 * N - 1 {
+        for i in (column + 1).saturating_sub(N)..=column.min(N - 1) {
+            let (next, carry) = sum.overflowing_add(u128::from(a[i]) * u128::from(b[column - i]));
+            sum = next;
+            over += u64::from(carry);
+        }
+        match column.checked_sub(N) {
+            Some(high) => out[high] = sum as u64,
+            None => below = sum as u64,
+        }
+        sum = sum >> 64 | u128::from(over) << 64;
+        over = 0;
+    }
+    out[N - 1] = sum as u64;
+    (out, below)
+}
+
+/// The error of the product of two exact numbers: none when what lies below the last place is zero.
+fn exact_tail<const N: usize>(a: &[u64; N], b: &[u64; N]) -> f64 {
+    let zeros = |m: &[u64; N]| {
+        let limb = m.iter().position(|x| *x != 0).unwrap_or(N);
+        64 * limb + m.get(limb).map_or(0, |x| x.trailing_zeros() as usize)
+    };
+    if zeros(a) + zeros(b) >= 64 * N { 0.0 } else { 2.0 }
+}
+
+/// Shifted to the right, and whether anything was lost.
+fn shifted_right<const N: usize>(a: &[u64; N], bits: usize) -> ([u64; N], bool) {
+    if bits == 0 {
+        return (*a, false);
+    }
+    let (limbs, bits) = (bits / 64, bits % 64);
+    let mut out = [0; N];
+    let mut lost = a[..limbs.min(N)].iter().any(|x| *x != 0);
+    if bits == 0 {
+        out[..N - limbs].copy_from_slice(&a[limbs..]);
+        return (out, lost);
+    }
+    lost |= a.get(limbs).is_some_and(|x| x << (64 - bits) != 0);
+    for i in 0..N - limbs {
+        let high = a.get(i + limbs + 1).map_or(0, |x| x << (64 - bits));
+        out[i] = a[i + limbs] >> bits | high;
+    }
+    (out, lost)
+}
+
+fn shifted_left<const N: usize>(a: &[u64; N], bits: usize) -> [u64; N] {
+    let (limbs, bits) = (bits / 64, bits % 64);
+    let mut out = [0; N];
+    for i in (limbs..N).rev() {
+        let low = if bits > 0 && i > limbs { a[i - limbs - 1] >> (64 - bits) } else { 0 };
+        out[i] = a[i - limbs] << bits | low;
+    }
+    out
+}
+
+/// Whether the sum has one bit more.
+fn add_to<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
+    let mut carry = false;
+    for (x, &y) in a.iter_mut().zip(b) {
+        let (sum, first) = x.overflowing_add(y);
+        let (sum, second) = sum.overflowing_add(u64::from(carry));
+        *x = sum;
+        carry = first || second;
+    }
+    carry
+}
+
+/// `a - b` for `a > b`.
+fn subtract_from<const N: usize>(a: &mut [u64; N], b: &[u64; N]) {
+    let mut borrow = false;
+    for (x, &y) in a.iter_mut().zip(b) {
+        let (rest, first) = x.overflowing_sub(y);
+        let (rest, second) = rest.overflowing_sub(u64::from(borrow));
+        *x = rest;
+        borrow = first || second;
+    }
+}
+
+fn compare<const N: usize>(a: &[u64; N], b: &[u64; N]) -> Ordering {
+    a.iter().rev().cmp(b.iter().rev())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_bigint::BigInt;
+    use num_rational::BigRational;
+    use proptest::prelude::*;
+
+    fn two(k: i64) -> BigRational {
+        let big = BigRational::from_integer(BigInt::from(1) << k.unsigned_abs());
+        if k < 0 { big.recip() } else { big }
+    }
+
+    fn exact<const N: usize>(ball: &Ball<N>) -> BigRational {
+        let digits =
+            ball.mantissa.iter().rev().fold(BigInt::from(0), |x, limb| (x << 64) + BigInt::from(*limb));
+        let size = BigRational::from_integer(digits) * two(ball.exponent - Ball::<N>::BITS);
+        if ball.negative { -size } else { size }
+    }
+
+    /// Whether a number lies in the ball.
+    fn holds<const N: usize>(ball: &Ball<N>, x: &BigRational) -> bool {
+        let radius =
+            BigRational::from_float(ball.error).expect("finite") * two(ball.exponent - Ball::<N>::BITS);
+        let off = exact(ball) - x;
+        off <= radius.clone() && off >= -radius
+    }
+
+    /// Numbers of any size, some close to each other, some with few digits, some uncertain; with a number they hold.
+    fn numbers() -> impl Strategy<Value = (Ball<2>, BigRational)> {
+        let places = prop_oneof![Just(0i64), -3..3i64, -140..140i64];
+        let digits = prop_oneof![any::<i128>(), (-9..9i128), (i128::MAX - 3..i128::MAX)];
+        (digits, places, -200.0..0.0f64, 0..3u8, -1.0..1.0f64).prop_map(|(m, place, wide, kind, inside)| {
+            let ball = Ball::<2>::from_i128(m).shifted(place);
+            let x = BigRational::from_integer(m.into()) * two(place);
+            if kind > 0 {
+                return (ball, x);
+            }
+            let wide = wide.round() as i64 + ball.exponent;
+            let off = BigRational::from_float(inside).expect("finite") * two(wide);
+            (ball.widened(wide as f64), x + off)
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// Whatever the true numbers are, the result holds theirs.
+        #[test]
+        fn results_hold_the_true_ones((a, x) in numbers(), (b, y) in numbers(), (c, z) in numbers()) {
+            prop_assert!(holds(&a, &x));
+            prop_assert!(holds(&a.add(&b), &(&x + &y)));
+            prop_assert!(holds(&a.sub(&b), &(&x - &y)));
+            prop_assert!(holds(&a.mul(&b), &(&x * &y)));
+            // what cancels, in three ways
+            prop_assert!(holds(&a.add(&b).sub(&a), &y));
+            prop_assert!(holds(&a.mul(&b).sub(&b.mul(&c)), &(&x * &y - &y * &z)));
+            let zero = BigRational::from_integer(0.into());
+            if let Some(inverse) = b.inverse() {
+                prop_assert!(y != zero && holds(&inverse, &y.recip()));
+                prop_assert!(holds(&a.mul(&inverse).mul(&c), &(&x / &y * &z)));
+            }
+            if let Some(root) = a.sqrt() {
+                prop_assert!(x >= zero && holds(&root.mul(&root), &x));
+                prop_assert!(!root.is_negative());
+            }
+            // a ball that holds zero is zero
+            prop_assert_eq!(a.is_zero(), holds(&a, &zero));
+        }
+    }
+
+    #[test]
+    fn digits_are_not_lost() {
+        // as narrow as they can be: sqrt 2 and 1/3 to the last places of 256 bits
+        let two = Ball::<4>::from_i64(2);
+        for x in [two.sqrt(), Ball::from_i64(3).inverse()].map(|x| x.expect("defined")) {
+            assert!(x.radius_log2() < -248.0, "{x:?}");
+        }
+        assert!(two.mul(&two).error == 0.0 && two.sub(&two).is_exactly_zero());
+        assert_eq!(two.sqrt().expect("root").nearest_integer(), Some(1));
+        assert_eq!(Ball::<4>::from_f64(-2.5).to_f64(), -2.5);
+        assert_eq!(Ball::<4>::from_f64(-2.51).nearest_integer(), Some(-3));
+        assert_eq!(Ball::<4>::ZERO.inverse(), None);
+        assert_eq!(Ball::<4>::from_i64(-1).sqrt(), None);
+    }
+}

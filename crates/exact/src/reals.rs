@@ -1,0 +1,364 @@
+//! Real numbers of `64 N` bits as a field, and row spaces over them.
+//!
+//! What differs from zero is proven to, by the error bound of its ball. That something is zero cannot be computed: it is
+//! taken to be when its ball holds zero and is narrow, and the [`Gap`] says how far apart the two kinds were. Where they
+//! were not far apart nothing is decided, and the caller takes more digits.
+
+use std::cell::Cell;
+
+use crate::{Ball, RowSpace, Scalars};
+
+/// Largest numerator and denominator that [`Scalars::rational`] believes in.
+const SMALL: i64 = 1 << 20;
+
+/// The field of real numbers of `64 N` bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Reals<const N: usize>;
+
+/// How far apart the two kinds of numbers were that decided ranks: binary logarithms, relative to the largest entry of
+/// their row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// The smallest that is not zero.
+    pub nonzero: f64,
+    /// The widest that was taken for zero.
+    pub zero: f64,
+}
+
+impl Gap {
+    /// Nothing was decided.
+    pub const OPEN: Self = Self { nonzero: 0.0, zero: f64::NEG_INFINITY };
+
+    /// The weaker of two in both respects.
+    pub fn and(self, other: Self) -> Self {
+        Self { nonzero: self.nonzero.min(other.nonzero), zero: self.zero.max(other.zero) }
+    }
+
+    /// Whether the two kinds are unmistakable with so many bits: not zero above a quarter of them, zero below half.
+    pub fn is_decisive(self, bits: i64) -> bool {
+        self.nonzero >= -(bits as f64) / 4.0 && self.zero <= -(bits as f64) / 2.0
+    }
+}
+
+impl<const N: usize> Scalars for Reals<N> {
+    type Element = Ball<N>;
+    type Sum = Ball<N>;
+    type Space = RealSpace<N>;
+
+    fn zero(&self) -> Ball<N> {
+        Ball::ZERO
+    }
+    fn one(&self) -> Ball<N> {
+        Ball::from_i64(1)
+    }
+    fn integer(&self, x: i64) -> Ball<N> {
+        Ball::from_i64(x)
+    }
+    fn is_zero(&self, a: &Ball<N>) -> bool {
+        a.is_zero()
+    }
+    fn add(&self, a: &Ball<N>, b: &Ball<N>) -> Ball<N> {
+        a.add(b)
+    }
+    fn sub(&self, a: &Ball<N>, b: &Ball<N>) -> Ball<N> {
+        a.sub(b)
+    }
+    fn neg(&self, a: &Ball<N>) -> Ball<N> {
+        a.neg()
+    }
+    fn mul(&self, a: &Ball<N>, b: &Ball<N>) -> Ball<N> {
+        a.mul(b)
+    }
+    fn inverse(&self, a: &Ball<N>) -> Option<Ball<N>> {
+        a.inverse()
+    }
+    fn dot<'a>(&self, start: &Ball<N>, terms: impl Iterator<Item = (&'a Ball<N>, &'a Ball<N>)>) -> Ball<N> {
+        terms.fold(*start, |sum, (a, b)| sum.add(&a.mul(b)))
+    }
+    fn no_sum(&self) -> Ball<N> {
+        Ball::ZERO
+    }
+    fn gather(&self, sums: &mut [Ball<N>], _: &mut usize, factor: &Ball<N>, lanes: &[u32], row: &[Ball<N>]) {
+        for (&lane, x) in lanes.iter().zip(row).filter(|(_, x)| !x.is_exactly_zero()) {
+            let sum = &mut sums[lane as usize];
+            *sum = sum.add(&factor.mul(x));
+        }
+    }
+    fn reduce(&self, sum: &Ball<N>) -> Ball<N> {
+        *sum
+    }
+    fn rational(&self, a: &Ball<N>) -> Option<(i64, i64)> {
+        // its continued fraction, as far as the numbers stay small
+        let (mut before, mut now) = ((0i64, 1i64), (1i64, 0i64));
+        let mut rest = *a;
+        for _ in 0..40 {
+            let whole = rest.nearest_integer().filter(|w| w.abs() <= SMALL)?;
+            let next = (whole * now.0 + before.0, whole * now.1 + before.1);
+            if next.0.abs() > SMALL || next.1.abs() > SMALL {
+                return None;
+            }
+            (before, now) = (now, next);
+            let off = a.mul(&Ball::from_i64(now.1)).sub(&Ball::from_i64(now.0));
+            if off.is_zero() {
+                let narrow = off.radius_log2() <= -(Ball::<N>::BITS as f64) / 2.0;
+                return narrow.then(|| if now.1 < 0 { (-now.0, -now.1) } else { now });
+            }
+            rest = rest.sub(&Ball::from_i64(whole)).inverse()?;
+        }
+        None
+    }
+}
+
+/// A row space over the reals in reduced row-echelon form, with a one at every pivot.
+///
+/// ```
+/// use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace};
+/// let x = Ball::<4>::from_i64(2).sqrt().expect("positive");
+/// let one = Ball::from_i64(1);
+/// let mut v = RealSpace::new(Reals, 2);
+/// assert!(v.insert(&[x, one]));
+/// // sqrt 2 (sqrt 2, 1) = (2, sqrt 2)
+/// assert!(!v.insert(&[Ball::from_i64(2), x]));
+/// assert!(v.gap().is_decisive(256) && v.rank() == 1);
+/// ```
+#[derive(Debug, Clone)]
+pub struct RealSpace<const N: usize> {
+    columns: usize,
+    rows: Vec<Vec<Ball<N>>>,
+    pivots: Vec<usize>,
+    row_of: Vec<Option<usize>>,
+    gap: Cell<Gap>,
+}
+
+impl<const N: usize> RealSpace<N> {
+    /// The largest exponent of a row; of one without digits that of one.
+    fn scale(row: &[Ball<N>]) -> f64 {
+        let largest = row.iter().map(Ball::size_log2).fold(f64::NEG_INFINITY, f64::max);
+        if largest == f64::NEG_INFINITY { 0.0 } else { largest }
+    }
+
+    /// Whether an entry counts as different from zero, in a row of this scale; the gap remembers.
+    fn differs(&self, entry: &Ball<N>, scale: f64) -> bool {
+        if entry.is_exactly_zero() {
+            return false;
+        }
+        let gap = self.gap.get();
+        let zero = entry.is_zero();
+        self.gap.set(if zero {
+            Gap { zero: gap.zero.max(entry.radius_log2() - scale), ..gap }
+        } else {
+            Gap { nonzero: gap.nonzero.min(entry.size_log2() - scale), ..gap }
+        });
+        !zero
+    }
+
+    /// The row minus what the basis explains of it, and the scale by which it is judged.
+    fn reduced(&self, row: &[Ball<N>]) -> (Vec<Ball<N>>, f64) {
+        let scale = Self::scale(row);
+        let mut out = row.to_vec();
+        for (basis, &pivot) in self.rows.iter().zip(&self.pivots) {
+            if self.differs(&row[pivot], scale) {
+                eliminate(&mut out, basis, &row[pivot].neg());
+            }
+            out[pivot] = Ball::ZERO;
+        }
+        for x in &mut out {
+            if !self.differs(x, scale) {
+                *x = Ball::ZERO;
+            }
+        }
+        (out, scale)
+    }
+}
+
+/// Adds `factor basis` to `row`.
+fn eliminate<const N: usize>(row: &mut [Ball<N>], basis: &[Ball<N>], factor: &Ball<N>) {
+    for (x, b) in row.iter_mut().zip(basis).filter(|(_, b)| !b.is_exactly_zero()) {
+        *x = x.add(&factor.mul(b));
+    }
+}
+
+impl<const N: usize> RowSpace for RealSpace<N> {
+    type Field = Reals<N>;
+    type Element = Ball<N>;
+
+    fn new(_: Reals<N>, columns: usize) -> Self {
+        Self {
+            columns,
+            rows: Vec::new(),
+            pivots: Vec::new(),
+            row_of: vec![None; columns],
+            gap: Cell::new(Gap::OPEN),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.rows.clear();
+        self.pivots.clear();
+        self.row_of.fill(None);
+    }
+
+    fn columns(&self) -> usize {
+        self.columns
+    }
+
+    fn rank(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn insert(&mut self, row: &[Ball<N>]) -> bool {
+        let (mut new, _) = self.reduced(row);
+        let size = |x: &Ball<N>| if x.is_zero() { f64::NEG_INFINITY } else { x.size_log2() };
+        let pivot = (0..self.columns).filter(|&c| !new[c].is_zero()).max_by(|&a, &b| {
+            // the first of the largest
+            size(&new[a]).total_cmp(&size(&new[b])).then(b.cmp(&a))
+        });
+        let Some((pivot, inverse)) = pivot.and_then(|p| Some((p, new[p].inverse()?))) else { return false };
+        for x in new.iter_mut().filter(|x| !x.is_exactly_zero()) {
+            *x = x.mul(&inverse);
+        }
+        new[pivot] = Ball::from_i64(1);
+        let mut rows = std::mem::take(&mut self.rows);
+        for basis in &mut rows {
+            let factor = basis[pivot].neg();
+            if factor.is_exactly_zero() {
+                continue;
+            }
+            eliminate(basis, &new, &factor);
+            basis[pivot] = Ball::ZERO;
+            let scale = Self::scale(basis);
+            for x in basis.iter_mut() {
+                if !self.differs(x, scale) {
+                    *x = Ball::ZERO;
+                }
+            }
+        }
+        self.rows = rows;
+        self.row_of[pivot] = Some(self.rows.len());
+        self.rows.push(new);
+        self.pivots.push(pivot);
+        true
+    }
+
+    fn contains(&self, row: &[Ball<N>]) -> bool {
+        self.reduced(row).0.iter().all(Ball::is_zero)
+    }
+
+    fn has_unit(&self, column: usize) -> bool {
+        let row = self.row_of[column].and_then(|i| self.rows.get(i));
+        row.is_some_and(|row| row.iter().enumerate().all(|(c, x)| c == column || x.is_exactly_zero()))
+    }
+
+    fn is_zero_column(&self, column: usize) -> bool {
+        self.rows.iter().all(|row| row[column].is_exactly_zero())
+    }
+
+    fn row(&self, i: usize) -> &[Ball<N>] {
+        &self.rows[i]
+    }
+
+    fn pivot_columns(&self) -> Vec<usize> {
+        self.pivots.clone()
+    }
+
+    fn null_space(&self) -> Vec<Vec<Ball<N>>> {
+        let free = (0..self.columns).filter(|&c| self.row_of[c].is_none());
+        free.map(|free| {
+            let mut v = vec![Ball::ZERO; self.columns];
+            v[free] = Ball::from_i64(1);
+            for (row, &pivot) in self.rows.iter().zip(&self.pivots) {
+                v[pivot] = row[free].neg();
+            }
+            v
+        })
+        .collect()
+    }
+
+    fn gap(&self) -> Gap {
+        self.gap.get()
+    }
+
+    fn companions(&self) -> Vec<Vec<usize>> {
+        let patterns =
+            self.rows.iter().map(|r| r.iter().map(|x| !x.is_exactly_zero()).collect::<Vec<bool>>());
+        crate::echelon::components(self.columns, self.pivots.iter().copied().zip(patterns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Echelon, Field};
+    use proptest::prelude::*;
+
+    type Real = Ball<4>;
+
+    proptest! {
+        /// Over the integers both kinds of spaces say the same.
+        #[test]
+        fn the_same_as_modulo_a_prime(
+            rows in prop::collection::vec(prop::collection::vec(-2i64..3, 6), 1..8),
+            probe in prop::collection::vec(-2i64..3, 6),
+        ) {
+            let f = Field::new((1 << 60) + 33);
+            let mut prime = Echelon::new(f, 6);
+            let mut real = RealSpace::new(Reals::<4>, 6);
+            // as real numbers: with a factor that no integer is
+            let factor = Real::from_i64(2).sqrt().expect("positive");
+            for row in &rows {
+                let image: Vec<u64> = row.iter().map(|&x| f.from_i64(x)).collect();
+                let digits: Vec<Real> = row.iter().map(|&x| Real::from_i64(x).mul(&factor)).collect();
+                prop_assert_eq!(prime.insert(&image), real.insert(&digits));
+            }
+            prop_assert_eq!(prime.rank(), real.rank());
+            prop_assert_eq!(prime.companions(), real.companions());
+            for c in 0..6 {
+                prop_assert_eq!(prime.has_unit(c), real.has_unit(c));
+                prop_assert_eq!(prime.is_zero_column(c), real.is_zero_column(c));
+            }
+            let image: Vec<u64> = probe.iter().map(|&x| f.from_i64(x)).collect();
+            let digits: Vec<Real> = probe.iter().map(|&x| Real::from_i64(x)).collect();
+            prop_assert_eq!(prime.contains(&image), real.contains(&digits));
+            for v in real.null_space() {
+                for row in &rows {
+                    let digits: Vec<Real> = row.iter().map(|&x| Real::from_i64(x)).collect();
+                    prop_assert!(Reals.dot(&Real::ZERO, digits.iter().zip(&v)).is_zero());
+                }
+                for x in &v {
+                    let (p, q) = Reals.rational(x).expect("rows of small integers");
+                    prop_assert!(x.sub(&Real::from_i64(p).div(&Real::from_i64(q)).expect("not zero")).is_zero());
+                }
+            }
+            prop_assert!(real.gap().is_decisive(256), "{:?}", real.gap());
+        }
+    }
+
+    #[test]
+    fn what_is_not_clear_is_not_decided() {
+        let one = Real::from_i64(1);
+        let rank = |small: Real| {
+            let mut v = RealSpace::new(Reals::<4>, 2);
+            v.insert(&[one, Real::ZERO]);
+            let grew = v.insert(&[one, small]);
+            (grew, v.gap().is_decisive(256))
+        };
+        assert_eq!(rank(one.shifted(-60)), (true, true));
+        // proven not to be zero, but small enough to make one wonder what else is
+        assert_eq!(rank(one.shifted(-70)), (true, false));
+        // holds zero: clear where it is narrow
+        assert_eq!(rank(Real::ZERO.widened(-200.0)), (false, true));
+        assert_eq!(rank(Real::ZERO.widened(-100.0)), (false, false));
+        assert!(Gap { nonzero: -3.0, zero: -9.0 }.and(Gap::OPEN).zero == -9.0);
+    }
+
+    #[test]
+    fn numbers_that_are_rational() {
+        let of = |p: i64, q: i64| Real::from_i64(p).div(&Real::from_i64(q)).expect("not zero");
+        for (p, q) in [(0, 1), (1, 1), (-7, 3), (355, 113), (1, 1000), (-999_983, 1_000_003)] {
+            assert_eq!(Reals.rational(&of(p, q)), Some((p, q)));
+        }
+        assert_eq!(Reals.rational(&of(1, 3_000_017)), None);
+        assert_eq!(Reals.rational(&Real::pi()), None);
+        assert_eq!(Reals.rational(&of(1, 3).widened(-100.0)), None);
+    }
+}

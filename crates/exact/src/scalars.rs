@@ -1,0 +1,205 @@
+//! The fields in which ranks are decided, and the spaces of rows over them.
+
+use std::fmt::Debug;
+
+use crate::{Echelon, Field, Gap, Ratio};
+
+/// A field whose elements a series or a row space holds.
+pub trait Scalars: Clone + Debug {
+    /// An element.
+    type Element: Copy + Debug + PartialEq;
+    /// A sum of products that is still to be reduced.
+    type Sum: Copy + Debug;
+    /// Row spaces over the field.
+    type Space: RowSpace<Field = Self, Element = Self::Element>;
+
+    /// 0.
+    fn zero(&self) -> Self::Element;
+    /// 1.
+    fn one(&self) -> Self::Element;
+    /// The image of an integer.
+    fn integer(&self, x: i64) -> Self::Element;
+    /// Whether an element cannot be told from zero.
+    fn is_zero(&self, a: &Self::Element) -> bool;
+    /// `a + b`.
+    fn add(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
+    /// `a - b`.
+    fn sub(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
+    /// `-a`.
+    fn neg(&self, a: &Self::Element) -> Self::Element;
+    /// `a b`.
+    fn mul(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
+    /// `1 / a`; `None` for what cannot be told from zero.
+    fn inverse(&self, a: &Self::Element) -> Option<Self::Element>;
+    /// `start + sum a_i b_i`.
+    fn dot<'a>(
+        &self,
+        start: &Self::Element,
+        terms: impl Iterator<Item = (&'a Self::Element, &'a Self::Element)>,
+    ) -> Self::Element
+    where
+        Self::Element: 'a;
+    /// The empty sum.
+    fn no_sum(&self) -> Self::Sum;
+    /// Adds `factor row_i` to `sums[lanes[i]]`; `pending` counts products since the sums were settled.
+    fn gather(
+        &self,
+        sums: &mut [Self::Sum],
+        pending: &mut usize,
+        factor: &Self::Element,
+        lanes: &[u32],
+        row: &[Self::Element],
+    );
+    /// What a sum stands for.
+    fn reduce(&self, sum: &Self::Sum) -> Self::Element;
+    /// The small rational number that an element is, if it is one: `(numerator, denominator)`.
+    fn rational(&self, a: &Self::Element) -> Option<(i64, i64)>;
+}
+
+/// The span of rows that come one by one.
+pub trait RowSpace: Clone + Debug {
+    /// The field.
+    type Field: Scalars<Element = Self::Element>;
+    /// Its elements.
+    type Element: Copy;
+
+    /// The zero space of rows of length `columns`.
+    fn new(field: Self::Field, columns: usize) -> Self;
+    /// Back to the zero space.
+    fn clear(&mut self);
+    /// The length of a row.
+    fn columns(&self) -> usize;
+    /// The dimension.
+    fn rank(&self) -> usize;
+    /// Adds a row; whether the rank grew.
+    fn insert(&mut self, row: &[Self::Element]) -> bool;
+    /// Whether a row lies in the space.
+    fn contains(&self, row: &[Self::Element]) -> bool;
+    /// Whether the unit vector of a column does.
+    fn has_unit(&self, column: usize) -> bool;
+    /// Whether a column is zero in every row.
+    fn is_zero_column(&self, column: usize) -> bool;
+    /// Row i of a reduced basis.
+    fn row(&self, i: usize) -> &[Self::Element];
+    /// The pivot columns, in the order of the rows.
+    fn pivot_columns(&self) -> Vec<usize>;
+    /// A basis of the null space: one vector for each column that is no pivot, with a one there.
+    fn null_space(&self) -> Vec<Vec<Self::Element>>;
+    /// Per column the others that share a null vector of minimal support with it ([`Echelon::companions`]).
+    fn companions(&self) -> Vec<Vec<usize>>;
+    /// How clear its decisions were; in an exact field nothing is open.
+    fn gap(&self) -> Gap {
+        Gap::OPEN
+    }
+}
+
+impl Scalars for Field {
+    type Element = u64;
+    type Sum = u128;
+    type Space = Echelon;
+
+    fn zero(&self) -> u64 {
+        0
+    }
+    fn one(&self) -> u64 {
+        Field::one(self)
+    }
+    fn integer(&self, x: i64) -> u64 {
+        self.from_i64(x)
+    }
+    #[inline]
+    fn is_zero(&self, a: &u64) -> bool {
+        *a == 0
+    }
+    #[inline]
+    fn add(&self, a: &u64, b: &u64) -> u64 {
+        Field::add(self, *a, *b)
+    }
+    #[inline]
+    fn sub(&self, a: &u64, b: &u64) -> u64 {
+        Field::sub(self, *a, *b)
+    }
+    #[inline]
+    fn neg(&self, a: &u64) -> u64 {
+        Field::neg(self, *a)
+    }
+    #[inline]
+    fn mul(&self, a: &u64, b: &u64) -> u64 {
+        Field::mul(self, *a, *b)
+    }
+    fn inverse(&self, a: &u64) -> Option<u64> {
+        (*a != 0).then(|| self.inv(*a))
+    }
+    fn dot<'a>(&self, start: &u64, terms: impl Iterator<Item = (&'a u64, &'a u64)>) -> u64 {
+        Field::dot(self, *start, terms.map(|(&a, &b)| (a, b)))
+    }
+    fn no_sum(&self) -> u128 {
+        0
+    }
+    #[inline]
+    fn gather(&self, sums: &mut [u128], pending: &mut usize, factor: &u64, lanes: &[u32], row: &[u64]) {
+        if *pending == Self::LAZY {
+            sums.iter_mut().for_each(|s| *s = self.settle(*s));
+            *pending = 0;
+        }
+        *pending += 1;
+        if lanes.len() == sums.len() {
+            for (s, &x) in sums.iter_mut().zip(row) {
+                *s += self.lazy(*factor, x);
+            }
+            return;
+        }
+        for (&lane, &x) in lanes.iter().zip(row) {
+            sums[lane as usize] += self.lazy(*factor, x);
+        }
+    }
+    #[inline]
+    fn reduce(&self, sum: &u128) -> u64 {
+        if *sum == 0 { 0 } else { Field::reduce(self, *sum) }
+    }
+    fn rational(&self, a: &u64) -> Option<(i64, i64)> {
+        Ratio::recover(self, *a).map(|r| (r.num, r.den))
+    }
+}
+
+impl RowSpace for Echelon {
+    type Field = Field;
+    type Element = u64;
+
+    fn new(field: Field, columns: usize) -> Self {
+        Self::new(field, columns)
+    }
+    fn clear(&mut self) {
+        Self::clear(self);
+    }
+    fn columns(&self) -> usize {
+        Self::columns(self)
+    }
+    fn rank(&self) -> usize {
+        Self::rank(self)
+    }
+    fn insert(&mut self, row: &[u64]) -> bool {
+        Self::insert(self, row)
+    }
+    fn contains(&self, row: &[u64]) -> bool {
+        Self::contains(self, row)
+    }
+    fn has_unit(&self, column: usize) -> bool {
+        Self::has_unit(self, column)
+    }
+    fn is_zero_column(&self, column: usize) -> bool {
+        Self::is_zero_column(self, column)
+    }
+    fn row(&self, i: usize) -> &[u64] {
+        Self::row(self, i)
+    }
+    fn pivot_columns(&self) -> Vec<usize> {
+        self.pivots().collect()
+    }
+    fn null_space(&self) -> Vec<Vec<u64>> {
+        Self::null_space(self)
+    }
+    fn companions(&self) -> Vec<Vec<usize>> {
+        Self::companions(self)
+    }
+}

@@ -1,0 +1,334 @@
+//! Models with functions: true values, at given points, in related arguments, in every segment its own. What is expected is
+//! written down by hand.
+
+use obsdeg_core::degree::Status;
+use obsdeg_core::system::{Judgement, SystemCertainty, judge, model_file};
+use proptest::prelude::*;
+
+fn judged(text: &str) -> Judgement {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    judge(&model, 7, None).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// `name 2, other -`: degrees, `-` for what no output sees, `~` for what is not told from others, `?` for what is not seen.
+fn verdicts(text: &str) -> String {
+    let j = judged(text);
+    let one = |c: usize| {
+        let v = j.verdict_on(c);
+        let mark = match (v.status, v.degree) {
+            (_, Some(k)) => k.to_string(),
+            (Status::NotExcited, _) => "-".into(),
+            (Status::NotSeen, _) => "?".into(),
+            _ => "~".into(),
+        };
+        format!("{} {mark}", j.layout.unknowns[c].name)
+    };
+    (0..j.layout.unknowns.len()).map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// A model of one output over constant states, with constants and segments.
+fn still(states: &str, output: &str, rest: &str) -> String {
+    let equations: String = states.split(' ').map(|s| format!("{s}='0'\n")).collect();
+    format!("name='m'\n[states]\n{equations}[outputs]\ny='{output}'\n{rest}")
+}
+
+/// Segments with a known angle of their own.
+fn at_angles(output: &str, angles: &[&str]) -> String {
+    let segments: String = angles.iter().map(|a| format!("[[segment]]\nconstants={{a='{a}'}}\n")).collect();
+    still("s b", output, &format!("[constants]\na=0\n{segments}"))
+}
+
+#[test]
+fn every_segment_has_values_of_its_own() {
+    // a tumble test: scale factor and bias from three known angles, or two
+    let tumble = |angles: &[&str]| verdicts(&at_angles("s*9.81*sin(a) + b", angles));
+    assert_eq!(tumble(&["0", "0.5", "1.5"]), "s 0, b 0");
+    assert_eq!(tumble(&["0.5", "1.5"]), "s 0, b 0");
+    assert_eq!(tumble(&["0"]), "s -, b 0");
+    assert_eq!(tumble(&["0.5"]), "s ~, b ~");
+    assert_eq!(tumble(&["0.5", "0.5"]), "s ~, b ~");
+    // the same sine
+    assert_eq!(tumble(&["0.5", "pi - 0.5"]), "s ~, b ~");
+    assert_eq!(tumble(&["30*deg", "150*deg"]), "s ~, b ~");
+    // two headings; a whole turn is none, but its decimals are not a whole turn
+    let heading = |angles: &[&str]| verdicts(&at_angles("s*cos(a) + b", angles));
+    assert_eq!(heading(&["0", "3.14159265"]), "s 0, b 0");
+    assert_eq!(heading(&["0", "2*pi"]), "s ~, b ~");
+    assert_eq!(heading(&["0", "360*deg"]), "s ~, b ~");
+    assert_eq!(heading(&["0", "6.283"]), "s 0, b 0");
+    assert_eq!(heading(&["0", "pi"]), "s 0, b 0");
+    // experiments: constants are shared, starts are not
+    let two =
+        "name='m'\nexperiments=2\nparameters=['p']\n[states]\nx='0'\n[outputs]\ny='sin(p)*cos(x)'\nz='x'";
+    assert_eq!(verdicts(two), "x@1 0, x@2 0, p 0");
+}
+
+#[test]
+fn definite_values_are_what_they_are() {
+    let with = |output: &str, constants: &str| {
+        verdicts(&still("z x", output, &format!("[constants]\n{constants}\n")))
+    };
+    assert_eq!(with("z*sin(c) + x", "c=0"), "z -, x 0");
+    assert_eq!(with("z*sin(c) + x", "c='pi'"), "z -, x 0");
+    assert_eq!(with("z*sin(c) + x", "c='30*deg'"), "z ~, x ~");
+    assert_eq!(with("z*log(c) + x", "c=1"), "z -, x 0");
+    assert_eq!(with("z*log(c) + x", "c='1 + 1/3 - 4/3 + 1'"), "z -, x 0");
+    assert_eq!(with("z*(exp(c) - 1) + x", "c=0"), "z -, x 0");
+    assert_eq!(with("z*(sqrt(c) - 2) + x", "c=4"), "z -, x 0");
+    assert_eq!(with("z*(c^0.5 - sqrt(2)) + x", "c=2"), "z -, x 0");
+    assert_eq!(with("z*(8^(1/3) - c) + x", "c=2"), "z -, x 0");
+    // at the ends of their ranges, where they have no derivative that anything needs
+    assert_eq!(with("z*(asin(c) - pi/2) + x", "c=1"), "z -, x 0");
+    assert_eq!(with("z*acos(c) + x", "c=1"), "z -, x 0");
+    assert_eq!(with("z*(acos(c) - pi) + x", "c=-1"), "z -, x 0");
+    assert_eq!(with("z*sqrt(c) + x", "c=0"), "z -, x 0");
+    assert_eq!(with("z*abs(c) + x", "c=0"), "z -, x 0");
+    assert_eq!(with("z*(sign(c) + 1) + x", "c=-3"), "z -, x 0");
+    assert_eq!(with("z*tanh(c) + x", "c=0"), "z -, x 0");
+    assert_eq!(with("z*atan2(c, 5) + x", "c=0"), "z -, x 0");
+    assert_eq!(with("z*(atan2(c, c) - pi/4) + x", "c=7"), "z -, x 0");
+    assert_eq!(with("z*(4*atan(c/5) - atan(c/239) - pi/4) + x", "c=1"), "z -, x 0");
+}
+
+#[test]
+fn starts_are_the_given_ones() {
+    let pendulum = |rate: &str| {
+        verdicts(&format!(
+            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial=0}}\nw={{equation='-k*sin(th)', initial={rate}}}\n[outputs]\ny='th'"
+        ))
+    };
+    // at rest nothing moves; pushed, th''' = -k w
+    assert_eq!(pendulum("0"), "k -");
+    assert_eq!(pendulum("1"), "k 3");
+    let upside_down = "name='m'\nparameters=['k']\n[states]\nth={equation='w', initial='pi'}\nw={equation='-k*sin(th)', initial=0}\n[outputs]\ny='th'";
+    assert_eq!(verdicts(upside_down), "k -");
+    // from anywhere: y'' = -k sin y
+    let free = "name='m'\nparameters=['k']\n[states]\nth='w'\nw='-k*sin(th)'\n[outputs]\ny='th'";
+    assert_eq!(verdicts(free), "th 0, w 1, k 2");
+    // the order of a power of the time
+    let power = |n: usize| {
+        format!("name='m'\nparameters=['p']\n[states]\nx={{equation='1', initial=0}}\n[outputs]\ny='p*x^{n}'")
+    };
+    assert_eq!((verdicts(&power(20)), verdicts(&power(50))), ("p 20".into(), "p 50".into()));
+    assert_eq!(verdicts(&power(80)), "p ?");
+    let timed = "name='m'\nparameters=['p']\n[states]\nx='0'\n[outputs]\ny='p*t^3 + x'";
+    assert_eq!(verdicts(timed), "x 0, p 3");
+    let input = "name='m'\nparameters=['p']\nknown_inputs={u={function='1 - cos(t)'}}\n[states]\nx='0'\n[outputs]\ny='p*u + x'";
+    assert_eq!(verdicts(input), "x 0, p 2");
+    // the end is proven where the rank is that of a generic point
+    let never = judged(
+        "name='m'\nparameters=['p', 'q']\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='(p + q)*x^20'",
+    );
+    assert!(!never.rests_on_bound && never.findings.degrees.rank() == 1);
+    // known, but generic
+    let known =
+        "name='m'\nparameters=['k']\n[states]\nx={equation='-k*exp(x)', initial='known'}\n[outputs]\ny='x'";
+    assert_eq!(verdicts(known), "k 1");
+}
+
+#[test]
+fn jumps_to_special_values_are_special() {
+    // the output of the first segment says nothing; after the jump x' = 1 + a x^2 starts at 0
+    let jump = |to: &str| {
+        format!(
+            "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n[[segment]]\nconstants={{c='1'}}\ncarry={{x='{to}'}}"
+        )
+    };
+    assert_eq!(verdicts(&jump("0")), "x -, a 3");
+    assert_eq!(verdicts(&jump("1")), "x -, a 1");
+    assert_eq!(verdicts(&jump("2*x")), "x 0, a 1");
+    // functions in the jump
+    assert_eq!(verdicts(&jump("sin(pi)*x")), "x -, a 3");
+    assert_eq!(verdicts(&jump("cos(0)")), "x -, a 1");
+}
+
+/// What is constant moves nothing: however its arguments are related.
+#[test]
+fn related_values_are_related() {
+    for zero in [
+        "sin(asin(x/2)) - x/2",
+        "asin(sin(x)) - x",
+        "acos(cos(x)) - x",
+        "atan(tan(x)) - x",
+        "tan(x) - sin(x)/cos(x)",
+        "tanh(x) - (exp(x) - exp(-x))/(exp(x) + exp(-x))",
+        "sqrt(exp(x)) - exp(x/2)",
+        "exp(q*(x + w)) - exp(q*x + q*w)",
+        "exp(q*(x + w)) - exp(q*x)*exp(q*w)",
+        "(x^q)^w - x^(q*w)",
+        "(x*q)^0.7368 - x^0.7368*q^0.7368",
+        "log((x + 2)^2 - q^2) - log(x + 2 - q) - log(x + 2 + q)",
+        "sqrt(x^2 + q^2)*cos(atan(q/x)) - x",
+        "sqrt(x^2 + q^2)*sin(atan2(q, x)) - q",
+        "atan2(q, x) - atan(q/x)",
+        "sin(x*q + x) - sin(x*(q + 1))",
+        "abs(x) - x",
+        "abs(-x) - x",
+        "sign(x*q)",
+        "x^pi - exp(pi*log(x))",
+        "exp(log(x)*2) - x^2",
+        "sqrt(2)*sqrt(3)*x - sqrt(6)*x",
+        "sin(x + pi) + sin(x)",
+        "cos(x + 90*deg) + sin(x)",
+        "log(exp(x) + exp(q)) - q - log(exp(x - q) + 1)",
+        "atan(x) + atan(q) - atan2(x + q, 1 - x*q)",
+        "sin(sin(x + q)) - sin(sin(x)*cos(q) + cos(x)*sin(q))",
+        "sin(x)^2 + cos(x)^2",
+        "x^0 + q^0",
+    ] {
+        let text = format!(
+            "name='identity'\n[states]\nx='w*x + q'\nq='x - w'\nw='0'\nz='-z'\n[outputs]\ny='z + ({zero})'"
+        );
+        let found = judged(&text);
+        assert_eq!(found.findings.degrees.rank(), 1, "{zero}: {:?}", found.findings.degrees);
+        assert_eq!(found.findings.degrees.degree[3], Some(0), "{zero}");
+    }
+    // and what is not constant is seen
+    for different in ["sin(asin(x/2)) - x", "sqrt(exp(x)) - exp(x/3)", "sin(x + 3.14159265) + sin(x)"] {
+        let text = format!("name='m'\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + ({different})'");
+        assert_eq!(verdicts(&text), "x ~, z ~", "{different}");
+    }
+}
+
+/// No seed refuses a root, however many there are.
+#[test]
+fn roots_are_never_refused() {
+    let beacons: String =
+        (0..12).map(|i| format!("r{i}='sqrt((x - {i})^2 + (y - {}.5)^2)'\n", (i * 7) % 12)).collect();
+    let text = format!("name='m'\n[states]\nx='vx'\ny='vy'\nvx='0'\nvy='0'\n[outputs]\n{beacons}");
+    for seed in 1..6 {
+        let model = model_file::read(&text).expect("a model");
+        let found = judge(&model, seed, None).expect("judged");
+        assert_eq!(found.findings.degrees.degree, [Some(0), Some(0), Some(1), Some(1)]);
+        let root = model_file::read(&still("x", "sqrt(2)*x", "")).expect("a model");
+        assert_eq!(judge(&root, seed, None).expect("judged").findings.degrees.degree, [Some(0)]);
+    }
+    assert_eq!(
+        verdicts("name='m'\nparameters=['k']\n[states]\nx='-k*x^0.7368'\n[outputs]\ny='x'"),
+        "x 0, k 1"
+    );
+}
+
+/// Where a model is defined is found; where it is nowhere, the place is named.
+#[test]
+fn points_lie_where_the_model_is_defined() {
+    for inside in [
+        "log(x - q - 5)",
+        "asin(x/9 + q)",
+        "sqrt(1 - x^2 - q^2)",
+        "log(log(log(x))) + q",
+        "acos(x*q)",
+        "sqrt(-x) + q",
+        "log(x^2 - q)",
+    ] {
+        let found = judged(&still("x q", inside, ""));
+        assert_eq!(found.findings.degrees.rank(), 1, "{inside}");
+    }
+    let refused = |output: &str, rest: &str| {
+        let model = model_file::read(&still("x q", output, rest)).expect("a model");
+        judge(&model, 1, None).expect_err(output).to_string()
+    };
+    assert_eq!(
+        refused("x + log(-1 - x^2)", ""),
+        "the output y: log is not defined here at any of 2000 points that were tried"
+    );
+    assert_eq!(
+        refused("x + asin(2 + x^2)", ""),
+        "the output y: asin is not defined here at any of 2000 points that were tried"
+    );
+    assert_eq!(
+        refused("x*sqrt(c)", "[constants]\nc=-2\n"),
+        "the output y: sqrt is not defined here at any of 2000 points that were tried"
+    );
+    assert_eq!(
+        refused("abs(sin(x)^2 + cos(x)^2 - 1) + q", ""),
+        "the output y: abs of zero, where it has no derivative; expected an argument that is not zero"
+    );
+    assert_eq!(refused("x/sin(pi)", ""), "the output y: division by zero at every point that was tried");
+}
+
+/// A definite value against the same model with the value written in by hand: the same verdicts, orders and ranks.
+#[test]
+fn substituted_by_hand() {
+    for (functions, by_hand) in [
+        ("x*exp(c) + sin(c)*q + cos(c)*w", "x + w"),
+        ("x*cos(c)^2 + x*q*sin(c) + log(1 + c)*w", "x"),
+        ("sqrt(4 + c)*x + q*abs(c - 1) + w*tanh(c)", "2*x + q"),
+        ("(2 + c)^1.5*x/2^1.5 + 3^c*q", "x + q"),
+        ("atan2(c, 1)*x + x*q + asin(c)*w + acos(1 + c)*w", "x*q"),
+    ] {
+        let model = |output: &str| {
+            judged(&format!(
+                "name='m'\n[constants]\nc=0\n[states]\nx='q*x'\nq='w'\nw='x*w'\n[outputs]\ny='{output}'"
+            ))
+            .findings
+            .degrees
+        };
+        assert_eq!(model(functions), model(by_hand), "{functions}");
+    }
+}
+
+/// Terms over x, q, w as text, and the same written differently.
+fn terms() -> impl Strategy<Value = (String, String)> {
+    let leaf = prop_oneof![
+        Just(("x".to_string(), "x".to_string())),
+        Just(("q".into(), "q".into())),
+        Just(("w".into(), "w".into())),
+        (1..5i32).prop_map(|k| (format!("{k}"), format!("{k}"))),
+    ];
+    leaf.prop_recursive(3, 12, 2, |inner| {
+        prop_oneof![
+            (inner.clone(), inner.clone())
+                .prop_map(|(a, b)| { (format!("({} + {})", a.0, b.0), format!("({} + {})", b.1, a.1)) }),
+            (inner.clone(), inner.clone())
+                .prop_map(|(a, b)| (format!("({}*{})", a.0, b.0), format!("({}*{})", a.1, b.1))),
+            // sum rules
+            (inner.clone(), inner.clone()).prop_map(|(a, b)| (
+                format!("sin({} + {})", a.0, b.0),
+                format!("(sin({0})*cos({1}) + cos({0})*sin({1}))", a.1, b.1)
+            )),
+            // shifted angles
+            inner.clone().prop_map(|a| (format!("cos({})", a.0), format!("sin({} + pi/2)", a.1))),
+            // products under roots and logarithms, of what is positive
+            (inner.clone(), inner.clone()).prop_map(|(a, b)| (
+                format!("log((1 + {}^2)*(2 + {}^2))", a.0, b.0),
+                format!("(log(1 + {}^2) + log(2 + {}^2))", a.1, b.1)
+            )),
+            inner
+                .clone()
+                .prop_map(|a| (format!("(1 + ({})^2)^1.3", a.0), format!("((1 + ({})^2)^2.6)^0.5", a.1))),
+            // inverse functions
+            inner.clone().prop_map(|a| (format!("({})", a.0), format!("tan(atan({}))", a.1))),
+            inner.clone().prop_map(|a| (format!("tanh({})", a.0), format!("(1 - 2/(1 + exp(2*({}))))", a.1))),
+            inner.prop_map(|a| (format!("exp(-({})^2)", a.0), format!("1/exp(({})^2)", a.1))),
+        ]
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    /// Two ways to write the same model give the same verdicts, orders and ranks.
+    #[test]
+    fn identities_change_nothing(f in terms(), g in terms(), h in terms()) {
+        let model = |f: &str, g: &str, h: &str| {
+            format!("name='m'\n[states]\nx='{f}'\nq='{g}'\nw='0'\n[outputs]\ny='{h}'")
+        };
+        let one = model_file::read(&model(&f.0, &g.0, &h.0)).and_then(|m| judge(&m, 3, None));
+        let other = model_file::read(&model(&f.1, &g.1, &h.1)).and_then(|m| judge(&m, 3, None));
+        // towers of exponentials are beyond any number of digits: then it says so
+        if let (Ok(one), Ok(other)) = (&one, &other) {
+            prop_assert_eq!(&one.findings.degrees, &other.findings.degrees, "{} {} {}", f.0, g.0, h.0);
+        }
+    }
+}
+
+#[test]
+fn certainty_names_what_it_rests_on() {
+    let SystemCertainty::Digits(d) = judged(&still("x", "sin(x)", "")).certainty else {
+        panic!("a model with functions is judged in digits")
+    };
+    assert_eq!(d.digits, [77, 154]);
+    assert!(d.zero < d.nonzero - 30.0);
+    assert!(matches!(judged(&still("x", "x^2", "")).certainty, SystemCertainty::Primes(_)));
+}
