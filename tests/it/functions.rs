@@ -325,10 +325,118 @@ proptest! {
 
 #[test]
 fn certainty_names_what_it_rests_on() {
-    let SystemCertainty::Digits(d) = judged(&still("x", "sin(x)", "")).certainty else {
-        panic!("a model with functions is judged in digits")
+    // two functions that depend on each other
+    let SystemCertainty::Digits(d) = judged(&still("x", "sin(x) + sin(2*x)", "")).certainty else {
+        panic!("related functions are judged in digits")
     };
     assert_eq!(d.digits, [77, 154]);
     assert!(d.zero < d.nonzero - 30.0);
     assert!(matches!(judged(&still("x", "x^2", "")).certainty, SystemCertainty::Primes(_)));
+}
+
+/// Which models prime fields may judge: those whose functions have independent values. Each of the others has a relation, a
+/// special value or a branch, which random values would miss.
+#[test]
+fn only_independent_functions_are_judged_in_prime_fields() {
+    let by_primes = |states: &str, output: &str, rest: &str| {
+        matches!(judged(&still(states, output, rest)).certainty, SystemCertainty::Primes(_))
+    };
+    for independent in [
+        "sin(x) + q*cos(x)",
+        "exp(x)*exp(q)",
+        "sin(x) + exp(x) + log(x)",
+        "sin(exp(x)*q) + exp(x)",
+        "x^w + q",
+        "pi*x + sin(x + pi)",
+        "tanh(x) + exp(x) + atan(x)",
+        "sin(1.5*x)*q",
+    ] {
+        assert!(by_primes("x q w", independent, ""), "{independent}");
+    }
+    for related in [
+        "exp(x) + exp(2*x)",
+        "exp(x + q) + exp(x)*exp(q)",
+        "sin(x) + sin(x + pi/2)",
+        "tanh(x) + exp(2*x)",
+        "exp(log(x)/2) + q",
+        "log(x*q) + log(x) + log(q)",
+        "log(exp(x)*q) + log(q)",
+        "sin(atan(x))",
+        "atan(x) + atan(1/x)",
+        "sqrt(x) + q",
+        "asin(x) + q",
+        "abs(x) + q",
+        "sin(1)*x",
+        "x^0.7368",
+        "exp(x - x) + q",
+    ] {
+        assert!(!by_primes("x q w", related, ""), "{related}");
+    }
+    // what is given, what changes, the time, experiments
+    assert!(by_primes("x q", "sin(c*x)", "[constants]\nc=2\n"));
+    assert!(!by_primes("x q", "x*sin(c)", "[constants]\nc=2\n"));
+    assert!(!by_primes("x q", "sin(c*x)", "[constants]\nc=0\n"));
+    assert!(!by_primes("x q", "sin(c*x)", "[constants]\nc=2\n[[segment]]\n[[segment]]\nconstants={c=3}\n"));
+    assert!(by_primes("x q", "c*sin(x)", "[constants]\nc=2\n[[segment]]\n[[segment]]\nconstants={c=3}\n"));
+    assert!(!by_primes("x q", "sin(x)", "[[segment]]\n[[segment]]\ncarry={x='1'}\n"));
+    assert!(by_primes("x q", "sin(x)*q", "[[segment]]\n[[segment]]\ncarry={q='1'}\n"));
+    assert!(!by_primes("x q", "x*sin(t)", ""));
+    let start = |of: &str| {
+        let text = format!(
+            "name='m'\n[states]\nx={{equation='q', initial=0}}\nq='-q'\n[outputs]\ny='x + exp({of})'"
+        );
+        matches!(judged(&text).certainty, SystemCertainty::Primes(_))
+    };
+    assert!(start("q") && !start("x"));
+    assert!(matches!(
+        judged("name='m'\nexperiments=2\n[states]\nx='0'\n[outputs]\ny='exp(x)'").certainty,
+        SystemCertainty::Digits(_)
+    ));
+    // no real point: neither field nor digits
+    let nowhere = model_file::read(&still("x q", "x + log(-1 - x^2)", "")).expect("a model");
+    assert!(judge(&nowhere, 1, None).is_err());
+}
+
+/// An exponent that is a constant of known value is the number that it stands for: no logarithm of its base.
+#[test]
+fn exponents_may_be_constants() {
+    let power = |start: &str, exponent: &str, rest: &str| {
+        format!(
+            "name='m'\nparameters=['p']\n{rest}\n[states]\nx={{equation='1', initial='{start}'}}\n[outputs]\ny='p*x^{exponent}'"
+        )
+    };
+    let constant = |start: &str, exponent: &str, n: &str| {
+        verdicts(&power(start, exponent, &format!("[constants]\nn='{n}'\nm='n + 1'")))
+    };
+    for (start, n, degree) in
+        [("0", "2", 2), ("0", "7", 7), ("-1", "2", 0), ("-1", "-3", 0), ("-2", "1/3 + 2/3", 0)]
+    {
+        assert_eq!(constant(start, "n", n), format!("p {degree}"), "{start} {n}");
+    }
+    // made of several, and half of one; a root is none of what is negative
+    assert_eq!(constant("0", "m", "2"), "p 3");
+    assert_eq!(constant("0", "(2*n - 1)", "2"), "p 3");
+    assert_eq!(constant("4", "n", "1/2"), "p 0");
+    assert_eq!(constant("4", "n", "-0.25"), "p 0");
+    let refused = model_file::read(&power("-4", "n", "[constants]\nn=0.5")).expect("a model");
+    assert_eq!(
+        judge(&refused, 1, None).expect_err("no root").to_string(),
+        "the output y: sqrt is not defined here at any of 2000 points that were tried"
+    );
+    // the same as the number by hand, and rational
+    let free = |exponent: &str, rest: &str| {
+        judged(&format!(
+            "name='m'\nparameters=['p']\n{rest}\n[states]\nx='-p*x^{exponent}'\n[outputs]\ny='x^2'"
+        ))
+    };
+    let (by_name, by_hand) = (free("n", "[constants]\nn=3"), free("3", ""));
+    assert_eq!(by_name.findings.degrees, by_hand.findings.degrees);
+    assert!(by_name.fields.is_some() && free("n", "[constants]\nn='generic'").fields.is_none());
+    // each experiment has its own; what a segment changes has none
+    let own = "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nn=2\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='p*x^n'\n[[experiment]]\n[[experiment]]\nconstants={n=4}\n";
+    assert_eq!(verdicts(own), "p 2");
+    let later = own.replace("[constants]\nn=2", "[constants]\nn=5");
+    assert_eq!(verdicts(&later), "p 4");
+    let segment = "name='m'\n[constants]\nn=1\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + x^n'\n[[segment]]\n[[segment]]\nconstants={n=2}\n";
+    assert_eq!(verdicts(segment), "x 0, z 0");
 }

@@ -6,6 +6,7 @@ mod cli;
 mod compare;
 mod crosscheck;
 mod design;
+mod engines;
 mod examples;
 #[cfg(unix)]
 mod files;

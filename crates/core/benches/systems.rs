@@ -1,13 +1,44 @@
 //! Any system: verdicts on the reference models, and how they scale. One core.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use obsdeg_core::system::{SystemModel, SystemOptions, analyze_system, json, judge};
+use obsdeg_core::system::{
+    SystemModel, SystemOptions, analyze_system, json, judge, judge_in_digits, model_file,
+};
 
 fn main() {
     divan::main();
+    growth();
+}
+
+/// How the time of a chain grows: the exponent between each size and twice that (the best of three runs), where benches are run, not tested.
+#[allow(clippy::print_stdout, reason = "what a bench is for")]
+fn growth() {
+    if !std::env::args().any(|a| a == "--bench") || std::env::args().any(|a| a == "--test") {
+        return;
+    }
+    for (name, functions, sizes) in
+        [("chain_of", false, [16, 32, 64, 128, 256]), ("chain_of_functions", true, [8, 16, 32, 64, 128])]
+    {
+        let seconds = |n: usize| {
+            let model = chain(n, functions);
+            let run = |_| {
+                let start = Instant::now();
+                rank_of(&model);
+                start.elapsed().as_secs_f64()
+            };
+            (0..3).map(run).fold(f64::INFINITY, f64::min)
+        };
+        let times = sizes.map(seconds);
+        println!("{name}: growth");
+        for (pair, n) in times.windows(2).zip(&sizes) {
+            let exponent = (pair[1] / pair[0]).log2();
+            println!("  {} to {} unknowns: {:.4} s, n^{exponent:.2}", 2 * n, 4 * n, pair[1]);
+        }
+    }
 }
 
 fn folder() -> PathBuf {
@@ -53,13 +84,14 @@ fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
 }
 
 /// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank needs
-/// order 2n-1.
-fn chain(n: usize) -> SystemModel {
+/// order 2n-1. With functions the last factor is sin(x_i).
+fn chain(n: usize, functions: bool) -> SystemModel {
     let states: Vec<String> = (0..n).map(|i| format!("\"x{i}\"")).collect();
     let rates: Vec<String> = (0..n).map(|i| format!("\"a{i}\"")).collect();
+    let factor = |i: usize| if functions { format!("sin(x{i})") } else { format!("x{i}") };
     let equation = |i: usize| match i {
-        0 => "\"x0\": \"-a0*x0^2\"".to_string(),
-        _ => format!("\"x{i}\": \"a{i}*(x{} - x{i})*x{i}\"", i - 1),
+        0 => format!("\"x0\": \"-a0*x0*{}\"", factor(0)),
+        _ => format!("\"x{i}\": \"a{i}*(x{} - x{i})*{}\"", i - 1, factor(i)),
     };
     let equations: Vec<String> = (0..n).map(equation).collect();
     let text = format!(
@@ -72,19 +104,44 @@ fn chain(n: usize) -> SystemModel {
     json::read(&text).expect("a model")
 }
 
-/// Unknowns and order grow together.
-#[divan::bench(args = [4, 8, 16, 32])]
-fn chain_of(bencher: Bencher<'_, '_>, n: usize) {
-    let model = chain(n);
-    bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").findings.degrees.rank());
+/// The rank, which is full.
+fn rank_of(model: &SystemModel) -> usize {
+    let rank = judge(black_box(model), 1, None).expect("judged").findings.degrees.rank();
+    assert_eq!(rank, model.states.len() + model.parameters.len());
+    rank
 }
 
-/// Eight states and rates, observed to a given order whatever the rank.
-#[divan::bench(args = [8, 16, 32, 64])]
-fn to_order(bencher: Bencher<'_, '_>, order: usize) {
-    let mut model = chain(8);
-    // a start that is known keeps the first stagnation from being the end
-    model.states[0].start = obsdeg_core::system::StateStart::Known;
-    model.outputs[0].1 = model.states[0].equation.clone();
-    bencher.bench(|| judge(black_box(&model), 1, Some(order)).expect("judged").findings.degrees.rank());
+/// Unknowns and order grow together: 2n unknowns.
+#[divan::bench(args = [4, 8, 16, 32, 64, 128])]
+fn chain_of(bencher: Bencher<'_, '_>, n: usize) {
+    let model = chain(n, false);
+    bencher.bench(|| rank_of(&model));
+}
+
+/// The same with a sine in every link: functions of independent arguments.
+#[divan::bench(args = [4, 8, 16, 32, 64])]
+fn chain_of_functions(bencher: Bencher<'_, '_>, n: usize) {
+    let model = chain(n, true);
+    bencher.bench(|| rank_of(&model));
+}
+
+/// The same by true values in real numbers.
+#[divan::bench(args = [4, 8], sample_count = 3, sample_size = 1)]
+fn chain_of_functions_in_digits(bencher: Bencher<'_, '_>, n: usize) {
+    let model = chain(n, true);
+    let compiled = model.compile().expect("a graph");
+    bencher.bench(|| judge_in_digits(&model, &compiled, 1, None).expect("judged").findings.degrees.rank());
+}
+
+/// One unknown of a given degree: y = p x^k with x' = 1, x(0) = 0.
+#[divan::bench(args = [8, 16, 32])]
+fn of_degree(bencher: Bencher<'_, '_>, degree: usize) {
+    let text = format!(
+        "name='m'\nparameters=['p']\n[states]\nx={{equation='1', initial=0}}\n[outputs]\ny='p*x^{degree}'"
+    );
+    let model = model_file::read(&text).expect("a model");
+    bencher.bench(|| {
+        let found = judge(black_box(&model), 1, None).expect("judged").findings.degrees.degree;
+        assert_eq!(found, [Some(degree)]);
+    });
 }

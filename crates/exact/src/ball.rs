@@ -26,6 +26,9 @@ pub struct Ball<const N: usize> {
     error: f64,
 }
 
+/// Exponents beyond this are not kept: what is smaller is zero with this error, of what is larger nothing is known.
+const FAR: f64 = 1e15;
+
 /// What rounding adds to a sum of error terms at most: each is a handful of operations on doubles.
 const SLACK: f64 = 1.0 + 1e-12;
 
@@ -67,7 +70,7 @@ impl<const N: usize> Ball<N> {
         if log2 == f64::NEG_INFINITY {
             return Self::ZERO;
         }
-        Self { exponent: log2.ceil() as i64 + Self::BITS, error: 1.0, ..Self::ZERO }
+        Self { exponent: log2.ceil().clamp(-FAR, FAR) as i64 + Self::BITS, error: 1.0, ..Self::ZERO }
     }
 
     /// A double, exactly; zero for what is not finite.
@@ -181,6 +184,7 @@ impl<const N: usize> Ball<N> {
     }
 
     /// `self + other`.
+    #[inline(never)]
     pub fn add(&self, other: &Self) -> Self {
         if self.is_exactly_zero() {
             return *other;
@@ -272,6 +276,7 @@ impl<const N: usize> Ball<N> {
     }
 
     /// `self other`.
+    #[inline(never)]
     pub fn mul(&self, other: &Self) -> Self {
         let (x, y) = (self, other);
         if x.is_exactly_zero() || y.is_exactly_zero() {
@@ -281,6 +286,9 @@ impl<const N: usize> Ball<N> {
             return Self::zero_within(x.bound_log2() + y.bound_log2());
         }
         let exponent = x.exponent + y.exponent;
+        if (exponent as f64).abs() > FAR {
+            return Self::zero_within(exponent as f64);
+        }
         // the error of one, as a part of 2^exponent, times that of the other: in parts that doubles hold
         let part = power(-Self::BITS / 4);
         let both = ((x.error * part) * (y.error * part)) * part * part;
@@ -304,6 +312,7 @@ impl<const N: usize> Ball<N> {
     }
 
     /// `1 / self`; `None` for a ball that holds zero, or nearly does.
+    #[inline(never)]
     pub fn inverse(&self) -> Option<Self> {
         if self.is_zero() {
             return None;
@@ -346,6 +355,7 @@ impl<const N: usize> Ball<N> {
     }
 
     /// The square root; `None` for a ball that holds what is not positive. Zero without an error has the root zero.
+    #[inline(never)]
     pub fn sqrt(&self) -> Option<Self> {
         if self.is_exactly_zero() {
             return Some(Self::ZERO);
@@ -550,6 +560,18 @@ mod tests {
             // a ball that holds zero is zero
             prop_assert_eq!(a.is_zero(), holds(&a, &zero));
         }
+    }
+
+    #[test]
+    fn exponents_end_somewhere() {
+        // squared seventy times: beyond any exponent
+        let square = |x: f64| (0..70).fold(Ball::<2>::from_f64(x), |x, _| x.mul(&x));
+        let (large, small) = (square(3.0), square(0.3));
+        assert!(large.is_zero() && large.radius_log2() > 1e14, "{large:?}");
+        assert!(small.is_zero() && small.radius_log2() < -1e14, "{small:?}");
+        assert!(large.add(&Ball::from_i64(1)).is_zero() && large.inverse().is_none());
+        assert!(Ball::from_i64(1).add(&small).is_positive());
+        assert!(Ball::<2>::zero_within(f64::INFINITY).mul(&large).is_zero());
     }
 
     #[test]

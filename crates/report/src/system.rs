@@ -176,6 +176,11 @@ impl Answer for SystemAnalysis {
         );
         assumed.extend(counting(self));
         assumed.extend(self.note.clone());
+        if let Some(count @ 1..) = self.independent_functions {
+            assumed.push(format!(
+                "the values of {count} functions, derivatives counted, are algebraically independent at a generic point (by Ax's theorem, from the rank of the gradients of their arguments), so that random values stand for them"
+            ));
+        }
         assumed.push(match (&self.primes, self.error_bound) {
             (Some([p, q]), Some(bound)) => format!(
                 "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {bound:.0e}; seed {}",

@@ -64,11 +64,15 @@ pub struct SystemAnalysis {
     pub note: Option<String>,
     /// The order of the derivatives with which solutions were counted by elimination; null when none were.
     pub counting_order: Option<usize>,
-    /// Of a rational model: the two random primes, as text (61 bits).
+    /// Functions that take part whose values are proven to be independent of each other at a generic point (Ax 1971,
+    /// doi:10.2307/1970774), so that random values in prime fields stand for them; 0 for a rational model, null where functions were
+    /// evaluated truly, in real numbers.
+    pub independent_functions: Option<usize>,
+    /// Of a model judged in prime fields: the two random primes, as text (61 bits).
     pub primes: Option<[String; 2]>,
-    /// Of a rational model: bound on the probability that a verdict is wrong.
+    /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
     pub error_bound: Option<f64>,
-    /// Of a model with functions: how clear its ranks were in real numbers.
+    /// Of a model judged in real numbers: how clear its ranks were.
     pub digits: Option<DigitsReport>,
     /// Seed of all random choices.
     pub seed: u64,
@@ -141,7 +145,7 @@ pub struct SymmetryReport {
 }
 
 impl Judgement {
-    /// Of a rational model: the bound on the probability that a verdict is wrong.
+    /// Of a model judged in prime fields: the bound on the probability that a verdict is wrong.
     pub fn error_bound(&self) -> Option<f64> {
         match self.certainty {
             SystemCertainty::Primes(primes) => Some(primes.error_bound),
@@ -149,7 +153,7 @@ impl Judgement {
         }
     }
 
-    /// Of a model with functions: how clear its ranks were.
+    /// Of a model judged in real numbers: how clear its ranks were.
     pub fn digits(&self) -> Option<DigitsReport> {
         match self.certainty {
             SystemCertainty::Primes(_) => None,
@@ -294,6 +298,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         rests_on_bound: judged.rests_on_bound,
         note: None,
         counting_order: None,
+        independent_functions: judged.independent_functions,
         primes: primes.map(|p| p.primes_as_text()),
         error_bound: judged.error_bound(),
         digits: judged.digits(),

@@ -61,6 +61,8 @@ pub struct Dag {
     index: HashMap<Op, usize>,
     /// Functions by kind and argument.
     pub(super) functions: HashMap<(Function, usize), usize>,
+    /// Values of slots that are rational and never change, by slot: what an exponent may be made of.
+    pub(super) definite: HashMap<usize, (i64, i64)>,
 }
 
 impl Dag {

@@ -1,5 +1,8 @@
 //! Functions in the graph, each with its derivative.
 
+use std::collections::HashMap;
+
+use super::constraints::below;
 use super::dag::{Dag, DagError, Op};
 use crate::model::expression::Function;
 
@@ -20,32 +23,27 @@ impl Dag {
         Some(self.quotient(pi, half_turn))
     }
 
-    /// The node as a rational number, if it is a small one.
-    fn rational(&self, node: usize) -> Option<(i64, i64)> {
-        match self.ops[node] {
-            Op::Number { mantissa, decimals } => {
-                let ten = 10i64.checked_pow(decimals.unsigned_abs())?;
-                let m = i64::try_from(mantissa).ok()?;
-                if decimals < 0 { Some((m.checked_mul(ten)?, 1)) } else { reduced(m, ten) }
-            }
-            Op::Divide(a, b) => match (self.ops[a], self.ops[b]) {
-                (Op::Number { .. }, Op::Number { .. }) => {
-                    let ((a, b), (c, d)) = (self.rational(a)?, self.rational(b)?);
-                    reduced(a.checked_mul(d)?, b.checked_mul(c)?)
+    /// The node as a small rational number, if it is one: made of numbers, and of constants whose values are known (`definite`).
+    pub(super) fn rational(&self, node: usize) -> Option<(i64, i64)> {
+        // operands come before what is made of them
+        let mut found: HashMap<usize, (i64, i64)> = HashMap::new();
+        for i in below(self, node) {
+            let value = match self.ops[i] {
+                Op::Number { mantissa, decimals } => {
+                    let ten = 10i64.checked_pow(decimals.unsigned_abs())?;
+                    let m = i64::try_from(mantissa).ok()?;
+                    if decimals < 0 { (m.checked_mul(ten)?, 1) } else { reduced(m, ten)? }
                 }
-                _ => None,
-            },
-            // -1 times a fraction
-            Op::Multiply(a, b) => match (self.ops[a], self.ops[b]) {
-                (Op::Number { .. }, Op::Number { .. } | Op::Divide(..))
-                | (Op::Divide(..), Op::Number { .. }) => {
-                    let ((a, b), (c, d)) = (self.rational(a)?, self.rational(b)?);
-                    reduced(a.checked_mul(c)?, b.checked_mul(d)?)
-                }
-                _ => None,
-            },
-            _ => None,
+                Op::Slot(s) => *self.definite.get(&s)?,
+                Op::Add(a, b) => plus(found[&a], found[&b])?,
+                Op::Subtract(a, b) => plus(found[&a], (-found[&b].0, found[&b].1))?,
+                Op::Multiply(a, b) => times(found[&a], found[&b])?,
+                Op::Divide(a, b) => times(found[&a], (found[&b].1, found[&b].0))?,
+                Op::Pi | Op::Primitive { .. } => return None,
+            };
+            found.insert(i, value);
         }
+        found.get(&node).copied()
     }
 
     /// `x^m`.
@@ -153,7 +151,19 @@ pub(super) fn gcd(a: i64, b: i64) -> i64 {
     obsdeg_exact::gcd(a.unsigned_abs(), b.unsigned_abs()) as i64
 }
 
+/// In lowest terms, the denominator positive; `None` beyond small numbers.
 fn reduced(p: i64, q: i64) -> Option<(i64, i64)> {
-    let g = gcd(p, q);
-    (q != 0 && g != 0).then(|| if q < 0 { (-p / g, -q / g) } else { (p / g, q / g) })
+    if q == 0 || p == i64::MIN || q == i64::MIN {
+        return None;
+    }
+    let g = gcd(p, q) * q.signum();
+    Some((p / g, q / g))
+}
+
+fn times((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
+    reduced(a.checked_mul(c)?, b.checked_mul(d)?)
+}
+
+fn plus((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
+    reduced(a.checked_mul(d)?.checked_add(c.checked_mul(b)?)?, b.checked_mul(d)?)
 }

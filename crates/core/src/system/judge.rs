@@ -4,6 +4,7 @@ use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field, Gap, Reals, RowSpace, SplitMix64};
 
 use super::dag::{Dag, Op};
+use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
 use super::rows::{Layout, SystemRows, random_field};
 use super::taylor::Singular;
@@ -29,6 +30,9 @@ pub struct Judgement {
     pub span: Option<Echelon>,
     /// The two prime fields of a rational model.
     pub fields: Option<[Field; 2]>,
+    /// Functions whose values are proven to be independent of each other, so that random ones stand for them; `None` where true values
+    /// were taken.
+    pub independent_functions: Option<usize>,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
 }
@@ -36,9 +40,9 @@ pub struct Judgement {
 /// What the verdicts on a system rest on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SystemCertainty {
-    /// A rational model: two prime fields that agree.
+    /// A rational model, or one whose functions have independent values: two prime fields that agree.
     Primes(ByPrimes),
-    /// A model with functions: two random real points that agree.
+    /// Any other model with functions: two random real points that agree.
     Digits(ByDigits),
 }
 
@@ -208,7 +212,6 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
                 name(function)
             ),
         ),
-        Singular::Unknown(node) => (node, "a number that no prime field holds".into()),
     };
     match compiled.places.get(&node) {
         Some((place, span)) => place.error(message, span.clone()),
@@ -217,7 +220,7 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
 }
 
 /// Judges a model at two random points, each of a stream of its own of `seed` and the model: a rational one modulo two
-/// primes, one with functions in many digits. `bound` overrides the highest order.
+/// primes, and so one with functions whose values are independent; any other in many digits. `bound` overrides the highest order.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -236,24 +239,44 @@ pub fn judge_compiled(
     seed: u64,
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
-    if !compiled.dag.is_rational() {
+    let layout = checked_layout(model, compiled, bound)?;
+    let rational = compiled.dag.is_rational();
+    if !rational {
+        let mut rng = model.random(seed, "values of functions");
+        let independent = independent_functions(model, compiled, &layout, &mut rng);
+        // where prime fields fail, for whatever reason, digits say why
+        if let Some(count) = independent
+            && let Ok(judged) = judge_in_fields(model, compiled, &layout, seed)
+        {
+            return Ok(Judgement { independent_functions: Some(count), ..judged });
+        }
         return judge_in_digits(model, compiled, seed, bound);
     }
-    let layout = checked_layout(model, compiled, bound)?;
+    let judged = judge_in_fields(model, compiled, &layout, seed)?;
+    Ok(Judgement { independent_functions: Some(0), ..judged })
+}
+
+/// Judges a model in two prime fields: a rational one, or one whose functions have independent values.
+fn judge_in_fields(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    seed: u64,
+) -> Result<Judgement, ModelError> {
     for attempt in 0..ATTEMPTS {
         let judged = |i: usize| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
             let field = random_field(&mut rng);
-            climb_at(model, compiled, &layout, field, &mut rng).map(|at| (field, at))
+            climb_at(model, compiled, layout, field, &mut rng).map(|at| (field, at))
         };
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
         if first.agrees(&second) {
-            let error_bound = error_bound(&claim(compiled, &layout, &first.degrees), 2);
+            let error_bound = error_bound(&claim(compiled, layout, &first.degrees), 2);
             let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), error_bound };
             let span = first.span.clone();
-            let certainty = SystemCertainty::Primes(primes);
-            let judged = Judgement::of(layout, first, certainty, seed);
-            return Ok(Judgement { span: Some(span), fields: Some([p, q]), ..judged });
+            let judged = Judgement::of(layout.clone(), first, SystemCertainty::Primes(primes), seed);
+            let fields = compiled.dag.is_rational().then_some([p, q]);
+            return Ok(Judgement { span: fields.map(|_| span), fields, ..judged });
         }
     }
     Err(refuse(format!(
@@ -351,6 +374,7 @@ impl Judgement {
             certainty,
             span: None,
             fields: None,
+            independent_functions: None,
         }
     }
 }
@@ -373,6 +397,7 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees) -> Claim {
             compiled.segments.iter().flat_map(|s| s.constants.iter().chain(&s.carry)).map(|(_, node)| node),
         )
         .map(|&node| fractions[node])
+        .chain(function_rates(&compiled.dag, &fractions, compiled))
         .collect();
     // over the product of all denominators
     let (below, below_bits) = used.iter().fold((0.0, 0.0), |(d, b), f| (d + f.below.0, b + f.below.1));
@@ -381,7 +406,8 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees) -> Claim {
     let delta = top.max(below) + below;
     let (orders, n) = (degrees.rank_profile.len() as f64, layout.unknowns.len() as f64);
     // jets of inputs and states are variables too
-    let variables = (compiled.roles.len() as f64) * (orders + 1.0);
+    let functions = compiled.dag.ops.iter().filter(|op| matches!(op, Op::Primitive { .. })).count();
+    let variables = (compiled.roles.len() as f64) * (orders + 1.0) + functions as f64;
     let degree = top + orders * delta + below;
     let step =
         (variables * (degree + (2.0 * orders + 1.0) * below).max(1.0)).log2() + 2.0 * (top_bits + below_bits);
@@ -405,10 +431,70 @@ struct Fraction {
     below: (f64, f64),
 }
 
-/// Every node of a rational graph as a quotient of polynomials in the slots, over the integers.
+impl Fraction {
+    const ZERO: Self = Self { above: (0.0, 0.0), below: (0.0, 0.0) };
+    const VARIABLE: Self = Self { above: (1.0, 0.0), below: (0.0, 0.0) };
+
+    fn plus(self, other: Self) -> Self {
+        let (left, right) = (times(self.above, other.below), times(other.above, self.below));
+        Self {
+            above: (left.0.max(right.0), left.1.max(right.1) + 1.0),
+            below: times(self.below, other.below),
+        }
+    }
+
+    fn times(self, other: Self) -> Self {
+        Self { above: times(self.above, other.above), below: times(self.below, other.below) }
+    }
+
+    fn inverse(self) -> Self {
+        Self { above: self.below, below: self.above }
+    }
+}
+
+/// Of a product of polynomials.
+fn times(x: (f64, f64), y: (f64, f64)) -> (f64, f64) {
+    (x.0 + y.0, x.1 + y.1)
+}
+
+/// The derivatives in time of the variables that stand for functions: `E' = E u'` of exp and tanh, `(1 + t^2)/2 u'` for `t = tan(u/2)` of sin,
+/// cos and tan, `weight u'` of a logarithm and an arc tangent.
+fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec<Fraction> {
+    // derivatives of all nodes; a jet of an input is a variable
+    let mut rates: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
+    let mut out = Vec::new();
+    for (i, op) in dag.ops.iter().enumerate() {
+        rates.push(match *op {
+            Op::Number { .. } | Op::Pi => Fraction::ZERO,
+            Op::Slot(s) => match compiled.roles[s] {
+                Role::State(k) => fractions[compiled.rates(0)[k]],
+                _ => Fraction::VARIABLE,
+            },
+            Op::Add(a, b) | Op::Subtract(a, b) => rates[a].plus(rates[b]),
+            Op::Multiply(a, b) => rates[a].times(fractions[b]).plus(fractions[a].times(rates[b])),
+            // (a' - (a/b) b') / b
+            Op::Divide(a, b) => {
+                let below = fractions[b].inverse();
+                rates[a].plus(fractions[i].times(rates[b])).times(below)
+            }
+            Op::Primitive { of, weight, function } => {
+                let factor = match function {
+                    Function::Exp | Function::Tanh => Fraction::VARIABLE,
+                    Function::Sin | Function::Cos | Function::Tan => {
+                        Fraction { above: (2.0, 1.0), below: (0.0, 1.0) }
+                    }
+                    _ => fractions[weight],
+                };
+                out.push(factor.times(rates[of]));
+                fractions[weight].times(rates[of])
+            }
+        });
+    }
+    out
+}
+
+/// Every node of a graph as a quotient of polynomials in the slots and in one variable for each function, over the integers.
 fn fractions(dag: &Dag) -> Vec<Fraction> {
-    let times = |x: (f64, f64), y: (f64, f64)| (x.0 + y.0, x.1 + y.1);
-    let plus = |x: (f64, f64), y: (f64, f64)| (x.0.max(y.0), x.1.max(y.1) + 1.0);
     let mut out: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
         let one = (0.0, 0.0);
@@ -421,22 +507,17 @@ fn fractions(dag: &Dag) -> Vec<Fraction> {
                     false => Fraction { above: (0.0, digits + ten), below: one },
                 }
             }
-            Op::Slot(_) | Op::Primitive { .. } | Op::Pi => Fraction { above: (1.0, 0.0), below: one },
-            Op::Add(a, b) | Op::Subtract(a, b) => {
-                let (a, b) = (out[a], out[b]);
-                Fraction {
-                    above: plus(times(a.above, b.below), times(b.above, a.below)),
-                    below: times(a.below, b.below),
+            Op::Slot(_) | Op::Pi => Fraction::VARIABLE,
+            Op::Primitive { function, .. } => match function {
+                // (E^2 - 1)/(E^2 + 1), 2t/(1 + t^2) and the like
+                Function::Tanh | Function::Sin | Function::Cos | Function::Tan => {
+                    Fraction { above: (2.0, 1.0), below: (2.0, 1.0) }
                 }
-            }
-            Op::Multiply(a, b) => {
-                let (a, b) = (out[a], out[b]);
-                Fraction { above: times(a.above, b.above), below: times(a.below, b.below) }
-            }
-            Op::Divide(a, b) => {
-                let (a, b) = (out[a], out[b]);
-                Fraction { above: times(a.above, b.below), below: times(a.below, b.above) }
-            }
+                _ => Fraction::VARIABLE,
+            },
+            Op::Add(a, b) | Op::Subtract(a, b) => out[a].plus(out[b]),
+            Op::Multiply(a, b) => out[a].times(out[b]),
+            Op::Divide(a, b) => out[a].times(out[b].inverse()),
         });
     }
     out

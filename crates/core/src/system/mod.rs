@@ -10,6 +10,7 @@ pub(crate) mod constraints;
 pub(crate) mod dag;
 mod fibre;
 mod functions;
+mod independent;
 pub mod json;
 pub(crate) mod judge;
 pub(crate) mod model;

@@ -461,13 +461,25 @@ impl SystemModel {
             self.constants.iter().map(|(n, _)| (n.name.clone(), names[&n.name])).collect();
         let shared = names.clone();
         let mut experiments: Vec<CompiledExperiment> = Vec::new();
+        let changed: HashSet<&str> =
+            self.segments.iter().flat_map(|s| &s.constants).map(|(name, _)| name.as_str()).collect();
+        let slot_of: HashMap<String, usize> =
+            roles.iter().enumerate().map(|(i, r)| (r.0.clone(), i)).collect();
+        // what starts, jumps and combinations may rely on: the same in all experiments
+        let mut always: Option<HashMap<usize, (i64, i64)>> = None;
         for experiment in 0..self.own.len().max(1) {
             let mut own = CompiledExperiment::default();
+            dag.definite.clear();
             let mut before: HashMap<String, usize> = HashMap::new();
             for (i, (named, _)) in self.constants.iter().enumerate() {
                 let formula = self.constant_formula(experiment, i);
                 own.constants.push(formula.map(|f| node(&mut dag, f, &before)).transpose()?);
                 before.insert(named.name.clone(), names[&named.name]);
+                // a segment may give it another value
+                let own_value = own.constants[i].filter(|_| !changed.contains(named.name.as_str()));
+                if let Some(value) = own_value.and_then(|node| dag.rational(node)) {
+                    dag.definite.insert(slot_of[&named.name], value);
+                }
             }
             let mut inside = shared.clone();
             for (i, (named, _)) in self.known_inputs.iter().enumerate() {
@@ -494,7 +506,13 @@ impl SystemModel {
                 names = inside;
             }
             experiments.push(own);
+            let here = &dag.definite;
+            always = Some(match always {
+                None => here.clone(),
+                Some(all) => all.into_iter().filter(|(slot, value)| here.get(slot) == Some(value)).collect(),
+            });
         }
+        dag.definite = always.unwrap_or_default();
         // a known start may depend on what is constant, and on states whose start is not given by a formula
         let mut start_names = constant_names.clone();
         for p in &self.parameters {

@@ -149,7 +149,7 @@ pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
 type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
 
 /// What the runs of one experiment share at a point.
-struct Point<S: Values> {
+pub(super) struct Point<S: Values> {
     signals: Vec<Signal<S::Element>>,
     initial: Vec<Option<Initial<S::Element>>>,
     seed: u64,
@@ -157,11 +157,11 @@ struct Point<S: Values> {
 }
 
 /// Everything a point is made from.
-struct Maker<'a, 'b, S: Values> {
-    model: &'b SystemModel,
-    compiled: &'a Compiled,
-    layout: &'b Layout,
-    field: S,
+pub(super) struct Maker<'a, 'b, S: Values> {
+    pub(super) model: &'b SystemModel,
+    pub(super) compiled: &'a Compiled,
+    pub(super) layout: &'b Layout,
+    pub(super) field: S,
 }
 
 impl<'a, S: Values> Maker<'a, '_, S> {
@@ -208,6 +208,26 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             });
         }
         Point { signals, initial, seed: rng.next_u64(), experiment }
+    }
+
+    /// Values of all slots at a start: those that are given, random ones of all else. `None` where a given one is not defined.
+    pub(super) fn values(&self, rng: &mut SplitMix64, attempt: usize) -> Option<Vec<S::Element>> {
+        let f = &self.field;
+        let random =
+            |n: usize, rng: &mut SplitMix64| (0..n).map(|_| f.random(rng, attempt)).collect::<Vec<_>>();
+        let (parameters, constants) =
+            (random(self.model.parameters.len(), rng), random(self.model.constants.len(), rng));
+        let mut point = self.draw(0, (&parameters, &constants), f.random(rng, attempt), rng, attempt);
+        self.set_constants(&mut point, &given(self.compiled.constants(0)), false).ok()?;
+        self.set_states(&mut point, &given(&self.compiled.starts)).ok()?;
+        let value = |(signal, start): (&Signal<S::Element>, &Option<Initial<S::Element>>)| match signal {
+            Signal::State { .. } => start.as_ref().map_or(f.zero(), |s| s.0),
+            Signal::Constant { value, .. }
+            | Signal::Known { value, .. }
+            | Signal::Unknown { value, .. }
+            | Signal::Time { value } => *value,
+        };
+        Some(point.signals.iter().zip(&point.initial).map(value).collect())
     }
 
     /// Values and gradients of some nodes at a point, at order 0.
@@ -412,6 +432,11 @@ impl<'a, S: Values> Maker<'a, '_, S> {
     }
 }
 
+/// What is given, with its place.
+fn given(list: &[Option<usize>]) -> Vec<(usize, usize)> {
+    list.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).collect()
+}
+
 /// A row with zeros where it has no lanes.
 fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::Element]) -> Vec<S::Element> {
     let mut out = vec![f.zero(); lanes];
@@ -450,9 +475,6 @@ impl<'a, S: Values> SystemRows<'a, S> {
         let mut parameters: Vec<S::Element> =
             model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
         let mut constants: Vec<S::Element> = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
-        let given = |list: &[Option<usize>]| -> Vec<(usize, usize)> {
-            list.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).collect()
-        };
         let whole = [CompiledSegment::default()];
         let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());

@@ -64,8 +64,6 @@ pub(crate) enum Singular {
     Domain(usize, Function),
     /// A function that is defined but has no derivative here, at this node.
     Kink(usize, Function),
-    /// A value that the field does not know, at this node.
-    Unknown(usize),
     /// Constraints that could not be solved here, this one among them.
     Constraint(usize),
 }
@@ -231,7 +229,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         let value = |a: usize| &self.values[a][0];
         Ok(match self.dag.ops[i] {
             Op::Number { mantissa, decimals } => f.number(mantissa, decimals),
-            Op::Pi => f.pi().ok_or(Singular::Unknown(i))?,
+            Op::Pi => f.pi(),
             Op::Slot(_) => self.start(i),
             Op::Add(a, b) => f.add(value(a), value(b)),
             Op::Subtract(a, b) => f.sub(value(a), value(b)),

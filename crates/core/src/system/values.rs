@@ -18,8 +18,8 @@ pub(crate) trait Values: Scalars {
 
     /// `mantissa / 10^decimals`.
     fn number(&self, mantissa: i128, decimals: i32) -> Self::Element;
-    /// The half turn, if the field knows it.
-    fn pi(&self) -> Option<Self::Element>;
+    /// The half turn.
+    fn pi(&self) -> Self::Element;
     /// The true value of a function; `None` where it is not defined.
     fn function(&self, function: Function, x: &Self::Element) -> Option<Self::Element>;
     /// A random value of something generic at the given attempt to find a point.
@@ -40,6 +40,12 @@ pub(crate) trait Values: Scalars {
     ) -> Result<(), usize>;
 }
 
+/// An element as if at random, of a kind of function and its argument.
+fn any(f: &Field, kind: u64, x: u64) -> u64 {
+    let mut rng = SplitMix64::new(SplitMix64::new(f.modulus() ^ kind).next_u64() ^ x);
+    1 + rng.below(f.modulus() - 1)
+}
+
 impl Values for Field {
     const ATTEMPTS: usize = 64;
     const BITS: i64 = 64;
@@ -51,14 +57,33 @@ impl Values for Field {
         Field::mul(self, from_i128(self, mantissa), factor)
     }
 
-    /// It is transcendental.
-    fn pi(&self) -> Option<u64> {
-        None
+    /// It is transcendental: any element serves, always the same one.
+    fn pi(&self) -> u64 {
+        any(self, 0, 0)
     }
 
-    /// Nothing in a prime field knows the value of a function.
-    fn function(&self, _: Function, _: &u64) -> Option<u64> {
-        None
+    /// Nothing in a prime field knows the value of a function. Where values are independent of each other
+    /// (`independent`) any element serves, the same one for the same argument; those of one argument belong together.
+    fn function(&self, function: Function, x: &u64) -> Option<u64> {
+        let (f, one) = (self, Field::one(self));
+        let exponential = || any(f, 1, *x);
+        // tan(x/2)
+        let half = || any(f, 2, *x);
+        let over = |a: u64, b: u64| Scalars::inverse(f, &b).map(|inverse| Field::mul(f, a, inverse));
+        let square = |a: u64| Field::mul(f, a, a);
+        match function {
+            Function::Exp => Some(exponential()),
+            Function::Tanh => {
+                let e = square(exponential());
+                over(Field::sub(f, e, one), Field::add(f, e, one))
+            }
+            Function::Sin => over(Field::add(f, half(), half()), Field::add(f, one, square(half()))),
+            Function::Cos => over(Field::sub(f, one, square(half())), Field::add(f, one, square(half()))),
+            Function::Tan => over(Field::add(f, half(), half()), Field::sub(f, one, square(half()))),
+            Function::Log => Some(any(f, 3, *x)),
+            Function::Atan => Some(any(f, 4, *x)),
+            Function::Asin | Function::Acos | Function::Sqrt | Function::Abs | Function::Sign => None,
+        }
     }
 
     fn random(&self, rng: &mut SplitMix64, _: usize) -> u64 {
@@ -98,8 +123,8 @@ impl<const N: usize> Values for Reals<N> {
         if decimals < 0 { whole.mul(&ten) } else { whole.div(&ten).unwrap_or(Ball::ZERO) }
     }
 
-    fn pi(&self) -> Option<Ball<N>> {
-        Some(Ball::pi())
+    fn pi(&self) -> Ball<N> {
+        Ball::pi()
     }
 
     fn function(&self, function: Function, x: &Ball<N>) -> Option<Ball<N>> {
@@ -116,7 +141,7 @@ impl<const N: usize> Values for Reals<N> {
             Function::Asin => Ball::atan2(x, &side()?),
             Function::Acos => {
                 // on the cut of the angle, but defined
-                if x.add(&one).is_exactly_zero() { self.pi() } else { Ball::atan2(&side()?, x) }
+                if x.add(&one).is_exactly_zero() { Some(self.pi()) } else { Ball::atan2(&side()?, x) }
             }
             Function::Atan => Ball::atan2(x, &one),
             Function::Exp => x.exp(),

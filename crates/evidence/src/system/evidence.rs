@@ -61,9 +61,9 @@ pub struct SystemEvidence {
     pub passed: bool,
     /// The longest horizon, of every experiment, in the unit of the model.
     pub duration: f64,
-    /// Of a rational model: bound on the probability that a verdict is wrong.
+    /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
     pub error_bound: Option<f64>,
-    /// Of a model with functions: how clear its ranks were in real numbers.
+    /// Of a model judged in real numbers: how clear its ranks were.
     pub digits: Option<DigitsReport>,
     /// Seed of all random choices.
     pub seed: u64,

@@ -53,9 +53,9 @@ pub struct SystemRun {
     pub step: f64,
     /// Standard deviation of the noise of a sample, by output.
     pub noise: Vec<(String, f64)>,
-    /// Of a rational model: bound on the probability that a verdict is wrong.
+    /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
     pub error_bound: Option<f64>,
-    /// Of a model with functions: how clear its ranks were in real numbers.
+    /// Of a model judged in real numbers: how clear its ranks were.
     pub digits: Option<DigitsReport>,
     /// Seed of the noise and of the initial errors.
     pub seed: u64,

@@ -1,0 +1,168 @@
+//! Functions whose values are independent of each other at a generic point: then random values stand for them, and prime
+//! fields decide as they do for rational models.
+//!
+//! Let `u_1 .. u_m` be what exp and tanh are taken of, and the logarithms; let `v_1 .. v_l` be what sin, cos and tan are taken of, and
+//! the arc tangents. If no combination of the `u` with rational coefficients, not all zero, is constant, and none of the `v`, then
+//! all `exp u_i`, `exp(i v_j)`, logarithms and arc tangents together are algebraically independent over the rational functions of
+//! the unknowns: Ax's theorem (Ax 1971, doi:10.2307/1970774: the transcendence degree of `(w, exp w)` is at least the
+//! number of independent `w` plus the rank of their differentials), applied to the `u`, the `i v` and generic multiples of all variables, by
+//! induction over functions of functions. So a point with random values of the functions is a generic point, and the degree of every
+//! minor in these values is bounded as for any other variable (crates/README.md, *Certainty*).
+//!
+//! That no combination is constant is proven by the rank of their gradients, side by side at random points of a prime field: a rank modulo a
+//! prime is never too large. Where it is not full, or an argument is special (a given start or value, the time, a jump), nothing is
+//! said here, and real numbers of many digits decide.
+
+use std::collections::BTreeSet;
+
+use obsdeg_exact::{Echelon, Field, Reals, SplitMix64};
+
+use super::constraints::slots_of;
+use super::dag::Op;
+use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
+use super::rows::{Layout, Maker, random_field};
+use super::taylor::{Signal, Taylor};
+use super::values::Values;
+use crate::model::expression::Function;
+
+/// Most points at which gradients are taken.
+const POINTS: usize = 32;
+
+/// What a function is to the argument above: with exponentials of the argument, or a logarithm itself; real or imaginary.
+fn family(function: Function) -> Option<(bool, bool)> {
+    match function {
+        Function::Exp | Function::Tanh => Some((false, true)),
+        Function::Log => Some((true, true)),
+        Function::Sin | Function::Cos | Function::Tan => Some((false, false)),
+        Function::Atan => Some((true, false)),
+        Function::Asin | Function::Acos | Function::Sqrt | Function::Abs | Function::Sign => None,
+    }
+}
+
+/// How many functions take part, if their values are proven to be independent, and there is a real point at which all are defined.
+pub(super) fn independent_functions(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    rng: &mut SplitMix64,
+) -> Option<usize> {
+    let functions = functions(compiled);
+    if functions.is_empty() {
+        return Some(0);
+    }
+    if model.experiments > 1 || !compiled.constraints.is_empty() {
+        return None;
+    }
+    // exp u and tanh u are one, as are sin v, cos v, tan v; exp(log x) and log x are not
+    let mut sets: [BTreeSet<(bool, usize)>; 2] = Default::default();
+    for &(node, function, of) in &functions {
+        let (inverse, real) = family(function)?;
+        if slots_of(&compiled.dag, of).into_iter().any(|s| !is_generic(model, compiled.roles[s])) {
+            return None;
+        }
+        sets[usize::from(real)].insert((inverse, if inverse { node } else { of }));
+    }
+    let maker = Maker { model, compiled, layout, field: random_field(rng) };
+    let free = sets.iter().all(|nodes| is_free(&maker, nodes, rng));
+    (free && is_somewhere(model, compiled, layout, rng)).then_some(functions.len())
+}
+
+/// Whether there is a real point at which rates and outputs are defined: then they are around it.
+fn is_somewhere(model: &SystemModel, compiled: &Compiled, layout: &Layout, rng: &mut SplitMix64) -> bool {
+    let field = Reals::<2>;
+    let maker = Maker { model, compiled, layout, field };
+    let roots: Vec<usize> =
+        compiled.rates(0).iter().chain(compiled.outputs(0)).chain(&compiled.combinations).copied().collect();
+    (0..<Reals<2> as Values>::ATTEMPTS).any(|attempt| {
+        let Some(values) = maker.values(rng, attempt) else { return false };
+        let starts = vec![None; values.len()];
+        let signals = values.into_iter().map(|value| Signal::Constant { value, lane: None }).collect();
+        Taylor::new(&compiled.dag, field, 0, signals, &starts, &roots, false, SplitMix64::new(0)).is_ok()
+    })
+}
+
+/// The functions that rates, outputs, starts, constants and jumps are made of: node, kind, argument.
+fn functions(compiled: &Compiled) -> Vec<(usize, Function, usize)> {
+    let dag = &compiled.dag;
+    let experiments = 0..compiled.experiments.len();
+    let own = experiments.flat_map(|e| {
+        let given = compiled.constants(e).iter().flatten();
+        compiled.rates(e).iter().chain(compiled.outputs(e)).chain(given)
+    });
+    let segments =
+        compiled.segments.iter().flat_map(|s| s.constants.iter().chain(&s.carry)).map(|(_, node)| node);
+    let mut left: Vec<usize> = own
+        .chain(compiled.starts.iter().flatten())
+        .chain(segments)
+        .chain(&compiled.combinations)
+        .copied()
+        .collect();
+    let mut seen = vec![false; dag.ops.len()];
+    let mut out = Vec::new();
+    while let Some(i) = left.pop() {
+        if std::mem::replace(&mut seen[i], true) {
+            continue;
+        }
+        match dag.ops[i] {
+            Op::Number { .. } | Op::Slot(_) | Op::Pi => {}
+            Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => left.extend([a, b]),
+            Op::Primitive { function, of, weight } => {
+                out.push((i, function, of));
+                left.extend([of, weight]);
+            }
+        }
+    }
+    out
+}
+
+/// Whether what an argument depends on is at a generic value wherever a run or a segment begins, and the same in all of them; or
+/// a number that never changes.
+fn is_generic(model: &SystemModel, role: Role) -> bool {
+    let changes = |name: &str| model.segments.iter().any(|s| s.constants.iter().any(|c| c.0 == name));
+    let jumps = |name: &str| model.segments.iter().any(|s| s.carry.iter().any(|c| c.0 == name));
+    match role {
+        Role::State(i) => {
+            let s = &model.states[i];
+            !matches!(s.start, StateStart::Value(_)) && !jumps(&s.named.name)
+        }
+        Role::Parameter(_) | Role::UnknownInput(_) => true,
+        Role::KnownInput(i) => !matches!(model.known_input(0, i), KnownInput::Function(_)),
+        Role::Constant(i) => !changes(&model.constants[i].0.name),
+        Role::Time => false,
+    }
+}
+
+/// Whether no combination of these nodes is constant: their gradients by all that is generic, at some points side by side, have full rank.
+fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &mut SplitMix64) -> bool {
+    let compiled = maker.compiled;
+    let roots: Vec<usize> = nodes.iter().map(|n| n.1).collect();
+    let given =
+        |s: usize| matches!(compiled.roles[s], Role::Constant(c) if compiled.constants(0)[c].is_some());
+    let lanes: Vec<usize> = (0..compiled.roles.len()).filter(|&s| !given(s)).collect();
+    let mut rows: Vec<Vec<u64>> = vec![Vec::new(); roots.len()];
+    for _ in 0..POINTS.min(roots.len()) {
+        let Some(values) = maker.values(rng, 0) else { return false };
+        let signal = |(s, value): (usize, &u64)| Signal::Constant {
+            value: *value,
+            lane: lanes.binary_search(&s).ok(),
+        };
+        let signals = values.iter().enumerate().map(signal).collect();
+        let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
+        let dag = &compiled.dag;
+        let Ok(at) = Taylor::new(dag, maker.field, lanes.len(), signals, &starts, &roots, false, seed) else {
+            return false;
+        };
+        for (row, &node) in rows.iter_mut().zip(&roots) {
+            let start = row.len();
+            row.resize(start + lanes.len(), 0);
+            for (&lane, x) in at.lanes_of(node).iter().zip(at.dual(node, 0)) {
+                row[start + lane as usize] = *x;
+            }
+        }
+        let mut space = Echelon::new(maker.field, rows[0].len());
+        if rows.iter().all(|row| space.insert(row)) {
+            return true;
+        }
+    }
+    roots.is_empty()
+}

@@ -1,0 +1,216 @@
+//! Two engines, one verdict: what is judged in prime fields is judged again in real numbers of many digits, which share the
+//! graph and the staircase but no arithmetic, no elimination and no values of functions.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use obsdeg_core::system::{
+    Judgement, SystemCertainty, SystemModel, json, judge_compiled, judge_in_digits, model_file,
+};
+use obsdeg_exact::SplitMix64;
+
+/// Everything that two judgements must have in common.
+fn same(a: &Judgement, b: &Judgement) -> Result<(), String> {
+    let of = |j: &Judgement| {
+        (j.findings.degrees.clone(), j.findings.asked.clone(), j.findings.partners.clone(), j.rests_on_bound)
+    };
+    let (a, b) = (of(a), of(b));
+    if a == b { Ok(()) } else { Err(format!("{a:?}\n{b:?}")) }
+}
+
+/// What came of a model.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Count {
+    agree: usize,
+    /// Digits decide nothing, and say so.
+    undecided: usize,
+    /// Neither has a value for it.
+    refused: usize,
+    /// Of those that agree: not everything is observable; a chain was not followed to a proven end.
+    deficient: usize,
+    open: usize,
+    /// Judged in prime fields by the one and in digits by the other.
+    apart: usize,
+}
+
+/// Judges a model by both.
+fn hold(model: &SystemModel, text: &str, order: Option<usize>, count: &mut Count) {
+    let compiled = model.compile().unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let fields = judge_compiled(model, &compiled, 3, order);
+    let digits = judge_in_digits(model, &compiled, 5, order);
+    match (fields, digits) {
+        (Ok(a), Ok(b)) => {
+            if let Err(difference) = same(&a, &b) {
+                panic!("{difference}\n{text}");
+            }
+            count.agree += 1;
+            count.deficient += usize::from(a.findings.degrees.rank() < a.layout.unknowns.len());
+            count.open += usize::from(a.rests_on_bound);
+            count.apart += usize::from(matches!(a.certainty, SystemCertainty::Primes(_)));
+        }
+        (Ok(_), Err(e)) if e.to_string().contains("undecided, because") => count.undecided += 1,
+        (Err(_), Err(_)) => count.refused += 1,
+        (a, b) => panic!("{:?} {:?}\n{text}", a.map(|a| a.findings.degrees), b.map(|b| b.findings.degrees)),
+    }
+}
+
+/// Draws models: polynomials and quotients in states, parameters, inputs, constants of given value, with known starts, segments,
+/// jumps and experiments now and then.
+struct Draw {
+    rng: SplitMix64,
+    functions: bool,
+}
+
+impl Draw {
+    fn below(&mut self, n: u64) -> u64 {
+        self.rng.below(n)
+    }
+
+    fn one_of<'a>(&mut self, names: &'a [String]) -> &'a str {
+        let i = self.below(names.len() as u64) as usize;
+        &names[i]
+    }
+
+    fn term(&mut self, names: &[String], depth: u64) -> String {
+        if depth == 0 || self.below(4) == 0 {
+            return match self.below(5) {
+                0 => (self.below(7) as i64 - 3).to_string(),
+                _ => self.one_of(names).to_string(),
+            };
+        }
+        let (a, b) = (self.term(names, depth - 1), self.term(names, depth - 1));
+        if self.functions && self.below(3) == 0 {
+            let function = ["sin", "cos", "tan", "exp", "log", "atan", "tanh", "sqrt"];
+            return format!("{}({a} + 2)", function[self.below(8) as usize]);
+        }
+        match self.below(9) {
+            0..=3 => format!("({a} + {b})"),
+            4 => format!("({a} - {b})"),
+            5..=7 => format!("({a})*({b})"),
+            _ => format!("({a})/(2 + ({b})^2)"),
+        }
+    }
+
+    fn model(&mut self) -> String {
+        let list = |letter: &str, n: u64| (0..n).map(|i| format!("{letter}{i}")).collect::<Vec<_>>();
+        let states = 1 + self.below(4);
+        let (x, p) = (list("x", states), list("p", self.below(4)));
+        let (c, u) = (list("c", self.below(2)), list("u", self.below(2)));
+        let w = list("w", u64::from(self.below(6) == 0));
+        let names = [&x[..], &p, &c, &u, &w].concat();
+        let mut text = String::from("name='m'\n");
+        let experiments = self.below(8) == 0;
+        if experiments {
+            text += "experiments=2\n";
+        }
+        let _ = writeln!(text, "parameters={p:?}");
+        if !c.is_empty() {
+            let _ = writeln!(text, "[constants]\nc0={}", self.below(4));
+        }
+        if !u.is_empty() {
+            let kind = if self.below(2) == 0 { "'generic'" } else { "{polynomial=1}" };
+            let _ = writeln!(text, "[known_inputs]\nu0={kind}");
+        }
+        if !w.is_empty() {
+            let kind = if self.below(3) == 0 { "'arbitrary'" } else { "{polynomial=1}" };
+            let _ = writeln!(text, "[unknown_inputs]\nw0={kind}");
+        }
+        text += "[states]\n";
+        let special = self.below(4) == 0;
+        for name in &x {
+            let rate = self.term(&names, 2);
+            let start = match (special, self.below(3)) {
+                (true, 0) => format!(", initial={}", self.below(3)),
+                (true, 1) => ", initial='known'".into(),
+                _ => String::new(),
+            };
+            let _ = writeln!(text, "{name}={{equation='{rate}'{start}}}");
+        }
+        text += "[outputs]\n";
+        for i in 0..1 + self.below(2) {
+            let _ = writeln!(text, "y{i}='{}'", self.term(&names, 2));
+        }
+        if self.below(4) == 0 {
+            text += "[[segment]]\n[[segment]]\n";
+            if !c.is_empty() {
+                let _ = writeln!(text, "constants={{c0='{}'}}", self.below(4));
+            }
+            if self.below(2) == 0 {
+                let _ = writeln!(text, "carry={{x0='{}'}}", self.term(&x, 1));
+            }
+        }
+        text
+    }
+}
+
+fn random_models(functions: bool, seeds: std::ops::Range<u64>) -> Count {
+    let mut count = Count::default();
+    for seed in seeds {
+        let text = Draw { rng: SplitMix64::of(seed, "random models", &[""; 0]), functions }.model();
+        let model = model_file::read(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        hold(&model, &text, Some(12), &mut count);
+    }
+    count
+}
+
+#[test]
+fn random_rational_models_in_both_engines() {
+    let count = random_models(false, 0..100);
+    assert!(count.agree > 95 && count.deficient > 15 && count.open > 0, "{count:?}");
+}
+
+/// `cargo test --release --test it -- --ignored a_thousand_random_rational_models`
+#[test]
+#[ignore = "minutes"]
+fn a_thousand_random_rational_models_in_both_engines() {
+    let count = random_models(false, 1000..2000);
+    assert_eq!((count.agree, count.apart), (1000, 1000), "{count:?}");
+}
+
+/// Functions of arguments that are independent are judged in prime fields: by true values they must be what they are there.
+#[test]
+fn random_function_models_in_both_engines() {
+    let count = random_models(true, 0..60);
+    assert!(count.agree > 40 && count.apart > 20, "{count:?}");
+}
+
+/// `cargo test --release --test it -- --ignored a_thousand_random_function_models`
+#[test]
+#[ignore = "minutes"]
+fn a_thousand_random_function_models_in_both_engines() {
+    let count = random_models(true, 1000..2000);
+    assert!(count.agree > 900 && count.apart > 300, "{count:?}");
+}
+
+/// The reference models, as far as a few seconds go; all of them with the ignored test.
+fn references(largest: usize) -> Count {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder).expect("models").map(|e| e.expect("an entry").path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "json"));
+    files.sort();
+    let mut count = Count::default();
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("readable");
+        let model = json::read(&text).expect("a model");
+        if model.states.len() + model.parameters.len() <= largest {
+            hold(&model, &file.display().to_string(), None, &mut count);
+        }
+    }
+    count
+}
+
+#[test]
+fn small_reference_models_in_both_engines() {
+    let count = references(8);
+    assert!(count.undecided == 0 && count.refused == 0 && count.agree > 40, "{count:?}");
+}
+
+/// `cargo test --release --test it -- --ignored all_reference_models_in_both_engines`
+#[test]
+#[ignore = "minutes"]
+fn all_reference_models_in_both_engines() {
+    // of two the digits say that they decide nothing
+    let count = references(usize::MAX);
+    assert_eq!((count.agree, count.undecided), (139, 2), "{count:?}");
+}
