@@ -1,6 +1,6 @@
 //! `obsdeg design`: the fewest positions, and the best of a number of positions.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
@@ -8,7 +8,8 @@ use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Scheme, Unknowns, parse_decimal};
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, design, scheme_found,
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, design,
+    design_merged, design_part, scheme_found,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
@@ -18,7 +19,7 @@ use crate::conditions::{MeasurementArguments, within};
 use crate::failure::Failure;
 use crate::input::Source;
 use crate::interrupt;
-use crate::output::{Output, to_a_folder};
+use crate::output::{Output, print, to_a_folder};
 use crate::progress::Bar;
 
 const AFTER_HELP: &str = "\
@@ -30,8 +31,11 @@ Examples:
   obsdeg design --positions 6 --observable D_F,D_O,D_S --max-degree 1
   obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01 --meet
   obsdeg design --positions 5 --carry inertial --candidates grid:45 --gimbal beta=-60:60 --refine
+  obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
+  obsdeg design --positions 7 --carry inertial --merge part-*.json
 
-Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. With slews
+Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. Under reset carry
+information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. With slews
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
 winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error, 130 interrupted before anything was found.";
@@ -76,6 +80,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     restarts: u64,
 
+    /// Under reset carry, where many sequences would have to be searched: a scheme found by exchange is enough when it is within so many percent
+    /// of what is possible at all (0: all are searched)
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.01, value_parser = percent)]
+    within: f64,
+
     /// Move the angles of the best scheme continuously, to hundredths of a degree
     #[arg(long)]
     refine: bool,
@@ -83,6 +92,15 @@ pub(crate) struct Arguments {
     /// Other numbers of positions for the front of total time against the criterion
     #[arg(long, value_name = "K", value_delimiter = ',')]
     front: Vec<usize>,
+
+    /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o; an interrupted part goes on
+    /// when the same command is given again
+    #[arg(long, value_name = "I/N", value_parser = part, requires = "output", conflicts_with_all = ["minimum", "merge"])]
+    part: Option<[usize; 2]>,
+
+    /// Put the parts of a search together to the answer of the whole; all other options as they were
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "minimum")]
+    merge: Vec<PathBuf>,
 
     /// Seed of all random choices; the result does not depend on the number of threads
     #[arg(long, default_value_t = 1)]
@@ -144,8 +162,23 @@ fn degree_cap(text: &str) -> Result<(Option<String>, usize), String> {
     Ok((name.map(Into::into), cap))
 }
 
+fn part(text: &str) -> Result<[usize; 2], String> {
+    let found =
+        text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
+    found
+        .filter(|[i, n]| (1..=*n).contains(i))
+        .ok_or_else(|| format!("expected a part such as 2/7, found `{text}`"))
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    let found = text.trim().parse().ok().filter(|x: &f64| (0.0..=100.0).contains(x));
+    found.ok_or_else(|| format!("expected 0 to 100 percent, found `{text}`"))
+}
+
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
-    a.output.target.check_folder()?;
+    if a.part.is_none() {
+        a.output.target.check_folder()?;
+    }
     let (mut base, candidates) = candidates(&a.candidates)?;
     a.assumptions.apply(&mut base);
     if let Some(terms) = &a.terms {
@@ -173,18 +206,55 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         restarts: a.restarts,
         refine: a.refine,
         front: a.front.clone(),
+        within: a.within / 100.0,
         seed: a.seed,
     };
+    let parts = a.merge.iter().map(|path| Ok((path.display().to_string(), read_part(path)?)));
+    let parts: Vec<(String, Part)> = parts.collect::<Result<_, Failure>>()?;
+    let going_on = a.part.and_then(|_| a.output.target.existing()).map(read_part).transpose()?;
     let bar = Bar::start(1, "searching", a.output.target.quiet);
     let interrupted = interrupt::flag()?;
-    let designed = design(&base, &conditions, &options, &|now| {
+    let progress = |now: Progress| {
         bar.search(&now);
         !interrupted.load(Ordering::Relaxed)
-    });
+    };
+    if let Some(number) = a.part {
+        let done = design_part(&base, &conditions, &options, number, going_on, &progress);
+        drop(bar);
+        return write_part(&done?, &a.output);
+    }
+    let designed = if parts.is_empty() {
+        design(&base, &conditions, &options, &progress)
+    } else {
+        design_merged(&base, &conditions, &options, &parts, &progress)
+    };
     drop(bar);
     let found = designed?;
     let more = || files(&found, &base, &conditions);
     a.output.write_folder(&found, "design.json", more)
+}
+
+/// A part of a search from its file.
+fn read_part(path: &Path) -> Result<Part, Failure> {
+    let source = Source::read(path, "part")?;
+    serde_json::from_str(source.text())
+        .map_err(|e| Failure::input(format!("{}: it is no part of a search: {e}", path.display())))
+}
+
+/// Writes a part to its file, whole or interrupted, and says which.
+fn write_part(part: &Part, output: &Output) -> Result<(), Failure> {
+    let text = serde_json::to_string(part).map_err(|e| Failure::internal(e.to_string()))?;
+    output.target.replace(format!("{text}\n").as_bytes())?;
+    let [number, of] = part.part;
+    let [from, to, all] = part.starts;
+    let examined: u64 = part.levels.iter().map(|level| level.best.examined).sum();
+    let what = format!("part {number} of {of}: {} of {all} starts, {examined} sequences", to - from);
+    match part.complete {
+        true => print(format!("{what}\n").as_bytes()),
+        false => {
+            Err(Failure::unfinished(format!("{what} so far: interrupted; the same command goes on with it")))
+        }
+    }
 }
 
 /// What a shared option says here.
@@ -227,7 +297,14 @@ fn scheme_file(
     conditions: &Conditions,
 ) -> Result<String, DesignError> {
     let proven = found.search.as_ref().is_some_and(|s| s.proven) && !best.refined;
-    let proven = if proven { "proven best" } else { "best found" };
+    let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| !best.refined);
+    let proven = match (proven, certificate) {
+        (true, _) => "proven best".into(),
+        (false, Some(c)) => {
+            format!("within {} of the best possible", obsdeg_report::percent(c.within_percent))
+        }
+        (false, None) => "best found".to_string(),
+    };
     let positions = best.positions.iter().enumerate().map(|(i, name)| format!("p{} {name}", i + 1));
     let positions = positions.collect::<Vec<_>>().join(", ");
     let scheme = scheme_found(best, base, conditions)?;

@@ -51,6 +51,11 @@ impl Failure {
         Self { message: "interrupted; nothing was written".into(), code: INTERRUPTED }
     }
 
+    /// Interrupted with something written that another run goes on with.
+    pub(crate) fn unfinished(message: String) -> Self {
+        Self { message, code: INTERRUPTED }
+    }
+
     /// The program is wrong.
     pub(crate) fn internal(message: String) -> Self {
         Self { message: format!("internal error: {message}"), code: INTERNAL }

@@ -83,6 +83,10 @@ impl Source {
         Ok(Self { path: path.to_path_buf(), text })
     }
 
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     /// The file's name without its ending; the folder's for a `scheme.toml`.
     pub(crate) fn title(&self) -> String {
         let stem = self.path.file_stem().unwrap_or(self.path.as_os_str());

@@ -118,6 +118,17 @@ impl Target {
         Ok(())
     }
 
+    /// The file if it is there and is not to be replaced.
+    pub(crate) fn existing(&self) -> Option<&Path> {
+        self.output.as_deref().filter(|path| path.exists() && !self.force)
+    }
+
+    /// Writes `text` to the file, in place of what is there.
+    pub(crate) fn replace(&self, text: &[u8]) -> Result<(), Failure> {
+        let Some(path) = &self.output else { return print(text) };
+        place(path, &[(path.clone(), text)])
+    }
+
     /// Writes `text` to the file or to stdout; beside a file what it refers to, which comes first.
     pub(crate) fn write(&self, text: &[u8], beside: &[File]) -> Result<(), Failure> {
         let Some(path) = &self.output else { return print(text) };

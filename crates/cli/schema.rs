@@ -5,7 +5,7 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
-use obsdeg_design::design::Design;
+use obsdeg_design::design::{Design, Part};
 use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
@@ -30,6 +30,8 @@ enum Kind {
     Comparison,
     /// The JSON of `obsdeg design`
     Design,
+    /// The JSON of `obsdeg design --part`
+    Part,
     /// Scheme files
     Scheme,
     /// The JSON of `obsdeg analyze --model`
@@ -56,6 +58,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         Kind::Crosscheck => schema_for!(CrossCheck),
         Kind::Comparison => schema_for!(Comparison),
         Kind::Design => schema_for!(Design),
+        Kind::Part => schema_for!(Part),
         Kind::Scheme => schema_for!(SchemeFile),
         Kind::System => schema_for!(SystemAnalysis),
         Kind::Run => schema_for!(SystemRun),

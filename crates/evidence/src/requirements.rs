@@ -1,7 +1,7 @@
 //! Requirements against sigmas: the one decision that every command reports.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Whether a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for what is no number.
 pub fn meets(sigma: f64, required: f64) -> bool {
@@ -37,7 +37,7 @@ impl Claim<'_> {
 }
 
 /// Why a requirement is missed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Miss {
     /// Sigma is above it.
@@ -53,7 +53,7 @@ pub enum Miss {
 }
 
 /// An unknown that misses its requirement.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Missed {
     /// The unknown.
     pub name: String,
@@ -62,7 +62,7 @@ pub struct Missed {
 }
 
 /// A margin and whose it is.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Margin {
     /// The unknown.
     pub name: String,
@@ -71,7 +71,7 @@ pub struct Margin {
 }
 
 /// Under what sigmas are held against requirements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
     /// The information of all samples: no prior, no drift noise, psi at the start (under reset carry at the start of each position).
@@ -81,7 +81,7 @@ pub enum Basis {
 }
 
 /// What became of all requirements.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Requirements {
     /// Under what this is decided.
     pub basis: Basis,

@@ -1,11 +1,11 @@
 //! Schemes that were found.
 
-use obsdeg_design::design::{Design, Found, SearchReport};
+use obsdeg_design::design::{Certificate, Design, Found, SearchReport};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
 use crate::document::{Block, Document, left, number, right};
-use crate::figure::{BLUE, Figure, FigureError, Line, Stroke};
+use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
 use crate::{Answer, words};
 
@@ -106,9 +106,18 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             s.examined, d.error_bound
         )
     } else if s.interrupted {
-        format!("interrupted after {} sequences: the best so far", s.examined)
+        let known = s.certificate.as_ref().map_or_else(String::new, |c| {
+            format!(", within {} of the best possible of these candidates", percent(c.within_percent))
+        });
+        format!("interrupted after {} sequences: the best so far{known}", s.examined)
     } else {
-        format!("not proven: coordinate exchange from random starts, {} sequences examined", s.examined)
+        let known = s.certificate.as_ref().map_or_else(String::new, |c| {
+            format!("; within {} of the best possible of these candidates", percent(c.within_percent))
+        });
+        format!(
+            "not proven: coordinate exchange from random starts, {} sequences examined{known}",
+            s.examined
+        )
     }];
     if s.ties.is_some() && s.interrupted {
         out.push("interrupted before the front was complete".into());
@@ -154,6 +163,58 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         criterion(&s.criterion)
     ));
     out.extend(s.constraints.iter().map(|c| format!("constraint: {c}")));
+    out
+}
+
+/// In percent, rounded up to two digits: `0.0021 %`.
+pub(crate) fn percent(x: f64) -> String {
+    const LEAST: f64 = 1e-6;
+    if x <= LEAST {
+        return format!("{LEAST} %");
+    }
+    let digit = 10f64.powi(x.log10().floor() as i32 - 1);
+    let decimals = (1 - x.log10().floor() as i32).max(0) as usize;
+    format!("{:.decimals$} %", (x / digit - 1e-9).ceil() * digit)
+}
+
+/// How good the best can be.
+fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
+    let Some(c) = &s.certificate else {
+        let why = match s.order_matters {
+            true => format!(
+                "not known: under {} carry the information of a scheme is no sum over its positions, and no bound is computed",
+                d.carry
+            ),
+            false if s.interrupted => "not known: interrupted".into(),
+            false => "not known: the weights of the candidates prove nothing here".into(),
+        };
+        return vec![why];
+    };
+    let first = if d.found.first().is_some_and(|f| f.refined) {
+        "the first that is not refined"
+    } else {
+        "the first"
+    };
+    let mut out = vec![
+        format!(
+            "{first} is within {} of the best possible of these candidates: no scheme of {} of them in equal dwells, of whatever degrees, has a \
+             criterion below {} ({} {:.6} at least)",
+            percent(c.within_percent),
+            s.positions,
+            number(c.best_possible),
+            if s.criterion == "D" { "D-efficiency" } else { "efficiency, the square of the ratio," },
+            (c.efficiency * 1e6).floor() / 1e6
+        ),
+        format!(
+            "by optimal weights of the candidates (approximate design theory), as if positions could be divided: they would reach {}, and this way \
+             of bounding gives no more",
+            number(c.attained)
+        ),
+    ];
+    let mut weights: Vec<_> = c.weights.iter().collect();
+    weights.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    let listed: Vec<String> = weights.iter().map(|w| format!("{} {:.4}", w.candidate, w.weight)).collect();
+    out.push(format!("weights: {}", shortened(&listed)));
     out
 }
 
@@ -215,6 +276,7 @@ impl Answer for Design {
             let first = self.found.first().map(|f| requirements(&f.requirements));
             blocks.extend(first.map(|lines| Block::list("Requirements of the first", lines)));
             blocks.push(Block::list("How", how(self, s)));
+            blocks.push(Block::list("How good the best can be", bound(self, s)));
             blocks.push(table(
                 "Front of total time against the criterion (other dwells by exchange, not proven)",
                 &self.front,
@@ -261,6 +323,16 @@ fn shortened(names: &[String]) -> String {
     format!("{}{more}", names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(" "))
 }
 
+/// What no scheme is below, by total time.
+pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
+    Line {
+        label: "no scheme of the candidates is below".into(),
+        color: BLACK,
+        stroke: Stroke::Dashed,
+        points: bound.iter().map(|p| (p[0], p[1])).collect(),
+    }
+}
+
 /// The front of total time against the criterion; none when there is no search.
 pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
     let Some(search) = d.search.as_ref().filter(|_| !d.front.is_empty()) else { return Ok(Vec::new()) };
@@ -278,18 +350,22 @@ pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
         let (low, high) = d.front.iter().map(of).fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
         Some((low / 1.3, high * 1.3))
     };
+    let bound = search.certificate.as_ref().map_or(&[][..], |c: &Certificate| &c.front);
+    let lowest = bound.iter().map(|p| p[1]).fold(f64::MAX, f64::min) / 1.3;
     let figure = Figure {
         title: format!("What total time buys{slews}"),
         x_label: "total time [s]".into(),
         y_label: label,
         x_range: ends(|f| f.total_s),
-        y_range: ends(|f| f.value),
-        lines: vec![Line {
-            label: String::new(),
+        y_range: ends(|f| f.value).map(|(low, high)| (low.min(lowest), high)),
+        lines: std::iter::once(Line {
+            label: if bound.is_empty() { String::new() } else { "best found".into() },
             color: BLUE,
             stroke: Stroke::Solid,
             points: steps.chain(last).collect(),
-        }],
+        })
+        .chain((!bound.is_empty()).then(|| bound_line(bound)))
+        .collect(),
         log: true,
         ..Figure::default()
     };

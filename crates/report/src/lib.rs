@@ -147,6 +147,11 @@ pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<S
     })
 }
 
+/// A part in percent, never below what it is: `0.0021 %`.
+pub fn percent(x: f64) -> String {
+    design::percent(x)
+}
+
 /// The front of a design as SVG and PNG.
 ///
 /// # Errors

@@ -10,7 +10,8 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::crosscheck::CrossCheck;
 
 use crate::analysis::null_vector;
-use crate::document::{Block, Document, Typeset, left, optional, right};
+use crate::design::percent;
+use crate::document::{Block, Document, Typeset, left, number, optional, right};
 use crate::{Answer, compare, latex, simulation, words};
 
 /// A review as one document.
@@ -337,6 +338,21 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
                 all.none_of.last().map_or_else(|| "few".into(), |n| n[0].to_string())
             ),
         });
+    }
+    if let (Some(c), Some(best)) = (
+        &alternatives.certificate,
+        alternatives.front.iter().find(|f| s.positions.first().is_some_and(|p| p.dwell_s == f.dwell_s)),
+    ) {
+        lines.push(format!(
+            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {} (optimal weights); the best found has {}, \
+             within {} of that",
+            alternatives.front_positions,
+            number(best.dwell_s),
+            alternatives.required.join(", "),
+            number(c.best_possible),
+            number(best.value),
+            percent(c.within_percent)
+        ));
     }
     blocks.push(Block::list("", lines));
     let row = |d: &obsdeg_evidence::compare::DropOne| {

@@ -204,3 +204,37 @@ fn the_winner_is_a_scheme_file() {
         assert!(output.status.code() == Some(2) && stderr.contains(expected), "{arguments:?}: {stderr}");
     }
 }
+
+/// Parts are files; together they give what the command gives, and what is wrong with one is said with its name.
+#[test]
+fn parts_are_files() {
+    let place = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| place.path().join(name).display().to_string();
+    let common =
+        ["design", "--positions", "3", "--carry", "inertial", "--observable", "D_F", "--format", "json"];
+    let with = |more: &[&str]| {
+        let arguments = [&common[..], more].concat();
+        run(&arguments)
+    };
+    let [one, two] = [1, 2].map(|i| file(&format!("part-{i}.json")));
+    for (i, path) in [(1, &one), (2, &two)] {
+        let said = stdout(&with(&["--part", &format!("{i}/2"), "-o", path]));
+        assert!(said.starts_with(&format!("part {i} of 2: ")), "{said}");
+        // done already
+        assert_eq!(stdout(&with(&["--part", &format!("{i}/2"), "-o", path])), said);
+    }
+    assert_eq!(stdout(&with(&["--merge", &two, &one])), stdout(&with(&[])));
+    for (arguments, expected) in [
+        (vec!["--merge", &one], "missing of 2 parts: 2"),
+        (vec!["--merge", &one, &two, &one], "is in"),
+        (vec!["--merge", &one, "Cargo.toml"], "Cargo.toml: it is no part of a search"),
+        (vec!["--merge", &one, &two, "--seed", "2"], "it is a part of another search"),
+        (vec!["--part", "2/2", "-o", &one], "it is part 1 of 2; expected part 2 of 2"),
+        (vec!["--part", "3/2", "-o", "x"], "expected a part such as 2/7"),
+        (vec!["--part", "1/2"], "--output"),
+    ] {
+        let output = with(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&output).contains(expected), "{arguments:?}: {}", stderr(&output));
+    }
+}

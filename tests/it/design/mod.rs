@@ -1,8 +1,10 @@
 //! Schemes found: the fewest positions, the best of five of the cardinal attitudes, and what the filter makes of it.
 
 mod brute;
+mod certificate;
 mod command;
 mod orders;
+mod parts;
 mod search;
 mod sigmas;
 

@@ -1,7 +1,7 @@
 //! Schemes that were found: plain data.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_evidence::requirements::Requirements;
@@ -11,7 +11,7 @@ use obsdeg_evidence::simulation::MeasurementReport;
 pub const SCHEMA: &str = "obsdeg.design/1";
 
 /// The result of a search.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Design {
     /// `obsdeg.design/1`.
     pub schema: String,
@@ -53,7 +53,7 @@ pub struct Design {
 }
 
 /// The fewest positions that make every required coefficient observable.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Minimum {
     /// Their number; null when all candidates together do not do, or when the sets are too many to be examined.
     pub positions: Option<usize>,
@@ -71,7 +71,7 @@ pub struct Minimum {
 }
 
 /// What was searched, and how.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SearchReport {
     /// The number of positions.
     pub positions: usize,
@@ -102,10 +102,41 @@ pub struct SearchReport {
     pub degree_floor: usize,
     /// The constraints in words.
     pub constraints: Vec<String>,
+    /// How good the best can be; null where no such bound is known: under platform and inertial carry information is no sum over positions.
+    pub certificate: Option<Certificate>,
+}
+
+/// How good the best scheme of so many of these candidates can be: a bound from the optimal weights of the candidates (approximate design
+/// theory). It holds for schemes of any worst degree, within the constraints or not, and allows for the rounding in its evaluation; the
+/// information of each position is as double precision gives it, the same as in the search.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Certificate {
+    /// No scheme of so many of these candidates, equal dwells, has a smaller criterion.
+    pub best_possible: f64,
+    /// The criterion of the first scheme that is not refined is at most so much above, in percent of the bound.
+    pub within_percent: f64,
+    /// The square of the bound over that criterion: how much of the information that the best could have it has at least (for D the D-efficiency).
+    pub efficiency: f64,
+    /// The criterion that the weights would have as a scheme; the bound cannot be larger.
+    pub attained: f64,
+    /// How the weights divide the time among the candidates; those below 0.0001 are left out.
+    pub weights: Vec<Weight>,
+    /// `[total time in s, criterion]`: no scheme of these candidates, in equal dwells and one of the numbers of positions asked for, is below at
+    /// this time.
+    pub front: Vec<[f64; 2]>,
+}
+
+/// A candidate and its weight.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Weight {
+    /// The candidate.
+    pub candidate: String,
+    /// Its part of all positions.
+    pub weight: f64,
 }
 
 /// Sequences that are as good as the best.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TiesReport {
     /// How many, the best and all their images under turns of the platform axes among them.
     pub sequences: u64,
@@ -114,7 +145,7 @@ pub struct TiesReport {
 }
 
 /// A scheme that was found.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Found {
     /// Its positions in order.
     pub positions: Vec<String>,
@@ -146,7 +177,7 @@ pub struct Found {
 }
 
 /// Half a turn to a position.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HalfTurn {
     /// Which position it leads to, counted from 1.
     pub to: usize,

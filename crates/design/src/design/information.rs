@@ -21,6 +21,9 @@ pub(super) struct Candidate {
     pub(super) c: Matrix3<f64>,
     /// `C E(g)` (3 x d), columns in the order of the evaluator.
     pub(super) drift: [Vec<f64>; 3],
+    /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower triangle): what it
+    /// adds to any scheme under reset carry; empty under the others.
+    pub(super) own: Vec<f64>,
 }
 
 /// What every evaluation shares.
@@ -156,6 +159,10 @@ impl Evaluator {
         }
         self.phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
         self.dwell_s = dwell_s;
+        let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
+        let ways = std::mem::take(&mut self.ways);
+        self.stand_at(&attitudes);
+        self.ways = ways;
         Ok(self)
     }
 
@@ -163,9 +170,57 @@ impl Evaluator {
     pub(super) fn stand_at(&mut self, attitudes: &[Matrix3<f64>]) {
         self.candidates = attitudes
             .iter()
-            .map(|c| Candidate { drift: self.ordered_columns(self.platform.drift_rows(&Float, c)), c: *c })
+            .map(|c| {
+                let drift = self.ordered_columns(self.platform.drift_rows(&Float, c));
+                Candidate { own: self.information_alone(c, &drift), drift, c: *c }
+            })
             .collect();
         self.ways.clear();
+    }
+
+    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on.
+    fn information_alone(&self, c: &Matrix3<f64>, drift: &[Vec<f64>; 3]) -> Vec<f64> {
+        if self.carry() != Carry::Reset {
+            return Vec::new();
+        }
+        let n = self.n;
+        let mut local = [[0.0; MAX]; LOCAL];
+        for r in 0..3 {
+            local[r][..3].copy_from_slice(&c[r]);
+            local[3 + r][3..n].copy_from_slice(&drift[r]);
+        }
+        let weighted = self.weighted(&local);
+        let mut own = [[0.0; MAX]; MAX];
+        for (i, row) in own[..n].iter_mut().enumerate() {
+            for (l, w) in local.iter().zip(&weighted) {
+                for (x, y) in row[..=i].iter_mut().zip(&w[..=i]) {
+                    *x += l[i] * y;
+                }
+            }
+        }
+        eliminate(&mut own, n, 3);
+        own[..n]
+            .iter()
+            .enumerate()
+            .flat_map(|(i, row)| (0..n).map(move |j| if j <= i { row[j] } else { 0.0 }))
+            .collect()
+    }
+
+    /// `G L` for the functionals L of `(psi^n, eps^n)` at a position (6 x n).
+    fn weighted(&self, local: &[[f64; MAX]; LOCAL]) -> [[f64; MAX]; LOCAL] {
+        let n = self.n;
+        let mut weighted = [[0.0; MAX]; LOCAL];
+        for (i, row) in weighted.iter_mut().enumerate() {
+            for (k, l) in local.iter().enumerate() {
+                let g = self.local[i][k];
+                if g != 0.0 {
+                    for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
+                        *x += g * y;
+                    }
+                }
+            }
+        }
+        weighted
     }
 
     pub(super) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
@@ -201,13 +256,28 @@ impl Evaluator {
     pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
         let n = self.n;
         let carry = self.carry();
-        let Candidate { c, drift } = &self.candidates[stop.candidate];
+        let Candidate { c, drift, own } = &self.candidates[stop.candidate];
         let turn = self.way_to(state.path.last().copied(), stop);
+        out.path.clone_from(&state.path);
+        out.path.push(stop.candidate);
+        out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
+        if carry == Carry::Reset {
+            // psi of the position is eliminated: information adds
+            for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
+                *sum = x + y;
+            }
+            return;
+        }
         let mut local = [[0.0; MAX]; LOCAL];
         for r in 0..3 {
-            match (carry, turn) {
-                (Carry::Inertial, None) => local[r][..n].copy_from_slice(&state.psi[r]),
-                (Carry::Inertial, Some(turn)) => {
+            match turn {
+                _ if carry == Carry::Platform => {
+                    for (j, x) in local[r][..n].iter_mut().enumerate() {
+                        *x = (0..3).map(|k| c[r][k] * state.psi[k][j]).sum();
+                    }
+                }
+                None => local[r][..n].copy_from_slice(&state.psi[r]),
+                Some(turn) => {
                     for (j, x) in local[r][..n].iter_mut().enumerate() {
                         *x = (0..3).map(|k| turn.phi[r][k] * state.psi[k][j]).sum();
                     }
@@ -215,75 +285,36 @@ impl Evaluator {
                         *x += y;
                     }
                 }
-                // psi of the position is eliminated below
-                (Carry::Reset, _) => local[r][..3].copy_from_slice(&c[r]),
-                (Carry::Platform, _) => {
-                    for (j, x) in local[r][..n].iter_mut().enumerate() {
-                        *x = (0..3).map(|k| c[r][k] * state.psi[k][j]).sum();
-                    }
-                }
             }
             local[3 + r][3..n].copy_from_slice(&drift[r]);
         }
-        out.path.clone_from(&state.path);
-        out.path.push(stop.candidate);
-        out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
-        // G L, then L^T (G L)
-        let mut weighted = [[0.0; MAX]; LOCAL];
-        for (i, row) in weighted.iter_mut().enumerate() {
-            for (k, l) in local.iter().enumerate() {
-                let g = self.local[i][k];
-                if g != 0.0 {
-                    for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
-                        *x += g * y;
-                    }
-                }
-            }
-        }
+        // L^T (G L)
+        let weighted = self.weighted(&local);
         out.information.copy_from_slice(&state.information);
-        if carry == Carry::Reset {
-            let mut own = [[0.0; MAX]; MAX];
-            for (i, row) in own[..n].iter_mut().enumerate() {
-                for (l, w) in local.iter().zip(&weighted) {
-                    for (x, y) in row[..=i].iter_mut().zip(&w[..=i]) {
-                        *x += l[i] * y;
-                    }
-                }
-            }
-            eliminate(&mut own, n, 3);
-            for (i, row) in own[..n].iter().enumerate() {
-                for (x, y) in out.information[i * n..=i * n + i].iter_mut().zip(row) {
-                    *x += y;
-                }
-            }
-        } else {
-            for i in 0..n {
-                let row = &mut out.information[i * n..=i * n + i];
-                for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
-                    for (x, y) in row.iter_mut().zip(&w[..=i]) {
-                        *x += l[i] * y;
-                    }
+        for i in 0..n {
+            let row = &mut out.information[i * n..=i * n + i];
+            for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
+                for (x, y) in row.iter_mut().zip(&w[..=i]) {
+                    *x += l[i] * y;
                 }
             }
         }
-        if carry != Carry::Reset {
-            let mut after = [[0.0; MAX]; 3];
-            for (row, phi) in after.iter_mut().zip(&self.phi) {
-                for (l, p) in local.iter().zip(phi) {
-                    for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
-                        *x += p * y;
-                    }
+        let mut after = [[0.0; MAX]; 3];
+        for (row, phi) in after.iter_mut().zip(&self.phi) {
+            for (l, p) in local.iter().zip(phi) {
+                for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
+                    *x += p * y;
                 }
             }
-            for (k, row) in out.psi.iter_mut().enumerate() {
-                match carry {
-                    Carry::Platform => {
-                        for (j, x) in row.iter_mut().enumerate() {
-                            *x = (0..3).map(|r| c[r][k] * after[r][j]).sum();
-                        }
+        }
+        for (k, row) in out.psi.iter_mut().enumerate() {
+            match carry {
+                Carry::Platform => {
+                    for (j, x) in row.iter_mut().enumerate() {
+                        *x = (0..3).map(|r| c[r][k] * after[r][j]).sum();
                     }
-                    _ => row.copy_from_slice(&after[k][..n]),
                 }
+                _ => row.copy_from_slice(&after[k][..n]),
             }
         }
     }

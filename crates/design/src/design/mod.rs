@@ -7,9 +7,12 @@
 
 pub(crate) mod answer;
 pub(crate) mod candidates;
+mod certificate;
+mod certify;
 pub(crate) mod criterion;
 pub(crate) mod information;
 pub(crate) mod observability;
+mod part;
 mod psi;
 mod refine;
 pub(crate) mod search;
@@ -21,9 +24,11 @@ mod winner;
 
 pub use answer::*;
 pub use candidates::Candidates;
+pub use certificate::Bound;
 pub use criterion::{Criterion, Limits};
 pub use information::{Evaluator, State};
 pub use observability::{Patience, Rows};
+pub use part::{Level, PART_SCHEMA, Part, PartError, design_merged, design_part, design_starts};
 pub use search::{Best, Constraints, Progress, Scored, Search, Worth};
 pub use symmetry::Symmetry;
 pub use ways::Stop;
@@ -36,6 +41,7 @@ pub use ties::Ties;
 pub use winner::scheme as scheme_found;
 
 use candidates::MAX_CANDIDATES;
+use certify::excess;
 use obsdeg_core::degree::EnsembleError;
 use obsdeg_core::model::{Scheme, SchemeError};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, SimulationError, latitude_of};
@@ -44,6 +50,8 @@ use ties::TIE;
 
 /// Most sequences that are searched exhaustively, up to symmetry.
 pub const EXHAUSTIVE: u64 = 50_000_000;
+/// Under reset carry: so many are searched without asking first whether a bound makes it unnecessary.
+const QUICK: u64 = 2_000_000;
 /// What may be wrong with a larger probability is not proven.
 const PROOF: f64 = 1e-12;
 
@@ -149,6 +157,41 @@ pub enum DesignError {
         /// How many were looked at.
         examined: u64,
     },
+    /// Parts of no exhaustive search.
+    #[error("parts are of a search for so many positions; found neither")]
+    Parts,
+    /// A part that is none.
+    #[error("part {} of {}; expected 1 of 1 or more, as in 2/7", .found[0], .found[1])]
+    PartNumber {
+        /// Which of how many.
+        found: [usize; 2],
+    },
+    /// A part that is not taken.
+    #[error("{name}: {why}")]
+    Part {
+        /// Its name.
+        name: String,
+        /// Why.
+        why: PartError,
+    },
+    /// Parts that are not there.
+    #[error("missing of {of} parts: {}", listed(.missing))]
+    MissingParts {
+        /// Their numbers.
+        missing: Vec<usize>,
+        /// How many there are.
+        of: usize,
+    },
+    /// More sequences than an exhaustive search takes, in parts or not.
+    #[error(
+        "all sequences of {positions} of {candidates} candidates are too many for an exhaustive search, in parts too"
+    )]
+    TooMany {
+        /// The number of positions.
+        positions: usize,
+        /// The number of candidates.
+        candidates: usize,
+    },
     /// Stopped before anything was found.
     #[error("interrupted before anything was found")]
     Interrupted,
@@ -194,6 +237,9 @@ pub struct DesignOptions {
     pub refine: bool,
     /// Numbers of positions for the front of total time, besides that asked for.
     pub front: Vec<usize>,
+    /// Where many sequences would have to be searched and information adds (reset carry): a scheme found by exchange whose
+    /// criterion is within this part of what is possible at all is enough; 0: all are searched.
+    pub within: f64,
     /// Seed of all random choices.
     pub seed: u64,
 }
@@ -214,6 +260,7 @@ impl Default for DesignOptions {
             restarts: 200,
             refine: false,
             front: Vec::new(),
+            within: 1e-4,
             seed: 1,
         }
     }
@@ -247,114 +294,218 @@ pub fn design(
     options: &DesignOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Design, DesignError> {
+    answered(base, conditions, options, progress, None)
+}
+
+/// Work that is told once to stop stays stopped; it hears of that too.
+fn watched<T>(
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+    work: impl FnOnce(&(dyn Fn(Progress) -> bool + Sync), &AtomicBool) -> T,
+) -> T {
     let stopped = AtomicBool::new(false);
-    // once stopped, always stopped
     let progress = |now: Progress| {
         if !stopped.load(Ordering::Relaxed) && !progress(now) {
             stopped.store(true, Ordering::Relaxed);
         }
         !stopped.load(Ordering::Relaxed)
     };
-    let nothing_yet = Progress { done: 0, total: 1, examined: 0, best: f64::INFINITY };
-    let going = || progress(nothing_yet);
-    let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
-    let task = Task::new(base, conditions, options, reached)?;
-    let every: Vec<usize> = (0..task.rows.candidates()).collect();
-    let best_degrees = task.rows.degrees(&every);
-    let minimum = task.minimum(&best_degrees, &going)?;
-    let mut sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
-    let mut out = Design {
-        schema: SCHEMA.into(),
-        version: env!("CARGO_PKG_VERSION").into(),
-        carry: base.carry,
-        latitude_deg: latitude_of(base).map_or(0.0, |l| l.degrees()),
-        latitude_by_default: base.latitude.is_none(),
-        geometry: base.geometry,
-        terms: base.unknowns.to_string(),
-        candidates: task.candidates.names.clone(),
-        beyond_gimbals: beyond,
-        symmetry: task.symmetry.order,
-        required: task.required.iter().map(|r| r.0.clone()).collect(),
-        minimum,
-        search: None,
-        found: Vec::new(),
-        front: Vec::new(),
-        primes: task.rows.fields(),
-        error_bound: task.rows.error_bound(sets),
-        seed: options.seed,
-    };
-    out.minimum.proven &= out.error_bound < PROOF;
-    let Some(k) = options.positions else { return Ok(out) };
-    if let Some(limit) = options.total_s
-        && limit < k as f64 * conditions.dwell_s
-    {
-        let why = format!("{k} times {} s at a position are more than {limit} s", conditions.dwell_s);
-        return Err(DesignError::Impossible { positions: k, wanted: task.wanted(), why });
+    work(&progress, &stopped)
+}
+
+/// Nothing is done yet.
+const NOTHING_YET: Progress = Progress { done: 0, total: 1, examined: 0, best: f64::INFINITY };
+
+/// A search that can begin: its task, and what evaluates sequences.
+struct Prepared<'a> {
+    task: Task<'a>,
+    evaluator: Evaluator,
+    conditions: &'a Conditions,
+    /// The degree of every required coefficient in all candidates together.
+    degrees: Vec<Option<usize>>,
+    /// Attitudes that the gimbals do not reach.
+    beyond: Vec<String>,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(
+        base: &'a Scheme,
+        conditions: &'a Conditions,
+        options: &'a DesignOptions,
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self, DesignError> {
+        let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
+        let task = Task::new(base, conditions, options, reached)?;
+        let every: Vec<usize> = (0..task.rows.candidates()).collect();
+        let degrees = task.rows.degrees(&every);
+        let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
+        // without a number of positions nothing is evaluated
+        let evaluated = options.positions.map_or(1, |_| task.candidates.attitudes.len());
+        let attitudes = &task.candidates.attitudes[..evaluated];
+        let evaluator = Evaluator::while_going(base, attitudes, &indices, conditions, going)?;
+        Ok(Self { task, evaluator, conditions, degrees, beyond })
     }
-    if !out.minimum.never.is_empty() {
-        let why = format!("all together leave {} unobservable", out.minimum.never.join(", "));
-        return Err(DesignError::Impossible { positions: k, wanted: task.wanted(), why });
+
+    fn search<'s>(&'s self, progress: &'s (dyn Fn(Progress) -> bool + Sync)) -> Search<'s> {
+        Search {
+            rows: &self.task.rows,
+            evaluator: &self.evaluator,
+            criterion: &self.task.criterion,
+            constraints: &self.task.constraints,
+            keep: self.task.options.keep,
+            floor: self.degrees.iter().flatten().max().copied().unwrap_or(0),
+            progress,
+        }
     }
-    let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
-    let evaluator = Evaluator::while_going(base, &task.candidates.attitudes, &indices, conditions, &going)?;
-    let floor = best_degrees.iter().flatten().max().copied().unwrap_or(0);
-    let search = Search {
-        rows: &task.rows,
-        evaluator: &evaluator,
-        criterion: &task.criterion,
-        constraints: &task.constraints,
-        keep: options.keep,
-        floor,
-        progress: &progress,
-    };
-    let exhaustive = task.space(k, &evaluator);
-    let best = if let Some(more) = exhaustive {
-        sets += more as f64;
-        out.error_bound = task.rows.error_bound(sets);
-        search.exhaust(&task.symmetry, k)
-    } else {
-        search.exchange(k, &[], options.restarts, options.seed)
-    };
-    let all = exhaustive.is_some() && best.complete;
-    out.found = task.all_found(&evaluator, &best.found)?;
-    let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
-        let (positions, wanted) = (k, task.wanted());
-        return Err(match (best.complete, exhaustive) {
-            (false, _) => DesignError::Interrupted,
-            (true, Some(_)) => DesignError::Impossible {
-                positions,
-                wanted,
-                why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
-            },
-            (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
+
+    /// Whether schemes of `k` positions can do at all.
+    fn check(&self, k: usize) -> Result<(), DesignError> {
+        let impossible = |why| Err(DesignError::Impossible { positions: k, wanted: self.task.wanted(), why });
+        if let Some(limit) = self.task.options.total_s
+            && limit < k as f64 * self.conditions.dwell_s
+        {
+            return impossible(format!(
+                "{k} times {} s at a position are more than {limit} s",
+                self.conditions.dwell_s
+            ));
+        }
+        let never: Vec<&str> = self.task.never(&self.degrees).collect();
+        match never.is_empty() {
+            true => Ok(()),
+            false => impossible(format!("all together leave {} unobservable", never.join(", "))),
+        }
+    }
+
+    /// The number of sets and of sequences of an exhaustive search.
+    fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
+        let too_many = DesignError::TooMany { positions: k, candidates: self.task.rows.candidates() };
+        self.task.space(k, &self.evaluator).ok_or(too_many)
+    }
+}
+
+/// What an exhaustive search found elsewhere.
+type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<Best, DesignError>;
+
+/// The answer; `elsewhere` instead of a search.
+fn answered(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+    elsewhere: Option<Elsewhere<'_>>,
+) -> Result<Design, DesignError> {
+    watched(progress, |progress, stopped| {
+        let going = || progress(NOTHING_YET);
+        let prepared = Prepared::new(base, conditions, options, &going)?;
+        let task = &prepared.task;
+        let minimum = task.minimum(&prepared.degrees, &going)?;
+        let mut sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
+        let mut out = Design {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            carry: base.carry,
+            latitude_deg: latitude_of(base).map_or(0.0, |l| l.degrees()),
+            latitude_by_default: base.latitude.is_none(),
+            geometry: base.geometry,
+            terms: base.unknowns.to_string(),
+            candidates: task.candidates.names.clone(),
+            beyond_gimbals: prepared.beyond.clone(),
+            symmetry: task.symmetry.order,
+            required: task.required.iter().map(|r| r.0.clone()).collect(),
+            minimum,
+            search: None,
+            found: Vec::new(),
+            front: Vec::new(),
+            primes: task.rows.fields(),
+            error_bound: task.rows.error_bound(sets),
+            seed: options.seed,
+        };
+        out.minimum.proven &= out.error_bound < PROOF;
+        let Some(k) = options.positions else { return Ok(out) };
+        prepared.check(k)?;
+        let evaluator = &prepared.evaluator;
+        let search = prepared.search(progress);
+        let bound = task.bound(evaluator, k, &going);
+        let mut exhaustive = task.space(k, evaluator);
+        let best = if let Some(elsewhere) = elsewhere {
+            elsewhere(&prepared, k)?
+        } else {
+            exhaustive = exhaustive.filter(|space| space.1 <= EXHAUSTIVE);
+            let mut tried = None;
+            if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, &bound)
+                && options.within > 0.0
+            {
+                let exchanged = search.exchange(k, &[], options.restarts, options.seed);
+                let enough = |f: &Scored| {
+                    f.worth.degree == search.floor && excess(f.worth.value, bound) < options.within
+                };
+                if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
+                    (tried, exhaustive) = (Some(exchanged), None);
+                }
+            }
+            tried.unwrap_or_else(|| match exhaustive {
+                Some(_) => search.exhaust(&task.symmetry, k),
+                None => search.exchange(k, &[], options.restarts, options.seed),
+            })
+        };
+        if let Some((more, _)) = exhaustive {
+            sets += more as f64;
+            out.error_bound = task.rows.error_bound(sets);
+        }
+        let all = exhaustive.is_some() && best.complete;
+        out.found = task.all_found(evaluator, &best.found)?;
+        let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
+            let (positions, wanted) = (k, task.wanted());
+            return Err(match (best.complete, exhaustive) {
+                (false, _) => DesignError::Interrupted,
+                (true, Some(_)) => DesignError::Impossible {
+                    positions,
+                    wanted,
+                    why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
+                },
+                (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
+            });
+        };
+        out.front = task.all_found(evaluator, &best.front)?;
+        let mut certificate = bound.map(|bound| task.certificate(&bound, first.worth.value));
+        if best.complete {
+            task.front(evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
+            if let Some(certificate) = &mut certificate {
+                certificate.front = task.front_bound(evaluator, (k, conditions.dwell_s), &going);
+            }
+        }
+        if options.refine && going() {
+            let refined = task.refined(evaluator, first, &going)?;
+            out.front.extend(refined.iter().cloned());
+            out.found.splice(0..0, refined);
+        }
+        out.front = pareto(std::mem::take(&mut out.front));
+        out.search = Some(SearchReport {
+            positions: k,
+            conditions: MeasurementReport::new(base, conditions),
+            drift_noise: None,
+            prior: None,
+            criterion: task.criterion.name().into(),
+            examined: best.examined,
+            lost: best.lost,
+            proven: all && out.error_bound < PROOF,
+            ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
+            order_matters: evaluator.ordered(),
+            interrupted: stopped.load(Ordering::Relaxed),
+            degree_floor: search.floor,
+            constraints: task.constraints_in_words(),
+            certificate,
         });
-    };
-    out.front = task.all_found(&evaluator, &best.front)?;
-    if best.complete {
-        task.front(&evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
-    }
-    if options.refine && going() {
-        let refined = task.refined(&evaluator, first, &going)?;
-        out.front.extend(refined.iter().cloned());
-        out.found.splice(0..0, refined);
-    }
-    out.front = pareto(std::mem::take(&mut out.front));
-    out.search = Some(SearchReport {
-        positions: k,
-        conditions: MeasurementReport::new(base, conditions),
-        drift_noise: None,
-        prior: None,
-        criterion: task.criterion.name().into(),
-        examined: best.examined,
-        lost: best.lost,
-        proven: all && out.error_bound < PROOF,
-        ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
-        order_matters: evaluator.ordered(),
-        interrupted: stopped.load(Ordering::Relaxed),
-        degree_floor: floor,
-        constraints: task.constraints_in_words(),
-    });
-    Ok(out)
+        Ok(out)
+    })
+}
+
+/// `2, 5`: at most twenty numbers.
+fn listed(numbers: &[usize]) -> String {
+    const SHOWN: usize = 20;
+    let shown: Vec<String> = numbers.iter().take(SHOWN).map(ToString::to_string).collect();
+    let more = numbers.len().saturating_sub(SHOWN);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", shown.join(", "))
 }
 
 /// Why an exhaustive search found nothing.

@@ -45,6 +45,17 @@ impl Evaluator {
     /// Sigma in deg of psi of a position with a psi of its own, when the rest of the scheme knows the coefficients as
     /// `root` says.
     fn psi_of_position(&self, candidate: usize, root: &[f64]) -> [f64; 3] {
+        [0, 1, 2].map(|k| {
+            let Some((own, moved)) = self.psi_by_coefficients(candidate, k) else { return f64::INFINITY };
+            let rest = solved(root, self.n, 3, moved.into_iter());
+            rest.map_or(f64::INFINITY, |z| own.sqrt().hypot(norm(&z)).to_degrees())
+        })
+    }
+
+    /// The variance in rad^2 of component `k` of a position's own psi where the coefficients are known, and by which
+    /// functional of the coefficients it is off where they are not (in the order of the evaluator); `None` where it is
+    /// not determined.
+    pub(super) fn psi_by_coefficients(&self, candidate: usize, k: usize) -> Option<(f64, Vec<f64>)> {
         let (n, c) = (self.n, &self.candidates[candidate].c);
         let drift = &self.candidates[candidate].drift;
         let local = |i: usize, j: usize| self.local[i][j];
@@ -65,19 +76,16 @@ impl Evaluator {
                 };
             }
         }
-        [0, 1, 2].map(|k| {
-            let unit = (0..3).map(|r| f64::from(u8::from(r == k)));
-            let Some(y) = solved(&l, 3, 0, unit) else { return f64::INFINITY };
-            // A^-1 e = L^-T y, from the last
-            let mut x = [0.0; 3];
-            for i in (0..3).rev() {
-                let sum: f64 = (i + 1..3).map(|j| l[3 * j + i] * x[j]).sum();
-                x[i] = if l[4 * i] > 0.0 { (y[i] - sum) / l[4 * i] } else { 0.0 };
-            }
-            let moved = (0..n - 3).map(|d| (0..3).map(|i| cross(i, d) * x[i]).sum());
-            let rest = solved(root, n, 3, moved);
-            rest.map_or(f64::INFINITY, |z| norm(&y).hypot(norm(&z)).to_degrees())
-        })
+        let unit = (0..3).map(|r| f64::from(u8::from(r == k)));
+        let y = solved(&l, 3, 0, unit)?;
+        // A^-1 e = L^-T y, from the last
+        let mut x = [0.0; 3];
+        for i in (0..3).rev() {
+            let sum: f64 = (i + 1..3).map(|j| l[3 * j + i] * x[j]).sum();
+            x[i] = if l[4 * i] > 0.0 { (y[i] - sum) / l[4 * i] } else { 0.0 };
+        }
+        let moved = (0..n - 3).map(|d| (0..3).map(|i| cross(i, d) * x[i]).sum()).collect();
+        Some((y.iter().map(|y| y * y).sum(), moved))
     }
 }
 

@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use obsdeg_evidence::requirements::meets;
 use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::criterion::{Criterion, Limits};
 use super::information::{Evaluator, State};
@@ -21,7 +23,7 @@ const ROUNDS: usize = 50;
 const PATIENCE: u64 = 256;
 
 /// What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
 pub struct Worth {
     /// How far time limits, requirements and degree caps are missed; 0 when kept.
     pub violation: f64,
@@ -53,7 +55,7 @@ impl Worth {
 }
 
 /// A sequence with its worth.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scored {
     /// What it is worth.
     pub worth: Worth,
@@ -119,7 +121,7 @@ fn beyond(found: f64, limit: Option<f64>) -> f64 {
 }
 
 /// The best sequences, best first, and the front of time against the criterion.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Best {
     /// At most as many as are kept.
     pub found: Vec<Scored>,
@@ -152,6 +154,15 @@ impl Best {
                 && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
     }
 
+    /// Whether an equal one of the front comes later in lexicographic order: then the new one takes its place, so that the
+    /// front does not depend on the order in which sequences come.
+    fn is_before_its_equal(&self, new: &Scored) -> bool {
+        let equal = |f: &&Scored| {
+            f.worth.degree == new.worth.degree && f.seconds == new.seconds && f.worth.value == new.worth.value
+        };
+        self.front.iter().find(equal).is_some_and(|f| new.sequence < f.sequence)
+    }
+
     fn add(&mut self, keep: usize, new: Scored) {
         if !new.worth.is_valid() {
             return;
@@ -167,7 +178,7 @@ impl Best {
     /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion; drops what
     /// it beats.
     fn add_to_front(&mut self, new: &Scored) {
-        if self.is_on_front(&new.worth, new.seconds) {
+        if self.is_on_front(&new.worth, new.seconds) || self.is_before_its_equal(new) {
             let beaten = |f: &Scored| {
                 f.worth.degree > new.worth.degree
                     || f.seconds >= new.seconds && f.worth.value >= new.worth.value
@@ -178,7 +189,8 @@ impl Best {
         }
     }
 
-    fn merge(&mut self, keep: usize, other: Self) {
+    /// Takes over what another found.
+    pub(super) fn merge(&mut self, keep: usize, other: Self) {
         for s in other.found.into_iter().chain(other.front) {
             self.add(keep, s);
         }
@@ -210,6 +222,14 @@ pub struct Search<'a> {
     pub floor: usize,
     /// Hears of progress, says whether to go on.
     pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
+}
+
+/// What an exhaustive search takes at once.
+pub(super) enum SearchLevel {
+    /// All sequences whose set has this worst degree: the keys of these sets.
+    Degree(usize, HashSet<u128>),
+    /// All sets, where order does not matter.
+    Sets,
 }
 
 /// What the workers of a search report to.
@@ -402,13 +422,11 @@ impl Search<'_> {
     /// orbit (where order does not matter: that have one of them as their smallest). As many of the best as are kept:
     /// worst degrees that are too large for these are not looked at.
     pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
-        if !self.evaluator.ordered() {
-            return self.exhaust_sets(symmetry, k);
-        }
-        let Some(levels) = self.levels(k) else { return Best::default() };
+        let Some(levels) = self.levels_of(k) else { return Best::default() };
+        let starts = self.starts(symmetry, k);
         let mut best = Best { complete: true, ..Best::default() };
-        for (degree, sets) in levels {
-            best.merge(self.keep, self.exhaust_level(symmetry, k, degree, &sets));
+        for level in levels {
+            best.merge(self.keep, self.exhaust_starts(&starts, symmetry, k, &level));
             if !best.complete || best.found.len() >= self.keep.max(1) {
                 break;
             }
@@ -416,59 +434,81 @@ impl Search<'_> {
         best
     }
 
-    /// The sequences whose set is one of `sets`, all of this worst degree.
-    fn exhaust_level(&self, symmetry: &Symmetry, k: usize, degree: usize, sets: &HashSet<u128>) -> Best {
+    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions.
+    pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
+        let ordered = self.evaluator.ordered();
         let second = |a: usize| {
-            let stops = (0..self.rows.candidates()).flat_map(move |b| self.evaluator.stops(Some(a), b));
+            let least = if ordered { 0 } else { a };
+            let stops = (least..self.rows.candidates()).flat_map(move |b| self.evaluator.stops(Some(a), b));
             stops.map(move |b| vec![a.into(), b])
         };
         let firsts = symmetry.representatives();
-        let starts: Vec<Vec<Stop>> = match k {
+        match k {
             1 => firsts.into_iter().map(|a| vec![a.into()]).collect(),
             _ => firsts.into_iter().flat_map(second).collect(),
-        };
+        }
+    }
+
+    /// What is searched one after the other, by worst degree; `None` when the search was stopped.
+    pub(super) fn levels_of(&self, k: usize) -> Option<Vec<SearchLevel>> {
+        if !self.evaluator.ordered() {
+            return Some(vec![SearchLevel::Sets]);
+        }
+        Some(self.levels(k)?.into_iter().map(|(degree, sets)| SearchLevel::Degree(degree, sets)).collect())
+    }
+
+    /// The sequences of one level that begin with some of the starts.
+    pub(super) fn exhaust_starts(
+        &self,
+        starts: &[Vec<Stop>],
+        symmetry: &Symmetry,
+        k: usize,
+        level: &SearchLevel,
+    ) -> Best {
         let meter = Meter::new(self, starts.len());
-        let from = |start: &Vec<Stop>| {
-            let mut walk = Walk::new(self, &meter, k);
-            let (a, b) = (start[0].candidate, start[start.len() - 1].candidate);
-            let key = if a == b { self.rows.key(a) } else { self.rows.key(a) ^ self.rows.key(b) };
-            if walk.go_to(start) && (start.len() < k || sets.contains(&key)) {
-                walk.visit(sets, degree, key, k);
-            }
-            walk.best
+        let from = |start: &Vec<Stop>| match level {
+            SearchLevel::Degree(degree, sets) => self.exhaust_sequences(&meter, start, k, *degree, sets),
+            SearchLevel::Sets => self.exhaust_sets(&meter, start, k, symmetry),
         };
         let parts = starts.par_iter().map(|start| meter.part(|| from(start))).collect();
         meter.gather(self.keep, parts)
     }
 
-    /// [`Self::exhaust`] where order does not matter.
-    fn exhaust_sets(&self, symmetry: &Symmetry, k: usize) -> Best {
-        let second = |a: usize| (a..self.rows.candidates()).map(move |b| vec![a, b]);
-        let firsts = symmetry.representatives();
-        let starts: Vec<Vec<usize>> = match k {
-            1 => firsts.into_iter().map(|a| vec![a]).collect(),
-            _ => firsts.into_iter().flat_map(second).collect(),
-        };
-        let meter = Meter::new(self, starts.len());
+    /// The sequences behind a start whose set is one of `sets`, all of this worst degree.
+    fn exhaust_sequences(
+        &self,
+        meter: &Meter<'_>,
+        start: &[Stop],
+        k: usize,
+        degree: usize,
+        sets: &HashSet<u128>,
+    ) -> Best {
+        let mut walk = Walk::new(self, meter, k);
+        let (a, b) = (start[0].candidate, start[start.len() - 1].candidate);
+        let key = if a == b { self.rows.key(a) } else { self.rows.key(a) ^ self.rows.key(b) };
+        if walk.go_to(start) && (start.len() < k || sets.contains(&key)) {
+            walk.visit(sets, degree, key, k);
+        }
+        walk.best
+    }
+
+    /// The sets behind a start, where order does not matter.
+    fn exhaust_sets(&self, meter: &Meter<'_>, start: &[Stop], k: usize, symmetry: &Symmetry) -> Best {
         let going = || meter.report(0, 0, None);
-        let from = |start: &Vec<usize>| {
-            let mut walk = Walk::new(self, &meter, k);
-            let mut sequence = Vec::with_capacity(k);
-            self.rows.each(start, k, true, &mut Patience::while_going(&going), &mut |set| {
-                let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
-                sequence.clear();
-                sequence.extend(set.iter().map(|&c| Stop::from(c)));
-                if let Some(degree) = degree
-                    && walk.go_to(&sequence)
-                {
-                    walk.score(degree, symmetry.searched_images(set));
-                }
-                !walk.stopped
-            });
-            walk.best
-        };
-        let parts = starts.par_iter().map(|start| meter.part(|| from(start))).collect();
-        meter.gather(self.keep, parts)
+        let mut walk = Walk::new(self, meter, k);
+        let mut sequence = Vec::with_capacity(k);
+        self.rows.each(&candidates(start), k, true, &mut Patience::while_going(&going), &mut |set| {
+            let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+            sequence.clear();
+            sequence.extend(set.iter().map(|&c| Stop::from(c)));
+            if let Some(degree) = degree
+                && walk.go_to(&sequence)
+            {
+                walk.score(degree, symmetry.searched_images(set));
+            }
+            !walk.stopped
+        });
+        walk.best
     }
 
     /// The keys of all observable sets of up to `k` within the caps, by their worst degree; `None` when the search was

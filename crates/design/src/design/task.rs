@@ -23,7 +23,7 @@ const MOST_SETS: u64 = 5_000_000;
 /// Most prefixes and sets that are looked at for the minimum, when it is not what was asked for.
 const MINIMUM_SETS: u64 = 1_000_000;
 /// Factors on the dwell for the front of total time.
-const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
+pub(super) const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Restarts of the exchange at each of them, besides those from the schemes found.
 const FRONT_RESTARTS: u64 = 8;
 
@@ -168,6 +168,12 @@ impl<'a> Task<'a> {
         })
     }
 
+    /// The required coefficients that all candidates together, of these degrees, leave unobservable.
+    pub(super) fn never<'s>(&'s self, degrees: &'s [Option<usize>]) -> impl Iterator<Item = &'s str> {
+        let lost = self.required.iter().zip(degrees).filter(|(_, d)| d.is_none());
+        lost.map(|(c, _)| c.0.as_str())
+    }
+
     /// The fewest candidates that do, with the proof; `proven` without regard to the bound on errors.
     ///
     /// # Errors
@@ -178,13 +184,12 @@ impl<'a> Task<'a> {
         going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Minimum, DesignError> {
         let names = |set: &[usize]| set.iter().map(|&c| self.candidates.names[c].clone()).collect();
-        let lost = self.required.iter().zip(best_degrees).filter(|(_, d)| d.is_none());
         let mut out = Minimum {
             positions: None,
             witness: Vec::new(),
             counting_bound: self.rows.counting_bound(),
             none_of: Vec::new(),
-            never: lost.map(|(c, _)| c.0.clone()).collect(),
+            never: self.never(best_degrees).map(Into::into).collect(),
             proven: true,
         };
         if !out.never.is_empty() {
@@ -214,8 +219,9 @@ impl<'a> Task<'a> {
         Ok(out)
     }
 
-    /// The number of sets behind an exhaustive search of `k` positions; `None` where the space is too large.
-    pub(super) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<u64> {
+    /// The number of sets behind an exhaustive search of `k` positions, and of sequences up to symmetry; `None` where
+    /// there are too many to hold, or to count.
+    pub(super) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<(u64, u64)> {
         let n = self.rows.candidates() as u64;
         let sets: u64 = (1..=k as u64).try_fold(0u64, |sum, size| sum.checked_add(choose(n, size)?))?;
         let searched = if evaluator.ordered() {
@@ -223,7 +229,7 @@ impl<'a> Task<'a> {
         } else {
             choose(n + k as u64 - 1, k as u64)? / self.symmetry.order as u64
         };
-        (searched <= EXHAUSTIVE).then_some(sets)
+        Some((sets, searched))
     }
 
     /// A sequence with its exact verdict; `None` when rounding called it determined and it is not.

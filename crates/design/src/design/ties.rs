@@ -2,18 +2,50 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::search::Worth;
 
 /// Sequences tie when their worst degrees are equal and their criteria differ by less than this part.
 pub(crate) const TIE: f64 = 1e-6;
 
 /// The sequences near the best so far: how many there are of each criterion.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(from = "Counted", into = "Counted")]
+#[schemars(with = "Counted")]
 pub struct Ties {
     /// The smallest worst degree.
     degree: usize,
     /// By the bits of the criterion, which order positive numbers, and the searched images of a sequence.
     counts: BTreeMap<(u64, usize), u64>,
+}
+
+/// The same as a list.
+#[derive(Serialize, Deserialize, JsonSchema)]
+struct Counted {
+    /// The smallest worst degree.
+    degree: usize,
+    /// Criterion, searched images of a sequence, how many there are.
+    counts: Vec<(f64, usize, u64)>,
+}
+
+impl From<Counted> for Ties {
+    fn from(listed: Counted) -> Self {
+        let counts =
+            listed.counts.into_iter().map(|(value, images, count)| ((value.to_bits(), images), count));
+        Self { degree: listed.degree, counts: counts.collect() }
+    }
+}
+
+impl From<Ties> for Counted {
+    fn from(ties: Ties) -> Self {
+        let counts = ties.counts.into_iter();
+        Self {
+            degree: ties.degree,
+            counts: counts.map(|((bits, images), count)| (f64::from_bits(bits), images, count)).collect(),
+        }
+    }
 }
 
 impl Ties {

@@ -3,6 +3,8 @@
 use obsdeg_core::model::slew::{Slew, Turn};
 use obsdeg_core::model::{Float, Matrix3, SlewTo};
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::DesignError;
 use super::information::Evaluator;
@@ -27,7 +29,7 @@ pub(super) struct Way {
 }
 
 /// A position of a sequence: which candidate, and which way there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct Stop {
     /// The candidate.
     pub candidate: usize,

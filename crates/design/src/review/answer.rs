@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{Simulation, SimulationError, Traces};
 use obsdeg_evidence::system::{RunError, SystemEvidence, SystemRun};
 
 use crate::design::DesignError;
-use crate::design::answer::{Found, Minimum};
+use crate::design::answer::{Certificate, Found, Minimum};
 
 /// A review of schemes and models.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,6 +134,8 @@ pub struct Alternatives {
     pub front: Vec<Found>,
     /// Their number of positions.
     pub front_positions: usize,
+    /// How good the best of so many cardinal attitudes can be; `None` where no bound is known.
+    pub certificate: Option<Certificate>,
     /// Why some of these were not searched for.
     pub refused: Vec<DesignError>,
 }

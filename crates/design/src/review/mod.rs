@@ -286,7 +286,10 @@ fn alternatives(
     if !seen.is_empty() {
         let positions = scheme.positions.len().min(FRONT_POSITIONS);
         let found = run(task(Candidates::cardinals(), Some(positions), &seen));
-        out.front = found.map(|d| d.front).unwrap_or_default();
+        if let Some(found) = found {
+            out.front = found.front;
+            out.certificate = found.search.and_then(|s| s.certificate);
+        }
         out.front_positions = positions;
     }
     out.required = seen;

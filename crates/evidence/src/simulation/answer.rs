@@ -5,7 +5,7 @@ use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Scheme};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
@@ -81,7 +81,7 @@ pub struct ConditionsReport {
 }
 
 /// What a predicted sigma rests on: the information of all samples, without prior and without drift noise.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasurementReport {
     /// Latitude in degrees.
     pub latitude_deg: f64,

@@ -193,6 +193,11 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
             let label = format!("best of 24, {} positions ({})", s.alternatives.front_positions, s.name);
             lines.push(line(&label, color, Stroke::Dotted, points));
         }
+        let bound = s.alternatives.certificate.as_ref().map_or(&[][..], |c| &c.front);
+        if bound.len() > 1 {
+            let label = format!("none of {} of 24 is below ({})", s.alternatives.front_positions, s.name);
+            lines.push(line(&label, color, Stroke::DashDot, bound.iter().map(|p| (p[0], p[1])).collect()));
+        }
     }
     let figure = Figure {
         title: "Pareto front".into(),
@@ -204,7 +209,7 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
     };
     let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
                    dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most, for the same \
-                   coefficients";
+                   coefficients; under reset carry with the bound that no scheme of as many cardinal attitudes crosses";
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 

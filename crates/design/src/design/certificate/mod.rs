@@ -1,0 +1,122 @@
+//! How good the best scheme can be, where information adds over positions (reset carry): a lower bound on the criterion
+//! of every scheme of k candidates, from the optimal weights of the candidates (approximate design theory).
+
+mod bound;
+mod weights;
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::Carry;
+
+use super::criterion::{Criterion, Limits};
+use super::information::Evaluator;
+use bound::{Additive, Aim};
+use weights::weigh;
+
+/// Most positions whose psi is looked at one by one, for requirements on psi.
+const MOST_PSI: usize = 48;
+
+/// A bound that holds for every scheme of some candidates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bound {
+    /// No scheme has a smaller criterion: in deg/h (per g), or for margin a ratio.
+    pub value: f64,
+    /// The criterion of the weights, were they possible: this way of bounding gives no more.
+    pub attained: f64,
+    /// The weight of every candidate, sum 1.
+    pub weights: Vec<f64>,
+}
+
+impl Evaluator {
+    /// What no scheme of `k` candidates, in any order and with repetitions, is below; `firsts` are candidates such that
+    /// every scheme is as good as one that has one of them. `None` where information does not add over positions
+    /// (platform and inertial carry), where the candidates together do not determine what counts, or when stopped.
+    pub fn bound(
+        &self,
+        criterion: &Criterion,
+        k: usize,
+        firsts: &[usize],
+        going: &dyn Fn() -> bool,
+    ) -> Option<Bound> {
+        if self.carry() != Carry::Reset || self.candidates.is_empty() || k == 0 {
+            return None;
+        }
+        let found = match criterion {
+            Criterion::Margin(limits) if limits.psi.iter().any(|l| l.is_finite()) => {
+                self.with_psi(limits, k, firsts, going)?
+            }
+            Criterion::Margin(limits) => self.weighed(self.largest(limits), k, going)?,
+            Criterion::Worst => {
+                let d = self.n - 3 - self.nuisance;
+                let none = Limits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] };
+                self.weighed(self.largest(&none), k, going)?
+            }
+            Criterion::A => self.weighed(Aim::Mean(self.units()), k, going)?,
+            Criterion::D => self.weighed(Aim::Volume, k, going)?,
+            Criterion::E => self.weighed(Aim::Least, k, going)?,
+        };
+        (going() && found.value > 0.0).then_some(found)
+    }
+
+    /// The coefficients that count as columns (m x d).
+    fn units(&self) -> DMatrix<f64> {
+        let m = self.n - 3;
+        DMatrix::from_fn(m, m - self.nuisance, |i, j| f64::from(u8::from(i == j + self.nuisance)))
+    }
+
+    /// The largest variance over the square of its limit.
+    fn largest(&self, limits: &Limits) -> Aim {
+        let mut vectors = self.units();
+        for (mut column, limit) in vectors.column_iter_mut().zip(&limits.coefficients) {
+            column /= *limit;
+        }
+        let offsets = vec![0.0; vectors.ncols()];
+        Aim::Largest(vectors, offsets)
+    }
+
+    /// The same with psi of one position: one of `firsts` is in every scheme, up to its images.
+    fn with_psi(
+        &self,
+        limits: &Limits,
+        k: usize,
+        firsts: &[usize],
+        going: &dyn Fn() -> bool,
+    ) -> Option<Bound> {
+        let every: Vec<usize> = if firsts.len() <= MOST_PSI { firsts.to_vec() } else { Vec::new() };
+        let Aim::Largest(coefficients, none) = self.largest(limits) else { return None };
+        let mut least: Option<Bound> = None;
+        for candidate in every.iter().map(Some).chain(every.is_empty().then_some(None)) {
+            let (mut vectors, mut offsets) = (coefficients.clone(), none.clone());
+            for (k, limit) in limits.psi.iter().enumerate().filter(|(_, l)| l.is_finite()) {
+                let Some((own, moved)) = candidate.and_then(|&c| self.psi_by_coefficients(c, k)) else {
+                    continue;
+                };
+                let unit = 1f64.to_degrees() / limit;
+                let at = vectors.ncols();
+                vectors = vectors.insert_column(at, 0.0);
+                vectors.set_column(at, &(DVector::from_vec(moved) * (unit * self.dph)));
+                offsets.push(own * unit * unit);
+            }
+            let found = self.weighed(Aim::Largest(vectors, offsets), k, going)?;
+            if least.as_ref().is_none_or(|l| found.value < l.value) {
+                least = Some(found);
+            }
+        }
+        least
+    }
+
+    /// The weights of least aim. Numbers are in deg/h (per g).
+    fn weighed(&self, aim: Aim, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+        let (n, m) = (self.n, self.n - 3);
+        let unit = k as f64 * self.dph * self.dph;
+        let information =
+            |own: &Vec<f64>| DMatrix::from_fn(m, m, |i, j| unit * own[(3 + i.max(j)) * n + 3 + i.min(j)]);
+        let problem = Additive {
+            candidates: self.candidates.iter().map(|c| information(&c.own)).collect(),
+            prior: DMatrix::zeros(m, m),
+            nuisance: self.nuisance,
+            aim,
+        };
+        let found = weigh(&problem, going)?;
+        Some(Bound { value: found.bound.sqrt(), attained: found.attained.sqrt(), weights: found.weights })
+    }
+}

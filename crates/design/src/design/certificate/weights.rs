@@ -1,0 +1,608 @@
+//! Optimal weights of candidates: a primal-dual interior-point method on the simplex, and candidates taken up as they are
+//! needed (column generation).
+//!
+//! With the aim f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau of the least aim.
+//! Newton's method follows these minima; the curvature of the barriers is that of their multipliers (S. J. Wright,
+//! *Primal-Dual Interior-Point Methods*, 1997), without which weights go to zero slowly. The matrix X of each minimum
+//! gives a bound that needs none of this (`bound`).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::bound::{Additive, Aim, Dual};
+
+/// Where a relative gap ends the search for weights.
+const GAP: f64 = 1e-7;
+/// Factor on tau between two minima.
+const FASTER: f64 = 12.0;
+/// Where Newton's decrement is below this tau becomes larger.
+const CENTRED: f64 = 1e-6;
+/// How far a step goes towards zero, at most.
+const INSIDE: f64 = 0.95;
+/// Newton steps to one minimum, at most.
+const STEPS: usize = 40;
+/// Candidates that are weighed at once.
+const ACTIVE: usize = 160;
+/// Rounds of taking up candidates, at most.
+const ROUNDS: usize = 60;
+/// A bound so much above what the weights reach shows that the latter rests on the ridge.
+const SINGULAR: f64 = 1e-6;
+/// Makes what nothing determines regular: a part of the mean information.
+const RIDGE: f64 = 1e-13;
+
+/// Weights, and what they prove.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Weighed {
+    /// Of every candidate, sum 1.
+    pub(super) weights: Vec<f64>,
+    /// The aim at these weights.
+    pub(super) attained: f64,
+    /// No scheme has a smaller aim.
+    pub(super) bound: f64,
+    /// What proves the bound; its X says what another candidate would add.
+    pub(super) dual: Dual,
+}
+
+/// The aim at some weights, with the root of the information.
+struct At {
+    root: Cholesky<f64, Dyn>,
+    /// `tau f`, with the barriers of the aim's own constraints.
+    value: f64,
+}
+
+/// First and second derivatives of the aim's part of what is minimised.
+struct Slopes {
+    /// By the weights (shape n).
+    gradient: Vec<f64>,
+    /// By the weights (n x n), s where it is best for them.
+    hessian: DMatrix<f64>,
+    /// Where the aim has s: derivatives by it, and how it follows the weights.
+    by_s: Option<ByS>,
+}
+
+struct ByS {
+    gradient: f64,
+    curvature: f64,
+    /// `ds/dw` (shape n).
+    follows: Vec<f64>,
+}
+
+/// The weighing of some of the candidates.
+struct Weighing<'a> {
+    problem: &'a Additive,
+    /// Which.
+    active: Vec<usize>,
+    /// `A_i = F_i^T F_i` (r x m).
+    factors: Vec<DMatrix<f64>>,
+    ridge: f64,
+}
+
+/// The best weights that are found while `going`, and the bound that they prove; `None` where all candidates together
+/// do not determine what counts as far as double precision tells.
+pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weighed> {
+    // where the ridge decides, and where rounding does without it, nothing is known
+    [RIDGE, 0.0].into_iter().find_map(|ridge| {
+        let found = generated(problem, ridge, going)?;
+        let singular = found.bound > found.attained * (1.0 + SINGULAR);
+        (!singular).then(|| Weighed { attained: found.attained.max(found.bound), ..found })
+    })
+}
+
+/// The same, column by column.
+fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<Weighed> {
+    let all = problem.candidates.len();
+    let mean = problem.candidates.iter().map(DMatrix::trace).sum::<f64>() / all as f64;
+    let ridge = ridge * (mean + problem.prior.trace()) / problem.unknowns() as f64;
+    let every = all.div_ceil(ACTIVE).max(1);
+    let mut active: Vec<usize> = (0..all).step_by(every).collect();
+    let mut best: Option<Weighed> = None;
+    for _ in 0..ROUNDS {
+        let weighing = Weighing::new(problem, active.clone(), ridge);
+        let Some(found) = weighing.weigh(going) else {
+            // these do not determine what counts: take more
+            let missing = (0..all).filter(|i| !active.contains(i)).step_by(2).collect::<Vec<_>>();
+            if missing.is_empty() {
+                return best;
+            }
+            active.extend(missing);
+            continue;
+        };
+        let bound = best.as_ref().map_or(0.0, |b| b.bound);
+        let gains = problem.gains(&found.dual.x);
+        let of_active = active.iter().map(|&i| gains[i]).fold(0.0, f64::max);
+        let weights = found.weights.clone();
+        if bound < found.bound {
+            best = Some(found);
+        } else if let Some(best) = &mut best {
+            (best.weights, best.attained) = (found.weights, found.attained);
+        }
+        let mut missing: Vec<usize> =
+            (0..all).filter(|&i| gains[i] > of_active * (1.0 + GAP) && !active.contains(&i)).collect();
+        if missing.is_empty() || !going() {
+            break;
+        }
+        missing.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
+        missing.truncate(ACTIVE / 4);
+        // what has no weight and would gain little gives way
+        let counts = |i: &usize| weights[*i] > 1e-7 || gains[*i] > 0.98 * of_active;
+        active.retain(counts);
+        active.extend(missing);
+    }
+    best
+}
+
+/// `F` with `A = F^T F`, its rank many rows, by Cholesky's decomposition with pivots.
+fn factor(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let m = a.nrows();
+    let mut rest = a.clone();
+    let least = 1e-12 * a.trace();
+    let mut rows: Vec<DVector<f64>> = Vec::new();
+    while rows.len() < m {
+        let (pivot, size) = rest.diagonal().argmax();
+        if size <= least {
+            break;
+        }
+        let row = rest.column(pivot) / size.sqrt();
+        rest -= &row * row.transpose();
+        rows.push(row);
+    }
+    DMatrix::from_fn(rows.len(), m, |i, j| rows[i][j])
+}
+
+impl<'a> Weighing<'a> {
+    fn new(problem: &'a Additive, active: Vec<usize>, ridge: f64) -> Self {
+        let factors = active.iter().map(|&i| factor(&problem.candidates[i])).collect();
+        Self { problem, active, factors, ridge }
+    }
+
+    fn information(&self, w: &[f64]) -> DMatrix<f64> {
+        let m = self.problem.unknowns();
+        let mut out = self.problem.prior.clone() + DMatrix::identity(m, m) * self.ridge;
+        for (&i, &w) in self.active.iter().zip(w) {
+            out.zip_apply(&self.problem.candidates[i], |sum, a| *sum += w * a);
+        }
+        out
+    }
+
+    /// The information without what E-optimality takes of it: `M - s` on what counts.
+    fn reduced(&self, w: &[f64], s: f64) -> DMatrix<f64> {
+        let mut out = self.information(w);
+        if self.problem.aim == Aim::Least {
+            (self.problem.nuisance..self.problem.unknowns()).for_each(|i| out[(i, i)] -= s);
+        }
+        out
+    }
+
+    /// `M^-1 v_j` of the aims (m x t), and `v_j^T M^-1 v_j`.
+    fn solved(&self, root: &Cholesky<f64, Dyn>) -> (DMatrix<f64>, Vec<f64>) {
+        match &self.problem.aim {
+            Aim::Mean(vectors) | Aim::Largest(vectors, _) => {
+                let u = root.solve(vectors);
+                let values = (0..vectors.ncols()).map(|j| vectors.column(j).dot(&u.column(j))).collect();
+                (u, values)
+            }
+            Aim::Volume | Aim::Least => (DMatrix::zeros(self.problem.unknowns(), 0), Vec::new()),
+        }
+    }
+
+    /// `-log det M_S / d`.
+    fn volume(&self, root: &Cholesky<f64, Dyn>) -> f64 {
+        let l = root.l_dirty();
+        let counting = self.problem.nuisance..self.problem.unknowns();
+        -2.0 * counting.map(|j| l[(j, j)].ln()).sum::<f64>() / self.problem.counting() as f64
+    }
+
+    /// The aim at some weights.
+    fn aim(&self, w: &[f64]) -> Option<f64> {
+        let root = self.information(w).cholesky()?;
+        let value = match &self.problem.aim {
+            Aim::Volume => self.volume(&root).exp(),
+            Aim::Mean(vectors) => self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64,
+            Aim::Largest(_, offsets) => {
+                self.solved(&root).1.iter().zip(offsets).map(|(v, o)| v + o).fold(0.0, f64::max)
+            }
+            Aim::Least => {
+                let (first, d) = (self.problem.nuisance, self.problem.counting());
+                root.inverse().view((first, first), (d, d)).into_owned().symmetric_eigenvalues().max()
+            }
+        };
+        Some(value).filter(|v| v.is_finite() && *v > 0.0)
+    }
+
+    /// `tau f / scale` with the barriers of the aim, not those of the weights; `None` outside of where it is defined.
+    fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<At> {
+        let root = self.reduced(w, s).cholesky()?;
+        let value = match &self.problem.aim {
+            Aim::Volume => tau * self.volume(&root),
+            Aim::Mean(vectors) => {
+                tau * self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64 / scale
+            }
+            Aim::Largest(_, offsets) => {
+                let (s, left) = left_of(&self.solved(&root).1, offsets, tau / scale)?;
+                tau * s / scale - left.iter().map(|left| (left / scale).ln()).sum::<f64>()
+            }
+            Aim::Least => {
+                let l = root.l_dirty();
+                -tau * s / scale - 2.0 * (0..l.nrows()).map(|j| l[(j, j)].ln()).sum::<f64>()
+            }
+        };
+        value.is_finite().then_some(At { root, value })
+    }
+
+    /// The weights of least aim, step by step; the best bound on the way.
+    fn weigh(&self, going: &dyn Fn() -> bool) -> Option<Weighed> {
+        let n = self.active.len();
+        let mut w = vec![1.0 / n as f64; n];
+        let mut scale = self.aim(&w)?;
+        let least = self.problem.aim == Aim::Least;
+        let mut s = if least { 0.5 / scale } else { 0.0 };
+        let mut best: Option<Weighed> = None;
+        let mut tau = n as f64;
+        let mut multipliers: Vec<f64> = w.iter().map(|w| 1.0 / w).collect();
+        while tau < 1e3 * n as f64 / GAP {
+            let unit = if least { 1.0 / scale } else { scale };
+            for _ in 0..STEPS {
+                let Some(decrement) = self.newton(&mut w, &mut s, &mut multipliers, tau, unit) else { break };
+                if decrement < CENTRED {
+                    break;
+                }
+            }
+            scale = self.aim(&w)?;
+            let dual = self.dual(&w, s, tau / unit)?;
+            let bound = self.problem.lower_bound(&dual);
+            if best.as_ref().is_none_or(|b| bound > b.bound) {
+                let mut weights = vec![0.0; self.problem.candidates.len()];
+                self.active.iter().zip(&w).for_each(|(&i, &w)| weights[i] = w);
+                best = Some(Weighed { weights, attained: scale, bound, dual });
+            }
+            let sought = best.as_ref().map_or(0.0, |b| b.attained / b.bound - 1.0);
+            if sought < GAP || !going() {
+                break;
+            }
+            tau *= FASTER;
+            multipliers.iter_mut().for_each(|x| *x *= FASTER);
+        }
+        best
+    }
+
+    /// X at some weights.
+    fn dual(&self, w: &[f64], s: f64, rate: f64) -> Option<Dual> {
+        let problem = self.problem;
+        let m = problem.unknowns();
+        // the root of an inverse: L^-T, upper triangular
+        let inverse_root = |root: &Cholesky<f64, Dyn>| {
+            let upper = root.l().transpose();
+            upper.solve_upper_triangular(&DMatrix::identity(m, m))
+        };
+        match &problem.aim {
+            Aim::Volume => {
+                let root = self.information(w).cholesky()?;
+                let x = inverse_root(&root)?.columns(problem.nuisance, problem.counting()).into_owned();
+                Some(Dual { x, shares: Vec::new() })
+            }
+            Aim::Least => {
+                Some(Dual { x: inverse_root(&self.reduced(w, s).cholesky()?)?, shares: Vec::new() })
+            }
+            Aim::Mean(vectors) => {
+                let share = 1.0 / vectors.ncols() as f64;
+                let root = self.information(w).cholesky()?;
+                let x = self.solved(&root).0 * share.sqrt();
+                Some(Dual { x, shares: vec![share; vectors.ncols()] })
+            }
+            Aim::Largest(_, offsets) => {
+                let root = self.information(w).cholesky()?;
+                let (mut x, values) = self.solved(&root);
+                let shares = multipliers_of(&left_of(&values, offsets, rate)?.1);
+                let sum: f64 = shares.iter().sum();
+                let shares: Vec<f64> = shares.iter().map(|x| x / sum).collect();
+                for (j, share) in shares.iter().enumerate() {
+                    x.column_mut(j).scale_mut(share.sqrt());
+                }
+                Some(Dual { x, shares })
+            }
+        }
+    }
+
+    /// One damped Newton step; its decrement, or `None` when nothing gets smaller.
+    fn newton(
+        &self,
+        w: &mut [f64],
+        s: &mut f64,
+        multipliers: &mut [f64],
+        tau: f64,
+        scale: f64,
+    ) -> Option<f64> {
+        let here = self.at(w, *s, tau, scale)?;
+        let slopes = self.slopes(&here.root, w, tau, scale)?;
+        let n = w.len();
+        // s where it is best for the weights as they are
+        let to_s = slopes.by_s.as_ref().map_or(0.0, |by| -by.gradient / by.curvature);
+        let pulled = |i: usize| slopes.by_s.as_ref().map_or(0.0, |by| by.gradient * by.follows[i]);
+        // in units of the weights themselves
+        let h = DMatrix::from_fn(n, n, |i, j| {
+            let own = if i == j { w[i] * multipliers[i] } else { 0.0 };
+            w[i] * w[j] * slopes.hessian[(i, j)] + own
+        });
+        let g = DVector::from_fn(n, |i, _| w[i] * (slopes.gradient[i] + pulled(i)) - 1.0);
+        let a = DVector::from_column_slice(w);
+        // what rounding makes of large curvatures may leave it indefinite
+        let rough = f64::EPSILON * n as f64 * h.diagonal().max();
+        let root = (h.clone() + DMatrix::identity(n, n) * rough).cholesky()?;
+        let (to, along) = (root.solve(&g), root.solve(&a));
+        let y = &along * (a.dot(&to) / a.dot(&along)) - to;
+        let s_step = slopes.by_s.as_ref().map_or(0.0, |by| {
+            to_s + by.follows.iter().zip(w.iter()).zip(y.iter()).map(|((f, w), y)| f * w * y).sum::<f64>()
+        });
+        let of_s = slopes.by_s.as_ref().map_or(0.0, |by| by.gradient * by.gradient / by.curvature);
+        let decrement = of_s - g.dot(&y);
+        if !(decrement.is_finite() && decrement > 0.0) {
+            return None;
+        }
+        // Newton's step of the multipliers, as far as they stay above zero
+        let steps: Vec<f64> = multipliers
+            .iter()
+            .zip(w.iter())
+            .zip(y.iter())
+            .map(|((z, w), y)| 1.0 / w - z * (1.0 + y))
+            .collect();
+        let deepest = multipliers.iter().zip(&steps).map(|(z, d)| -d / z).fold(0.0, f64::max);
+        let follow = if deepest > 0.0 { (INSIDE / deepest).min(1.0) } else { 1.0 };
+        multipliers.iter_mut().zip(&steps).for_each(|(z, d)| *z += follow * d);
+        let logs = |w: &[f64]| w.iter().map(|w| w.ln()).sum::<f64>();
+        let before = here.value - logs(w);
+        let deepest = y.iter().fold(0.0f64, |m, y| m.max(-y));
+        let mut step = if deepest > 0.0 { (INSIDE / deepest).min(1.0) } else { 1.0 };
+        for _ in 0..30 {
+            let mut next: Vec<f64> = w.iter().zip(y.iter()).map(|(w, y)| w * (1.0 + step * y)).collect();
+            let sum: f64 = next.iter().sum();
+            next.iter_mut().for_each(|w| *w /= sum);
+            let s_next = *s + step * s_step;
+            let there = self.at(&next, s_next, tau, scale).map(|at| at.value - logs(&next));
+            if there.is_some_and(|v| v <= before - 1e-4 * step * decrement + 1e-12 * before.abs()) {
+                w.copy_from_slice(&next);
+                *s = s_next;
+                return Some(decrement);
+            }
+            step *= 0.5;
+        }
+        None
+    }
+
+    /// Gradient and Hessian of [`Self::at`] by the weights, and by s where the aim has it.
+    fn slopes(&self, root: &Cholesky<f64, Dyn>, w: &[f64], tau: f64, scale: f64) -> Option<Slopes> {
+        let (n, problem) = (w.len(), self.problem);
+        let inverse = root.inverse();
+        // F_i M^-1
+        let through: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &inverse).collect();
+        let pair = |i: usize, j: usize| &through[i] * self.factors[j].transpose();
+        let symmetric = |entry: &dyn Fn(usize, usize) -> f64| {
+            let mut h = DMatrix::zeros(n, n);
+            for i in 0..n {
+                for j in 0..=i {
+                    let x = entry(i, j);
+                    (h[(i, j)], h[(j, i)]) = (x, x);
+                }
+            }
+            h
+        };
+        Some(match &problem.aim {
+            Aim::Volume => {
+                let d = problem.counting() as f64;
+                let nuisance = problem.nuisance;
+                // of the information on the nuisance alone
+                let root = (nuisance > 0)
+                    .then(|| self.information(w).view((0, 0), (nuisance, nuisance)).into_owned().cholesky());
+                let inner = root.flatten().map(|r| r.inverse());
+                let corner = |i: usize| self.factors[i].columns(0, nuisance);
+                let own: Vec<DMatrix<f64>> = (0..n)
+                    .map(|i| inner.as_ref().map_or_else(|| DMatrix::zeros(0, 0), |v| corner(i) * v))
+                    .collect();
+                let hidden = |i: usize, j: usize| match inner {
+                    Some(_) => &own[i] * corner(j).transpose(),
+                    None => DMatrix::zeros(self.factors[i].nrows(), self.factors[j].nrows()),
+                };
+                let gradient =
+                    (0..n).map(|i| tau / d * (hidden(i, i).trace() - pair(i, i).trace())).collect();
+                let entry =
+                    |i: usize, j: usize| tau / d * (pair(i, j).norm_squared() - hidden(i, j).norm_squared());
+                Slopes { gradient, hessian: symmetric(&entry), by_s: None }
+            }
+            Aim::Least => {
+                // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on what counts
+                let r = root
+                    .l()
+                    .transpose()
+                    .solve_upper_triangular(&DMatrix::identity(problem.unknowns(), problem.unknowns()));
+                let r = r.unwrap_or_else(|| DMatrix::zeros(problem.unknowns(), problem.unknowns()));
+                let counting = r.rows(problem.nuisance, problem.counting());
+                let unit = counting.transpose() * counting;
+                let of: Vec<DMatrix<f64>> =
+                    self.factors.iter().map(|f| f * &r).map(|f| f.transpose() * f).collect();
+                let curvature = unit.norm_squared();
+                let follows: Vec<f64> = of.iter().map(|x| x.dot(&unit) / curvature).collect();
+                let rest: Vec<DMatrix<f64>> = of.iter().zip(&follows).map(|(x, c)| x - &unit * *c).collect();
+                Slopes {
+                    gradient: of.iter().map(|x| -x.trace()).collect(),
+                    hessian: symmetric(&|i, j| rest[i].dot(&rest[j])),
+                    by_s: Some(ByS { gradient: unit.trace() - tau / scale, curvature, follows }),
+                }
+            }
+            Aim::Mean(vectors) => {
+                let factor = tau / scale / vectors.ncols() as f64;
+                let (u, _) = self.solved(root);
+                let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
+                let gradient = (0..n).map(|i| -factor * seen[i].norm_squared()).collect();
+                let entry =
+                    |i: usize, j: usize| 2.0 * factor * pair(i, j).dot(&(&seen[i] * seen[j].transpose()));
+                Slopes { gradient, hessian: symmetric(&entry), by_s: None }
+            }
+            Aim::Largest(_, offsets) => {
+                let (u, values) = self.solved(root);
+                let shares = multipliers_of(&left_of(&values, offsets, tau / scale)?.1);
+                let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
+                let weighted: Vec<DMatrix<f64>> = seen
+                    .iter()
+                    .map(|x| DMatrix::from_fn(x.nrows(), x.ncols(), |r, j| x[(r, j)] * shares[j]))
+                    .collect();
+                // share_j times what the slope of v_j by the weights is beside that of s, which follows their mean
+                let slope = |i: usize, j: usize| -seen[i].column(j).norm_squared();
+                let slopes = DMatrix::from_fn(n, shares.len(), slope);
+                let weighed = |row: usize, by: &dyn Fn(f64) -> f64| -> f64 {
+                    slopes.row(row).iter().zip(&shares).map(|(x, share)| x * by(*share)).sum()
+                };
+                let curvature: f64 = shares.iter().map(|x| x * x).sum();
+                let follows: Vec<f64> = (0..n).map(|i| weighed(i, &|x| x * x) / curvature).collect();
+                let rest = |i: usize, j: usize| shares[j] * (slopes[(i, j)] - follows[i]);
+                let rest = DMatrix::from_fn(n, shares.len(), rest);
+                let outer = &rest * rest.transpose();
+                let entry = |i: usize, j: usize| {
+                    outer[(i, j)] + 2.0 * pair(i, j).dot(&(&weighted[i] * seen[j].transpose()))
+                };
+                // s is the best for the weights
+                Slopes {
+                    gradient: (0..n).map(|i| weighed(i, &|x| x)).collect(),
+                    hessian: symmetric(&entry),
+                    by_s: None,
+                }
+            }
+        })
+    }
+}
+
+/// The s that makes `rate s - sum_j ln(s - o_j - v_j)` least, and how far each aim is below it; `None` where values are
+/// not finite.
+fn left_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
+    let aims: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
+    let largest = aims.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // how far s is above the largest: the sum of the inverses falls with it, and is convex, so Newton's steps grow to the end
+    let mut above = 1.0 / rate;
+    for _ in 0..100 {
+        let left = || aims.iter().map(|a| above + (largest - a));
+        let beyond = left().map(|x| 1.0 / x).sum::<f64>() - rate;
+        if beyond.is_nan() || beyond.abs() <= 1e-13 * rate {
+            break;
+        }
+        above += beyond / left().map(|x| 1.0 / (x * x)).sum::<f64>();
+    }
+    let left: Vec<f64> = aims.iter().map(|a| above + (largest - a)).collect();
+    (largest.is_finite() && left.iter().all(|x| *x > 0.0)).then_some((largest + above, left))
+}
+
+fn multipliers_of(left: &[f64]) -> Vec<f64> {
+    left.iter().map(|x| 1.0 / x).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at this many points.
+    fn quadratic(points: usize, nuisance: usize, aim: Aim) -> Additive {
+        let at = |i: usize| -> DMatrix<f64> {
+            let x = 2.0 * i as f64 / (points - 1) as f64 - 1.0;
+            // what counts comes last
+            let f = if nuisance == 2 {
+                DVector::from_vec(vec![1.0, x, x * x])
+            } else {
+                DVector::from_vec(vec![x * x, x, 1.0])
+            };
+            &f * f.transpose()
+        };
+        let candidates = (0..points).map(at).collect();
+        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, aim }
+    }
+
+    /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and E-optimal designs, and
+    /// of the one for the coefficient of x^2 alone; column generation finds them among 401 points.
+    #[test]
+    fn weights_are_those_of_the_textbook() {
+        let units = DMatrix::identity(3, 3);
+        let square = DMatrix::from_column_slice(3, 1, &[0.0, 0.0, 1.0]);
+        let cases = [
+            (0, Aim::Volume, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0]),
+            (0, Aim::Mean(units.clone()), [0.25, 0.5, 0.25]),
+            (0, Aim::Least, [0.2, 0.6, 0.2]),
+            (2, Aim::Volume, [0.25, 0.5, 0.25]),
+            (2, Aim::Least, [0.25, 0.5, 0.25]),
+            (2, Aim::Largest(square, vec![0.0]), [0.25, 0.5, 0.25]),
+        ];
+        for points in [3, 41, 401] {
+            for (nuisance, aim, expected) in &cases {
+                let problem = quadratic(points, *nuisance, aim.clone());
+                let found = weigh(&problem, &|| true).expect("weights");
+                assert!(found.attained / found.bound < 1.0 + 1e-6, "{points} {aim:?}: {found:?}");
+                for (i, w) in [(0, expected[0]), (points / 2, expected[1]), (points - 1, expected[2])] {
+                    assert!((found.weights[i] - w).abs() < 2e-3, "{points} {aim:?}: {:?}", found.weights);
+                }
+            }
+        }
+    }
+
+    /// Gradients and Hessians are the slopes of what is minimised.
+    #[test]
+    fn slopes_are_differences() {
+        let units = DMatrix::identity(3, 3);
+        let aims = [
+            (0, Aim::Volume),
+            (1, Aim::Volume),
+            (0, Aim::Mean(units.clone())),
+            (0, Aim::Least),
+            (1, Aim::Least),
+            (0, Aim::Largest(units, vec![0.1, 0.0, 0.3])),
+        ];
+        for (nuisance, aim) in aims {
+            let mut problem = quadratic(5, 0, aim.clone());
+            problem.nuisance = nuisance;
+            let weighing = Weighing::new(&problem, (0..5).collect(), 0.0);
+            let w = [0.3, 0.1, 0.25, 0.15, 0.2];
+            let scale = weighing.aim(&w).expect("regular");
+            let s = if aim == Aim::Least { 0.5 / scale } else { 2.0 * scale };
+            let (tau, unit) = (7.0, 1.3);
+            let root = weighing.at(&w, s, tau, unit).expect("inside").root;
+            // with s as a sixth variable
+            let whole = |slopes: Slopes| {
+                let n = slopes.gradient.len();
+                let (mut gradient, mut h) = (slopes.gradient, slopes.hessian);
+                if let Some(by) = slopes.by_s {
+                    gradient.push(by.gradient);
+                    h = h.insert_row(n, 0.0).insert_column(n, 0.0);
+                    let m = DVector::from_fn(n + 1, |i, _| if i < n { by.follows[i] } else { -1.0 });
+                    h += &m * m.transpose() * by.curvature;
+                }
+                (gradient, h)
+            };
+            let (gradient, hessian) = whole(weighing.slopes(&root, &w, tau, unit).expect("inside"));
+            let moved = |k: usize, h: f64| {
+                let (mut w, mut s) = (w, s);
+                if k < 5 {
+                    w[k] += h
+                } else {
+                    s += h
+                }
+                (w, s)
+            };
+            let h = 1e-5;
+            for k in 0..gradient.len() {
+                let (up, down) = (moved(k, h), moved(k, -h));
+                let value = |(w, s): &([f64; 5], f64)| weighing.at(w, *s, tau, unit).expect("inside").value;
+                let slope = (value(&up) - value(&down)) / (2.0 * h);
+                assert!(
+                    (slope - gradient[k]).abs() < 1e-5 * (1.0 + slope.abs()),
+                    "{aim:?} {k}: {slope} {}",
+                    gradient[k]
+                );
+                let at = |(w, s): &([f64; 5], f64)| {
+                    let root = weighing.at(w, *s, tau, unit).expect("inside").root;
+                    whole(weighing.slopes(&root, w, tau, unit).expect("inside")).0
+                };
+                for (j, (a, b)) in at(&up).iter().zip(at(&down)).enumerate() {
+                    let bend = (a - b) / (2.0 * h);
+                    let told = hessian[(k, j)];
+                    assert!(
+                        (bend - told).abs() < 1e-4 * (1.0 + bend.abs()),
+                        "{aim:?} {k} {j}: {bend} {told}"
+                    );
+                }
+            }
+        }
+    }
+}

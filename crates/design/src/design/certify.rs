@@ -1,0 +1,67 @@
+//! What is said of how good the best can be: bounds on the schemes of a task.
+
+use super::answer::{Certificate, Weight};
+use super::certificate::Bound;
+use super::information::Evaluator;
+use super::task::{DWELLS, Task};
+
+/// Weights below are not listed.
+const LISTED: f64 = 1e-4;
+/// Rounding of a criterion as the search computes it, as a part of it.
+const ROUNDING: f64 = 1e-10;
+
+/// How far a criterion is above a bound at most, as a part of it.
+pub(super) fn excess(value: f64, bound: &Bound) -> f64 {
+    (value * (1.0 + ROUNDING) / bound.value - 1.0).max(0.0)
+}
+
+impl Task<'_> {
+    /// What no scheme of `k` candidates is below.
+    pub(super) fn bound(&self, evaluator: &Evaluator, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+        evaluator.bound(&self.criterion, k, &self.symmetry.representatives(), going)
+    }
+
+    /// The bound in the light of the best scheme found, of this criterion.
+    pub(super) fn certificate(&self, bound: &Bound, value: f64) -> Certificate {
+        let excess = excess(value, bound);
+        let weights = self.candidates.names.iter().zip(&bound.weights).filter(|(_, w)| **w >= LISTED);
+        Certificate {
+            best_possible: bound.value,
+            within_percent: 100.0 * excess,
+            efficiency: (1.0 + excess).powi(-2),
+            attained: bound.attained,
+            weights: weights.map(|(name, &weight)| Weight { candidate: name.clone(), weight }).collect(),
+            front: Vec::new(),
+        }
+    }
+
+    /// `[total time, criterion]`: no scheme of the candidates that takes this time in equal dwells is below, whatever of
+    /// the numbers of positions asked for it has.
+    pub(super) fn front_bound(
+        &self,
+        evaluator: &Evaluator,
+        (k, dwell_s): (usize, f64),
+        going: &dyn Fn() -> bool,
+    ) -> Vec<[f64; 2]> {
+        let mut counts = vec![k];
+        counts.extend(self.options.front.iter().filter(|f| **f != k));
+        let mut totals: Vec<f64> =
+            counts.iter().flat_map(|&count| DWELLS.map(|factor| count as f64 * dwell_s * factor)).collect();
+        totals.sort_by(f64::total_cmp);
+        totals.dedup();
+        let at = |total: f64| {
+            let least = counts.iter().filter_map(|&count| {
+                // a dwell of too many steps is no point of the front
+                let there = evaluator.clone().with_dwell(total / count as f64).ok()?;
+                Some(self.bound(&there, count, going).map(|b| b.value))
+            });
+            // where one is not known, nothing is
+            least
+                .collect::<Option<Vec<f64>>>()?
+                .into_iter()
+                .min_by(f64::total_cmp)
+                .map(|value| [total, value])
+        };
+        totals.into_iter().filter_map(at).collect()
+    }
+}

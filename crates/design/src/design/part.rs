@@ -1,0 +1,303 @@
+//! Exhaustive searches in parts: ranges of the ordered starts, each searched where and when one likes, put together
+//! again to what the whole gives.
+
+use std::ops::Range;
+
+use obsdeg_core::model::Scheme;
+use obsdeg_evidence::simulation::Conditions;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::search::{Best, Progress};
+use super::{Design, DesignError, DesignOptions, NOTHING_YET, Prepared, answered, watched};
+
+/// Name and version of the JSON layout.
+pub const PART_SCHEMA: &str = "obsdeg.design.part/1";
+/// Starts that are searched at once: an interrupted part goes on behind the last that are all done.
+const CHUNK: usize = 16;
+
+/// One part of an exhaustive search, done or interrupted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Part {
+    /// `obsdeg.design.part/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// SHA-256 of all inputs: the parts of one search have the same.
+    pub digest: String,
+    /// Which part, counted from 1, of how many.
+    pub part: [usize; 2],
+    /// The starts that are its own, counted from 0: the first, the one behind the last, and how many there are in all.
+    pub starts: [usize; 3],
+    /// What was found, by worst degree, smallest first (under reset carry all degrees together).
+    pub levels: Vec<Level>,
+    /// Whether all of its starts were searched, at as many worst degrees as the whole may need.
+    pub complete: bool,
+}
+
+/// What was found among the sequences of one worst degree.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Level {
+    /// The first start that is not yet searched.
+    pub next: usize,
+    /// What was examined, found, and the front.
+    pub best: Best,
+}
+
+/// Why a part is not taken.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PartError {
+    /// No part at all.
+    #[error("it is no part of a search: {why}")]
+    Layout {
+        /// What is wrong.
+        why: String,
+    },
+    /// Of other inputs.
+    #[error("it is a part of another search: the digest of its inputs is {found}, that of these {expected}")]
+    Foreign {
+        /// Its digest.
+        found: String,
+        /// That of the inputs.
+        expected: String,
+    },
+    /// Divided otherwise.
+    #[error("it is part {} of {}; expected a part of {expected}", .found[0], .found[1])]
+    Division {
+        /// Which part it is.
+        found: [usize; 2],
+        /// How many there are.
+        expected: usize,
+    },
+    /// Another number.
+    #[error("it is part {} of {}; expected part {} of {}", .found[0], .found[1], .expected[0], .expected[1])]
+    Number {
+        /// Which part it is.
+        found: [usize; 2],
+        /// Which part is asked for.
+        expected: [usize; 2],
+    },
+    /// Other starts than its number has.
+    #[error("it has the starts {found:?}; part {} of {} has {expected:?}", .part[0], .part[1])]
+    Starts {
+        /// Its starts.
+        found: [usize; 3],
+        /// Those of its number.
+        expected: [usize; 3],
+        /// Which part it is.
+        part: [usize; 2],
+    },
+    /// Not done.
+    #[error("part {} of {} was interrupted; the command that wrote it goes on with it", .part[0], .part[1])]
+    Unfinished {
+        /// Which part it is.
+        part: [usize; 2],
+    },
+    /// Given twice.
+    #[error("part {} of {} is in {other} too", .part[0], .part[1])]
+    Doubled {
+        /// Which part it is.
+        part: [usize; 2],
+        /// Where else.
+        other: String,
+    },
+}
+
+/// `SHA-256` of everything that a search depends on.
+fn digest(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> String {
+    let text = format!("{}\n{base:?}\n{conditions:?}\n{options:?}", env!("CARGO_PKG_VERSION"));
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The starts of part `number` of `of`, counted from 1.
+fn range(starts: usize, [number, of]: [usize; 2]) -> Range<usize> {
+    let to = |part: usize| (starts as u128 * part as u128 / of as u128) as usize;
+    to(number - 1)..to(number)
+}
+
+/// The number of starts of an exhaustive search: what its parts divide. More parts than starts leave some of them empty.
+///
+/// # Errors
+/// [`DesignError`].
+pub fn design_starts(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+) -> Result<usize, DesignError> {
+    let going = || true;
+    let prepared = Prepared::new(base, conditions, options, &going)?;
+    let k = options.positions.ok_or(DesignError::Parts)?;
+    Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
+}
+
+/// Part `number` of `of` of the exhaustive search, however large that is; `resumed` is what an interrupted run of the
+/// same part found. Interrupted again, it is not complete.
+///
+/// # Errors
+/// [`DesignError`]; [`PartError`] for a part that cannot be gone on with.
+pub fn design_part(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+    part: [usize; 2],
+    resumed: Option<Part>,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Part, DesignError> {
+    let k = options.positions.ok_or(DesignError::Parts)?;
+    if !(1..=part[1]).contains(&part[0]) {
+        return Err(DesignError::PartNumber { found: part });
+    }
+    let digest = digest(base, conditions, options);
+    if let Some(resumed) = &resumed {
+        let number = (resumed.part != part)
+            .then_some(PartError::Number { found: resumed.part, expected: part })
+            .map_or(Ok(()), Err);
+        let why = resumed.check(&digest).and(number);
+        why.map_err(|why| DesignError::Part { name: "the part to go on with".into(), why })?;
+        if resumed.complete {
+            return Ok(resumed.clone());
+        }
+    }
+    watched(progress, |progress, _| {
+        let going = || progress(NOTHING_YET);
+        let prepared = Prepared::new(base, conditions, options, &going)?;
+        prepared.check(k)?;
+        prepared.exhaustible(k)?;
+        let search = prepared.search(progress);
+        let starts = search.starts(&prepared.task.symmetry, k);
+        let own = range(starts.len(), part);
+        let expected = [own.start, own.end, starts.len()];
+        let mut out = resumed.unwrap_or_else(|| Part {
+            schema: PART_SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            digest,
+            part,
+            starts: expected,
+            levels: Vec::new(),
+            complete: false,
+        });
+        if out.starts != expected {
+            let why = PartError::Starts { found: out.starts, expected, part };
+            return Err(DesignError::Part { name: "the part to go on with".into(), why });
+        }
+        let Some(levels) = search.levels_of(k) else { return Ok(out) };
+        let mut all = Best { complete: true, ..Best::default() };
+        for (i, level) in levels.iter().enumerate() {
+            if out.levels.len() == i {
+                let best = Best { complete: true, ..Best::default() };
+                out.levels.push(Level { next: own.start, best });
+            }
+            let here = &mut out.levels[i];
+            while here.next < own.end {
+                let to = (here.next + CHUNK).min(own.end);
+                let done = search.exhaust_starts(&starts[here.next..to], &prepared.task.symmetry, k, level);
+                if !done.complete {
+                    return Ok(out);
+                }
+                here.best.merge(options.keep, done);
+                here.next = to;
+            }
+            all.merge(options.keep, here.best.clone());
+            if all.found.len() >= options.keep.max(1) {
+                break;
+            }
+        }
+        out.complete = true;
+        Ok(out)
+    })
+}
+
+/// What all parts of an exhaustive search found together: the answer of the whole. The parts are named, and come in any
+/// order.
+///
+/// # Errors
+/// [`DesignError::Part`] for one that is foreign, doubled or not done, [`DesignError::MissingParts`]; [`DesignError`].
+pub fn design_merged(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+    parts: &[(String, Part)],
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Design, DesignError> {
+    let digest = digest(base, conditions, options);
+    let Some((_, first)) = parts.first() else { return Err(DesignError::Parts) };
+    let of = first.part[1];
+    let mut sorted: Vec<Option<&(String, Part)>> = vec![None; of.min(MOST_PARTS)];
+    for named in parts {
+        let (name, part) = named;
+        let named_error = |why: PartError| DesignError::Part { name: name.clone(), why };
+        part.check(&digest).map_err(named_error)?;
+        if part.part[1] != of {
+            return Err(named_error(PartError::Division { found: part.part, expected: of }));
+        }
+        if !part.complete {
+            return Err(named_error(PartError::Unfinished { part: part.part }));
+        }
+        let slot = sorted.get_mut(part.part[0] - 1);
+        let Some(slot) = slot else { return Err(DesignError::PartNumber { found: part.part }) };
+        if let Some((other, _)) = slot {
+            return Err(named_error(PartError::Doubled { part: part.part, other: other.clone() }));
+        }
+        *slot = Some(named);
+    }
+    let missing: Vec<usize> = (1..=sorted.len()).filter(|i| sorted[i - 1].is_none()).collect();
+    if !missing.is_empty() {
+        return Err(DesignError::MissingParts { missing, of });
+    }
+    let sorted: Vec<&(String, Part)> = sorted.into_iter().flatten().collect();
+    let together = |prepared: &Prepared<'_>, k: usize| {
+        prepared.exhaustible(k)?;
+        let starts = prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len();
+        for (name, part) in &sorted {
+            let own = range(starts, part.part);
+            let expected = [own.start, own.end, starts];
+            let wrong = |why| Err(DesignError::Part { name: name.clone(), why });
+            if part.starts != expected {
+                return wrong(PartError::Starts { found: part.starts, expected, part: part.part });
+            }
+            if part.levels.iter().any(|level| level.next != own.end) {
+                return wrong(PartError::Unfinished { part: part.part });
+            }
+        }
+        let mut all = Best { complete: true, ..Best::default() };
+        for i in 0.. {
+            if sorted.iter().all(|(_, part)| part.levels.len() <= i) {
+                break;
+            }
+            for (name, part) in &sorted {
+                // a part ends early only when it has found enough by itself
+                let unfinished = || DesignError::Part {
+                    name: name.clone(),
+                    why: PartError::Unfinished { part: part.part },
+                };
+                all.merge(options.keep, part.levels.get(i).ok_or_else(unfinished)?.best.clone());
+            }
+            if all.found.len() >= options.keep.max(1) {
+                break;
+            }
+        }
+        Ok(all)
+    };
+    answered(base, conditions, options, progress, Some(&together))
+}
+
+/// Most parts of a search.
+const MOST_PARTS: usize = 1_000_000;
+
+impl Part {
+    /// Whether it belongs to a search of these inputs.
+    fn check(&self, digest: &str) -> Result<(), PartError> {
+        let [number, of] = self.part;
+        let why = if self.schema != PART_SCHEMA {
+            format!("schema {}; expected {PART_SCHEMA}", self.schema)
+        } else if !(1..=of).contains(&number) {
+            format!("part {number} of {of}")
+        } else if self.digest != digest {
+            return Err(PartError::Foreign { found: self.digest.clone(), expected: digest.into() });
+        } else {
+            return Ok(());
+        };
+        Err(PartError::Layout { why })
+    }
+}
