@@ -2,7 +2,11 @@
 //! written down by hand.
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::system::{Judgement, SystemCertainty, judge, model_file};
+use obsdeg_core::system::{
+    Judgement, NumberOfSolutions, StateStart, SystemCertainty, SystemOptions, analyze_system, judge,
+    model_file,
+};
+use obsdeg_evidence::system::crosscheck_system;
 use proptest::prelude::*;
 
 fn judged(text: &str) -> Judgement {
@@ -142,40 +146,43 @@ fn jumps_to_special_values_are_special() {
     assert_eq!(verdicts(&jump("cos(0)")), "x -, a 1");
 }
 
+/// Expressions that are constant, whatever x, q and w are near one.
+const IDENTITIES: [&str; 29] = [
+    "sin(asin(x/2)) - x/2",
+    "asin(sin(x)) - x",
+    "acos(cos(x)) - x",
+    "atan(tan(x)) - x",
+    "tan(x) - sin(x)/cos(x)",
+    "tanh(x) - (exp(x) - exp(-x))/(exp(x) + exp(-x))",
+    "sqrt(exp(x)) - exp(x/2)",
+    "exp(q*(x + w)) - exp(q*x + q*w)",
+    "exp(q*(x + w)) - exp(q*x)*exp(q*w)",
+    "(x^q)^w - x^(q*w)",
+    "(x*q)^0.7368 - x^0.7368*q^0.7368",
+    "log((x + 2)^2 - q^2) - log(x + 2 - q) - log(x + 2 + q)",
+    "sqrt(x^2 + q^2)*cos(atan(q/x)) - x",
+    "sqrt(x^2 + q^2)*sin(atan2(q, x)) - q",
+    "atan2(q, x) - atan(q/x)",
+    "sin(x*q + x) - sin(x*(q + 1))",
+    "abs(x) - x",
+    "abs(-x) - x",
+    "sign(x*q)",
+    "x^pi - exp(pi*log(x))",
+    "exp(log(x)*2) - x^2",
+    "sqrt(2)*sqrt(3)*x - sqrt(6)*x",
+    "sin(x + pi) + sin(x)",
+    "cos(x + 90*deg) + sin(x)",
+    "log(exp(x) + exp(q)) - q - log(exp(x - q) + 1)",
+    "atan(x) + atan(q) - atan2(x + q, 1 - x*q)",
+    "sin(sin(x + q)) - sin(sin(x)*cos(q) + cos(x)*sin(q))",
+    "sin(x)^2 + cos(x)^2",
+    "x^0 + q^0",
+];
+
 /// What is constant moves nothing: however its arguments are related.
 #[test]
 fn related_values_are_related() {
-    for zero in [
-        "sin(asin(x/2)) - x/2",
-        "asin(sin(x)) - x",
-        "acos(cos(x)) - x",
-        "atan(tan(x)) - x",
-        "tan(x) - sin(x)/cos(x)",
-        "tanh(x) - (exp(x) - exp(-x))/(exp(x) + exp(-x))",
-        "sqrt(exp(x)) - exp(x/2)",
-        "exp(q*(x + w)) - exp(q*x + q*w)",
-        "exp(q*(x + w)) - exp(q*x)*exp(q*w)",
-        "(x^q)^w - x^(q*w)",
-        "(x*q)^0.7368 - x^0.7368*q^0.7368",
-        "log((x + 2)^2 - q^2) - log(x + 2 - q) - log(x + 2 + q)",
-        "sqrt(x^2 + q^2)*cos(atan(q/x)) - x",
-        "sqrt(x^2 + q^2)*sin(atan2(q, x)) - q",
-        "atan2(q, x) - atan(q/x)",
-        "sin(x*q + x) - sin(x*(q + 1))",
-        "abs(x) - x",
-        "abs(-x) - x",
-        "sign(x*q)",
-        "x^pi - exp(pi*log(x))",
-        "exp(log(x)*2) - x^2",
-        "sqrt(2)*sqrt(3)*x - sqrt(6)*x",
-        "sin(x + pi) + sin(x)",
-        "cos(x + 90*deg) + sin(x)",
-        "log(exp(x) + exp(q)) - q - log(exp(x - q) + 1)",
-        "atan(x) + atan(q) - atan2(x + q, 1 - x*q)",
-        "sin(sin(x + q)) - sin(sin(x)*cos(q) + cos(x)*sin(q))",
-        "sin(x)^2 + cos(x)^2",
-        "x^0 + q^0",
-    ] {
+    for zero in IDENTITIES {
         let text = format!(
             "name='identity'\n[states]\nx='w*x + q'\nq='x - w'\nw='0'\nz='-z'\n[outputs]\ny='z + ({zero})'"
         );
@@ -439,4 +446,215 @@ fn exponents_may_be_constants() {
     assert_eq!(verdicts(&later), "p 4");
     let segment = "name='m'\n[constants]\nn=1\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + x^n'\n[[segment]]\n[[segment]]\nconstants={n=2}\n";
     assert_eq!(verdicts(segment), "x 0, z 0");
+}
+
+/// A model with numbers for a filter: what it has no values for gets some near one.
+fn with_numbers(text: &str, duration: f64) -> String {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    let mut values = String::new();
+    let states = model.states.iter().filter(|s| !matches!(s.start, StateStart::Value(_)));
+    let names = states.map(|s| &s.named.name).chain(model.parameters.iter().map(|p| &p.name));
+    for (i, name) in names.enumerate() {
+        values += &format!("{name}={}\n", 0.7 - 0.13 * i as f64);
+    }
+    let noise: String = model.outputs.iter().map(|o| format!("{}=0.01\n", o.0.name)).collect();
+    format!(
+        "{text}\n[simulation]\nduration={duration}\nstep=0.01\n[simulation.values]\n{values}\n[simulation.noise]\n{noise}"
+    )
+}
+
+/// The samples of a filter say the same of every named case, or that they do not show it.
+#[test]
+fn the_information_agrees_on_every_named_case() {
+    let tumble = |angles: &[&str]| at_angles("s*9.81*sin(a) + b", angles);
+    let heading = |angles: &[&str]| at_angles("s*cos(a) + b", angles);
+    let constant = |output: &str, c: &str| still("z x", output, &format!("[constants]\nc={c}\n"));
+    let pendulum = |th: &str, w: &str| {
+        format!(
+            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial='{th}'}}\nw={{equation='-k*sin(th)', initial='{w}'}}\n[outputs]\ny='th'"
+        )
+    };
+    let beacons: String =
+        (0..12).map(|i| format!("r{i}='sqrt((x - {i})^2 + (y - {}.5)^2)'\n", (i * 7) % 12)).collect();
+    let satellites: String = (0..5)
+        .map(|i| format!("r{i}='sqrt((x - {})^2 + (y - {})^2 + (z - 20)^2) + c'\n", 5 * i, (i * 3) % 5 - 2))
+        .collect();
+    let mut cases = vec![
+        tumble(&["0", "0.5", "1.5"]),
+        tumble(&["0.5", "1.5"]),
+        tumble(&["0"]),
+        tumble(&["0.5"]),
+        tumble(&["30*deg", "150*deg"]),
+        heading(&["0", "3.14159265"]),
+        heading(&["0", "2*pi"]),
+        constant("z*sin(c) + x", "0"),
+        constant("z*sin(c) + x", "'pi'"),
+        constant("z*log(c) + x", "1"),
+        constant("z*log(c) + x", "2"),
+        pendulum("0", "0"),
+        pendulum("0", "1"),
+        pendulum("pi", "0"),
+        "name='m'\nparameters=['k']\n[states]\nth='w'\nw='-k*sin(th)'\n[outputs]\ny='th'".into(),
+        "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n[[segment]]\nconstants={c='1'}\ncarry={x='0'}".into(),
+        "name='m'\nparameters=['p']\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='p*x^20'".into(),
+        still("x", "sqrt(2)*x", ""),
+        format!("name='m'\n[states]\nx='vx'\ny='vy'\nvx='0'\nvy='0'\n[outputs]\n{beacons}"),
+        format!("name='m'\n[states]\nx='0'\ny='0'\nz='0'\nc='0'\n[outputs]\n{satellites}"),
+        "name='m'\nparameters=['k']\n[states]\nx='-k*x^0.7368'\n[outputs]\ny='x'".into(),
+        "name='m'\n[states]\nx='u'\nv='0'\nu='v'\n[outputs]\ny='atan(u/x)'\nz='sqrt(u^2 + x^2)'".into(),
+    ];
+    cases.extend(
+        IDENTITIES.iter().map(|zero| {
+            format!("name='m'\n[states]\nx='0'\nq='0'\nw='0'\nz='-z'\n[outputs]\ny='z + ({zero})'")
+        }),
+    );
+    let (mut disagree, mut checks) = (Vec::new(), 0);
+    for text in &cases {
+        let model = model_file::read(&with_numbers(text, 1.0)).unwrap_or_else(|e| panic!("{e}: {text}"));
+        match crosscheck_system(&model, 1) {
+            Ok(e) if e.passed => checks += e.checks,
+            Ok(e) => disagree.push(format!("{text}\n{e:?}")),
+            Err(e) => disagree.push(format!("{text}\n{e}")),
+        }
+    }
+    assert!(disagree.is_empty(), "{} of {}\n{}", disagree.len(), cases.len(), disagree.join("\n\n"));
+    assert!(checks > 3 * cases.len(), "{checks}");
+}
+
+/// What a sceptic might try, each truth by hand from the first derivatives of the output.
+#[test]
+fn held_out_models() {
+    let c = |output: &str, value: &str| still("z x", output, &format!("[constants]\nc='{value}'\n"));
+    let two = |output: &str, angles: &[&str]| {
+        let segments: String =
+            angles.iter().map(|a| format!("[[segment]]\nconstants={{a='{a}'}}\n")).collect();
+        still("s m", output, &format!("[constants]\na=0\n{segments}"))
+    };
+    let model = |parameters: &str, states: &str, outputs: &str, rest: &str| {
+        format!("name='m'\n{rest}parameters=[{parameters}]\n[states]\n{states}\n[outputs]\n{outputs}\n")
+    };
+    let start = |rate: &str, x: &str, p: &str| {
+        model(p, &format!("x={{equation='{rate}', initial='{x}'}}"), "y='x'", "")
+    };
+    let pendulum = |th: &str, w: &str| model("'l', 'd'", &format!("th={th}\nw={w}"), "y='th'", "");
+    let swing = |th: &str, w: &str| {
+        pendulum(
+            &format!("{{equation='w', initial={th}}}"),
+            &format!("{{equation='-9.81/l*sin(th) - d*w', initial={w}}}"),
+        )
+    };
+    let arrhenius = "name='m'\nexperiments=2\nparameters=['A', 'E']\n[constants]\nT=300\n[states]\nx='-A*exp(-E/T)*x'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\nconstants={T=350}\n";
+    let cases: Vec<(String, &str)> = vec![
+        // given values
+        (c("z*tan(c) + x", "0"), "z -, x 0"),
+        (c("z*(cos(c) - 1) + x", "2*pi"), "z -, x 0"),
+        (c("z*(exp(c) - exp(1)) + x", "1"), "z -, x 0"),
+        (c("z*(c^c - 4) + x", "2"), "z -, x 0"),
+        (c("z*(c^c - 4) + x", "2.0001"), "z ~, x ~"),
+        (c("z*(sqrt(c)*sqrt(c) - c) + x", "3"), "z -, x 0"),
+        (c("z*tanh(c) + x", "0.1"), "z ~, x ~"),
+        (c("z*(log(c) - 3*log(2)) + x", "8"), "z -, x 0"),
+        (c("z*(sin(c)^2 - 3/4) + x", "60*deg"), "z -, x 0"),
+        (c("z*((c + 1)^(c - 1) - 9) + x", "2"), "z ~, x ~"),
+        (c("z*((c + 1)^c - 9) + x", "2"), "z -, x 0"),
+        // special starts
+        (start("p*sin(x)", "0", "'p'"), "p -"),
+        (start("p*sin(x)", "pi/2", "'p'"), "p 1"),
+        (start("p*cos(x)", "0", "'p'"), "p 1"),
+        (start("p*x + q", "0", "'p', 'q'"), "p 2, q 1"),
+        (start("1 + p*(exp(x) - 1 - x)", "0", "'p'"), "p 3"),
+        (swing("0", "0"), "l -, d -"),
+        (swing("0", "1"), "l 3, d 2"),
+        (pendulum("'w'", "'-9.81/l*sin(th) - d*w'"), "th 0, w 1, l 3, d 3"),
+        // the time
+        (model("'k'", "x='0'", "y='x*exp(-k*t)'", ""), "x 0, k 1"),
+        (still("a w phi", "a*sin(w*t + phi)", ""), "a 2, w 2, phi 2"),
+        (still("a w", "a*sin(w*t)", ""), "a 3, w 3"),
+        (still("a w", "a*cos(w*t)", ""), "a 0, w 2"),
+        (model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='sin(t)'}}\n"), "p 2"),
+        (
+            model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='exp(t) - 1 - t'}}\n"),
+            "p 3",
+        ),
+        // related values
+        (model("", "x='0'\nq='0'", "y='log(x) + log(q)'\nz='x*q'", ""), "x ~, q ~"),
+        (model("", "x='0'\nq='0'", "y='exp(x)*exp(q)'\nz='x - q'", ""), "x 0, q 0"),
+        (model("", "x='0'\nq='0'", "y='atan2(x, q)'\nz='x^2 + q^2'", ""), "x 0, q 0"),
+        (model("", "x='0'\nq='0'", "y='sqrt(x)*sqrt(q)'\nz='sqrt(x*q)'", ""), "x ~, q ~"),
+        (model("", "x='0'\nq='0'", "y='x^q'\nz='q*log(x)'", ""), "x ~, q ~"),
+        (model("", "x='0'\nq='0'", "y='x^q'\nz='q'", ""), "x 0, q 0"),
+        (still("x q", "sqrt(x^2 + 2*x*q + q^2)", ""), "x ~, q ~"),
+        (still("x z", "(x^2)^0.5 - x + z", ""), "x -, z 0"),
+        (still("x z", "acos(x) + asin(x) + z", ""), "x -, z 0"),
+        (still("x z", "sign(x)*z + x", ""), "x ~, z ~"),
+        (still("x z", "abs(x*z)", ""), "x ~, z ~"),
+        (model("'r', 'K'", "x='r*x*log(K/x)'", "y='x'", ""), "x 0, r 2, K 2"),
+        (model("", "x='v*cos(h)'\ny='v*sin(h)'\nh='0'\nv='0'", "a='x'\nb='y'", ""), "x 0, y 0, h 1, v 1"),
+        (
+            model("", "x='v*cos(h)'\ny='v*sin(h)'\nh='0'\nv={equation='0', initial=0}", "a='x'\nb='y'", ""),
+            "x 0, y 0, h -",
+        ),
+        // segments and experiments
+        (two("s*sin(a) + m*cos(a)", &["0", "90*deg"]), "s 0, m 0"),
+        (two("s*sin(a) + m*cos(a)", &["30*deg", "210*deg"]), "s ~, m ~"),
+        (two("s*sin(a) + m*cos(a)", &["30*deg", "390*deg"]), "s ~, m ~"),
+        (two("s*sin(a) + m*cos(a)", &["0", "pi"]), "s -, m 0"),
+        (two("s*exp(a) + m", &["0", "log(1)"]), "s ~, m ~"),
+        (two("s*exp(a) + m", &["0", "log(2)"]), "s 0, m 0"),
+        (arrhenius.into(), "x@1 0, x@2 0, A 1, E 1"),
+        (arrhenius.replace("350", "300"), "x@1 0, x@2 0, A ~, E ~"),
+        (
+            "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nc=0\n[states]\nx='0'\n[outputs]\ny='p*sin(c) + x'\n[[experiment]]\n[[experiment]]\nconstants={c='pi/2'}\n".into(),
+            "x@1 0, x@2 ~, p ~",
+        ),
+    ];
+    let wrong = cases.iter().filter_map(|(text, truth)| {
+        let found = verdicts(text);
+        (found != *truth).then(|| format!("{found} instead of {truth}:\n{text}"))
+    });
+    let wrong: Vec<String> = wrong.collect();
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
+
+/// The answer says on which branch it stands, and where solutions come from.
+#[test]
+fn the_answer_says_what_it_leaves_open() {
+    let analysis = |text: &str| {
+        let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+        analyze_system(&model, SystemOptions::default(), None).expect("judged")
+    };
+    let of = |output: &str| analysis(&still("x z", output, "")).branches;
+    assert_eq!(of("sqrt(x^2) + abs(z)"), ["sqrt", "abs"]);
+    assert_eq!(of("sqrt(2)*x + exp(z)"), [""; 0]);
+    let plain = analysis("name='m'\n[states]\nx='-sin(x)*z'\nz='0'\n[outputs]\ny='x'");
+    assert_eq!(plain.quantities[0].number_of_solutions, Some(NumberOfSolutions::OneByExpression));
+    assert_eq!(plain.quantities[0].solution.as_deref(), Some("y"));
+    assert!(matches!(plain.quantities[1].number_of_solutions, Some(NumberOfSolutions::Undecided(_))));
+    assert!(plain.note.expect("why").contains("without functions only"));
+    assert_eq!((plain.independent_functions, plain.error_bound.is_some()), (Some(2), true));
+}
+
+/// Constraints in models with functions: a pendulum on a circle, by its bearing.
+#[test]
+fn constraints_beside_functions() {
+    let circle = |constraint: &str, output: &str| {
+        verdicts(&format!(
+            "name='m'\n{constraint}[states]\nx='-w*y'\ny='w*x'\nw='0'\n[outputs]\nz='{output}'"
+        ))
+    };
+    // free: the bearing says nothing of the radius
+    assert_eq!(circle("", "atan2(y, x)"), "x ~, y ~, w 1");
+    assert_eq!(circle("constraints=['x^2 + y^2 = 2']\n", "atan2(y, x)"), "x 0, y 0, w 1");
+    assert_eq!(circle("constraints=['x^2 + y^2 = 2']\n", "exp(x)"), "x 0, y 0, w 1");
+    // the radius is known before: the output adds nothing
+    assert_eq!(circle("constraints=['x^2 + y^2 = 2']\n", "log(x^2 + y^2)"), "x ~, y ~, w -");
+    let two = "constraints=['x^2 + y^2 = 2', 'x = y']\n";
+    assert_eq!(circle(two, "sin(w*x)"), "x 0, y 0, w 0");
+    // what no point holds
+    let none = model_file::read(
+        "name='m'\nconstraints=['x^2 + y^2 = -1']\n[states]\nx='0'\ny='0'\n[outputs]\nz='exp(x)'",
+    )
+    .expect("a model");
+    let refused = judge(&none, 1, None).expect_err("no real point").to_string();
+    assert!(refused.contains("no point was found at which it holds"), "{refused}");
 }

@@ -99,6 +99,20 @@ impl Field {
         self.redc(u128::from(a) * u128::from(b))
     }
 
+    /// An element that is `a b`, below `2p` but maybe not below p, for `a < 4p` and `b < 2p`: `t < 8 p^2 <= p 2^64`.
+    #[inline]
+    pub(crate) fn loose_product(&self, a: u64, b: u64) -> u64 {
+        let t = u128::from(a) * u128::from(b);
+        let m = (t as u64).wrapping_mul(self.neg_inv);
+        ((t + u128::from(m) * u128::from(self.p)) >> 64) as u64
+    }
+
+    /// What is below `4p`, below `2p`.
+    #[inline]
+    pub(crate) fn loosely(&self, a: u64) -> u64 {
+        a.min(a.wrapping_sub(2 * self.p))
+    }
+
     /// `a^e`.
     pub fn pow(&self, mut a: u64, mut e: u64) -> u64 {
         let mut r = self.one;

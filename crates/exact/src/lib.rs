@@ -11,6 +11,7 @@
 //! - [`turn`]: cosines and sines of decimal degrees in such a field;
 //! - [`echelon`]: the incremental reduced row-echelon basis;
 //! - [`series`]: truncated power series, and echelon form over them;
+//! - [`transform`]: products of long polynomials;
 //! - [`radical`]: numbers of `Q(sqrt 2, sqrt 3)` recovered from their images;
 //! - [`polynomial`]: roots of small polynomials in the field;
 //! - [`multivariate`], [`groebner`]: polynomials in several variables, and bases of their ideals;
@@ -37,6 +38,7 @@ pub mod reals;
 pub mod rng;
 pub mod scalars;
 pub mod series;
+pub mod transform;
 pub mod turn;
 
 pub use ball::Ball;
@@ -48,4 +50,5 @@ pub use radical::{Radical, Ratio};
 pub use reals::{Gap, RealSpace, Reals};
 pub use rng::SplitMix64;
 pub use scalars::{RowSpace, Scalars};
+pub use transform::Transform;
 pub use turn::Turn;

@@ -4,7 +4,7 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
     DigitsReport, NumberOfSolutions, POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity,
 };
-use obsdeg_evidence::crosscheck::{Agreement, Check};
+use obsdeg_evidence::crosscheck::Agreement;
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
@@ -171,9 +171,18 @@ impl Answer for SystemAnalysis {
         )
     });
         assumed.push(
-            "the verdict is local: an observable unknown has finitely many solutions near any generic point"
+            "observable is meant locally: around a generic point no other value gives the same outputs; how many values there are in all is said where it was decided"
                 .into(),
         );
+        if !self.branches.is_empty() {
+            assumed.push(format!(
+                "{}: one branch was looked at, that of points near one (positive unknowns), or where the model is not defined there, of the first point that was found; others may have other verdicts",
+                words::names(self.branches.iter().map(String::as_str))
+            ));
+        }
+        if !self.combinations.is_empty() {
+            assumed.push("the number of solutions of a combination is not counted".into());
+        }
         assumed.extend(counting(self));
         assumed.extend(self.note.clone());
         if let Some(count @ 1..) = self.independent_functions {
@@ -253,7 +262,11 @@ impl Answer for SystemRun {
 /// The exact verdicts against the information of the samples.
 impl Answer for SystemEvidence {
     fn document(&self) -> Document {
-        let said = |c: &Check| if c.fails() { "DISAGREES" } else { "agrees" };
+        let said = |outcome: Agreement| match outcome {
+            Agreement::Disagrees => "DISAGREES",
+            Agreement::NotResolvable => "not resolvable",
+            Agreement::Agrees | Agreement::NotTested => "agrees",
+        };
         let row = |q: &SystemQuantityEvidence| {
             vec![
                 q.name.clone(),
@@ -265,11 +278,13 @@ impl Answer for SystemEvidence {
                 q.inflation.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}")),
                 match (
                     q.slope.fails() || q.inflation.fails(),
+                    q.inflation.outcome,
                     q.degree.is_some() && q.slope.measured.is_none(),
                 ) {
-                    (true, _) => "DISAGREES",
-                    (false, true) => "agrees, degree not measured",
-                    (false, false) => "agrees",
+                    (true, _, _) => "DISAGREES",
+                    (false, Agreement::NotResolvable, _) => "not resolvable",
+                    (false, _, true) => "agrees, degree not measured",
+                    (false, _, false) => "agrees",
                 }
                 .into(),
             ]
@@ -293,14 +308,14 @@ impl Answer for SystemEvidence {
             .iter()
             .map(|s| {
                 let seen = s.seen.measured.map_or_else(|| "-".into(), |x| format!("{x:.0e}"));
-                format!("{}: seen with {seen} of the best direction, {}", s.words, said(&s.seen))
+                format!("{}: seen with {seen} of the best direction, {}", s.words, said(s.seen.outcome))
             })
             .collect();
         null.push(format!(
             "unobservable directions: {} exact, {} singular values vanish, {}",
             self.defect.predicted,
             self.defect.measured,
-            if self.defect.outcome == Agreement::Disagrees { "DISAGREES" } else { "agrees" }
+            said(self.defect.outcome)
         ));
         blocks.push(Block::list("Directions that no output sees", null));
         blocks.push(Block::list(
@@ -311,15 +326,21 @@ impl Answer for SystemEvidence {
                 number(self.duration)
             ),
             "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is observable, 10 for what is not".into(),
+            "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is observable and leaves more than a hundredth of its diffuse prior, and directions seen with less than 1e-9 of the best and more than 1e-12".into(),
             certainty(self.error_bound, self.digits, self.seed),
         ],
     ));
-        let verdict = match (self.passed, self.orders.measured < self.orders.of) {
+        let open = self.orders.measured < self.orders.of || self.not_resolvable > 0;
+        let verdict = match (self.passed, open) {
             (false, _) => "filter and exact verdicts DISAGREE",
             (true, true) => "filter and exact verdicts agree as far as measured",
             (true, false) => "filter and exact verdicts agree",
         };
-        let passed = format!("{} of {} checks passed", self.checks - self.failures, self.checks);
+        let open = match self.not_resolvable {
+            0 => String::new(),
+            k => format!(", {k} not resolvable"),
+        };
+        let passed = format!("{} of {} checks passed{open}", self.checks - self.failures, self.checks);
         Document {
             title: format!("Cross-check: {}", self.name),
             lead: vec![format!(

@@ -4,12 +4,16 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::constraints::slots_of;
+use super::dag::Op;
 use super::fibre::{Count, values_taken};
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
-use super::model::{ModelError, Role, StateStart, SystemModel};
+use super::model::{Compiled, ModelError, Role, StateStart, SystemModel};
+use super::rows::Unknown;
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};
+use crate::model::expression::Function;
 
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
@@ -60,6 +64,9 @@ pub struct SystemAnalysis {
     pub closed: bool,
     /// Whether a verdict rests on the bound.
     pub rests_on_bound: bool,
+    /// Functions of unknowns that have branches (abs, sign, roots, asin, acos): the verdicts are those of the branch that points near one lie
+    /// in, or where the model is not defined there, of the first that was found.
+    pub branches: Vec<String>,
     /// Why there are no solving expressions, if there are none.
     pub note: Option<String>,
     /// The order of the derivatives with which solutions were counted by elimination; null when none were.
@@ -207,6 +214,7 @@ pub fn analyze_system(
     let judged = judge_compiled(model, &compiled, seed, order)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let mut out = answer(model, &judged, &symmetries);
+    out.branches = branches(&compiled);
     if !options.solutions {
         return Ok(out);
     }
@@ -219,14 +227,41 @@ pub fn analyze_system(
     });
     for ((u, count), found) in judged.layout.unknowns.iter().zip(counts).zip(found) {
         if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
-            let unique = found.as_ref().is_some_and(|e| e.unique);
-            q.solution = found.map(|e| e.text);
+            let shown = found.is_none().then(|| shown_by(model, &compiled, u)).flatten();
+            let unique = shown.is_some() || found.as_ref().is_some_and(|e| e.unique);
+            q.solution = found.map(|e| e.text).or(shown);
             q.number_of_solutions = count.map(|count| number_of_solutions(count, unique));
         }
     }
     let counted = |q: &SystemQuantity| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(_)));
     out.counting_order = out.quantities.iter().any(counted).then_some(counting_order);
     Ok(out)
+}
+
+/// The output that a state is, if one is nothing else.
+fn shown_by(model: &SystemModel, compiled: &Compiled, unknown: &Unknown) -> Option<String> {
+    if model.experiments > 1 || !model.segments.is_empty() || !matches!(unknown.role, Role::State(_)) {
+        return None;
+    }
+    let node = compiled.node_of(unknown.role)?;
+    let output = compiled.outputs(0).iter().position(|&o| o == node)?;
+    Some(model.outputs[output].0.name.clone())
+}
+
+/// The functions with branches that are taken of what is not known.
+fn branches(compiled: &Compiled) -> Vec<String> {
+    let known = |s: usize| matches!(compiled.roles[s], Role::Constant(_) | Role::KnownInput(_) | Role::Time);
+    let branched = [Function::Abs, Function::Sign, Function::Sqrt, Function::Asin, Function::Acos];
+    let taken = |f: Function| {
+        compiled.dag.ops.iter().any(|op| {
+            // a sign is the derivative of a size
+            matches!(*op, Op::Primitive { function, of, .. } if function == f
+                && !(f == Function::Sign && compiled.dag.has(Function::Abs, of))
+                && !slots_of(&compiled.dag, of).into_iter().all(known))
+        })
+    };
+    let named = Function::ALL.iter().filter(|(_, f)| branched.contains(f) && taken(*f));
+    named.map(|(name, _)| name.to_string()).collect()
 }
 
 fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
@@ -296,6 +331,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         bound: judged.layout.bound,
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
+        branches: Vec::new(),
         note: None,
         counting_order: None,
         independent_functions: judged.independent_functions,

@@ -71,6 +71,11 @@ impl Dag {
         !self.ops.iter().any(|op| matches!(op, Op::Primitive { .. } | Op::Pi))
     }
 
+    /// Whether a function of a node is there.
+    pub(super) fn has(&self, function: Function, of: usize) -> bool {
+        self.functions.contains_key(&(function, of))
+    }
+
     pub(super) fn add(&mut self, op: Op) -> usize {
         if let Some(&i) = self.index.get(&op) {
             return i;

@@ -39,7 +39,7 @@ const REMAINDER: u64 = 100_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NotCounted {
     /// A function in an equation.
-    #[error("the system is not rational in its unknowns")]
+    #[error("solutions are counted for models without functions only")]
     NotRational,
     /// Too many unknowns.
     #[error("there are more than {UNKNOWNS} unknowns")]

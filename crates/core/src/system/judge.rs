@@ -1,7 +1,7 @@
 //! Verdicts on any system: degrees, agreed on at two random points, modulo two primes or in many digits.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
-use obsdeg_exact::{Echelon, Field, Gap, Reals, RowSpace, SplitMix64};
+use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
 use super::dag::{Dag, Op};
 use super::independent::independent_functions;
@@ -16,6 +16,9 @@ use crate::model::expression::Function;
 
 /// Pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
+
+/// From so many orders on, about, fields have roots of unity.
+const LONG: usize = 100;
 
 /// What is known of a system.
 #[derive(Debug, Clone)]
@@ -263,15 +266,24 @@ fn judge_in_fields(
     layout: &Layout,
     seed: u64,
 ) -> Result<Judgement, ModelError> {
+    // long series are multiplied by transforms, which need roots of unity
+    let orders = layout.unknowns.len() / model.outputs.len().max(1);
+    let order = if orders < LONG { 1 } else { (4 * orders as u64).next_power_of_two() };
+    let runs = compiled.segments.len().max(1) * model.experiments.max(1);
     for attempt in 0..ATTEMPTS {
         let judged = |i: usize| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
-            let field = random_field(&mut rng);
+            let field = match order {
+                1 => random_field(&mut rng),
+                // it has divisors enough
+                _ => RootField::random(order, &mut rng).map_or_else(|_| random_field(&mut rng), |k| k.field),
+            };
             climb_at(model, compiled, layout, field, &mut rng).map(|at| (field, at))
         };
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
         if first.agrees(&second) {
-            let error_bound = error_bound(&claim(compiled, layout, &first.degrees), 2);
+            let error_bound =
+                error_bound(&Claim { order, ..claim(compiled, layout, &first.degrees, runs) }, 2);
             let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), error_bound };
             let span = first.span.clone();
             let judged = Judgement::of(layout.clone(), first, SystemCertainty::Primes(primes), seed);
@@ -384,7 +396,7 @@ impl Judgement {
 ///
 /// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`, where the degree of `P_k` grows by at most
 /// `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative and two products make of them.
-fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees) -> Claim {
+fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> Claim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
     let used: Vec<Fraction> = experiments
@@ -414,10 +426,13 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees) -> Claim {
     let bits = top_bits + (orders + 1.0) * step + n.max(1.0).log2();
     Claim {
         unknowns: layout.unknowns.len(),
-        // a rank and every unit vector at each order, at points drawn anew up to so many times
+        // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here and at a generic point; that no
+        // unit vector comes an order early (if the ranks are right none comes late), and no column or entry of the last basis is zero by chance
         decisions: ATTEMPTS
-            * (degrees.rank_profile.len() + 1)
-            * (2 + layout.unknowns.len() + compiled.combinations.len()),
+            * ((degrees.rank_profile.len() + 1) * (1 + 2 * runs)
+                + 2 * layout.unknowns.len()
+                + 2 * compiled.combinations.len()
+                + degrees.rank() * (layout.unknowns.len() - degrees.rank())),
         order: 1,
         row_degree: degree.min(1e18) as usize,
         row_bits: bits,

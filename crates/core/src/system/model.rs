@@ -164,7 +164,7 @@ pub struct ModelError {
 }
 
 /// Most unknowns of a system.
-pub(crate) const MAX_UNKNOWNS: usize = 500;
+pub(crate) const MAX_UNKNOWNS: usize = 4000;
 /// Most experiments.
 pub(crate) const MAX_EXPERIMENTS: usize = 20;
 /// Highest degree of an input that is a polynomial in time.

@@ -3,6 +3,7 @@
 use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
+use super::adjoint::Adjoint;
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
@@ -10,6 +11,8 @@ use crate::degree::rows::DerivativeRows;
 
 /// Orders that are followed where no end is proven, at least.
 const ORDERS: usize = 60;
+/// From so many lanes on rows are computed backwards: before that memory is no matter, and lanes are as fast.
+pub(super) const MANY: usize = 48;
 
 /// An unknown of a system.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -102,7 +105,6 @@ pub(crate) struct SystemRows<'a, S: Values> {
     lanes: usize,
     runs: Vec<Run<'a, S>>,
     bound: usize,
-    row: Vec<S::Element>,
     /// Of the ranks at generic points.
     gap: Gap,
 }
@@ -124,6 +126,8 @@ enum End {
 #[derive(Debug, Clone)]
 struct Run<'a, S: Values> {
     taylor: Taylor<'a, S>,
+    /// Its rows, where there are many lanes.
+    adjoint: Option<Adjoint<'a, S>>,
     outputs: &'a [usize],
     /// Its own rank.
     own: S::Space,
@@ -366,6 +370,26 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         )
     }
 
+    /// The rows of a run without lanes in every node, where there are many.
+    fn adjoint(&self, point: &Point<S>, lanes: usize) -> Option<Adjoint<'a, S>> {
+        let outputs = self.compiled.outputs(point.experiment);
+        let (dag, f) = (&self.compiled.dag, self.field.clone());
+        let values = self.series(point, 0).ok()?;
+        Adjoint::new(dag, f, lanes, &point.signals, &point.initial, outputs, values)
+    }
+
+    /// A run at a random point, by lanes and backwards.
+    #[cfg(test)]
+    pub(super) fn both(&self, rng: &mut SplitMix64) -> (Taylor<'a, S>, Adjoint<'a, S>) {
+        let f = &self.field;
+        let parameters: Vec<S::Element> = self.model.parameters.iter().map(|_| f.random(rng, 0)).collect();
+        let mut point = self.draw(0, (&parameters, &[]), f.zero(), rng, 0);
+        self.set_states(&mut point, &given(&self.compiled.starts)).expect("starts");
+        let lanes = self.layout.unknowns.len();
+        let forward = self.series(&point, lanes).expect("a point");
+        (forward, self.adjoint(&point, lanes).expect("no unknown inputs"))
+    }
+
     /// The rank that the rows of a run cannot exceed: the one at a generic point, where every state is an unknown, the time is
     /// anything, and the first order that adds nothing is the last; seen through the derivatives of the run's states by
     /// the unknowns. A minor that is not zero at the run's own point is not zero there either.
@@ -400,6 +424,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                 }
             }
             let Ok(mut taylor) = self.series(&generic, lanes) else { continue };
+            let mut adjoint = if lanes < MANY { None } else { self.adjoint(&generic, lanes) };
             let mut whole = S::Space::new(f.clone(), lanes);
             let mut seen = S::Space::new(f.clone(), unknowns);
             for row in known {
@@ -407,11 +432,9 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             }
             for order in 0..=lanes {
                 let mut grew = false;
-                while taylor.length <= order {
-                    taylor.advance();
-                }
-                for &output in self.compiled.outputs(point.experiment) {
-                    let row = dense(f, lanes, taylor.lanes_of(output), taylor.dual(output, order));
+                for row in
+                    rows_of(&mut taylor, adjoint.as_mut(), self.compiled.outputs(point.experiment), order)
+                {
                     grew |= whole.insert(&row);
                     // by the unknowns themselves, and through the states
                     let mut through = row[..unknowns].to_vec();
@@ -430,6 +453,25 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         }
         None
     }
+}
+
+/// The rows of an order of all outputs.
+fn rows_of<S: Values>(
+    taylor: &mut Taylor<'_, S>,
+    adjoint: Option<&mut Adjoint<'_, S>>,
+    outputs: &[usize],
+    order: usize,
+) -> Rows<S> {
+    if let Some(adjoint) = adjoint {
+        return adjoint.rows(order);
+    }
+    while taylor.length <= order {
+        taylor.advance();
+    }
+    let row = |&output: &usize| {
+        dense(&taylor.field(), taylor.lanes(), taylor.lanes_of(output), taylor.dual(output, order))
+    };
+    outputs.iter().map(row).collect()
 }
 
 /// What is given, with its place.
@@ -524,10 +566,12 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 };
                 let own = S::Space::new(f.clone(), lanes);
                 let outputs = compiled.outputs(experiment);
-                runs.push(Run { taylor, outputs, own, end, done: false, known: known.clone(), combinations });
+                let adjoint = if lanes < MANY { None } else { maker.adjoint(&point, lanes) };
+                let known = known.clone();
+                runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
             }
         }
-        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, row: vec![f.zero(); lanes], gap })
+        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, gap })
     }
 
     /// The gradients of the combinations at the start of the first run.
@@ -554,10 +598,16 @@ impl<'a, S: Values> SystemRows<'a, S> {
     pub(crate) fn derivative(&mut self, node: usize, order: usize) -> S::Element {
         let f = self.field.clone();
         let Some(run) = self.runs.first_mut() else { return f.zero() };
-        while run.taylor.length <= order {
-            run.taylor.advance();
-        }
-        (1..=order).fold(run.taylor.value(node, order), |x, k| f.mul(&x, &f.integer(k as i64)))
+        let value = match &mut run.adjoint {
+            Some(adjoint) => adjoint.values_to(order).value(node, order),
+            None => {
+                while run.taylor.length <= order {
+                    run.taylor.advance();
+                }
+                run.taylor.value(node, order)
+            }
+        };
+        (1..=order).fold(value, |x, k| f.mul(&x, &f.integer(k as i64)))
     }
 
     /// The Taylor coefficient of a node at the start of a run.
@@ -609,26 +659,16 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
         }
         let single = self.runs.len() == 1;
         for run in self.runs.iter_mut().filter(|r| !r.done) {
-            while run.taylor.length <= order {
-                run.taylor.advance();
-            }
             let mut grew = false;
             // a constraint is an output of which only the start is known
             for row in run.known.iter().filter(|_| order == 0) {
                 sink(row);
                 run.own.insert(row);
             }
-            for &output in run.outputs {
-                let support = run.taylor.lanes_of(output);
-                for (&lane, x) in support.iter().zip(run.taylor.dual(output, order)) {
-                    self.row[lane as usize] = *x;
-                }
-                let new = sink(&self.row);
+            for row in rows_of(&mut run.taylor, run.adjoint.as_mut(), run.outputs, order) {
+                let new = sink(&row);
                 // where runs share the rank, each has to be followed until its own stalls
-                grew |= if single && run.end == End::Stagnation { new } else { run.own.insert(&self.row) };
-                for &lane in support {
-                    self.row[lane as usize] = self.field.zero();
-                }
+                grew |= if single && run.end == End::Stagnation { new } else { run.own.insert(&row) };
             }
             run.done = match run.end {
                 End::Stagnation => !grew,

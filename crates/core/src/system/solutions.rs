@@ -52,7 +52,9 @@ pub(super) enum NoExpressions {
     #[error("no solving expressions: more than {UNKNOWNS} unknowns, or a degree above {ORDER}")]
     TooMany,
     /// A function in an equation.
-    #[error("no solving expressions: the system is not rational in its unknowns")]
+    #[error(
+        "solving expressions are sought for models without functions only (and where an output is the unknown itself)"
+    )]
     NotRational,
     /// Too long an equation.
     #[error("no solving expressions: the equations are too long")]

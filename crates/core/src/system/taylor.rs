@@ -99,7 +99,7 @@ pub(crate) struct Taylor<'a, S: Values> {
 
 impl<'a, S: Values> Taylor<'a, S> {
     /// The series at order 0 of the nodes `roots` and what they are made of: `initial` gives every state's start (by
-    /// slot). Rates take part when `moving`.
+    /// slot). Rates take part when `moving`. Without lanes these are the values alone.
     ///
     /// # Errors
     /// [`Singular`] when the point is none.
@@ -263,6 +263,10 @@ impl<'a, S: Values> Taylor<'a, S> {
     /// Which lanes a node can depend on, at any order.
     fn find_support(&mut self, initial: &[Option<Initial<S::Element>>], moving: bool) {
         let n = self.dag.ops.len();
+        if self.lanes == 0 {
+            self.support = vec![Arc::from([]); n];
+            return;
+        }
         let words = self.lanes.div_ceil(64);
         let mut sets = vec![0u64; n * words];
         let mut own = |i: usize, lane: usize| sets[i * words + lane / 64] |= 1 << (lane % 64);
@@ -319,7 +323,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     fn start_duals(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
         let f = self.f.clone();
         for i in 0..self.dag.ops.len() {
-            if self.known[i] || !self.needed[i] {
+            if self.known[i] || !self.needed[i] || self.lanes == 0 {
                 continue;
             }
             let mut sums = std::mem::take(&mut self.sums);
@@ -424,6 +428,26 @@ impl<'a, S: Values> Taylor<'a, S> {
         &self.support[a]
     }
 
+    /// The field.
+    pub(super) fn field(&self) -> S {
+        self.f.clone()
+    }
+
+    /// The number of unknowns.
+    pub(super) fn lanes(&self) -> usize {
+        self.lanes
+    }
+
+    /// Whether a node takes part.
+    pub(super) fn takes_part(&self, a: usize) -> bool {
+        self.needed[a]
+    }
+
+    /// All coefficients of a node that there are; one of what is constant.
+    pub(super) fn series(&self, a: usize) -> &[S::Element] {
+        &self.values[a]
+    }
+
     /// Whether a node depends on no unknown.
     pub(crate) fn is_known(&self, a: usize) -> bool {
         self.known[a]
@@ -468,7 +492,7 @@ impl<'a, S: Values> Taylor<'a, S> {
                 self.values[i].push(x);
             }
         }
-        for i in 0..self.dag.ops.len() {
+        for i in 0..if self.lanes == 0 { 0 } else { self.dag.ops.len() } {
             if self.needed[i] && !self.constant[i] && !self.known[i] {
                 self.next_dual(i, k);
             }

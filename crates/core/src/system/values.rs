@@ -1,6 +1,6 @@
 //! What a model's numbers and functions are worth in a field, and random points there.
 
-use obsdeg_exact::{Ball, Field, RealSpace, Reals, RowSpace, Scalars, SplitMix64};
+use obsdeg_exact::{Ball, Field, RealSpace, Reals, RowSpace, Scalars, SplitMix64, Transform};
 
 use super::constraints::hold;
 use super::dag::Dag;
@@ -16,6 +16,19 @@ pub(crate) trait Values: Scalars {
     /// Most coefficients of a direction that is sought among polynomials.
     const COEFFICIENTS: usize;
 
+    /// What products of series need.
+    type Plan: Clone + std::fmt::Debug;
+
+    /// For series of this length.
+    fn plan(&self, length: usize) -> Self::Plan;
+    /// The first `n` coefficients of the product of a series with each of several, which are known to the plan by their keys.
+    fn products(
+        &self,
+        plan: &mut Self::Plan,
+        a: &[Self::Element],
+        factors: &[(usize, &[Self::Element])],
+        n: usize,
+    ) -> Vec<Vec<Self::Element>>;
     /// `mantissa / 10^decimals`.
     fn number(&self, mantissa: i128, decimals: i32) -> Self::Element;
     /// The half turn.
@@ -50,6 +63,22 @@ impl Values for Field {
     const ATTEMPTS: usize = 64;
     const BITS: i64 = 64;
     const COEFFICIENTS: usize = 800;
+
+    type Plan = Transform;
+
+    fn plan(&self, length: usize) -> Transform {
+        Transform::new(*self, length)
+    }
+
+    fn products(
+        &self,
+        plan: &mut Transform,
+        a: &[u64],
+        factors: &[(usize, &[u64])],
+        n: usize,
+    ) -> Vec<Vec<u64>> {
+        plan.products(a, factors, n)
+    }
 
     fn number(&self, mantissa: i128, decimals: i32) -> u64 {
         let ten = self.pow(self.from_u64(10), decimals.unsigned_abs().into());
@@ -113,6 +142,24 @@ impl<const N: usize> Values for Reals<N> {
     const ATTEMPTS: usize = 2000;
     const BITS: i64 = Ball::<N>::BITS;
     const COEFFICIENTS: usize = 200;
+
+    type Plan = ();
+
+    fn plan(&self, _: usize) {}
+
+    fn products(
+        &self,
+        (): &mut (),
+        a: &[Ball<N>],
+        factors: &[(usize, &[Ball<N>])],
+        n: usize,
+    ) -> Vec<Vec<Ball<N>>> {
+        let product = |(_, b): &(usize, &[Ball<N>])| {
+            let terms = |k: usize| (0..=k).filter_map(move |j| Some((a.get(j)?, b.get(k - j)?)));
+            (0..n).map(|k| self.dot(&Ball::ZERO, terms(k))).collect()
+        };
+        factors.iter().map(product).collect()
+    }
 
     fn number(&self, mantissa: i128, decimals: i32) -> Ball<N> {
         let mut ten = Ball::from_i64(1);

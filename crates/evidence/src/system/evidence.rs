@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::numeric::{FilterState, Numeric};
 use super::run::{RunError, Setup};
-use crate::crosscheck::answer::{Check, Count, Counts, Measured};
+use crate::crosscheck::answer::{Agreement, Check, Count, Counts, Measured};
 use crate::crosscheck::rules::{self, SLOPE_TOLERANCE};
 
 /// Name and version of the JSON layout.
@@ -32,6 +32,10 @@ const HORIZONS: i32 = 45;
 /// Singular values (columns of unit length) above this are seen, below the next are not.
 const SEEN: f64 = 1e-9;
 const UNSEEN: f64 = 1e-12;
+/// What moves no output by more than this part of the outputs themselves, over the width of its prior, is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Where samples leave more than this part of the diffuse prior, its inflation says nothing.
+const LEFT: f64 = 0.01;
 /// How many slopes in a row must settle, and how much rounding changes them.
 const SETTLED: usize = 4;
 const JITTER: f64 = 0.005;
@@ -55,8 +59,11 @@ pub struct SystemEvidence {
     pub failures: usize,
     /// How many degrees were measured.
     pub orders: Measured,
-    /// Checks that were made: what could not be measured is none.
+    /// Checks that were made: what could not be measured, or not be resolved, is none.
     pub checks: usize,
+    /// What was measured and is neither for nor against a verdict: an unknown that moves no output by more than rounding, or less than
+    /// a hundredth of its diffuse prior is learnt of it; singular values between what is seen and what is not.
+    pub not_resolvable: usize,
     /// Whether none failed.
     pub passed: bool,
     /// The longest horizon, of every experiment, in the unit of the model.
@@ -94,8 +101,8 @@ pub struct SymmetryEvidence {
 }
 
 /// The rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start, and those of the constraints, each
-/// of which weighs as much as the best sample.
-fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
+/// of which weighs as much as the best sample; and the size of all outputs, over their noise.
+fn rows(setup: &Setup<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError> {
     let numeric = &setup.numeric;
     let n = numeric.states.len();
     let segments = numeric.segments();
@@ -105,6 +112,7 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
     let (_, constraints) = numeric.constraints(&setup.truth);
     let mut out = DMatrix::zeros(parts * SAMPLES * outputs + constraints.nrows(), n);
     let (mut x, mut phi) = (setup.truth.clone(), DMatrix::identity(n, n));
+    let mut size = 0.0;
     for part in 0..parts {
         let begin = (part % segments * SAMPLES) as f64 * dt;
         let (after, jump) = numeric.carry(part, begin, &x);
@@ -119,6 +127,12 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
             })?;
             (x, phi) = (next.x, next.phi * phi);
             let h = measurement.jacobian(t + dt, &x) * &phi;
+            size += measurement
+                .h(t + dt, &x)
+                .iter()
+                .zip(&setup.sigmas)
+                .map(|(h, s)| (h / s).powi(2))
+                .sum::<f64>();
             for (i, sigma) in setup.sigmas.iter().enumerate() {
                 out.row_mut((part * SAMPLES + k) * outputs + i).copy_from(&(h.row(i) / *sigma));
             }
@@ -134,7 +148,7 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<DMatrix<f64>, RunError> {
         out.row_mut(samples + c).copy_from(&(constraints.row(c) * (best / own)));
     }
     match out.iter().all(|v| v.is_finite()) {
-        true => Ok(out),
+        true => Ok((out, size.sqrt())),
         false => Err(RunError::Filter {
             time: 0.0,
             duration: horizon,
@@ -202,9 +216,15 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         return Err(ModelError { what: model.name.clone(), message, span: None }.into());
     }
     let filter = |error| RunError::Filter { time: setup.duration, duration: setup.duration, error };
-    let whole = rows(&setup, setup.duration)?;
-    let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
+    let (mut whole, size) = rows(&setup, setup.duration)?;
     let rank = judged.findings.degrees.rank();
+    let weight = |c: usize| whole.column(columns[c]).norm() * setup.prior[columns[c]];
+    let largest = (0..columns.len()).map(weight).fold(size, f64::max);
+    let rounded: Vec<bool> = (0..columns.len()).map(|c| weight(c) <= ROUNDING * largest).collect();
+    for (&c, _) in columns.iter().zip(&rounded).filter(|(_, rounded)| **rounded) {
+        whole.column_mut(c).fill(0.0);
+    }
+    let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
     // with jumps, dwell may see earlier what derivatives see late: slopes are those of accuracy orders then
     let slopes =
         if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == StateStart::Unknown) {
@@ -217,6 +237,11 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         .enumerate()
         .map(|(c, u)| {
             let Verdict { status, degree } = judged.verdict_on(c);
+            let (inflated, left) = inflated[c];
+            let mut inflation = rules::LINEARISED.check(degree.is_some(), Some(inflated));
+            if inflation.fails() && (rounded[c] || (degree.is_some() && left > LEFT)) {
+                inflation.outcome = Agreement::NotResolvable;
+            }
             // of what has no degree nothing is measured that could be learnt
             let measured = slopes[c].filter(|_| degree.is_some());
             SystemQuantityEvidence {
@@ -224,14 +249,23 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
                 status,
                 degree,
                 slope: rules::slope(degree, measured),
-                inflation: rules::LINEARISED.check(degree.is_some(), Some(inflated[c])),
+                inflation,
             }
         })
         .collect();
     let (m, norms) = scaled(&whole, &columns);
     let (values, _) = singular_values(&m.clone().qr().r()).map_err(filter)?;
     let largest = values.first().copied().unwrap_or(1.0);
-    let defect = rules::defect(unknowns.len() - rank, &values, SEEN);
+    let vanish = |limit: f64| values.iter().filter(|s| **s <= limit * largest).count();
+    let (hidden, unseen) = (vanish(UNSEEN), vanish(SEEN));
+    let mut defect = rules::defect(unknowns.len() - rank, &values, SEEN);
+    // observable, and too little of it to be told from rounding
+    let faint = (0..columns.len()).filter(|&c| rounded[c] && quantities[c].degree.is_some()).count();
+    if (hidden.saturating_sub(faint)..=unseen).contains(&defect.predicted)
+        && defect.predicted != defect.measured
+    {
+        defect.outcome = Agreement::NotResolvable;
+    }
     let directions = found
         .found
         .iter()
@@ -261,6 +295,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         defect,
         failures: counts.disagree,
         checks: counts.agree + counts.disagree,
+        not_resolvable: counts.not_resolvable,
         passed: counts.disagree == 0,
         duration: setup.duration,
         error_bound: judged.error_bound(),
@@ -298,8 +333,8 @@ fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[u
     v
 }
 
-/// The factor on sigma of every unknown at the start when a diffuse prior is ten times as loose.
-fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Result<Vec<f64>, EkfError> {
+/// The factor on sigma of every unknown at the start when a diffuse prior is ten times as loose, and the part of the first that is left.
+fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Result<Vec<(f64, f64)>, EkfError> {
     let picked = rows.select_columns(columns);
     let sigmas = |factor: f64| {
         let prior: Vec<f64> = columns.iter().map(|&c| setup.prior[c] * factor).collect();
@@ -308,7 +343,8 @@ fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Resul
         information.sigmas()
     };
     let (small, large) = (sigmas(DIFFUSE)?, sigmas(10.0 * DIFFUSE)?);
-    Ok(large.iter().zip(&small).map(|(l, s)| l / s).collect())
+    let prior = columns.iter().map(|&c| setup.prior[c] * DIFFUSE);
+    Ok(large.iter().zip(&small).zip(prior).map(|((l, s), prior)| (l / s, s / prior)).collect())
 }
 
 /// What slopes at shorter and shorter horizons settle at: the last one, if the last of them change little and less and less. Two that agree
@@ -328,7 +364,7 @@ fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Optio
     for j in 0..HORIZONS {
         let horizon = setup.duration * SHORTER.powi(-j);
         let error = |error| RunError::Filter { time: horizon, duration: horizon, error };
-        match sigmas(&rows(setup, horizon)?, columns, rank).map_err(error)? {
+        match sigmas(&rows(setup, horizon)?.0, columns, rank).map_err(error)? {
             Some(s) => seen.push((horizon, s)),
             None if seen.len() > 2 => break,
             None => seen.clear(),

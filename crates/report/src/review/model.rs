@@ -1,8 +1,10 @@
 //! The part of a model in a review.
 
 use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
 use obsdeg_design::review::ModelReview;
 use obsdeg_evidence::simulation::Outcome;
+use obsdeg_evidence::system::SystemEvidence;
 
 use super::{derivatives, is_list, pictures, section};
 use crate::document::{Block, Finding, Grade, Status};
@@ -22,26 +24,47 @@ fn verdict(m: &ModelReview) -> String {
         n => format!("{n} independent directions change no output"),
     };
     let limits = limits(m);
+    let whole = |e: &SystemEvidence| e.passed && e.not_resolvable == 0 && e.orders.measured == e.orders.of;
     let filter = match &m.evidence {
-        Some(e) if e.passed && limits.is_empty() => {
+        Some(e) if whole(e) && limits.is_empty() => {
             " The information of a simulated run confirms the verdicts."
         }
         Some(e) if e.passed => {
-            " Within these limits the information of a simulated run agrees with the verdicts."
+            " The information of a simulated run agrees with the verdicts as far as it shows them."
         }
         _ => "",
     };
     let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
     format!(
-        "{lead}{} of {} unknowns are locally observable{derivatives}; {lost}.{filter}",
+        "{lead}{} of {} unknowns are observable{derivatives} ({}); {lost}.{filter}",
         seen.len(),
-        a.quantities.len()
+        a.quantities.len(),
+        solutions(a)
     )
+}
+
+/// How much is known of the number of solutions of what is observable.
+fn solutions(a: &SystemAnalysis) -> String {
+    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
+    let one = |q: &&&SystemQuantity| {
+        matches!(
+            q.number_of_solutions,
+            Some(NumberOfSolutions::OneByExpression | NumberOfSolutions::Counted(1))
+        )
+    };
+    match seen.iter().filter(one).count() {
+        0 => "locally".into(),
+        k if k == seen.len() => "each with one solution".into(),
+        k => format!("{k} with one solution, the others locally"),
+    }
 }
 
 /// Whether the information of a run agrees.
 fn evidence(m: &ModelReview) -> (Grade, String) {
     match &m.evidence {
+        Some(e) if e.passed && e.not_resolvable > 0 => {
+            (Grade::Good, format!("agree in all {} checks, {} not resolvable", e.checks, e.not_resolvable))
+        }
         Some(e) if e.passed => (Grade::Good, format!("agree in all {} checks", e.checks)),
         Some(e) => (Grade::Limited, format!("DISAGREE in {} of {} checks", e.failures, e.checks)),
         None => (Grade::Open, "not taken".into()),
@@ -97,7 +120,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
     let row = |what, (grade, text)| Finding { what, grade, text };
     let every = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
     let mut rows = vec![
-        row("Observable", (every, format!("{seen} of {} unknowns, locally", a.quantities.len()))),
+        row("Observable", (every, format!("{seen} of {} unknowns: {}", a.quantities.len(), solutions(a)))),
         row("Filter, one run", credible(m)),
         row("Filter and exact verdicts", evidence(m)),
     ];

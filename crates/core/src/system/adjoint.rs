@@ -1,0 +1,294 @@
+//! Derivative rows without a lane per unknown in every node: the differentials of `h, L_f h, L_f^2 h, ...` along the trajectory, carried
+//! backwards through the graph.
+//!
+//! With `d(L_f^k h) = sum_s w_s dx_s` over states and unknown constants, `w_s` series in time, the next one is
+//! `w_s' + sum_r w_r d(f_r)/dx_s`: a derivative, and one sweep through the graph against its direction (Hermann, Krener 1977,
+//! doi:10.1109/TAC.1977.1101601, for the Lie derivatives of covectors). A row of order k is the value at the start, k! times that of
+//! the Taylor coefficient. For orders below K series of length K - k are enough. So n unknowns and n orders take
+//! n^2 numbers in memory instead of n^3, and n^2 products of series, n^3 log n operations where these are transformed.
+
+use std::cell::RefCell;
+
+use super::dag::{Dag, Op};
+use super::taylor::{Initial, Signal, Taylor};
+use super::values::Values;
+
+/// A series in time.
+type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
+
+/// The rows of one run.
+#[derive(Debug, Clone)]
+pub(super) struct Adjoint<'a, S: Values> {
+    dag: &'a Dag,
+    f: S,
+    lanes: usize,
+    signals: Vec<Signal<S::Element>>,
+    initial: Vec<Option<Initial<S::Element>>>,
+    outputs: Vec<usize>,
+    /// The values of all nodes, of this many orders.
+    length: usize,
+    values: Taylor<'a, S>,
+    /// Of a quotient: one over the divisor, and minus the quotient over the divisor.
+    quotients: Vec<Option<[Series<S>; 2]>>,
+    plan: RefCell<S::Plan>,
+    /// The order of what is held.
+    order: usize,
+    /// Per output and slot the factor of its differential.
+    held: Vec<Vec<Option<Series<S>>>>,
+}
+
+impl<'a, S: Values> Adjoint<'a, S> {
+    /// The rows of a run, from order 0, and its values; `None` where inputs are unknown.
+    pub(super) fn new(
+        dag: &'a Dag,
+        f: S,
+        lanes: usize,
+        signals: &[Signal<S::Element>],
+        initial: &[Option<Initial<S::Element>>],
+        outputs: &[usize],
+        values: Taylor<'a, S>,
+    ) -> Option<Self> {
+        if signals.iter().any(|s| matches!(s, Signal::Unknown { .. })) {
+            return None;
+        }
+        // with fewer orders nobody sees everything
+        let length = lanes / outputs.len().max(1) + 2;
+        let (signals, initial, outputs) = (signals.to_vec(), initial.to_vec(), outputs.to_vec());
+        let plan = RefCell::new(f.plan(1));
+        let quotients = Vec::new();
+        let mut out = Self {
+            dag,
+            f,
+            lanes,
+            signals,
+            initial,
+            outputs,
+            length,
+            values,
+            quotients,
+            plan,
+            order: 0,
+            held: Vec::new(),
+        };
+        out.begin();
+        Some(out)
+    }
+
+    /// Values up to the length, and what is held at order 0.
+    fn begin(&mut self) {
+        while self.values.length < self.length {
+            self.values.advance();
+        }
+        self.plan = RefCell::new(self.f.plan(self.length));
+        let (f, n) = (&self.f, self.length);
+        let quotient = |(i, op): (usize, &Op)| match *op {
+            Op::Divide(_, b) if self.values.takes_part(i) && !self.values.is_known(i) => {
+                let below = inverse(f, self.values.series(b), n);
+                let ratio: Series<S> = self.values.series(i).iter().map(|x| f.neg(x)).collect();
+                // nothing has this key
+                let other = self.products(&ratio, &[(usize::MAX - i, &below)], n);
+                Some([below, other.into_iter().next()?])
+            }
+            _ => None,
+        };
+        self.quotients = self.dag.ops.iter().enumerate().map(quotient).collect();
+        self.order = 0;
+        let start = |&output: &usize| {
+            let mut one = vec![self.f.zero(); n];
+            one[0] = self.f.one();
+            self.sweep(vec![(output, one)], n)
+        };
+        self.held = self.outputs.iter().map(start).collect();
+    }
+
+    /// The next order.
+    fn step(&mut self) {
+        let (f, n) = (&self.f, self.length - self.order - 1);
+        let next = |held: &Vec<Option<Series<S>>>| {
+            let seeds = held.iter().zip(&self.signals).filter_map(|(w, signal)| match (w, signal) {
+                (Some(w), Signal::State { rate }) => Some((*rate, w[..n].to_vec())),
+                _ => None,
+            });
+            let mut out = self.sweep(seeds.collect(), n);
+            for (next, w) in out.iter_mut().zip(held) {
+                let Some(w) = w else { continue };
+                let next = next.get_or_insert_with(|| vec![f.zero(); n]);
+                for (j, x) in next.iter_mut().enumerate() {
+                    *x = f.add(x, &f.mul(&f.integer(j as i64 + 1), &w[j + 1]));
+                }
+            }
+            out
+        };
+        let held = self.held.iter().map(next).collect();
+        self.held = held;
+        self.order += 1;
+    }
+
+    /// The values of the run, up to an order.
+    pub(super) fn values_to(&mut self, order: usize) -> &Taylor<'a, S> {
+        while self.values.length <= order {
+            self.values.advance();
+        }
+        &self.values
+    }
+
+    /// The rows of an order, not below those that were asked for before, one for each output.
+    pub(super) fn rows(&mut self, order: usize) -> Vec<Series<S>> {
+        if order >= self.length {
+            self.length = order + 1 + order / 2;
+            self.begin();
+        }
+        while self.order < order {
+            self.step();
+        }
+        let f = &self.f;
+        let row = |held: &Vec<Option<Series<S>>>| {
+            let mut row = vec![f.zero(); self.lanes];
+            for ((w, signal), start) in held.iter().zip(&self.signals).zip(&self.initial) {
+                let Some(w) = w else { continue };
+                match signal {
+                    Signal::Constant { lane: Some(lane), .. } => row[*lane] = f.add(&row[*lane], &w[0]),
+                    Signal::State { .. } => {
+                        for (lane, d) in start.iter().flat_map(|s| &s.1) {
+                            row[*lane] = f.add(&row[*lane], &f.mul(&w[0], d));
+                        }
+                    }
+                    _ => {}
+                }
+            }
+            row
+        };
+        self.held.iter().map(row).collect()
+    }
+
+    /// From factors of differentials of nodes to those of slots, the first `n` orders.
+    fn sweep(&self, seeds: Vec<(usize, Series<S>)>, n: usize) -> Vec<Option<Series<S>>> {
+        let f = &self.f;
+        let mut left: Vec<Option<Series<S>>> = vec![None; self.dag.ops.len()];
+        let mut slots = vec![None; self.signals.len()];
+        let last = seeds.iter().map(|s| s.0).max().unwrap_or(0);
+        for (node, w) in seeds {
+            self.put(&mut left[node], w);
+        }
+        for i in (0..=last).rev() {
+            let Some(w) = left[i].take() else { continue };
+            if self.values.is_known(i) {
+                continue;
+            }
+            match self.dag.ops[i] {
+                Op::Number { .. } | Op::Pi => {}
+                Op::Slot(s) => slots[s] = Some(w),
+                Op::Add(a, b) => {
+                    self.put(&mut left[a], w.clone());
+                    self.put(&mut left[b], w);
+                }
+                Op::Subtract(a, b) => {
+                    self.put(&mut left[b], w.iter().map(|x| f.neg(x)).collect());
+                    self.put(&mut left[a], w);
+                }
+                Op::Multiply(a, b) => {
+                    let known = |i: &usize| !self.values.is_known(*i);
+                    let [a, b] = [(a, b), (b, a)].map(|(to, by)| Some(to).filter(known).map(|to| (to, by)));
+                    let parts: Vec<(usize, usize)> = a.into_iter().chain(b).collect();
+                    let factors: Vec<_> =
+                        parts.iter().map(|&(_, by)| (3 * by, self.values.series(by))).collect();
+                    for ((to, _), part) in parts.iter().zip(self.products(&w, &factors, n)) {
+                        self.put(&mut left[*to], part);
+                    }
+                }
+                Op::Divide(a, b) => {
+                    let [by_a, by_b] =
+                        [0, 1].map(|k| self.quotients[i].as_ref().map(|q| (3 * i + 1 + k, &q[k][..])));
+                    let parts = [(a, by_a), (b, by_b)].into_iter().filter(|p| !self.values.is_known(p.0));
+                    let (to, factors): (Vec<usize>, Vec<_>) =
+                        parts.filter_map(|(to, factor)| Some((to, factor?))).unzip();
+                    for (to, part) in to.into_iter().zip(self.products(&w, &factors, n)) {
+                        self.put(&mut left[to], part);
+                    }
+                }
+                Op::Primitive { of, weight, .. } => {
+                    for part in self.products(&w, &[(3 * weight, self.values.series(weight))], n) {
+                        self.put(&mut left[of], part);
+                    }
+                }
+            }
+        }
+        slots
+    }
+
+    fn put(&self, place: &mut Option<Series<S>>, w: Series<S>) {
+        match place {
+            None => *place = Some(w),
+            Some(sum) => sum.iter_mut().zip(&w).for_each(|(x, y)| *x = self.f.add(x, y)),
+        }
+    }
+
+    /// The first `n` coefficients of the products of a series with others, each with a key of its own; what is constant is a series of one.
+    fn products(&self, w: &[S::Element], factors: &[(usize, &[S::Element])], n: usize) -> Vec<Series<S>> {
+        let f = &self.f;
+        if factors.iter().all(|(_, b)| b.len() > 1) {
+            return f.products(&mut self.plan.borrow_mut(), w, factors, n);
+        }
+        let product = |&(key, b): &(usize, &[S::Element])| match *b {
+            [factor] => w[..n.min(w.len())].iter().map(|x| f.mul(x, &factor)).collect(),
+            _ => f.products(&mut self.plan.borrow_mut(), w, &[(key, b)], n).remove(0),
+        };
+        factors.iter().map(product).collect()
+    }
+}
+
+/// The first `n` coefficients of one over a series.
+fn inverse<S: Values>(f: &S, b: &[S::Element], n: usize) -> Series<S> {
+    // no divisor is zero, or there were no series
+    let first = f.inverse(&b[0]).unwrap_or(f.zero());
+    let mut out = vec![first];
+    if b.len() == 1 {
+        return out;
+    }
+    for k in 1..n {
+        let known = (0..k).filter_map(|j| Some((&out[j], b.get(k - j)?)));
+        out.push(f.neg(&f.mul(&first, &f.dot(&f.zero(), known))));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_exact::{Field, Scalars, SplitMix64};
+
+    use crate::system::model_file;
+    use crate::system::rows::{Layout, Maker, random_field};
+
+    /// Against duals in every node, to orders beyond the first length.
+    #[test]
+    fn the_same_as_forwards() {
+        for text in [
+            "[states]\nx='-a*x*z + u'\nz='x/(z + b)'\nw='w'\n[outputs]\ny='x*z'\nv='w + t'\n[known_inputs]\nu='generic'\n",
+            "[states]\nx={equation='a*sin(z)', initial='2*b'}\nz='exp(x) - u*z/x'\n[outputs]\ny='x^3/z'\n[known_inputs]\nu={polynomial=1}\n",
+            "[states]\nx='a/b'\nz='log(x + z)*tanh(a)'\n[outputs]\ny='z'\n",
+        ] {
+            let model =
+                model_file::read(&format!("name='m'\nparameters=['a', 'b']\n{text}")).expect("a model");
+            let compiled = model.compile().expect("a graph");
+            let layout = Layout::new(&model, &compiled, None);
+            let mut rng = SplitMix64::new(5);
+            let field: Field = random_field(&mut rng);
+            let maker = Maker { model: &model, compiled: &compiled, layout: &layout, field };
+            let (mut forward, mut adjoint) = maker.both(&mut rng);
+            let mut factorial = field.one();
+            for order in 0..12 {
+                factorial = Scalars::mul(&field, &factorial, &field.integer((order as i64).max(1)));
+                while forward.length <= order {
+                    forward.advance();
+                }
+                for (&output, row) in compiled.outputs(0).iter().zip(adjoint.rows(order)) {
+                    let mut expected = vec![0; layout.unknowns.len()];
+                    for (&lane, x) in forward.lanes_of(output).iter().zip(forward.dual(output, order)) {
+                        expected[lane as usize] = Scalars::mul(&field, x, &factorial);
+                    }
+                    assert_eq!(row, expected, "order {order} of {text}");
+                }
+            }
+        }
+    }
+}
