@@ -630,6 +630,9 @@ fn the_answer_says_what_it_leaves_open() {
     assert_eq!(plain.quantities[0].number_of_solutions, Some(NumberOfSolutions::OneByExpression));
     assert_eq!(plain.quantities[0].solution.as_deref(), Some("y"));
     assert!(matches!(plain.quantities[1].number_of_solutions, Some(NumberOfSolutions::Undecided(_))));
+    let fall = analysis("name='m'\n[states]\nx='v'\nv='a'\na='-sin(v)'\n[outputs]\ny='x'");
+    let shown: Vec<Option<&str>> = fall.quantities.iter().map(|q| q.solution.as_deref()).collect();
+    assert_eq!(shown, [Some("y"), Some("y'"), Some("y''")]);
     assert!(plain.note.expect("why").contains("without functions only"));
     assert_eq!((plain.independent_functions, plain.error_bound.is_some()), (Some(2), true));
 }

@@ -30,10 +30,15 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
     match (error_bound, digits) {
         (Some(bound), _) => format!("a verdict is wrong with probability below {bound:.0e}; seed {seed}"),
         (None, Some(d)) => {
-            let zero = d.zero_log10.map_or_else(|| "0".into(), |x| format!("10^{x:.0}"));
+            let zero = d.zero_log10.map_or_else(
+                || "what counts as zero is so exactly".into(),
+                |x| format!("what counts as zero is less than 10^{x:.0} of its row; a judgement by this gap"),
+            );
+            // no "-0"
+            let least = d.nonzero_log10.round() + 0.0;
             format!(
-                "functions by their true values at two random real points, with {} and {} digits, that agree: what counts as different from zero is proven to be (at least 10^{:.0} of its row), what counts as zero is less than {zero} of its row; a judgement by this gap, to which no probability belongs; seed {seed}",
-                d.digits[0], d.digits[1], d.nonzero_log10
+                "functions by their true values at two random real points, with {} and {} digits, that agree: what counts as different from zero is proven to be (at least 10^{least} of its row), {zero}; no probability belongs to it; seed {seed}",
+                d.digits[0], d.digits[1]
             )
         }
         (None, None) => format!("seed {seed}"),

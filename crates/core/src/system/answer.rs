@@ -227,7 +227,8 @@ pub fn analyze_system(
     });
     for ((u, count), found) in judged.layout.unknowns.iter().zip(counts).zip(found) {
         if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
-            let shown = found.is_none().then(|| shown_by(model, &compiled, u)).flatten();
+            let shown =
+                (q.degree.is_some() && found.is_none()).then(|| shown_by(model, &compiled, u)).flatten();
             let unique = shown.is_some() || found.as_ref().is_some_and(|e| e.unique);
             q.solution = found.map(|e| e.text).or(shown);
             q.number_of_solutions = count.map(|count| number_of_solutions(count, unique));
@@ -238,14 +239,20 @@ pub fn analyze_system(
     Ok(out)
 }
 
-/// The output that a state is, if one is nothing else.
+/// The output that a state is, or the derivative of such a state that it is, if it is nothing else: `y`, `y'`, `y''`.
 fn shown_by(model: &SystemModel, compiled: &Compiled, unknown: &Unknown) -> Option<String> {
     if model.experiments > 1 || !model.segments.is_empty() || !matches!(unknown.role, Role::State(_)) {
         return None;
     }
-    let node = compiled.node_of(unknown.role)?;
-    let output = compiled.outputs(0).iter().position(|&o| o == node)?;
-    Some(model.outputs[output].0.name.clone())
+    let mut node = compiled.node_of(unknown.role)?;
+    for primes in 0..4 {
+        if let Some(output) = compiled.outputs(0).iter().position(|&o| o == node) {
+            return Some(format!("{}{}", model.outputs[output].0.name, "'".repeat(primes)));
+        }
+        let state = compiled.rates(0).iter().position(|&rate| rate == node)?;
+        node = compiled.node_of(Role::State(state))?;
+    }
+    None
 }
 
 /// The functions with branches that are taken of what is not known.

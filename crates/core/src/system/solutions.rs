@@ -53,7 +53,7 @@ pub(super) enum NoExpressions {
     TooMany,
     /// A function in an equation.
     #[error(
-        "solving expressions are sought for models without functions only (and where an output is the unknown itself)"
+        "solving expressions are sought for models without functions only (elsewhere only where an unknown is an output or its derivative)"
     )]
     NotRational,
     /// Too long an equation.
