@@ -31,6 +31,7 @@ Examples:
   obsdeg design --positions 6 --observable D_F,D_O,D_S --max-degree 1
   obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01 --meet
   obsdeg design --positions 5 --carry inertial --candidates grid:45 --gimbal beta=-60:60 --refine
+  obsdeg design --positions 12 --carry reset --candidates free --round 5
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --positions 7 --carry inertial --merge part-*.json
 
@@ -60,10 +61,15 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with = "positions")]
     minimum: bool,
 
-    /// What to choose from: cardinal (the 24 attitudes along North, Up, East, South, Down, West), grid:DEG (Euler angles in steps), or
+    /// What to choose from: cardinal (the 24 attitudes along North, Up, East, South, Down, West), grid:DEG (Euler angles in steps), free (the
+    /// attitudes that weights on all attitudes need, reset carry), or
     /// the positions of a scheme file, whose carry, latitude, geometry, terms, conditions and gimbal limits hold too
     #[arg(long, value_name = "WHAT", default_value = "cardinal")]
     candidates: String,
+
+    /// With --candidates free: angles are rounded to multiples of so many degrees
+    #[arg(long, value_name = "DEG", default_value = "5")]
+    round: String,
 
     #[command(flatten)]
     assumptions: Assumptions,
@@ -193,6 +199,10 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.measurement.concern(std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
+    let round = parse_decimal(a.round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
+    let round = round.ok_or_else(|| {
+        Failure::input(format!("--round {}: expected degrees above 0 and up to 90, as in 5", a.round))
+    })?;
     let options = DesignOptions {
         candidates,
         positions: a.positions,
@@ -207,6 +217,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         refine: a.refine,
         front: a.front.clone(),
         within: a.within / 100.0,
+        everywhere: true,
+        free: (a.candidates == "free").then_some(round),
         seed: a.seed,
     };
     let parts = a.merge.iter().map(|path| Ok((path.display().to_string(), read_part(path)?)));
@@ -266,6 +278,10 @@ fn words(arg: Arg) -> Arg {
 fn candidates(text: &str) -> Result<(Scheme, Candidates), Failure> {
     if text == "cardinal" {
         return Ok((Scheme::default(), Candidates::cardinals()));
+    }
+    if text == "free" {
+        // where the search for attitudes begins
+        return Ok((Scheme::default(), Candidates::grid(45_000_000_000)?));
     }
     if let Some(step) = text.strip_prefix("grid:") {
         let wrong =

@@ -108,6 +108,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "s.toml",
             "t.toml",
             "grid:90",
+            "free",
             "grid:0",
             "grid:7",
             "grid:1e-9",
@@ -117,9 +118,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         ],
         "keep" => &["1", "3", "0", "-1", "18446744073709551615"],
         "restarts" => &["2", "1", "0", "-1"],
-        "within" => &["0.01", "0", "100", "-1", "x"],
-        "part" => &["1/5000", "5000/5000", "0/1", "x"],
-        "merge" => &["s.toml", "none.json"],
+        "round" => &["5", "0", "x"],
+        "within" => &["0.01", "0", "x"],
         "front" => &["1", "3", "0", "2:4", "1,2", "x"],
         "observable" => &["D_F,D_O,D_S", "D_F", "D_FX", "psi", "D_Q", ""],
         "max-degree" => &["1", "2", "D_F=1", "D_Q=1", "0", "-1"],
@@ -262,7 +262,9 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
         "report" => &["output", "runs"],
         _ => &[],
     };
-    let some = options.keys().map(String::as_str).filter(|name| *name != "help" && !always.contains(name));
+    // parts need files of their own
+    let left_out = |name: &&str| ["help", "part", "merge"].contains(name) || always.contains(name);
+    let some = options.keys().map(String::as_str).filter(|name| !left_out(name));
     let some: Vec<&str> = some.filter(|_| rng.below(10) == 0).collect();
     for name in always.iter().copied().chain(some) {
         let value = values(name).map(|from| pick(rng, from));

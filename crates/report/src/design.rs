@@ -1,6 +1,6 @@
 //! Schemes that were found.
 
-use obsdeg_design::design::{Certificate, Design, Found, SearchReport};
+use obsdeg_design::design::{Certificate, Design, Found, SearchReport, Weight};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
@@ -211,12 +211,48 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
             number(c.attained)
         ),
     ];
-    let mut weights: Vec<_> = c.weights.iter().collect();
-    weights.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-    let listed: Vec<String> = weights.iter().map(|w| format!("{} {:.4}", w.candidate, w.weight)).collect();
-    out.push(format!("weights: {}", shortened(&listed)));
+    out.push(format!("weights: {}", weights(&c.weights)));
+    let Some(every) = &c.everywhere else { return out };
+    out.push(format!(
+        "of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}: {first} is within {} of that (attitudes \
+         that add most are sought on a net; between its points what they add is bounded as a trigonometric polynomial)",
+        s.positions,
+        number(every.best_possible),
+        if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
+        percent(every.within_percent)
+    ));
+    out.push(format!(
+        "weights on {} attitudes would reach {}: {}",
+        every.weights.len(),
+        number(every.attained),
+        weights(&every.weights)
+    ));
+    let ratio = c.best_possible / every.attained;
+    match every.rounded_deg {
+        Some(step) => out.push(format!(
+            "the candidates are these attitudes with angles rounded to {step} deg: with weights they would reach {}, {} more",
+            number(c.attained),
+            percent(100.0 * (c.attained / every.attained - 1.0).max(0.0))
+        )),
+        None if ratio > FAR => out.push(format!(
+            "these candidates cost: weights on other attitudes would reach a criterion {ratio:.2} times smaller than any scheme of these has \
+             (--candidates free finds them)"
+        )),
+        None => {}
+    }
     out
 }
+
+/// `NUE 0.5000 NDW 0.5000`, largest first.
+fn weights(list: &[Weight]) -> String {
+    let mut sorted: Vec<_> = list.iter().collect();
+    sorted.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    let listed: Vec<String> = sorted.iter().map(|w| format!("{} {:.4}", w.candidate, w.weight)).collect();
+    shortened(&listed)
+}
+
+/// Candidates whose best is so many times worse than what other attitudes could do are said to cost.
+const FAR: f64 = 1.1;
 
 fn minimum(d: &Design) -> Vec<String> {
     let m = &d.minimum;

@@ -231,7 +231,8 @@ fn no_scheme_is_below_the_bound() {
             best = oracle.value(scheme, &counting, &criterion).map_or(best, |v| best.min(v));
         });
         let Some(bound) = bound else {
-            unknown += usize::from(best.is_finite());
+            // in tasks that nothing determines rounding makes the oracle's inverse finite, and large
+            unknown += usize::from(best < 1e3);
             continue;
         };
         assert!(bound.value <= best * (1.0 + 1e-5), "task {task} {criterion:?}: {} {best}", bound.value);
@@ -244,7 +245,7 @@ fn no_scheme_is_below_the_bound() {
             close += usize::from(bound.value > 0.8 * best);
         }
     }
-    assert!(close > 250 && loose < 15 && unknown < 50, "{close} {loose} {unknown}");
+    assert!(close > 250 && loose < 15 && unknown < 5, "{close} {loose} {unknown}");
 }
 
 fn of_d(positions: usize, candidates: Candidates, restarts: u64) -> Design {
@@ -319,4 +320,64 @@ fn exhaustion_agrees_with_the_bound() {
     }
     let found = designed(Carry::Inertial, &DesignOptions { restarts: 2, ..options(Some(5)) });
     assert!(found.search.expect("a search").certificate.is_none());
+}
+
+/// Over all attitudes: the bound holds for odd attitudes too, is near what weights reach, and cardinal attitudes are 1.8 times worse.
+#[test]
+fn all_attitudes_have_a_bound() {
+    let grid = Candidates::grid(45_000_000_000).expect("a grid");
+    let start = evaluator_of(Carry::Reset, &grid);
+    let k = 12;
+    let every = start.everywhere(&Criterion::D, k, &|| true).expect("a bound");
+    assert!(every.value <= every.attained && every.attained < every.value * 1.02, "{every:?}");
+    // section 11: 0.00075 at twelve positions, computed elsewhere
+    assert!((every.attained - 0.00075).abs() < 0.6e-5, "{every:?}");
+    let of_grid = start.bound(&Criterion::D, k, &[], &|| true).expect("a bound");
+    assert!(every.attained <= of_grid.attained * (1.0 + 1e-9), "{every:?}");
+    assert!(0.001_407_8 / every.attained > 1.8);
+    // sets of random attitudes, weighed as well as may be, are not below
+    let mut rng = SplitMix64::new(5);
+    for _ in 0..5 {
+        let mut angle = || Angle::from_nanodeg(rng.below(360_000_000_000) as i64 - 180_000_000_000);
+        let attitudes: Vec<Euler> = (0..60).map(|_| [angle(), angle(), angle()]).collect();
+        let names = Candidates { names: vec![String::new(); 60], attitudes };
+        let there =
+            evaluator_of(Carry::Reset, &names).bound(&Criterion::D, k, &[], &|| true).expect("a bound");
+        assert!(there.attained > every.value, "{} {every:?}", there.attained);
+    }
+}
+
+/// Free attitudes as a command: what is found is near the bound over all, readable, and what rounding costs is said; other
+/// carries are refused.
+#[test]
+fn free_attitudes_are_found() {
+    let grid = Candidates::grid(45_000_000_000).expect("a grid");
+    let free = |step: i64| DesignOptions {
+        candidates: grid.clone(),
+        criterion: CriterionName::D,
+        restarts: 4,
+        keep: 1,
+        free: Some(step),
+        ..options(Some(12))
+    };
+    let found = designed(Carry::Reset, &free(5_000_000_000));
+    let certificate = found.search.expect("a search").certificate.expect("a certificate");
+    let every = certificate.everywhere.expect("a bound over all attitudes");
+    assert_eq!(every.rounded_deg, Some(5.0));
+    assert!(certificate.attained >= every.best_possible && every.within_percent < 8.0, "{every:?}");
+    assert!(found.found[0].value < 0.000_81, "{:?}", found.found[0]);
+    for angle in found.found[0].angles.iter().flat_map(|a| a.split(',')) {
+        assert_eq!(angle.parse::<f64>().expect("degrees") % 5.0, 0.0, "{angle}");
+    }
+    for (carry, options) in [
+        (Carry::Inertial, free(5_000_000_000)),
+        (Carry::Reset, free(0)),
+        (Carry::Reset, DesignOptions { positions: None, ..free(5_000_000_000) }),
+    ] {
+        let error = design(&base(carry), &quiet(), &options, &on).expect_err("refused").to_string();
+        assert!(
+            error.starts_with("free attitudes are chosen for a number of positions under reset carry"),
+            "{error}"
+        );
+    }
 }

@@ -121,9 +121,28 @@ pub struct Certificate {
     pub attained: f64,
     /// How the weights divide the time among the candidates; those below 0.0001 are left out.
     pub weights: Vec<Weight>,
+    /// The same for all attitudes; null where it was not asked for.
+    pub everywhere: Option<EverywhereReport>,
     /// `[total time in s, criterion]`: no scheme of these candidates, in equal dwells and one of the numbers of positions asked for, is below at
     /// this time.
     pub front: Vec<[f64; 2]>,
+}
+
+/// How good the best scheme of any attitudes can be, whatever the candidates and the gimbals are; requirements on psi left out. Attitudes are
+/// taken up where they add most; between the points of a net of 3 degrees what they add is bounded as a trigonometric polynomial, so that
+/// the bound holds for all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EverywhereReport {
+    /// No scheme of so many attitudes, equal dwells, has a smaller criterion.
+    pub best_possible: f64,
+    /// The criterion of the first scheme that is not refined is at most so much above, in percent of the bound.
+    pub within_percent: f64,
+    /// The criterion that the weights would have as a scheme.
+    pub attained: f64,
+    /// The attitudes with weights, Euler angles in degrees; weights below 0.001 are left out.
+    pub weights: Vec<Weight>,
+    /// The candidates are these attitudes with angles rounded to multiples of so many degrees; null: they are others.
+    pub rounded_deg: Option<f64>,
 }
 
 /// A candidate and its weight.

@@ -1,7 +1,9 @@
 //! What is said of how good the best can be: bounds on the schemes of a task.
 
-use super::answer::{Certificate, Weight};
-use super::certificate::Bound;
+use obsdeg_core::model::Euler;
+
+use super::answer::{Certificate, EverywhereReport, Weight};
+use super::certificate::{Bound, Everywhere};
 use super::information::Evaluator;
 use super::task::{DWELLS, Task};
 
@@ -11,8 +13,23 @@ const LISTED: f64 = 1e-4;
 const ROUNDING: f64 = 1e-10;
 
 /// How far a criterion is above a bound at most, as a part of it.
-pub(super) fn excess(value: f64, bound: &Bound) -> f64 {
-    (value * (1.0 + ROUNDING) / bound.value - 1.0).max(0.0)
+pub(super) fn excess(value: f64, bound: f64) -> f64 {
+    (value * (1.0 + ROUNDING) / bound - 1.0).max(0.0)
+}
+
+/// The bound over all attitudes in the light of the best scheme found, of this criterion.
+pub(super) fn everywhere(found: &Everywhere, value: f64, rounded: Option<i64>) -> EverywhereReport {
+    let weight = |(euler, weight): &(Euler, f64)| Weight {
+        candidate: euler.each_ref().map(ToString::to_string).join(","),
+        weight: *weight,
+    };
+    EverywhereReport {
+        best_possible: found.value,
+        within_percent: 100.0 * excess(value, found.value),
+        attained: found.attained,
+        weights: found.support.iter().map(weight).collect(),
+        rounded_deg: rounded.map(|step| step as f64 / 1e9),
+    }
 }
 
 impl Task<'_> {
@@ -23,7 +40,7 @@ impl Task<'_> {
 
     /// The bound in the light of the best scheme found, of this criterion.
     pub(super) fn certificate(&self, bound: &Bound, value: f64) -> Certificate {
-        let excess = excess(value, bound);
+        let excess = excess(value, bound.value);
         let weights = self.candidates.names.iter().zip(&bound.weights).filter(|(_, w)| **w >= LISTED);
         Certificate {
             best_possible: bound.value,
@@ -31,6 +48,7 @@ impl Task<'_> {
             efficiency: (1.0 + excess).powi(-2),
             attained: bound.attained,
             weights: weights.map(|(name, &weight)| Weight { candidate: name.clone(), weight }).collect(),
+            everywhere: None,
             front: Vec::new(),
         }
     }

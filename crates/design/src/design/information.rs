@@ -206,6 +206,16 @@ impl Evaluator {
             .collect()
     }
 
+    /// Information of a position on its drift in n, its psi eliminated (3 x 3).
+    pub(super) fn drift_information(&self) -> Matrix3<f64> {
+        let mut all = [[0.0; MAX]; MAX];
+        for (row, local) in all.iter_mut().zip(&self.local) {
+            row[..LOCAL].copy_from_slice(local);
+        }
+        eliminate(&mut all, LOCAL, 3);
+        std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
+    }
+
     /// `G L` for the functionals L of `(psi^n, eps^n)` at a position (6 x n).
     fn weighted(&self, local: &[[f64; MAX]; LOCAL]) -> [[f64; MAX]; LOCAL] {
         let n = self.n;

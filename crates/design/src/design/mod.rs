@@ -24,7 +24,7 @@ mod winner;
 
 pub use answer::*;
 pub use candidates::Candidates;
-pub use certificate::Bound;
+pub use certificate::{Bound, Everywhere};
 pub use criterion::{Criterion, Limits};
 pub use information::{Evaluator, State};
 pub use observability::{Patience, Rows};
@@ -43,7 +43,7 @@ pub use winner::scheme as scheme_found;
 use candidates::MAX_CANDIDATES;
 use certify::excess;
 use obsdeg_core::degree::EnsembleError;
-use obsdeg_core::model::{Scheme, SchemeError};
+use obsdeg_core::model::{Angle, Carry, Scheme, SchemeError, format_decimal};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, SimulationError, latitude_of};
 use task::Task;
 use ties::TIE;
@@ -158,7 +158,7 @@ pub enum DesignError {
         examined: u64,
     },
     /// Parts of no exhaustive search.
-    #[error("parts are of a search for so many positions; found neither")]
+    #[error("parts are of a search for so many positions of given candidates; expected these")]
     Parts,
     /// A part that is none.
     #[error("part {} of {}; expected 1 of 1 or more, as in 2/7", .found[0], .found[1])]
@@ -191,6 +191,14 @@ pub enum DesignError {
         positions: usize,
         /// The number of candidates.
         candidates: usize,
+    },
+    /// Attitudes chosen freely where nothing says which.
+    #[error(
+        "free attitudes are chosen for a number of positions under reset carry, where information adds; found {found}"
+    )]
+    Free {
+        /// What was found.
+        found: String,
     },
     /// Stopped before anything was found.
     #[error("interrupted before anything was found")]
@@ -240,6 +248,11 @@ pub struct DesignOptions {
     /// Where many sequences would have to be searched and information adds (reset carry): a scheme found by exchange whose
     /// criterion is within this part of what is possible at all is enough; 0: all are searched.
     pub within: f64,
+    /// Whether the bound over all attitudes is sought too (reset carry).
+    pub everywhere: bool,
+    /// The candidates are where the search for the best attitudes of all begins; these take their place, with angles
+    /// rounded to multiples of so many 1e-9 degrees (reset carry).
+    pub free: Option<i64>,
     /// Seed of all random choices.
     pub seed: u64,
 }
@@ -261,6 +274,8 @@ impl Default for DesignOptions {
             refine: false,
             front: Vec::new(),
             within: 1e-4,
+            everywhere: false,
+            free: None,
             seed: 1,
         }
     }
@@ -382,6 +397,35 @@ impl<'a> Prepared<'a> {
     }
 }
 
+/// The best attitudes of all for a task, and as candidates with rounded angles.
+fn freely(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+    step: i64,
+    going: &(dyn Fn() -> bool + Sync),
+) -> Result<(Everywhere, Candidates), DesignError> {
+    let wrong = |found: String| DesignError::Free { found };
+    let k = options.positions.ok_or_else(|| wrong("no number of positions".into()))?;
+    if base.carry != Carry::Reset {
+        return Err(wrong(format!("{} carry", base.carry)));
+    }
+    if step <= 0 {
+        return Err(wrong(format!("angles rounded to {} degrees", format_decimal(step))));
+    }
+    let prepared = Prepared::new(base, conditions, options, going)?;
+    prepared.check(k)?;
+    let found = prepared.evaluator.everywhere(&prepared.task.criterion, k, going);
+    let found = found.ok_or(DesignError::Interrupted)?;
+    let rounded =
+        |angle: &Angle| Angle::from_nanodeg((angle.nanodeg() as f64 / step as f64).round() as i64 * step);
+    let mut candidates = Candidates::default();
+    for (euler, _) in &found.support {
+        candidates.add(euler.each_ref().map(rounded));
+    }
+    Ok((found, candidates))
+}
+
 /// What an exhaustive search found elsewhere.
 type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<Best, DesignError>;
 
@@ -395,6 +439,13 @@ fn answered(
 ) -> Result<Design, DesignError> {
     watched(progress, |progress, stopped| {
         let going = || progress(NOTHING_YET);
+        let mut every = None;
+        let mut chosen = options.clone();
+        if let Some(step) = options.free {
+            let (found, candidates) = freely(base, conditions, options, step, &going)?;
+            (every, chosen.candidates) = (Some(found), candidates);
+        }
+        let options = &chosen;
         let prepared = Prepared::new(base, conditions, options, &going)?;
         let task = &prepared.task;
         let minimum = task.minimum(&prepared.degrees, &going)?;
@@ -436,7 +487,7 @@ fn answered(
             {
                 let exchanged = search.exchange(k, &[], options.restarts, options.seed);
                 let enough = |f: &Scored| {
-                    f.worth.degree == search.floor && excess(f.worth.value, bound) < options.within
+                    f.worth.degree == search.floor && excess(f.worth.value, bound.value) < options.within
                 };
                 if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
                     (tried, exhaustive) = (Some(exchanged), None);
@@ -470,6 +521,11 @@ fn answered(
         if best.complete {
             task.front(evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
             if let Some(certificate) = &mut certificate {
+                if options.everywhere && every.is_none() {
+                    every = evaluator.everywhere(&task.criterion, k, &going);
+                }
+                let value = first.worth.value;
+                certificate.everywhere = every.map(|every| certify::everywhere(&every, value, options.free));
                 certificate.front = task.front_bound(evaluator, (k, conditions.dwell_s), &going);
             }
         }

@@ -127,7 +127,7 @@ pub fn design_starts(
 ) -> Result<usize, DesignError> {
     let going = || true;
     let prepared = Prepared::new(base, conditions, options, &going)?;
-    let k = options.positions.ok_or(DesignError::Parts)?;
+    let k = options.positions.filter(|_| options.free.is_none()).ok_or(DesignError::Parts)?;
     Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
 }
 
@@ -144,7 +144,7 @@ pub fn design_part(
     resumed: Option<Part>,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Part, DesignError> {
-    let k = options.positions.ok_or(DesignError::Parts)?;
+    let k = options.positions.filter(|_| options.free.is_none()).ok_or(DesignError::Parts)?;
     if !(1..=part[1]).contains(&part[0]) {
         return Err(DesignError::PartNumber { found: part });
     }
@@ -221,7 +221,9 @@ pub fn design_merged(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Design, DesignError> {
     let digest = digest(base, conditions, options);
-    let Some((_, first)) = parts.first() else { return Err(DesignError::Parts) };
+    let Some((_, first)) = parts.first().filter(|_| options.free.is_none()) else {
+        return Err(DesignError::Parts);
+    };
     let of = first.part[1];
     let mut sorted: Vec<Option<&(String, Part)>> = vec![None; of.min(MOST_PARTS)];
     for named in parts {

@@ -73,12 +73,17 @@ impl Additive {
     /// The aim is not below this at any weights of sum 1, hence in no scheme; 0 where nothing is known. Rounding in
     /// evaluating it is allowed for: what is claimed of matrices `A_i`, P as they are given.
     pub(super) fn lower_bound(&self, dual: &Dual) -> f64 {
+        self.lower_bound_over(dual, 0.0)
+    }
+
+    /// The same where there are other candidates, none of which adds more than `others` to `tr(X^T M X)`.
+    pub(super) fn lower_bound_over(&self, dual: &Dual, others: f64) -> f64 {
         let x = &dual.x;
         let (m, columns) = x.shape();
         let (w, size) = (x * x.transpose(), x.abs() * x.abs().transpose());
         // above what it is: entries of W are rounded as well as the sum over them
         let above = |a: &DMatrix<f64>| a.dot(&w) + rounding(m * m + columns) * a.abs().dot(&size);
-        let most = self.candidates.iter().map(&above).fold(0.0, f64::max);
+        let most = self.candidates.iter().map(&above).fold(others, f64::max);
         let energy = above(&self.prior) + most;
         let shared = |vectors: &DMatrix<f64>| -> f64 {
             let column = |(j, share): (usize, &f64)| {

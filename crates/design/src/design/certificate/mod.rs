@@ -2,7 +2,10 @@
 //! of every scheme of k candidates, from the optimal weights of the candidates (approximate design theory).
 
 mod bound;
+mod free;
 mod weights;
+
+pub use free::Everywhere;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::Carry;
@@ -44,17 +47,23 @@ impl Evaluator {
             Criterion::Margin(limits) if limits.psi.iter().any(|l| l.is_finite()) => {
                 self.with_psi(limits, k, firsts, going)?
             }
-            Criterion::Margin(limits) => self.weighed(self.largest(limits), k, going)?,
-            Criterion::Worst => {
-                let d = self.n - 3 - self.nuisance;
-                let none = Limits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] };
-                self.weighed(self.largest(&none), k, going)?
-            }
-            Criterion::A => self.weighed(Aim::Mean(self.units()), k, going)?,
-            Criterion::D => self.weighed(Aim::Volume, k, going)?,
-            Criterion::E => self.weighed(Aim::Least, k, going)?,
+            _ => self.weighed(self.aim(criterion), k, going)?,
         };
         (going() && found.value > 0.0).then_some(found)
+    }
+
+    /// What a criterion makes of the coefficients.
+    fn aim(&self, criterion: &Criterion) -> Aim {
+        match criterion {
+            Criterion::Margin(limits) => self.largest(limits),
+            Criterion::Worst => {
+                let d = self.n - 3 - self.nuisance;
+                self.largest(&Limits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] })
+            }
+            Criterion::A => Aim::Mean(self.units()),
+            Criterion::D => Aim::Volume,
+            Criterion::E => Aim::Least,
+        }
     }
 
     /// The coefficients that count as columns (m x d).
@@ -104,19 +113,23 @@ impl Evaluator {
         least
     }
 
-    /// The weights of least aim. Numbers are in deg/h (per g).
+    /// The weights of least aim.
     fn weighed(&self, aim: Aim, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+        let found = weigh(&self.additive(aim, k), going)?;
+        Some(Bound { value: found.bound.sqrt(), attained: found.attained.sqrt(), weights: found.weights })
+    }
+
+    /// The information of the candidates, k times; numbers are in deg/h (per g).
+    fn additive(&self, aim: Aim, k: usize) -> Additive {
         let (n, m) = (self.n, self.n - 3);
         let unit = k as f64 * self.dph * self.dph;
         let information =
             |own: &Vec<f64>| DMatrix::from_fn(m, m, |i, j| unit * own[(3 + i.max(j)) * n + 3 + i.min(j)]);
-        let problem = Additive {
+        Additive {
             candidates: self.candidates.iter().map(|c| information(&c.own)).collect(),
             prior: DMatrix::zeros(m, m),
             nuisance: self.nuisance,
             aim,
-        };
-        let found = weigh(&problem, going)?;
-        Some(Bound { value: found.bound.sqrt(), attained: found.attained.sqrt(), weights: found.weights })
+        }
     }
 }
