@@ -179,7 +179,7 @@ fn random_function_models_in_both_engines() {
 #[ignore = "minutes"]
 fn a_thousand_random_function_models_in_both_engines() {
     let count = random_models(true, 1000..2000);
-    assert!(count.agree > 900 && count.apart > 300, "{count:?}");
+    assert_eq!((count.agree, count.refused, count.apart), (986, 14, 386), "{count:?}");
 }
 
 /// The reference models, as far as a few seconds go; all of them with the ignored test.
