@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Command, Id};
-use obsdeg_core::model::{Carry, Euler, Latitude, Rotation, Scheme, Unknowns, parse_attitude};
+use obsdeg_core::model::{
+    Carry, DefinedBy, Euler, Latitude, Path, Rotation, Scheme, TermError, Unknowns, parse_attitude,
+};
 
 use crate::failure::Failure;
 use crate::input::{Input, Source};
@@ -39,9 +41,13 @@ pub(crate) struct InputArguments {
     #[command(flatten)]
     assumptions: Assumptions,
 
-    /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS; or drift for eps^n of one position
-    #[arg(long, value_name = "TERMS")]
-    terms: Option<Unknowns>,
+    #[command(flatten)]
+    terms: TermArguments,
+
+    /// How the platform is turned from one position to the next: one-axis (the shortest way) or gimbals (alpha, beta, gamma). Torquer
+    /// errors (GS, GM, GM3) act on the way under inertial carry
+    #[arg(long, value_name = "PATH")]
+    path: Option<Path>,
 
     /// The azimuth psi_y^n is measured too
     #[arg(long)]
@@ -67,6 +73,35 @@ pub(crate) struct Assumptions {
     /// Latitude in degrees, exact; left out: generic
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     latitude: Option<Latitude>,
+}
+
+/// What is unknown.
+#[derive(Debug, Args)]
+pub(crate) struct TermArguments {
+    /// Unknown terms, separated by commas; or drift for eps^n of one position. Gyros: F,I,O,S,II,OO,SS,IO,IS,OS (drifts), GS (torquer
+    /// scale factor), GM (misalignment of the input axes; GM3: its lower triangle). Accelerometers: K0 (bias), K1 (scale factor), M6
+    /// (misalignment; M3: its lower triangle), K2, K3 (second and third power of the force), Kx (products of forces). Families: gyros is
+    /// F,I,O,S,GS and the misalignment, accelerometers is K0,K1,K2 and the misalignment, all is both
+    #[arg(long, value_name = "TERMS", value_parser = listed)]
+    terms: Option<String>,
+
+    /// What defines the platform axes, and so which misalignments the families have: accelerometers (default; GM and M3), gyros (GM3 and M6)
+    /// or body (GM and M6, of which a rotation is not observable); `frame` in a scheme file
+    #[arg(long, value_name = "SENSORS", requires = "terms")]
+    axes: Option<DefinedBy>,
+}
+
+/// A list of terms, as it is written: the frame may change what families are.
+fn listed(text: &str) -> Result<String, TermError> {
+    text.parse::<Unknowns>().map(|_| text.into())
+}
+
+impl TermArguments {
+    /// What is unknown, if they say so.
+    pub(crate) fn unknowns(&self) -> Result<Option<Unknowns>, Failure> {
+        let of = |text: &String| Unknowns::of(text, self.axes).map_err(|e| Failure::input(e.to_string()));
+        self.terms.as_ref().map(of).transpose()
+    }
 }
 
 impl Assumptions {
@@ -137,8 +172,9 @@ impl InputArguments {
             }
         };
         self.assumptions.apply(&mut scheme);
-        if let Some(terms) = &self.terms {
-            scheme.unknowns = terms.clone();
+        scheme.path = self.path.or(scheme.path);
+        if let Some(terms) = self.terms.unknowns()? {
+            scheme.unknowns = terms;
         }
         scheme.measured_azimuth |= self.measured_azimuth;
         scheme.combinations.extend(self.combination.iter().cloned());

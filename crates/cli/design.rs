@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use clap::{Arg, Args};
 use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
 use obsdeg_core::model::scheme_file::write;
-use obsdeg_core::model::{Scheme, Unknowns, parse_decimal};
+use obsdeg_core::model::{Scheme, parse_decimal};
 use obsdeg_design::design::{
     Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, design,
     design_merged, design_part, scheme_found,
@@ -14,7 +14,7 @@ use obsdeg_design::design::{
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
 
-use crate::arguments::{Assumptions, one_of};
+use crate::arguments::{Assumptions, TermArguments, one_of};
 use crate::conditions::{MeasurementArguments, within};
 use crate::failure::Failure;
 use crate::input::Source;
@@ -74,9 +74,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     assumptions: Assumptions,
 
-    /// Unknown terms of the gyro model: some of F,I,O,S,II,OO,SS,IO,IS,OS
-    #[arg(long, value_name = "TERMS")]
-    terms: Option<Unknowns>,
+    #[command(flatten)]
+    terms: TermArguments,
 
     /// How many schemes are listed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -187,8 +186,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     }
     let (mut base, candidates) = candidates(&a.candidates)?;
     a.assumptions.apply(&mut base);
-    if let Some(terms) = &a.terms {
-        base.unknowns = terms.clone();
+    if let Some(terms) = a.terms.unknowns()? {
+        base.unknowns = terms;
     }
     for limit in &a.wanted.gimbal {
         base.gimbals.limit(limit).map_err(|e| Failure::input(format!("--gimbal: {e}")))?;

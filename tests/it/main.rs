@@ -27,3 +27,4 @@ mod second_path;
 mod simulation;
 mod solutions;
 mod structure;
+mod whole_platform;

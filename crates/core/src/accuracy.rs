@@ -158,7 +158,7 @@ fn module(
     let point = &sample.point;
     let field = point.ring;
     let n = platform.names().len();
-    let chain = local_chain(&field, point.w_n, point.w_u, platform.scheme().measured_azimuth);
+    let chain = local_chain(&field, point.w_n, point.w_u, platform.observed());
     let blocks = platform.blocks(point);
 
     let mut full = Echelon::new(field, n);
@@ -192,7 +192,7 @@ fn module(
 type Row<R> = Vec<<R as Ring>::Element>;
 
 /// The rows `T^j H F^j S_i Phi_{i-1} ... Phi_1` in a ring: `power` gives `T^j`, `phi` the three rows of
-/// `Phi_i` for `psi^n` as functionals of `(psi^n, eps^n)` (the drift is constant). With them psi in the carried axes at the end.
+/// `Phi_i` for `psi^n` as functionals of the local unknowns (all but psi^n are constant). With them psi in the carried axes at the end.
 fn dwell_rows<R: LiftField>(
     ring: &R,
     blocks: &[Block<R::Element>],
@@ -206,21 +206,29 @@ fn dwell_rows<R: LiftField>(
     let mut psi: [Vec<R::Element>; 3] = std::array::from_fn(unit);
     let mut rows = Vec::new();
     for (i, block) in blocks.iter().enumerate() {
+        // of psi^n what torquer errors have added in turns is a part of its own
+        let torqued = |r: usize, c: usize| (c >= 3).then(|| &block.rows[r][c]).filter(|x| !ring.is_zero(x));
         let local: [Vec<R::Element>; LOCAL] = std::array::from_fn(|r| {
             if r >= 3 {
                 return block.rows[r].clone();
             }
-            (0..n).map(|c| ring.dot((0..3).map(|k| (&block.rows[r][k], &psi[k][c])))).collect()
+            let carried = |c: usize| ring.dot((0..3).map(|k| (&block.rows[r][k], &psi[k][c])));
+            let sum = |c: usize| torqued(r, c).map_or_else(|| carried(c), |x| ring.add(&carried(c), x));
+            (0..n).map(sum).collect()
         });
+        let at = |row: &[R::Element], c: usize| {
+            ring.dot(row.iter().zip(&local).filter_map(|(x, l)| Some((x, l.get(c)?))))
+        };
         for row in chain {
             let coefficients = row.row.map(|x| ring.mul(&ring.lift(x), &power(row.order)));
-            rows.push(
-                (0..n).map(|c| ring.dot(coefficients.iter().zip(&local).map(|(x, l)| (x, &l[c])))).collect(),
-            );
+            rows.push((0..n).map(|c| at(&coefficients, c)).collect());
         }
         let phi = phi(i);
         let after: [Vec<R::Element>; 3] = std::array::from_fn(|r| {
-            (0..n).map(|c| ring.dot(phi[r].iter().zip(&local).map(|(x, l)| (x, &l[c])))).collect()
+            let left = |c: usize| {
+                torqued(r, c).map_or_else(|| at(&phi[r], c), |x| ring.add(&at(&phi[r], c), &ring.neg(x)))
+            };
+            (0..n).map(left).collect()
         });
         // back to the carried axes: the psi block is a rotation
         psi = std::array::from_fn(|k| {
@@ -331,7 +339,8 @@ impl AtATime {
         std::array::from_fn(|i| {
             std::array::from_fn(|j| match j {
                 0..3 => combine(i, j, [f.one(), sin, versine]),
-                _ => combine(i, j - 3, [time, versine, rest]),
+                3..6 => combine(i, j - 3, [time, versine, rest]),
+                _ => 0,
             })
         })
     }

@@ -15,16 +15,25 @@ fn short(x: f64) -> String {
 }
 
 fn positions(positions: &[PositionReport]) -> Block {
+    let turned = positions.iter().any(|p| !p.turns.is_empty());
+    let turns = |p: &PositionReport| p.turns.iter().map(words::turn).collect::<Vec<_>>().join(", ");
     let row = |p: &PositionReport| {
-        vec![
+        let mut row = vec![
             p.name.clone(),
             words::angles(p),
             p.attitude.clone().unwrap_or_default(),
             p.g_c.map_or_else(String::new, |g| g.map(short).join(", ")),
-        ]
+        ];
+        row.extend(turned.then(|| turns(p)));
+        row
     };
-    let columns =
-        [left("position"), left("alpha, beta, gamma [deg]"), left("X_p Y_p Z_p"), left("g in x, y, z [g]")];
+    let mut columns = vec![
+        left("position"),
+        left("alpha, beta, gamma [deg]"),
+        left("X_p Y_p Z_p"),
+        left("g in x, y, z [g]"),
+    ];
+    columns.extend(turned.then(|| left("reached by")));
     Block::table("", columns, positions.iter().map(row))
 }
 

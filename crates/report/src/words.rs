@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use obsdeg_core::analysis::{Analysis, CarryReport, Component, PositionReport, Quantity, Solution};
 use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::{Carry, Geometry};
+use obsdeg_core::model::{Carry, Geometry, Source, Term, Unknowns};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
 use obsdeg_evidence::simulation::{
@@ -149,14 +149,51 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         }
         Frame::Platform => "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives",
     };
+    let terms: Vec<Term> = a.terms.parse::<Unknowns>().map(|u| u.terms().to_vec()).unwrap_or_default();
+    let has = |source: Source| terms.iter().any(|t| t.source() == source);
+    let has_others = has(Source::Rate) || has(Source::Force);
+    let units = [
+        has(Source::Rate).then_some("GS and GM as numbers, "),
+        has(Source::Force).then_some("K0 and K2 in g, K1 and M as numbers, "),
+    ];
+    let units: String = units.into_iter().flatten().collect();
     let mut out = vec![
         format!("carry {carry}"),
         format!("latitude {latitude}"),
-        format!("{}; drift terms {}", gyros(&a.geometry), a.terms),
+        format!(
+            "{}; {} {}",
+            gyros(&a.geometry),
+            if has_others { "unknown terms" } else { "drift terms" },
+            a.terms
+        ),
         format!("observation {z}"),
-        "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g; a blank multiplies"
-            .into(),
+        format!(
+            "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g; {units}a blank multiplies"
+        ),
     ];
+    if has(Source::Force) {
+        let inputs = ["X", "Y", "Z"].iter().zip(a.geometry.accelerometers.inputs());
+        let inputs: Vec<String> = inputs.map(|(name, axis)| format!("{name}: I={axis}")).collect();
+        out.push(format!(
+            "accelerometers {}; their error a (K0, and K1, M, K2, K3, Kx times components of the specific force f = -g) is part of Z: {}",
+            inputs.join(", "),
+            if a.frame == Frame::N { "Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n" } else { "in all three axes" }
+        ));
+    }
+    if has(Source::Rate) {
+        out.push(
+            "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, GM_XY that of gyro X times the \
+             torqued rate along the input axis of gyro Y; at a position that is the earth rate"
+                .into(),
+        );
+    }
+    if a.positions.iter().any(|p| !p.turns.is_empty()) {
+        out.push(
+            "on the way to a position the torqued rate is that of the slew, fast against the earth rate: the listed turns leave torquer errors \
+             in psi^n, with pi as a number of its own"
+                .into(),
+        );
+    }
     if a.positions.iter().any(|p| p.rotation.is_some()) {
         out.push(
             "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \

@@ -7,6 +7,7 @@ use crate::degree::coefficient::Form;
 use crate::degree::status::{Difference, Status};
 use crate::model::Carry;
 use crate::model::geometry::Geometry;
+use crate::model::slew::Turn;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
@@ -73,6 +74,9 @@ pub struct PositionReport {
     pub attitude: Option<String>,
     /// The rotation that starts there, such as `X_p:360`.
     pub rotation: Option<String>,
+    /// The turns that lead there from the position before, where torquer errors act on them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub turns: Vec<Turn>,
     /// Gravity in platform axes (at the start of a rotation), in g; null for generic angles.
     pub g_c: Option<[f64; 3]>,
 }

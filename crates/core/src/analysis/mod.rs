@@ -14,9 +14,10 @@ use crate::degree::findings::Findings;
 use crate::degree::status::{Difference, Verdict};
 use crate::findings::{CombinationFinding, Judged, SchemeFindings};
 use crate::model::attitude::c_n_from_euler;
-use crate::model::platform::Platform;
+use crate::model::platform::{Platform, Point};
 use crate::model::ring::Float;
-use crate::model::{Angle, Carry, Scheme, Unknowns};
+use crate::model::slew::{Slew, Turn};
+use crate::model::{Angle, Carry, Position, Scheme, SchemeError, Source, Term, Unknowns};
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
@@ -71,7 +72,10 @@ pub fn analyze(
     printer.notes.extend(found.incomplete);
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
-    if scheme.slews() {
+    printer.notes.extend(notes(scheme));
+    let (carries, untold) = carry_reports(&platform, &findings.verdicts)?;
+    printer.notes.extend(untold);
+    if scheme.slews() && !scheme.torquers_act() {
         printer.notes.push(
             "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at once, and with slews of \
              finite duration they need not hold"
@@ -92,7 +96,7 @@ pub fn analyze(
         geometry: scheme.geometry,
         terms: scheme.unknowns.to_string(),
         measured_azimuth: scheme.measured_azimuth,
-        positions: position_reports(scheme),
+        positions: position_reports(&platform),
         rank_profile: findings.verdicts.degrees.rank_profile.clone(),
         rank: findings.verdicts.degrees.rank(),
         unknowns: platform.names().to_vec(),
@@ -100,7 +104,7 @@ pub fn analyze(
         quantities,
         combinations,
         null_space: findings.null_space.iter().map(|v| null_report(&platform, v)).collect(),
-        carries: carry_reports(&platform, &findings.verdicts)?,
+        carries,
         degenerate_loci: found.loci,
         formulas,
         frame: options.frame,
@@ -244,7 +248,8 @@ fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, Analysis
 
 /// The same scheme with a name for every angle; `None` when some are names already.
 fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
-    if !scheme.generic_names().is_empty() || scheme.unknowns == Unknowns::Drift {
+    // the angle of a slew is none of its sines and cosines
+    if !scheme.generic_names().is_empty() || scheme.unknowns == Unknowns::Drift || scheme.torquers_act() {
         return None;
     }
     let mut out = scheme.clone();
@@ -256,14 +261,64 @@ fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
     Some(out)
 }
 
-fn position_reports(scheme: &Scheme) -> Vec<PositionReport> {
+/// What the unknown terms of a scheme cannot but mean, whatever its verdicts are.
+fn notes(scheme: &Scheme) -> Vec<String> {
+    let terms = scheme.unknowns.terms();
+    let have = |all: &[Term]| all.iter().all(|t| terms.contains(t));
+    let force = |p: &Position| -> Vec<f64> {
+        let c = c_n_from_euler(&Float, &std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64()));
+        scheme.geometry.accelerometers.inputs().iter().map(|a| c[1][a.axis]).collect()
+    };
+    let whole = |x: &f64| x.abs() < 1e-15 || (x.abs() - 1.0).abs() < 1e-15;
+    let stands = |p: &Position| p.rotation.is_none() && p.angles.iter().all(|a| a.generic().is_none());
+    let cardinal = scheme.positions.iter().all(|p| stands(p) && force(p).iter().all(whole));
+    let mut out = Vec::new();
+    let mut say = |holds: bool, text: &str| out.extend(holds.then(|| text.to_string()));
+    say(
+        have(&[Term::GM, Term::M6]),
+        "GM and M6 together leave the platform axes undefined: turning psi, GM and M6 by one rotation changes no output, so three directions are \
+         not observable by any scheme; let the accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
+    );
+    say(
+        have(&[Term::GM3, Term::M3]),
+        "GM3 and M3 together take both triads as defining the platform axes: the rotation between them counts as known",
+    );
+    say(
+        have(&[Term::F, Term::II, Term::OO, Term::SS]),
+        "the squares of the components of g along I, O and S add up to 1 g^2 at every attitude: D_F, D_II, D_OO and D_SS of a gyro are never \
+         told apart",
+    );
+    say(
+        cardinal && have(&[Term::K1, Term::K3]),
+        "at attitudes where the force along every input axis is -1, 0 or 1 g its third power is itself: K1 and K3 are not told apart there",
+    );
+    say(
+        cardinal && have(&[Term::Kx]),
+        "at attitudes where the force is along one input axis the product of two components is zero: Kx is not excited there",
+    );
+    say(
+        scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
+        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act by the earth rate alone, \
+         as if nothing had been torqued in between; real slews need inertial carry and a path",
+    );
+    say(
+        scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
+        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act by the earth rate alone",
+    );
+    out
+}
+
+fn position_reports(platform: &Platform) -> Vec<PositionReport> {
+    let scheme = platform.scheme();
+    let turns = turns(platform);
     let report = |angle: &Angle| {
         angle.degrees().map_or_else(|| AngleReport::Generic(angle.to_string()), AngleReport::Degrees)
     };
     scheme
         .positions
         .iter()
-        .map(|p| {
+        .enumerate()
+        .map(|(i, p)| {
             let constant = p.angles.iter().all(|a| a.generic().is_none());
             let cos_sin = std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64());
             let c = c_n_from_euler(&Float, &cos_sin);
@@ -272,20 +327,50 @@ fn position_reports(scheme: &Scheme) -> Vec<PositionReport> {
                 angles_deg: std::array::from_fn(|k| report(&p.angles[k])),
                 attitude: p.cardinal(),
                 rotation: p.rotation.as_ref().map(ToString::to_string),
+                turns: turns.get(i).cloned().unwrap_or_default(),
                 g_c: constant.then(|| std::array::from_fn(|j| 0.0 - c[1][j])),
             }
         })
         .collect()
 }
 
-fn carry_reports(platform: &Platform, verdicts: &Findings) -> Result<Vec<CarryReport>, AnalysisError> {
+/// The turns that lead to every position, where torquer errors act on them.
+fn turns(platform: &Platform) -> Vec<Vec<Turn>> {
+    if platform.paths().is_empty() {
+        return Vec::new();
+    }
+    let point = Point::in_floats(platform, 1.0, 1.0, |_| 0.0);
+    let stations = platform.scheme().stations();
+    let mut out = vec![Vec::new(); platform.scheme().positions.len()];
+    for (i, station) in stations.iter().enumerate().filter(|(_, s)| !s.continues) {
+        let Some(mut from) = i.checked_sub(1).map(|before| point.attitudes[before]) else { continue };
+        for turn in &point.turns[i] {
+            let slew = Slew::by(&from, &turn.axis.map(|x| x * turn.angle), 1.0);
+            out[station.index].push(slew.turn());
+            from = slew.at(slew.duration_s);
+        }
+    }
+    out
+}
+
+/// What is found under the other carries, and why nothing is under one of them.
+fn carry_reports(
+    platform: &Platform,
+    verdicts: &Findings,
+) -> Result<(Vec<CarryReport>, Option<String>), AnalysisError> {
     let scheme = platform.scheme();
     if scheme.unknowns == Unknowns::Drift {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), None));
     }
-    let mut out = Vec::new();
+    let (mut out, mut untold) = (Vec::new(), None);
     for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
-        let other = Platform::new(Scheme { carry, ..scheme.clone() })?;
+        let other = match Platform::new(Scheme { carry, ..scheme.clone() }) {
+            Err(SchemeError::Path(e)) => {
+                untold = Some(format!("nothing is said of {carry} carry: {e}"));
+                continue;
+            }
+            other => other?,
+        };
         let there = degrees(&other, verdicts.seed)?;
         // under reset carry every position has a psi of its own: each is held against the psi of the other carry
         let reset = [scheme.carry, carry].contains(&Carry::Reset);
@@ -305,5 +390,5 @@ fn carry_reports(platform: &Platform, verdicts: &Findings) -> Result<Vec<CarryRe
             rank_profile: there.rank_profile.clone(),
         });
     }
-    Ok(out)
+    Ok((out, untold))
 }

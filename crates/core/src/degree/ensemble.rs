@@ -1,13 +1,13 @@
 //! Two random fields in four embeddings each: what verdicts agree in and coefficients are recovered from.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
-use obsdeg_exact::{Echelon, PrimeError};
+use obsdeg_exact::{Echelon, PrimeError, gcd};
 
 use super::platform_rows::PlatformRows;
 use super::reset::reset_degrees;
 use super::staircase::{Degrees, climb};
 use crate::model::platform::{RandomValues, Sample};
-use crate::model::{Carry, Platform, Unknowns};
+use crate::model::{Carry, Platform, Source, Unknowns};
 
 /// How many pairs of fields are drawn before a disagreement is an error.
 const ATTEMPTS: usize = 4;
@@ -92,18 +92,36 @@ pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>
 }
 
 /// The size of the claim (see [`obsdeg_exact::certainty`]): a row is a row of `H F^k`, of degree k in
-/// the rates, times `S_i`, whose entries are products of at most six sines and cosines per g factor.
+/// the rates, times `S_i`, whose entries are products of at most six sines and cosines per factor, and of `C_c^n`. Torqued rates make it
+/// one more in the rates, and what torquer errors add in turns is of degree one in pi.
 fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
-    let generic = !platform.scheme().generic_names().is_empty();
+    let scheme = platform.scheme();
+    let generic = !scheme.generic_names().is_empty();
     let orders = degrees.rank_profile.len();
     let unknowns = platform.names().len();
+    let factors = scheme.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0).max(2);
+    let torquers = usize::from(scheme.unknowns.have(Source::Rate));
+    // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
+    let bits = 16.0 + 3.0 * (factors - 2) as f64 + (unknowns as f64 / 15.0).log2().max(0.0) / 2.0;
     Claim {
         unknowns,
         decisions: orders * (1 + unknowns),
         order,
-        row_degree: orders + if generic { 18 } else { 0 },
-        // |entry| <= 6, denominators 2^9, 15 entries of norm at most sqrt(15) together, w/ margin
-        row_bits: 16.0,
+        row_degree: orders + if generic { 6 * (1 + factors) } else { 0 } + torquers,
+        row_bits: bits + torquer_bits(platform),
+    }
+}
+
+/// What turns add to the bits of a row: a turn is `C J E(u)`, of products of at most six entries of `C_c^n`, with denominators 2^3 each and the
+/// cube of that of a root, and of an angle with a denominator of its own; every turn adds one.
+fn torquer_bits(platform: &Platform) -> f64 {
+    let steps: Vec<_> = platform.paths().iter().flatten().collect();
+    let half_turn = 180_000_000_000u64;
+    let common = steps.iter().fold(half_turn, |g, s| gcd(g, s.angle().nanodeg().unsigned_abs()));
+    if steps.is_empty() {
+        0.0
+    } else {
+        24.0 + (steps.len() as f64).log2() + ((half_turn / common) as f64).log2()
     }
 }
 

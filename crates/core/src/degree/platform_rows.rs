@@ -3,26 +3,26 @@
 use obsdeg_exact::{Echelon, Field};
 
 use super::rows::DerivativeRows;
-use crate::model::platform::{Block, LOCAL, Platform, Sample, local_dynamics, local_output};
+use crate::model::platform::{Block, LOCAL, Observed, Platform, Sample, local_dynamics, local_output};
 
-/// A row of the local chain: `Z_component^(order)` as a functional of `(psi^n, eps^n)`.
+/// A row of the local chain: `Z_component^(order)` as a functional of the local unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LocalRow {
-    /// Component of Z in n: 1, 2 or 3.
+    /// Component of Z in n: 1, 2 or 3, or the azimuth.
     pub component: usize,
     /// Derivative order.
     pub order: usize,
-    /// Shape 6.
+    /// Shape 9.
     pub row: [u64; LOCAL],
 }
 
 /// The rows of `H F^k` that raise the rank of one position, order by order until it stalls.
 /// `V_{k+1} = V_k + V_k F`, so only rows that were new at order k need a derivative.
-pub fn local_chain(field: &Field, w_n: u64, w_u: u64, measured_azimuth: bool) -> Vec<LocalRow> {
+pub fn local_chain(field: &Field, w_n: u64, w_u: u64, observed: Observed) -> Vec<LocalRow> {
     let f = local_dynamics(field, &w_n, &w_u);
     let mut basis = Echelon::new(*field, LOCAL);
     let mut chain: Vec<LocalRow> = Vec::new();
-    let mut candidates: Vec<LocalRow> = local_output(field, measured_azimuth)
+    let mut candidates: Vec<LocalRow> = local_output(field, observed)
         .into_iter()
         .map(|(component, row)| LocalRow { component, order: 0, row })
         .collect();
@@ -52,11 +52,10 @@ impl PlatformRows {
     /// The rows of `platform` at `sample`.
     pub fn new(platform: &Platform, sample: &Sample) -> Self {
         let p = &sample.point;
-        let azimuth = platform.scheme().measured_azimuth;
         Self {
             field: p.ring,
             columns: platform.names().len(),
-            chain: local_chain(&p.ring, p.w_n, p.w_u, azimuth),
+            chain: local_chain(&p.ring, p.w_n, p.w_u, platform.observed()),
             blocks: platform.blocks(p),
             scratch: vec![0; platform.names().len()],
         }
@@ -79,6 +78,7 @@ impl DerivativeRows for PlatformRows {
         for block in &self.blocks {
             for local in self.chain.iter().filter(|r| r.order == order) {
                 for (k, &column) in block.columns.iter().enumerate() {
+                    // where there are no errors of the accelerometers, nothing of them is in a row
                     let terms =
                         (0..LOCAL).filter(|&i| local.row[i] != 0).map(|i| (local.row[i], block.rows[i][k]));
                     self.scratch[column] = f.dot(0, terms);

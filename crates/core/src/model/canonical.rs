@@ -23,6 +23,13 @@ impl Scheme {
         for gyro in self.geometry.gyros() {
             out.extend([gyro.I, gyro.O, gyro.S].map(|axis| axis.to_string()));
         }
+        if !self.geometry.accelerometers.is_default() {
+            out.extend(self.geometry.accelerometers.inputs().map(|axis| format!("accelerometer {axis}")));
+        }
+        // the way from one position to the next counts where a verdict depends on it
+        if let Ok(paths) = self.paths() {
+            out.extend(paths.iter().flatten().map(ToString::to_string));
+        }
         out.push(self.positions.len().to_string());
         for p in &self.positions {
             out.push(p.angles_text());

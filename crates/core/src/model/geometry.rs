@@ -1,4 +1,4 @@
-//! How the gyros are mounted and which of their error coefficients are unknown.
+//! How gyros and accelerometers are mounted.
 
 use std::fmt;
 use std::str::FromStr;
@@ -80,7 +80,7 @@ pub struct GyroAxes {
 /// The mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23),
 /// (27) and (28).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 #[allow(non_snake_case, reason = "the letters of the paper")]
 pub struct Geometry {
     /// The gyro whose coefficients end in X.
@@ -89,6 +89,41 @@ pub struct Geometry {
     pub Y: GyroAxes,
     /// The gyro whose coefficients end in Z.
     pub Z: GyroAxes,
+    /// The input axes of the accelerometers.
+    #[serde(skip_serializing_if = "Accelerometers::is_default")]
+    pub accelerometers: Accelerometers,
+}
+
+/// The input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case, reason = "the letters of the coefficients")]
+pub struct Accelerometers {
+    /// Of the accelerometer whose coefficients end in X, or have it first.
+    pub X: SignedAxis,
+    /// Of Y.
+    pub Y: SignedAxis,
+    /// Of Z.
+    pub Z: SignedAxis,
+}
+
+impl Default for Accelerometers {
+    fn default() -> Self {
+        let axis = |axis| SignedAxis { axis, negative: false };
+        Self { X: axis(0), Y: axis(1), Z: axis(2) }
+    }
+}
+
+impl Accelerometers {
+    /// In order X, Y, Z.
+    pub fn inputs(&self) -> [SignedAxis; 3] {
+        [self.X, self.Y, self.Z]
+    }
+
+    /// Whether they are along the platform axes.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 impl Default for Geometry {
@@ -98,6 +133,7 @@ impl Default for Geometry {
             X: GyroAxes { I: axis(0, false), O: axis(2, true), S: axis(1, false) },
             Y: GyroAxes { I: axis(1, false), O: axis(2, true), S: axis(0, true) },
             Z: GyroAxes { I: axis(2, false), O: axis(0, false), S: axis(1, false) },
+            accelerometers: Accelerometers::default(),
         }
     }
 }
@@ -123,12 +159,14 @@ pub enum GeometryError {
         /// Spin axis.
         s: SignedAxis,
     },
-    /// Two gyros measure about the same axis.
+    /// Two sensors of a kind measure along the same axis.
     #[error(
-        "gyros {first} and {second} both have their input axis along {axis}; expected three different axes"
+        "{sensors} {first} and {second} both have their input axis along {axis}; expected three different axes"
     )]
     SharedInput {
-        /// One gyro.
+        /// gyros or accelerometers.
+        sensors: &'static str,
+        /// One of them.
         first: char,
         /// The other.
         second: char,
@@ -137,7 +175,7 @@ pub enum GeometryError {
     },
 }
 
-/// The letters of the three gyros.
+/// The letters of the three gyros and of the three accelerometers.
 pub const GYROS: [char; 3] = ['X', 'Y', 'Z'];
 
 impl Geometry {
@@ -146,10 +184,10 @@ impl Geometry {
         [self.X, self.Y, self.Z]
     }
 
-    /// Checks that every gyro is right-handed and that the three input axes differ.
+    /// Checks that every gyro is right-handed and that the three input axes of gyros and of accelerometers differ.
     ///
     /// # Errors
-    /// [`GeometryError`] naming the gyro.
+    /// [`GeometryError`] naming the sensor.
     pub fn validate(&self) -> Result<(), GeometryError> {
         let gyros = self.gyros();
         for (gyro, a) in GYROS.into_iter().zip(gyros) {
@@ -162,150 +200,17 @@ impl Geometry {
                 return Err(GeometryError::NotRightHanded { gyro, i: a.I, o: a.O, s: a.S });
             }
         }
-        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
-            if gyros[a].I.axis == gyros[b].I.axis {
-                let axis = ['x', 'y', 'z'][gyros[a].I.axis];
-                return Err(GeometryError::SharedInput { first: GYROS[a], second: GYROS[b], axis });
+        let of_gyros = gyros.map(|g| g.I);
+        for (sensors, inputs) in [("gyros", of_gyros), ("accelerometers", self.accelerometers.inputs())] {
+            for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+                if inputs[a].axis == inputs[b].axis {
+                    let axis = ['x', 'y', 'z'][inputs[a].axis];
+                    let (first, second) = (GYROS[a], GYROS[b]);
+                    return Err(GeometryError::SharedInput { sensors, first, second, axis });
+                }
             }
         }
         Ok(())
-    }
-}
-
-/// A term of the gyro error model: `D_F`, the g-sensitive `D_I D_O D_S`, the g^2-sensitive rest
-/// (IEEE Std 517 and 529).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[allow(missing_docs, reason = "the letters say it: products of the components of g along I, O, S")]
-pub enum Term {
-    F,
-    I,
-    O,
-    S,
-    II,
-    OO,
-    SS,
-    IO,
-    IS,
-    OS,
-}
-
-impl Term {
-    /// All terms in the order of the unknowns.
-    pub const ALL: [Self; 10] =
-        [Self::F, Self::I, Self::O, Self::S, Self::II, Self::OO, Self::SS, Self::IO, Self::IS, Self::OS];
-
-    /// The letters of the term.
-    pub const fn letters(self) -> &'static str {
-        match self {
-            Self::F => "F",
-            Self::I => "I",
-            Self::O => "O",
-            Self::S => "S",
-            Self::II => "II",
-            Self::OO => "OO",
-            Self::SS => "SS",
-            Self::IO => "IO",
-            Self::IS => "IS",
-            Self::OS => "OS",
-        }
-    }
-
-    /// The gyro axes whose g components the term multiplies: none, one or two.
-    pub fn factors(self, gyro: &GyroAxes) -> Vec<SignedAxis> {
-        let letters = if self == Self::F { "" } else { self.letters() };
-        letters
-            .chars()
-            .map(|letter| match letter {
-                'I' => gyro.I,
-                'O' => gyro.O,
-                _ => gyro.S,
-            })
-            .collect()
-    }
-
-    /// The number of g factors.
-    pub const fn order(self) -> usize {
-        if matches!(self, Self::F) { 0 } else { self.letters().len() }
-    }
-
-    /// The unit of its coefficient.
-    pub fn unit(self) -> &'static str {
-        match self.letters().len() {
-            _ if self == Self::F => "deg/h",
-            1 => "deg/h/g",
-            _ => "deg/h/g^2",
-        }
-    }
-}
-
-/// Why a list of terms is not usable.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum TermError {
-    /// Not a term.
-    #[error(
-        "`{found}` is not a term of the gyro model; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, or `drift` alone"
-    )]
-    Unknown {
-        /// The text found.
-        found: String,
-    },
-    /// The same term twice.
-    #[error("term {found} is listed twice; expected every term once")]
-    Duplicate {
-        /// The term.
-        found: &'static str,
-    },
-}
-
-/// What is unknown besides psi.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Unknowns {
-    /// The coefficients of these terms, for the three gyros.
-    Coefficients(Vec<Term>),
-    /// The total drift `eps^n` of a single position, with `psi` in n: (8), (9).
-    Drift,
-}
-
-impl Default for Unknowns {
-    fn default() -> Self {
-        Self::Coefficients(vec![Term::F, Term::I, Term::O, Term::S])
-    }
-}
-
-impl FromStr for Unknowns {
-    type Err = TermError;
-
-    /// A comma-separated list such as `F,I,O,S`, or `drift`.
-    fn from_str(text: &str) -> Result<Self, TermError> {
-        if text.trim() == "drift" {
-            return Ok(Self::Drift);
-        }
-        let mut terms = Vec::new();
-        for part in text.split(',') {
-            let part = part.trim();
-            let term = Term::ALL
-                .into_iter()
-                .find(|t| t.letters() == part)
-                .ok_or_else(|| TermError::Unknown { found: part.into() })?;
-            if terms.contains(&term) {
-                return Err(TermError::Duplicate { found: term.letters() });
-            }
-            terms.push(term);
-        }
-        terms.sort_unstable();
-        Ok(Self::Coefficients(terms))
-    }
-}
-
-impl fmt::Display for Unknowns {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Drift => f.write_str("drift"),
-            Self::Coefficients(terms) => {
-                let letters: Vec<&str> = terms.iter().map(|t| t.letters()).collect();
-                f.write_str(&letters.join(","))
-            }
-        }
     }
 }
 
@@ -328,18 +233,8 @@ mod tests {
         assert!(matches!(left.validate(), Err(GeometryError::NotRightHanded { gyro: 'Y', .. })));
         let mut shared = Geometry::default();
         shared.Z = shared.X;
-        let expected = GeometryError::SharedInput { first: 'X', second: 'Z', axis: 'x' };
+        let expected = GeometryError::SharedInput { sensors: "gyros", first: 'X', second: 'Z', axis: 'x' };
         assert_eq!(shared.validate(), Err(expected));
         assert!("w".parse::<SignedAxis>().is_err());
-    }
-
-    #[test]
-    fn term_lists() {
-        let shown = |s: &str| s.parse::<Unknowns>().map(|u| u.to_string());
-        assert_eq!(shown("S,F"), Ok("F,S".into()));
-        assert_eq!(shown("drift"), Ok("drift".into()));
-        assert_eq!(shown("F,F"), Err(TermError::Duplicate { found: "F" }));
-        assert_eq!(shown("F,Q"), Err(TermError::Unknown { found: "Q".into() }));
-        assert_eq!(shown(""), Err(TermError::Unknown { found: "".into() }));
     }
 }

@@ -10,6 +10,7 @@ pub(crate) mod file_error;
 pub(crate) mod geometry;
 pub(crate) mod gimbals;
 mod parser;
+pub(crate) mod path;
 pub(crate) mod per_gyro;
 pub(crate) mod platform;
 pub mod ranges;
@@ -20,6 +21,7 @@ pub mod scheme_file;
 pub mod settings;
 pub mod slew;
 pub(crate) mod symbols;
+pub(crate) mod terms;
 pub(crate) mod vectors;
 
 pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
@@ -27,11 +29,13 @@ pub use attitude::{
     Euler, Matrix3, Turned, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary, product,
 };
 pub use dwell::{Dwell, DwellError};
-pub use geometry::{GYROS, Geometry, GeometryError, GyroAxes, SignedAxis, Term, TermError, Unknowns};
+pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, SignedAxis};
 pub use gimbals::{GimbalError, Gimbals};
+pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{
-    Block, DriftTerm, LOCAL, Platform, Point, RandomValues, Sample, local_dynamics, local_output,
+    AZIMUTH, Block, LOCAL, Observed, PSI_EPS, Platform, Point, RandomValues, Sample, earth_rate_in,
+    local_dynamics, local_output,
 };
 pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
@@ -40,3 +44,4 @@ pub use scheme::{
     parse_attitude,
 };
 pub use symbols::Symbols;
+pub use terms::{DefinedBy, ErrorTerm, FrameError, Source, Term, TermError, Unknowns};

@@ -4,15 +4,21 @@ use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order}
 
 use super::angle::Angle;
 use super::attitude::{Matrix3, product};
-use super::geometry::{GYROS, SignedAxis, Unknowns};
-use super::ring::Ring;
-use super::scheme::{Carry, Scheme, SchemeError};
+use super::geometry::SignedAxis;
+use super::path::{PathError, PathStep, TurnAt};
+use super::ring::{Float, Ring};
+use super::scheme::{Carry, Scheme, SchemeError, Station};
+use super::terms::{ErrorTerm, Source, Unknowns};
 
-/// The local unknowns of one position, in n: `psi^n` then `eps^n`.
-pub const LOCAL: usize = 6;
+/// The local unknowns of one position, in n: `psi^n`, `eps^n`, then the error of the accelerometers in `Z^n`.
+pub const LOCAL: usize = 9;
+/// Of these `psi^n` and `eps^n`.
+pub const PSI_EPS: usize = 6;
 /// Names of the local unknowns.
 pub(crate) const LOCAL_NAMES: [&str; LOCAL] =
-    ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n"];
+    ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n", "a_x^n", "a_y^n", "a_z^n"];
+/// The number of a measured azimuth among the components that are observed: Z has 1, 2, 3.
+pub const AZIMUTH: usize = 4;
 
 /// A scheme with its unknowns spelled out.
 #[derive(Debug, Clone)]
@@ -20,16 +26,25 @@ pub struct Platform {
     scheme: Scheme,
     names: Vec<String>,
     units: Vec<&'static str>,
-    drift: Vec<DriftTerm>,
+    terms: Vec<ErrorTerm>,
+    /// The turns that lead to every position, where torquer errors act on them.
+    paths: Vec<Vec<PathStep>>,
 }
 
-/// How one coefficient enters the drift: along the input axis of its gyro, times components of g.
-#[derive(Debug, Clone)]
-pub struct DriftTerm {
-    /// The input axis of the gyro.
-    pub input: SignedAxis,
-    /// The components of g that the coefficient multiplies; none for a constant drift.
-    pub factors: Vec<SignedAxis>,
+/// What is observed, and which local unknowns there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Observed {
+    /// `psi_y^n` is measured too.
+    pub azimuth: bool,
+    /// Errors of the accelerometers are unknown, so that Z has three components.
+    pub accelerometers: bool,
+}
+
+impl Observed {
+    /// How many local unknowns there are: the first so many.
+    pub fn locals(self) -> usize {
+        if self.accelerometers { LOCAL } else { PSI_EPS }
+    }
 }
 
 /// The platform at one point: cosines and sines of all angles and the earth rate, in some ring.
@@ -43,15 +58,27 @@ pub struct Point<R: Ring> {
     pub w_u: R::Element,
     /// `C_c^n` of every station of the scheme.
     pub attitudes: Vec<Matrix3<R::Element>>,
+    /// The turns on which torquer errors act: to a station that is the start of a position, from the end of the position before; to another
+    /// of a rotation, from its start. Empty where there are no such errors.
+    pub turns: Vec<Vec<TurnAt<R::Element>>>,
+    /// The rate at which every station turns, in rad/s. Empty where there are no such errors.
+    pub turning: Vec<R::Element>,
 }
 
 /// `S_i`: how the local unknowns of one position depend on the unknowns of the scheme.
 #[derive(Debug, Clone)]
 pub struct Block<E> {
-    /// The columns (unknowns of the scheme) that occur.
+    /// The columns (unknowns of the scheme) that occur: psi, then the coefficients.
     pub columns: Vec<usize>,
-    /// One row per local unknown, one entry per column listed.
+    /// One row per local unknown, one entry per column listed; the last three are empty where no error of the accelerometers is unknown.
     pub rows: [Vec<E>; LOCAL],
+}
+
+impl<E: Clone> Block<E> {
+    /// The entry of a functional of the local unknowns at the `k`-th column.
+    pub fn entry<R: Ring<Element = E>>(&self, ring: &R, row: &[E], k: usize) -> E {
+        ring.dot(row.iter().zip(&self.rows).filter_map(|(x, row)| Some((x, row.get(k)?))))
+    }
 }
 
 impl Platform {
@@ -63,12 +90,13 @@ impl Platform {
         scheme.validate()?;
         let mut names = Vec::new();
         let mut units = Vec::new();
+        let mut terms = Vec::new();
         match &scheme.unknowns {
             Unknowns::Drift => {
-                names.extend(LOCAL_NAMES.map(String::from));
+                names.extend(LOCAL_NAMES[..PSI_EPS].iter().map(|n| n.to_string()));
                 units.extend(["rad", "rad", "rad", "deg/h", "deg/h", "deg/h"]);
             }
-            Unknowns::Coefficients(terms) => {
+            Unknowns::Coefficients(unknown) => {
                 let copies = if scheme.carry == Carry::Reset { scheme.positions.len() } else { 1 };
                 for i in 1..=copies {
                     for axis in ['x', 'y', 'z'] {
@@ -77,24 +105,35 @@ impl Platform {
                         units.push("rad");
                     }
                 }
-                for term in terms {
-                    for gyro in GYROS {
-                        names.push(format!("D_{}{gyro}", term.letters()));
+                for term in unknown {
+                    for (name, effect) in term.coefficients(&scheme.geometry) {
+                        names.push(name);
                         units.push(term.unit());
+                        terms.push(effect);
                     }
                 }
             }
         }
-        let drift = match &scheme.unknowns {
-            Unknowns::Drift => Vec::new(),
-            Unknowns::Coefficients(terms) => terms
-                .iter()
-                .flat_map(|term| {
-                    scheme.geometry.gyros().map(|g| DriftTerm { input: g.I, factors: term.factors(&g) })
-                })
-                .collect(),
+        let paths = scheme.paths()?;
+        let platform = Self { scheme, names, units, terms, paths };
+        platform.check_paths()?;
+        Ok(platform)
+    }
+
+    /// Refuses turns that have no image in a field.
+    fn check_paths(&self) -> Result<(), SchemeError> {
+        let Some(index) = self.paths.iter().rposition(|p| !p.is_empty()) else { return Ok(()) };
+        // every validated scheme has a field
+        let Ok(values) = RandomValues::draw(&self.scheme, &mut SplitMix64::new(1)) else { return Ok(()) };
+        let roots = *values.roots();
+        let inexact = |index: usize| {
+            let found = self.paths[index].iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+            PathError::NotExact { name: self.scheme.positions[index].name.clone(), index, found }
         };
-        Ok(Self { scheme, names, units, drift })
+        match values.turns(&self.scheme, &self.paths, &roots, &values.attitudes(&self.scheme, &roots)) {
+            Ok(_) => Ok(()),
+            Err(at) => Err(inexact(at.min(index)).into()),
+        }
     }
 
     /// The scheme.
@@ -117,20 +156,35 @@ impl Platform {
         &self.units
     }
 
-    /// `S_i` of every station: of every position, and several of a rotation (section 4 of the method: the psi block depends on the carry).
+    /// What is observed.
+    pub fn observed(&self) -> Observed {
+        let accelerometers = self.scheme.unknowns.have(Source::Force);
+        Observed { azimuth: self.scheme.measured_azimuth, accelerometers }
+    }
+
+    /// The turns that lead to every position, where torquer errors act on them; empty where they do not.
+    pub fn paths(&self) -> &[Vec<PathStep>] {
+        &self.paths
+    }
+
+    /// `S_i` of every station: of every position, and several of a rotation (section 4 of the method: the psi block depends on the carry;
+    /// section 10: torquer errors add to psi^n in every turn).
     pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
         if self.scheme.unknowns == Unknowns::Drift {
-            let rows = std::array::from_fn(|i| {
-                (0..LOCAL).map(|j| if i == j { ring.one() } else { ring.zero() }).collect()
+            let rows = std::array::from_fn(|i| match i {
+                0..PSI_EPS => (0..PSI_EPS).map(|j| if i == j { ring.one() } else { ring.zero() }).collect(),
+                _ => Vec::new(),
             });
-            return vec![Block { columns: (0..LOCAL).collect(), rows }];
+            return vec![Block { columns: (0..PSI_EPS).collect(), rows }];
         }
-        let first_d = self.names.len() - self.drift.len();
+        let first_d = self.names.len() - self.terms.len();
+        let accelerometers = self.observed().accelerometers;
         // psi^n as a function of psi at the start of the scheme, and psi in platform axes where a rotation ended
         let mut psi_block = &point.attitudes[0];
         let mut composed;
         let mut handed_on: Option<Matrix3<R::Element>> = None;
+        let mut torqued = Torqued::default();
         let stations = self.scheme.stations();
         let mut out = Vec::with_capacity(stations.len());
         for (i, (station, c)) in stations.iter().zip(&point.attitudes).enumerate() {
@@ -148,12 +202,22 @@ impl Platform {
                     std::array::from_fn(|r| std::array::from_fn(|k| c[k][r].clone()));
                 handed_on = Some(product(ring, &back, psi_block));
             }
+            if !point.turns.is_empty() {
+                torqued.advance(self, point, i, station.continues);
+            }
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
-            let drift = drift_block(ring, &self.drift, c);
+            let drift = self.drift_rows(ring, c, || point.torqued_rate(i, station));
             let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
+            let jump = |r: usize| -> Vec<R::Element> {
+                torqued.psi.as_ref().map_or_else(|| zeros(self.terms.len()).collect(), |j| j[r].clone())
+            };
+            let accelerometer =
+                if accelerometers { self.accelerometer_rows(ring, c) } else { Default::default() };
             let rows = std::array::from_fn(|r| match r {
-                0..3 => psi_block[r].iter().cloned().chain(zeros(self.drift.len())).collect(),
-                _ => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
+                0..3 => psi_block[r].iter().cloned().chain(jump(r)).collect(),
+                3..PSI_EPS => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
+                _ if !accelerometers => Vec::new(),
+                _ => zeros(3).chain(accelerometer[r - PSI_EPS].iter().cloned()).collect(),
             });
             let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
             out.push(Block { columns, rows });
@@ -162,43 +226,200 @@ impl Platform {
     }
 }
 
-impl Platform {
-    /// The rows of `eps^n = C E(g) D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
-    /// coefficient; none when the unknowns are the drift itself.
-    pub fn drift_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
-        drift_block(ring, &self.drift, c)
+/// A vector with one column per coefficient, in n.
+type Columns<E> = [Vec<E>; 3];
+
+/// What torquer errors have made of `psi^n` so far.
+struct Torqued<E> {
+    psi: Option<Columns<E>>,
+    /// The same at the start of the segment, and the attitude there.
+    start: Option<(Option<Columns<E>>, Matrix3<E>)>,
+    /// The attitude of the station before.
+    before: Option<Matrix3<E>>,
+}
+
+impl<E> Default for Torqued<E> {
+    fn default() -> Self {
+        Self { psi: None, start: None, before: None }
+    }
+}
+
+impl<E: Clone> Torqued<E> {
+    /// Goes on to station `i`.
+    fn advance<R: Ring<Element = E>>(
+        &mut self,
+        platform: &Platform,
+        point: &Point<R>,
+        i: usize,
+        continues: bool,
+    ) {
+        let ring = &point.ring;
+        let c = &point.attitudes[i];
+        if continues {
+            if let Some((psi, start)) = &self.start {
+                self.psi.clone_from(psi);
+                let mut attitude = start.clone();
+                self.turn(platform, ring, &mut attitude, &point.turns[i]);
+            }
+        } else {
+            match (platform.scheme.carry, &self.before) {
+                (_, None) | (Carry::Reset, _) => self.psi = None,
+                (Carry::Inertial, Some(before)) => {
+                    let mut attitude = before.clone();
+                    self.turn(platform, ring, &mut attitude, &point.turns[i]);
+                }
+                // psi^c goes on
+                (Carry::Platform, Some(before)) => {
+                    let back: Matrix3<E> =
+                        std::array::from_fn(|r| std::array::from_fn(|k| before[k][r].clone()));
+                    let over = product(ring, c, &back);
+                    self.psi = self.psi.as_ref().map(|psi| times(ring, &over, psi));
+                }
+            }
+            self.start = Some((self.psi.clone(), c.clone()));
+        }
+        self.before = Some(c.clone());
     }
 
-    /// How each coefficient enters the drift, in the order of the unknowns; none when the unknowns are the drift itself.
-    pub fn drift_terms(&self) -> &[DriftTerm] {
-        &self.drift
+    /// Adds `C J E(u)` of every turn.
+    fn turn<R: Ring<Element = E>>(
+        &mut self,
+        platform: &Platform,
+        ring: &R,
+        attitude: &mut Matrix3<E>,
+        turns: &[TurnAt<E>],
+    ) {
+        for turn in turns {
+            let left = times(
+                ring,
+                &product(ring, attitude, &turn.integral(ring)),
+                &platform.torquer_columns(ring, &turn.axis),
+            );
+            self.psi = Some(match &self.psi {
+                None => left,
+                Some(old) => std::array::from_fn(|r| {
+                    old[r].iter().zip(&left[r]).map(|(a, b)| ring.add(a, b)).collect()
+                }),
+            });
+            *attitude = product(ring, attitude, &turn.rotation(ring));
+        }
+    }
+}
+
+/// `m v`.
+fn times<R: Ring>(ring: &R, m: &Matrix3<R::Element>, v: &Columns<R::Element>) -> Columns<R::Element> {
+    std::array::from_fn(|r| (0..v[0].len()).map(|k| ring.dot((0..3).map(|j| (&m[r][j], &v[j][k])))).collect())
+}
+
+fn unit<R: Ring>(ring: &R) -> Matrix3<R::Element> {
+    std::array::from_fn(|i| std::array::from_fn(|j| if i == j { ring.one() } else { ring.zero() }))
+}
+
+/// `C^T (wN, wU, 0)`: the earth rate in the axes of c.
+pub fn earth_rate_in<R: Ring>(
+    ring: &R,
+    c: &Matrix3<R::Element>,
+    w_n: &R::Element,
+    w_u: &R::Element,
+) -> [R::Element; 3] {
+    std::array::from_fn(|j| ring.dot([(&c[0][j], w_n), (&c[1][j], w_u)]))
+}
+
+impl<R: Ring> Point<R> {
+    /// The rate with which the gyros are torqued at a station, in c: the earth rate, and where it turns the rate of that.
+    fn torqued_rate(&self, i: usize, station: &Station<'_>) -> [R::Element; 3] {
+        let (ring, c) = (&self.ring, &self.attitudes[i]);
+        let rate = earth_rate_in(ring, c, &self.w_n, &self.w_u);
+        let Some(turned) = &station.turned else { return rate };
+        let unit = |k: usize| if k == turned.axis.index { ring.one() } else { ring.zero() };
+        std::array::from_fn(|j| {
+            let along = if turned.axis.geographic { c[turned.axis.index][j].clone() } else { unit(j) };
+            ring.add(&rate[j], &ring.mul(&along, &self.turning[i]))
+        })
+    }
+}
+
+impl Platform {
+    /// The rows of `eps^n = C E D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
+    /// coefficient; none when the unknowns are the drift itself. `rate` is that with which the gyros are torqued, in c; it is asked for
+    /// where a torquer error is unknown.
+    pub fn drift_rows<R: Ring>(
+        &self,
+        ring: &R,
+        c: &Matrix3<R::Element>,
+        rate: impl FnOnce() -> [R::Element; 3],
+    ) -> [Vec<R::Element>; 3] {
+        let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
+        let rate = self.scheme.unknowns.have(Source::Rate).then(rate);
+        let of = |source: Source| match source {
+            Source::Gravity => Some(&g),
+            Source::Rate => rate.as_ref(),
+            Source::Force => None,
+        };
+        self.error_rows(ring, c, of)
+    }
+
+    /// The rows of the error of the accelerometers in `Z^n` at any attitude `C`, with the specific force `f = C^T (0,1,0)`: three rows, one
+    /// column per coefficient.
+    pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
+        let f = c[1].clone();
+        self.error_rows(ring, c, |source| (source == Source::Force).then_some(&f))
+    }
+
+    /// The errors of the accelerometers in c, at the specific force `f`: three rows, one column per coefficient.
+    pub fn accelerometer_columns<R: Ring>(&self, ring: &R, f: &[R::Element; 3]) -> [Vec<R::Element>; 3] {
+        self.error_rows(ring, &unit(ring), |source| (source == Source::Force).then_some(f))
+    }
+
+    /// `E(u)` of torquer errors in c, for a rate along `u`: three rows, one column per coefficient.
+    pub fn torquer_columns<R: Ring>(&self, ring: &R, u: &[R::Element; 3]) -> [Vec<R::Element>; 3] {
+        self.error_rows(ring, &unit(ring), |source| (source == Source::Rate).then_some(u))
+    }
+
+    /// One column per coefficient, in n: along the input axis, times the components of what the term is a function of (3); zero where `of`
+    /// says nothing of it.
+    fn error_rows<'a, R: Ring>(
+        &self,
+        ring: &R,
+        c: &Matrix3<R::Element>,
+        of: impl Fn(Source) -> Option<&'a [R::Element; 3]>,
+    ) -> [Vec<R::Element>; 3]
+    where
+        R::Element: 'a,
+    {
+        let signed = |a: &SignedAxis, x: &R::Element| if a.negative { ring.neg(x) } else { x.clone() };
+        let excitation = |t: &ErrorTerm| {
+            let x = of(t.source)?;
+            Some(match t.factors.split_first() {
+                None => ring.one(),
+                Some((first, rest)) => rest
+                    .iter()
+                    .fold(signed(first, &x[first.axis]), |e, a| ring.mul(&e, &signed(a, &x[a.axis]))),
+            })
+        };
+        let excitations: Vec<Option<R::Element>> = self.terms.iter().map(excitation).collect();
+        std::array::from_fn(|row| {
+            let along_input = |t: &ErrorTerm| signed(&t.input, &c[row][t.input.axis]);
+            let entry = |(t, e): (&ErrorTerm, &Option<R::Element>)| match e {
+                Some(e) => ring.mul(&along_input(t), e),
+                None => ring.zero(),
+            };
+            self.terms.iter().zip(&excitations).map(entry).collect()
+        })
+    }
+
+    /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift itself.
+    pub fn error_terms(&self) -> &[ErrorTerm] {
+        &self.terms
     }
 
     /// The number of coefficients.
     pub fn coefficients(&self) -> usize {
-        self.drift.len()
+        self.terms.len()
     }
 }
 
-/// `eps^n = C_c^n E(g^c) D` (3), (8): three rows, one column per coefficient (term by term, gyro by
-/// gyro). `g^c = C_n^c (0,-1,0)` is minus the second row of `C_c^n`.
-fn drift_block<R: Ring>(ring: &R, terms: &[DriftTerm], c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
-    let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
-    let signed = |a: &SignedAxis, x: &R::Element| if a.negative { ring.neg(x) } else { x.clone() };
-    let excitation = |t: &DriftTerm| match t.factors.split_first() {
-        None => ring.one(),
-        Some((first, rest)) => {
-            rest.iter().fold(signed(first, &g[first.axis]), |e, a| ring.mul(&e, &signed(a, &g[a.axis])))
-        }
-    };
-    let excitations: Vec<R::Element> = terms.iter().map(excitation).collect();
-    std::array::from_fn(|row| {
-        let along_input = |t: &DriftTerm| signed(&t.input, &c[row][t.input.axis]);
-        terms.iter().zip(&excitations).map(|(t, e)| ring.mul(&along_input(t), e)).collect()
-    })
-}
-
-/// `F` of (8) on `(psi^n, eps^n)`: `psi' = psi x omega_ie + eps`, `eps' = 0`.
+/// `F` of (8) on the local unknowns: `psi' = psi x omega_ie + eps`, the others constant.
 pub fn local_dynamics<R: Ring>(ring: &R, w_n: &R::Element, w_u: &R::Element) -> [[R::Element; LOCAL]; LOCAL] {
     let mut f: [[R::Element; LOCAL]; LOCAL] = std::array::from_fn(|_| std::array::from_fn(|_| ring.zero()));
     f[0][2] = ring.neg(w_u);
@@ -211,17 +432,22 @@ pub fn local_dynamics<R: Ring>(ring: &R, w_n: &R::Element, w_u: &R::Element) -> 
     f
 }
 
-/// `H` of (9), `Z^n = (psi_z, 0, -psi_x)`: the components (1, 3, and 2 for a measured azimuth
-/// `psi_y^n`) with their rows.
-pub fn local_output<R: Ring>(ring: &R, measured_azimuth: bool) -> Vec<(usize, [R::Element; LOCAL])> {
+/// `H` of (9), `Z^n = (psi_z, 0, -psi_x)` and the error of the accelerometers if it is unknown: the components (1, 3, with that error 2, and
+/// [`AZIMUTH`] for a measured `psi_y^n`) with their rows.
+pub fn local_output<R: Ring>(ring: &R, observed: Observed) -> Vec<(usize, [R::Element; LOCAL])> {
     let unit = |j: usize, value: R::Element| {
         let mut row: [R::Element; LOCAL] = std::array::from_fn(|_| ring.zero());
         row[j] = value;
         row
     };
     let mut out = vec![(1, unit(2, ring.one())), (3, unit(0, ring.neg(&ring.one())))];
-    if measured_azimuth {
-        out.push((2, unit(1, ring.one())));
+    if observed.accelerometers {
+        out.insert(1, (2, unit(PSI_EPS + 1, ring.one())));
+        out[0].1[PSI_EPS] = ring.one();
+        out[2].1[PSI_EPS + 2] = ring.one();
+    }
+    if observed.azimuth {
+        out.push((AZIMUTH, unit(1, ring.one())));
     }
     out
 }
@@ -242,6 +468,8 @@ pub struct RandomValues {
     rates: (u64, u64),
     /// `exp(i angle)` of every generic angle.
     generic: Vec<(String, u64)>,
+    /// The image of pi, and the rate at which every position turns: where torquer errors are unknown.
+    torquers: Option<(u64, Vec<u64>)>,
 }
 
 impl RandomValues {
@@ -251,14 +479,21 @@ impl RandomValues {
     /// [`PrimeError`] never for a validated scheme.
     pub fn draw(scheme: &Scheme, rng: &mut SplitMix64) -> Result<Self, PrimeError> {
         let stations = scheme.stations();
-        let angles = stations.iter().flat_map(super::scheme::Station::angles).map(Angle::turn);
+        // a scheme that is analysed has been validated
+        let paths = scheme.paths().unwrap_or_default();
+        let turns = paths.iter().flatten().map(|step| step.angle().turn());
+        let angles = stations.iter().flat_map(Station::angles).map(Angle::turn).chain(turns);
         let latitude = scheme.latitude.map(|l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()));
         let roots = RootField::random(common_order(angles.chain(latitude)), rng)?;
         let p = roots.field.modulus();
         let mut nonzero = || 1 + rng.below(p - 1);
         let rates = (nonzero(), nonzero());
         let generic = scheme.generic_names().into_iter().map(|n| (n, nonzero())).collect();
-        Ok(Self { roots, rates, generic })
+        let torquers = scheme
+            .unknowns
+            .have(Source::Rate)
+            .then(|| (nonzero(), scheme.positions.iter().map(|_| nonzero()).collect()));
+        Ok(Self { roots, rates, generic, torquers })
     }
 
     /// The field.
@@ -294,7 +529,7 @@ impl RandomValues {
     pub fn angle_cos_sin(&self, roots: &RootField, angle: &Angle) -> (u64, u64) {
         let f = roots.field;
         let flip = roots.imaginary_unit() != self.roots.imaginary_unit();
-        let constant = unit(roots, angle.turn());
+        let constant = circle(roots, angle.turn());
         let generic = angle.generic().map_or(f.one(), |(name, minus)| {
             let drawn = self.generic.iter().find(|(n, _)| n == name);
             let z = drawn.expect("a value is drawn for every generic angle of the scheme").1;
@@ -312,6 +547,29 @@ impl RandomValues {
         Some(sample.roots.cos_sin(if flipped { f.inv(z) } else { z }))
     }
 
+    /// `C_c^n` of every station in a conjugate of the field.
+    fn attitudes(&self, scheme: &Scheme, roots: &RootField) -> Vec<Matrix3<u64>> {
+        let cos_sin = |angle: &Angle| self.angle_cos_sin(roots, angle);
+        scheme.stations().iter().map(|station| station.attitude(&roots.field, cos_sin)).collect()
+    }
+
+    /// The turns to every station ([`Point::turns`]).
+    ///
+    /// # Errors
+    /// The index of the first position whose way has no image.
+    fn turns(
+        &self,
+        scheme: &Scheme,
+        paths: &[Vec<PathStep>],
+        roots: &RootField,
+        attitudes: &[Matrix3<u64>],
+    ) -> Result<Vec<Vec<TurnAt<u64>>>, usize> {
+        let Some((pi, _)) = self.torquers else { return Ok(Vec::new()) };
+        let f = roots.field;
+        let cos_sin = |angle: &Angle| self.angle_cos_sin(roots, angle);
+        turns_of(&f, scheme, paths, attitudes, |step, from, to| step.at_field(roots, from, to, pi, cos_sin))
+    }
+
     /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
     pub fn sample(&self, scheme: &Scheme, a: u64) -> Sample {
         let roots = self.roots.conjugate(a);
@@ -320,20 +578,78 @@ impl RandomValues {
             None => self.rates,
             Some(latitude) => {
                 let turn = obsdeg_exact::Turn::from_nanodeg(latitude.nanodeg());
-                let (c, s) = roots.cos_sin(unit(&roots, turn));
+                let (c, s) = roots.cos_sin(circle(&roots, turn));
                 (f.mul(self.rates.0, c), f.mul(self.rates.0, s))
             }
         };
-        let attitudes = scheme
-            .stations()
-            .iter()
-            .map(|station| station.attitude(&f, |angle| self.angle_cos_sin(&roots, angle)))
-            .collect();
-        Sample { roots, point: Point { ring: f, w_n, w_u, attitudes } }
+        let attitudes = self.attitudes(scheme, &roots);
+        let paths = scheme.paths().unwrap_or_default();
+        let turns = self.turns(scheme, &paths, &roots, &attitudes);
+        let turns = turns.expect("the ways of a platform have images in the fields of its angles");
+        let stations = scheme.stations();
+        let turning =
+            self.torquers.as_ref().map(|(_, rates)| stations.iter().map(|s| rates[s.index]).collect());
+        let turning = turning.unwrap_or_default();
+        Sample { roots, point: Point { ring: f, w_n, w_u, attitudes, turns, turning } }
+    }
+}
+
+/// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an attitude, and ends at another where
+/// it is the only one.
+///
+/// # Errors
+/// The index of the first position whose way `at` does not know.
+fn turns_of<R: Ring>(
+    ring: &R,
+    scheme: &Scheme,
+    paths: &[Vec<PathStep>],
+    attitudes: &[Matrix3<R::Element>],
+    at: impl Fn(&PathStep, &Matrix3<R::Element>, Option<&Matrix3<R::Element>>) -> Option<TurnAt<R::Element>>,
+) -> Result<Vec<Vec<TurnAt<R::Element>>>, usize> {
+    let mut out = Vec::with_capacity(attitudes.len());
+    let mut start = 0;
+    for (i, station) in scheme.stations().iter().enumerate() {
+        let mut turns = Vec::new();
+        if station.continues {
+            let turned = station.turned.as_ref().ok_or(station.index)?;
+            let step = PathStep::Named { axis: turned.axis, angle: turned.angle.clone() };
+            turns.push(at(&step, &attitudes[start], None).ok_or(station.index)?);
+        } else {
+            start = i;
+            let path = paths.get(station.index).map_or(&[][..], Vec::as_slice);
+            let mut attitude = attitudes[i.saturating_sub(1)].clone();
+            let only = (path.len() == 1).then_some(&attitudes[i]);
+            for step in path {
+                let turn = at(step, &attitude, only).ok_or(station.index)?;
+                attitude = product(ring, &attitude, &turn.rotation(ring));
+                turns.push(turn);
+            }
+        }
+        out.push(turns);
+    }
+    Ok(out)
+}
+
+impl Point<Float> {
+    /// The platform in floating point at these rates of the earth, and of every position that turns.
+    pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64, turning: impl Fn(usize) -> f64) -> Self {
+        let scheme = platform.scheme();
+        let stations = scheme.stations();
+        let cos_sin = |angle: &Angle| angle.turn().cos_sin_f64();
+        let attitudes: Vec<_> = stations.iter().map(|s| s.attitude(&Float, cos_sin)).collect();
+        let (mut turns, mut rates) = (Vec::new(), Vec::new());
+        if scheme.unknowns.have(Source::Rate) {
+            turns = turns_of(&Float, scheme, &platform.paths, &attitudes, |step, from, _| {
+                Some(step.at_f64(from))
+            })
+            .unwrap_or_default();
+            rates = stations.iter().map(|s| turning(s.index)).collect();
+        }
+        Self { ring: Float, w_n, w_u, attitudes, turns, turning: rates }
     }
 }
 
 /// The image of `exp(i angle)` for an angle of the scheme whose field this is.
-fn unit(roots: &RootField, angle: obsdeg_exact::Turn) -> u64 {
+fn circle(roots: &RootField, angle: obsdeg_exact::Turn) -> u64 {
     roots.unit_circle(angle).expect("fields are drawn with the roots of unity of every angle of the scheme")
 }

@@ -10,10 +10,12 @@ use serde::{Deserialize, Serialize};
 use super::angle::{Angle, AngleError, MAX_NAME, excerpt, format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, Turned, c_n, cardinal, cardinal_name};
 use super::dwell::Dwell;
-use super::geometry::{Geometry, Term, Unknowns};
+use super::geometry::Geometry;
 use super::gimbals::Gimbals;
+use super::path::{self, Path, PathError, PathStep, StepError};
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
+use super::terms::{Source, Unknowns};
 use crate::model::ranges::{self, RangeError};
 use crate::model::settings;
 use crate::model::settings::Settings;
@@ -283,6 +285,8 @@ pub struct Scheme {
     pub requirements: BTreeMap<String, f64>,
     /// How far the gimbals turn.
     pub gimbals: Gimbals,
+    /// How the platform is turned from one position to the next, where a position does not say.
+    pub path: Option<Path>,
 }
 
 /// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.
@@ -395,23 +399,20 @@ pub enum SchemeError {
     /// An impossible mounting.
     #[error(transparent)]
     Geometry(#[from] super::geometry::GeometryError),
+    /// A coefficient that is there twice.
+    #[error(transparent)]
+    Terms(#[from] super::terms::TermError),
+    /// A way that has no exact verdict.
+    #[error(transparent)]
+    Path(#[from] PathError),
 }
 
 /// A turn in 1e-9 degrees.
 const FULL_TURN: i64 = 360_000_000_000;
-/// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of them.
+/// Stations of a rotation lie at multiples of a part of it (of a turn, if it is more): of this one for up to seven of them.
 const STATION_STEPS: i64 = 8;
-/// So many are different along a whole turn, which is enough for two g factors; with more the verdicts would say too little.
-const _: () = {
-    let mut term = 0;
-    while term < Term::ALL.len() {
-        assert!(
-            2 * (1 + Term::ALL[term].order() as i64) < STATION_STEPS,
-            "more steps for a term of more g factors"
-        );
-        term += 1;
-    }
-};
+/// For more, of a part that makes so many more different ones along a whole turn than are needed.
+const SPARE_STEPS: i64 = 3;
 
 /// Most positions that a scheme may have.
 pub(crate) const MAX_POSITIONS: usize = 1000;
@@ -434,11 +435,12 @@ impl SchemeError {
             Self::LongText { key, .. } | Self::UnknownName { key, .. } => Some(key.clone()),
             Self::Combinations { .. } => Some("combinations".into()),
             Self::Range(e) => Some(e.what.clone()),
-            Self::DriftPositions { .. } => Some("terms".into()),
+            Self::DriftPositions { .. } | Self::Terms(_) => Some("terms".into()),
             Self::Rotation { index, .. } => Some(format!("position.{index}.rotation")),
             Self::Gimbals { index, .. } => Some(format!("position.{index}")),
             Self::FirstSlew { .. } => Some("position.0.slew".into()),
             Self::Geometry(_) => Some("geometry".into()),
+            Self::Path(e) => e.key(),
         }
     }
 }
@@ -473,6 +475,7 @@ impl Scheme {
             return Err(SchemeError::TooMany { found });
         }
         self.geometry.validate()?;
+        self.unknowns.validate()?;
         self.validate_texts()?;
         self.validate_numbers()?;
         for (index, p) in self.positions.iter().enumerate() {
@@ -491,6 +494,7 @@ impl Scheme {
         if self.unknowns == Unknowns::Drift && (found > 1 || self.rotates()) {
             return Err(SchemeError::DriftPositions { found });
         }
+        self.paths()?;
         Ok(())
     }
 
@@ -582,13 +586,13 @@ impl Scheme {
     }
 
     /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric polynomials of its
-    /// angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for each component of g^c): any
-    /// 2m+1 different angles of the arc span what all of it spans. The end is added, where psi is handed on.
+    /// angle, of degree m = 1 + the largest number of factors (one for `C_c^n`, one for each component of g^c, f or the torqued rate), and
+    /// with torquer errors the angle itself: any 2m+1 different angles of the arc span what all of it spans, and one more does with
+    /// the angle. The end is added, where psi is handed on.
     pub fn stations(&self) -> Vec<Station<'_>> {
-        let degree = 1 + match &self.unknowns {
-            Unknowns::Coefficients(terms) => terms.iter().map(|t| t.order()).max().unwrap_or(0),
-            Unknowns::Drift => 0,
-        };
+        let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0) as i64;
+        let last = 2 * degree + i64::from(self.unknowns.have(Source::Rate));
+        let steps = if last < STATION_STEPS - 1 { STATION_STEPS } else { last + SPARE_STEPS };
         let mut out = Vec::with_capacity(self.positions.len());
         for (index, position) in self.positions.iter().enumerate() {
             let Some(r) = &position.rotation else {
@@ -596,8 +600,8 @@ impl Scheme {
                 continue;
             };
             let whole = r.angle.nanodeg();
-            let step = whole.clamp(-FULL_TURN, FULL_TURN) / STATION_STEPS;
-            let angles = (0..=2 * degree as i64).map(|k| k * step).chain([whole]);
+            let step = whole.clamp(-FULL_TURN, FULL_TURN) / steps;
+            let angles = (0..=last).map(|k| k * step).chain([whole]);
             out.extend(angles.map(|angle| Station {
                 position,
                 index,
@@ -606,6 +610,37 @@ impl Scheme {
             }));
         }
         out
+    }
+
+    /// Whether verdicts depend on how positions are reached: torquer errors act while psi^n is carried.
+    pub fn torquers_act(&self) -> bool {
+        self.carry == Carry::Inertial && self.unknowns.have(Source::Rate) && self.positions.len() > 1
+    }
+
+    /// The turns that lead to every position, where verdicts depend on them; nothing where they do not.
+    ///
+    /// # Errors
+    /// [`PathError`] when a way is not stated or has no exact form.
+    pub fn paths(&self) -> Result<Vec<Vec<PathStep>>, PathError> {
+        if !self.torquers_act() {
+            return Ok(Vec::new());
+        }
+        let mut out = vec![Vec::new()];
+        for (i, pair) in self.positions.windows(2).enumerate() {
+            let [from, to] = pair else { continue };
+            let (name, index) = (to.name.clone(), i + 1);
+            let stated = to.slew.is_some() || self.simulation.slew_rate_deg_s.is_some();
+            let Some(path) = self.path.or(stated.then_some(Path::OneAxis)) else {
+                let of_rate = self.unknowns.terms().iter().filter(|t| t.source() == Source::Rate);
+                let terms = of_rate.map(|t| t.letters()).collect::<Vec<_>>().join(", ");
+                return Err(PathError::NotStated { name, index, terms });
+            };
+            out.push(path::steps(from, to, path).map_err(|e| match e {
+                StepError::NoWay => PathError::NoWay { name, index },
+                StepError::NotExact(found) => PathError::NotExact { name, index, found },
+            })?);
+        }
+        Ok(out)
     }
 
     /// The names of generic angles, in order of appearance.

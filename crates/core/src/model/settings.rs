@@ -177,7 +177,7 @@ impl fmt::Display for DriftNoise {
 pub struct Assignment {
     /// The unknown or family.
     pub name: String,
-    /// In the unit of the unknown: deg, deg/h, deg/h/g, deg/h/g^2.
+    /// In the unit of the unknown: deg, deg/h, deg/h/g, deg/h/g^2, ppm, arcsec, ug, ug/g^2, ug/g^3.
     pub value: f64,
 }
 
@@ -312,24 +312,25 @@ pub(crate) fn may_be_unknown(name: &str) -> bool {
 
 /// Whether a gyro model may have it, even if the scheme at hand does not.
 pub fn is_family(name: &str) -> bool {
-    let letters = name.strip_prefix("D_").unwrap_or("");
-    let letters = letters.strip_suffix(['X', 'Y', 'Z']).unwrap_or(letters);
-    ["psi", "eps", "D"].contains(&name) || super::Term::ALL.iter().any(|t| t.letters() == letters)
+    families().chain(coefficients()).any(|known| known == name)
 }
 
-/// Families that stand for several unknowns.
-const FAMILIES: [&str; 7] = ["psi", "eps", "D", "D_F", "D_I", "D_O", "D_S"];
+/// Names that stand for several unknowns.
+fn families() -> impl Iterator<Item = String> {
+    ["psi", "eps", "D"].into_iter().chain(super::Term::ALL.iter().map(|t| t.family())).map(String::from)
+}
+
+/// The coefficients that an error model may have.
+fn coefficients() -> impl Iterator<Item = String> {
+    let geometry = super::Geometry::default();
+    super::Term::ALL.iter().flat_map(move |t| t.coefficients(&geometry)).map(|(name, _)| name)
+}
 
 /// What could have been meant by `name`, of all that some scheme has.
 pub(crate) fn meant(name: &str) -> String {
     let axes = |stem: &str, letters: [char; 3]| letters.map(|l| format!("{stem}{l}"));
-    let of_terms = super::Term::ALL.iter().flat_map(|t| {
-        let family = format!("D_{}", t.letters());
-        axes(&family, ['X', 'Y', 'Z']).into_iter().chain([family])
-    });
     let angles = ["psi_", "eps_"].into_iter().flat_map(|stem| axes(stem, ['x', 'y', 'z']));
-    let families = ["psi", "eps", "D"].map(String::from);
-    let all: Vec<String> = families.into_iter().chain(angles).chain(of_terms).collect();
+    let all: Vec<String> = families().chain(angles).chain(coefficients()).collect();
     let expected = "expected an unknown such as D_FX or psi_x, or a family such as D_F, D or psi";
     match nearest(name, &all) {
         Some(near) => format!("did you mean `{near}`? ({expected})"),
@@ -339,9 +340,10 @@ pub(crate) fn meant(name: &str) -> String {
 
 /// What could have been meant by `name`: the nearest, or all there is (the first of very many).
 pub fn known(platform: &Platform, name: &str) -> String {
-    let families = FAMILIES.iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
-    let names: Vec<String> =
-        platform.names().iter().cloned().chain(families.map(ToString::to_string)).collect();
+    let mut families: Vec<String> = families().collect();
+    families.dedup();
+    let families = families.into_iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
+    let names: Vec<String> = platform.names().iter().cloned().chain(families).collect();
     match nearest(name, &names) {
         Some(hint) => format!("did you mean `{hint}`?"),
         None if names.len() > 40 => {

@@ -128,6 +128,12 @@ impl Slew {
         Self { from: *from, rate: axis_in_c(from, rotation.axis).map(|x| x * rate), duration_s }
     }
 
+    /// A turn by a rotation vector (rad) in the axes of c, at `rate_rad_s`.
+    pub fn by(from: &Matrix3<f64>, vector: &[f64; 3], rate_rad_s: f64) -> Self {
+        let duration_s = norm(vector) / rate_rad_s;
+        Self { from: *from, rate: vector.map(|x| x / duration_s), duration_s }
+    }
+
     /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn. Without an axis it is the shortest
     /// way; of two shortest ways, half turns, the one about the axis in n (North, Up, East) whose first component that is not zero is
     /// positive. So `from -> from P`, `to -> to P`, a turn of the platform axes, leaves the turn in n as it is.

@@ -9,7 +9,7 @@ use super::solve::{Contribution, Key, Used};
 use super::solver::{Functional, Solver};
 use super::turning::drift_derivative;
 use crate::degree::coefficient::{Number, Rates};
-use crate::model::platform::{LOCAL, local_dynamics, local_output};
+use crate::model::platform::{LOCAL, Observed, PSI_EPS, local_dynamics, local_output};
 use crate::model::ring::{Ring, Text};
 use crate::model::symbols::Symbols;
 
@@ -82,8 +82,8 @@ impl Solver<'_> {
     fn check(&self, used: &[Used], target: Vec<(String, String)>) -> Check {
         let zeros = self.tables.zeros;
         let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
-        let azimuth = self.platform.scheme().measured_azimuth;
-        let components: Vec<usize> = local_output(&Text, azimuth).iter().map(|(c, _)| *c).collect();
+        let observed = self.platform.observed();
+        let components: Vec<usize> = local_output(&Text, observed).iter().map(|(c, _)| *c).collect();
         let state = |i: usize| format!("x_{i}");
         let unknown = |c: usize| format!("u_{c}");
         let first_d = self.platform.names().len() - self.platform.coefficients();
@@ -94,9 +94,9 @@ impl Solver<'_> {
                     let names: Vec<String> = block.columns.iter().map(|&c| unknown(c)).collect();
                     Text.dot(row.iter().zip(&names))
                 };
-                let local = block.rows.iter().map(entry);
+                let local = block.rows[..observed.locals()].iter().map(entry);
                 let moving: Vec<String> = match *station {
-                    (position, Some(axis)) => drift_derivative(self.platform, &Text, c, axis)
+                    (position, Some(axis)) => drift_derivative(self.platform, &self.text_point, c, axis)
                         .iter()
                         .map(|row| {
                             let names: Vec<String> = (0..row.len()).map(|k| unknown(first_d + k)).collect();
@@ -125,7 +125,7 @@ impl Solver<'_> {
             observable.solution.iter().map(term).collect()
         });
         Check {
-            dynamics: dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), azimuth, state),
+            dynamics: dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), observed, state),
             unknowns: (0..self.platform.names().len()).map(unknown).collect(),
             segments: segments.collect(),
             terms: terms.collect(),
@@ -134,23 +134,23 @@ impl Solver<'_> {
     }
 }
 
-/// (8) and (9) as text, with names for the six local unknowns and for the derivatives of the last three: `eps^n`
-/// changes while the platform turns.
+/// (8) and (9) as text, with names for the local unknowns and then for the derivatives of `eps^n`, which changes while the platform turns.
 pub(crate) fn dynamics_text(
     w_n: &str,
     w_u: &str,
-    azimuth: bool,
+    observed: Observed,
     state: impl Fn(usize) -> String,
 ) -> Dynamics {
-    let states: Vec<String> = (0..LOCAL + 3).map(state).collect();
-    let row = |row: &[String; LOCAL]| Text.dot(row.iter().zip(&states));
-    let mut equations: Vec<String> =
-        local_dynamics(&Text, &w_n.to_string(), &w_u.to_string()).iter().map(row).collect();
-    equations[3..].clone_from_slice(&states[LOCAL..]);
+    let locals = observed.locals();
+    let states: Vec<String> = (0..locals + 3).map(state).collect();
+    let row = |row: &[String; LOCAL]| Text.dot(row[..locals].iter().zip(&states));
+    let dynamics = local_dynamics(&Text, &w_n.to_string(), &w_u.to_string());
+    let mut equations: Vec<String> = dynamics[..locals].iter().map(row).collect();
+    equations[3..PSI_EPS].clone_from_slice(&states[locals..]);
     equations.extend(vec![Text.zero(); 3]);
     Dynamics {
         equations,
-        outputs: local_output(&Text, azimuth).iter().map(|(_, r)| row(r)).collect(),
+        outputs: local_output(&Text, observed).iter().map(|(_, r)| row(r)).collect(),
         states,
     }
 }

@@ -8,9 +8,9 @@ use super::ask::dynamics_text;
 use super::print::stations;
 use super::solver::Solver;
 use super::turning::drift_derivative;
-use crate::model::Platform;
-use crate::model::platform::{LOCAL_NAMES, local_output};
+use crate::model::platform::{AZIMUTH, LOCAL_NAMES, PSI_EPS, local_output};
 use crate::model::ring::{Ring, Text};
+use crate::model::{Platform, Source};
 
 /// One formula.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -26,6 +26,9 @@ pub struct Formula {
 /// Why there are no formulas.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum FormulasError {
+    /// Torquer errors have no symbols.
+    #[error("no formulas of Z: those with torquer errors (GS, GM, GM3) are not written out")]
+    Torquers,
     /// Nobody derives them.
     #[error("formulas of Z need the symbolic engine")]
     NoEngine,
@@ -40,17 +43,22 @@ pub(crate) enum FormulasError {
 /// # Errors
 /// [`FormulasError`].
 pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, FormulasError> {
-    let azimuth = platform.scheme().measured_azimuth;
+    if platform.scheme().unknowns.have(Source::Rate) {
+        return Err(FormulasError::Torquers);
+    }
+    let observed = platform.observed();
+    let locals = observed.locals();
     let zeros = solver.tables.zeros;
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
     let rotates = platform.scheme().rotates();
-    let mut dynamics = dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), azimuth, |i| {
+    let mut dynamics = dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), observed, |i| {
         // `psi_x^n` is a power to the engine
-        LOCAL_NAMES.get(i).map_or_else(|| LOCAL_NAMES[i - 3].replace("^n", "_d"), |n| n.replace("^n", "_n"))
+        let derivative = || LOCAL_NAMES[i - locals + 3].replace("^n", "_d");
+        if i < locals { LOCAL_NAMES[i].replace("^n", "_n") } else { derivative() }
     });
     if !rotates {
         // eps^n is constant
-        dynamics.equations[3..6].fill(Text.zero());
+        dynamics.equations[3..PSI_EPS].fill(Text.zero());
     }
     const ORDER: usize = 2;
     let text_point = solver.symbols().point(platform, "wN", "wU");
@@ -62,7 +70,7 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     let attitudes = text_point.attitudes.iter().zip(platform.scheme().stations());
     let slopes: Vec<Option<[Vec<String>; 3]>> = attitudes
         .map(|(c, station)| {
-            let rows = drift_derivative(platform, &Text, c, station.turned?.axis);
+            let rows = drift_derivative(platform, &text_point, c, station.turned?.axis);
             Some(rows.map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()))
         })
         .collect();
@@ -76,8 +84,8 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     };
     let (texts, _) = worker.ask(&request).map_err(FormulasError::Engine)?;
     let mut out = Vec::new();
-    for (i, (component, _)) in local_output(&Text, azimuth).iter().enumerate() {
-        let name = if *component == 2 { "Za".to_string() } else { format!("Z{component}") };
+    for (i, (component, _)) in local_output(&Text, observed).iter().enumerate() {
+        let name = if *component == AZIMUTH { "Za".to_string() } else { format!("Z{component}") };
         for k in 0..=ORDER {
             let right = texts[i * (ORDER + 1) + k].replace("_n", "^n").replace("_d", "^n'");
             out.push(Formula { position: None, left: format!("{name}{}", "'".repeat(k)), right });
@@ -89,13 +97,13 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
         let mut push = |left: String, right| {
             out.push(Formula { position: Some(station.label.clone()), left, right });
         };
-        for (name, row) in LOCAL_NAMES.iter().zip(rows) {
+        for (name, row) in LOCAL_NAMES[..locals].iter().zip(rows) {
             push(
                 (*name).into(),
                 sum(row.iter().zip(&columns).map(|(t, &c)| Text.mul(t, &platform.names()[c]))),
             );
         }
-        for (name, row) in LOCAL_NAMES[3..].iter().zip(slopes.iter().flatten()) {
+        for (name, row) in LOCAL_NAMES[3..PSI_EPS].iter().zip(slopes.iter().flatten()) {
             let rate = station.rate.as_deref().unwrap_or_default();
             let names = &platform.names()[first_d..];
             let right = sum(row.iter().zip(names).map(|(t, d)| Text.mul(&Text.mul(t, &rate.to_string()), d)));

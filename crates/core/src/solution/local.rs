@@ -2,13 +2,13 @@
 
 use crate::degree::coefficient::Rates;
 use crate::model::Platform;
-use crate::model::platform::{Block, LOCAL, Point};
+use crate::model::platform::{AZIMUTH, Block, LOCAL, Observed, Point};
 use crate::model::ring::Ring;
 
 /// `sign * wN^a wU^b * Z_component^(order)`, Z in n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ZTerm {
-    /// Component of Z: 1, 2, 3 in n-axes.
+    /// Component of Z: 1, 2, 3 in n-axes, or the azimuth.
     pub component: usize,
     /// Derivative order.
     pub order: usize,
@@ -18,7 +18,7 @@ pub(crate) struct ZTerm {
     pub rates: Rates,
 }
 
-/// An observable of one position: a functional of `(psi^n, eps^n)` and its solution in Z.
+/// An observable of one position: a functional of the local unknowns and its solution in Z.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LocalObservable {
     /// The derivative order that it needs.
@@ -53,15 +53,19 @@ const fn z(component: usize, order: usize, sign: i64, rates: Rates) -> ZTerm {
 /// The observables of a single position, by order: `psi_x` (13), `psi_z` (14), `eps_x` (15), then
 /// `eps_z - wN psi_y` (17) and `eps_y` (16) away from the poles; with a measured azimuth `psi_y`,
 /// `eps_z` and `eps_y` itself.
-pub(crate) fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
+pub(crate) fn local_observables(zeros: RateZeros, observed: Observed) -> Vec<LocalObservable> {
     const UNIT: Rates = [0, 0];
     let unit = |index: usize| vec![(index, 1, UNIT)];
+    let measured_azimuth = observed.azimuth;
+    if observed.accelerometers {
+        return with_accelerometers(zeros, measured_azimuth);
+    }
     let mut out = vec![
         LocalObservable { order: 0, row: unit(2), solution: vec![z(1, 0, 1, UNIT)] },
         LocalObservable { order: 0, row: unit(0), solution: vec![z(3, 0, -1, UNIT)] },
     ];
     if measured_azimuth {
-        out.push(LocalObservable { order: 0, row: unit(1), solution: vec![z(2, 0, 1, UNIT)] });
+        out.push(LocalObservable { order: 0, row: unit(1), solution: vec![z(AZIMUTH, 0, 1, UNIT)] });
     }
     out.push(LocalObservable {
         order: 1,
@@ -72,12 +76,12 @@ pub(crate) fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec
         out.push(LocalObservable {
             order: 1,
             row: unit(5),
-            solution: vec![z(1, 1, 1, UNIT), z(3, 0, 1, [0, 1]), z(2, 0, 1, [1, 0])],
+            solution: vec![z(1, 1, 1, UNIT), z(3, 0, 1, [0, 1]), z(AZIMUTH, 0, 1, [1, 0])],
         });
         out.push(LocalObservable {
             order: 1,
             row: unit(4),
-            solution: vec![z(2, 1, 1, UNIT), z(1, 0, -1, [1, 0])],
+            solution: vec![z(AZIMUTH, 1, 1, UNIT), z(1, 0, -1, [1, 0])],
         });
     } else {
         out.push(LocalObservable {
@@ -93,6 +97,43 @@ pub(crate) fn local_observables(zeros: RateZeros, measured_azimuth: bool) -> Vec
             });
         }
     }
+    without_zeros(out, zeros)
+}
+
+/// The same where Z has an error of the accelerometers, a: `psi_z + a_x`, `a_y`, `psi_x - a_z`; `eps_x - wU psi_z`, then
+/// `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z` away from the poles; with a measured azimuth `psi_y`, and the last two in Z' and Za'.
+fn with_accelerometers(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
+    const UNIT: Rates = [0, 0];
+    let observable = |order, row: &[(usize, i64, Rates)], solution: &[ZTerm]| LocalObservable {
+        order,
+        row: row.to_vec(),
+        solution: solution.to_vec(),
+    };
+    let mut out = vec![
+        observable(0, &[(2, 1, UNIT), (6, 1, UNIT)], &[z(1, 0, 1, UNIT)]),
+        observable(0, &[(7, 1, UNIT)], &[z(2, 0, 1, UNIT)]),
+        observable(0, &[(0, 1, UNIT), (8, -1, UNIT)], &[z(3, 0, -1, UNIT)]),
+    ];
+    if measured_azimuth {
+        out.push(observable(0, &[(1, 1, UNIT)], &[z(AZIMUTH, 0, 1, UNIT)]));
+    }
+    out.push(observable(1, &[(3, 1, UNIT), (2, -1, [0, 1])], &[z(3, 1, -1, UNIT)]));
+    if measured_azimuth {
+        let solution = [z(1, 1, 1, UNIT), z(AZIMUTH, 0, 1, [1, 0])];
+        out.push(observable(1, &[(5, 1, UNIT), (0, 1, [0, 1])], &solution));
+        out.push(observable(1, &[(4, 1, UNIT), (2, 1, [1, 0])], &[z(AZIMUTH, 1, 1, UNIT)]));
+    } else {
+        out.push(observable(1, &[(5, 1, UNIT), (1, -1, [1, 0]), (0, 1, [0, 1])], &[z(1, 1, 1, UNIT)]));
+        if !zeros.w_n {
+            let solution = [z(1, 2, -1, [-1, 0]), z(3, 1, -1, [-1, 1])];
+            out.push(observable(2, &[(4, 1, UNIT), (2, 1, [1, 0])], &solution));
+        }
+    }
+    without_zeros(out, zeros)
+}
+
+/// The observables without what is zero at the latitude.
+fn without_zeros(mut out: Vec<LocalObservable>, zeros: RateZeros) -> Vec<LocalObservable> {
     let vanishes = |r: &Rates| (zeros.w_n && r[0] > 0) || (zeros.w_u && r[1] > 0);
     for o in &mut out {
         o.row.retain(|(_, _, r)| !vanishes(r));
@@ -140,17 +181,21 @@ mod tests {
     fn observables_of_one_position_follow_from_the_recursion() {
         let f = Field::new((1 << 60) + 33);
         let mut rng = SplitMix64::new(4);
-        for (pole, equator, azimuth) in [
+        let places = [
             (false, false, false),
             (true, false, false),
             (false, true, false),
             (false, false, true),
             (true, false, true),
-        ] {
+        ];
+        for ((pole, equator, azimuth), accelerometers) in
+            places.iter().flat_map(|p| [(*p, false), (*p, true)])
+        {
             let mut rate = |zero: bool| if zero { 0 } else { f.from_u64(rng.next_u64()) };
             let (w_n, w_u) = (rate(pole), rate(equator));
             let dynamics = local_dynamics(&f, &w_n, &w_u);
-            let output = local_output(&f, azimuth);
+            let observed = Observed { azimuth, accelerometers };
+            let output = local_output(&f, observed);
             let derivative = |component: usize, order: usize| {
                 let row = output.iter().find(|(c, _)| *c == component).expect("measured").1;
                 (0..order).fold(row, |r, _| {
@@ -162,8 +207,8 @@ mod tests {
                     |w: u64, e: i32| f.pow(if e < 0 { f.inv(w) } else { w }, e.unsigned_abs().into());
                 f.mul(factor(w_n, r[0]), factor(w_u, r[1]))
             };
-            let observables = local_observables(RateZeros { w_n: pole, w_u: equator }, azimuth);
-            let chain = local_chain(&f, w_n, w_u, azimuth);
+            let observables = local_observables(RateZeros { w_n: pole, w_u: equator }, observed);
+            let chain = local_chain(&f, w_n, w_u, observed);
             for o in &observables {
                 let mut substituted = [0; LOCAL];
                 for t in &o.solution {

@@ -12,7 +12,7 @@ use super::substitution::{Substitution, binomial};
 use super::support::short_support;
 use super::turning::attitude_derivative;
 use crate::degree::coefficient::{Coefficient, Form, Number, READABLE, Rates, power, readable};
-use crate::model::platform::Point;
+use crate::model::platform::{AZIMUTH, Point};
 use crate::model::ring::Ring;
 
 /// Values of `(wN, wU)` and of every rate of turning at which decimals are checked.
@@ -37,7 +37,7 @@ pub enum Verification {
 pub struct Term {
     /// Index of the station.
     pub station: usize,
-    /// 1, 2, 3: component in n (2 is a measured azimuth) or platform axis.
+    /// 1, 2, 3: component in n or platform axis; of a measured azimuth its number.
     pub component: usize,
     /// Whether this is the measured azimuth.
     pub azimuth: bool,
@@ -318,7 +318,7 @@ impl Solver<'_> {
             let station = self.tables.station(u.row);
             let turns = self.stations[station].1.is_some();
             for z in &self.tables.observables[u.row % self.tables.observables.len()].solution {
-                let azimuth = z.component == 2;
+                let azimuth = z.component == AZIMUTH;
                 let in_platform = self.frame == Frame::Platform && !azimuth;
                 // Z^n = C_c^n Z^c, and C_c^n changes where the platform turns
                 for derivative in 0..=if in_platform && turns { z.order } else { 0 } {

@@ -16,6 +16,7 @@ use crate::model::platform::{Platform, Point};
 use crate::model::ring::{Float, Text};
 use crate::model::rotation::Axis;
 use crate::model::symbols::Symbols;
+use crate::model::terms::Source;
 use crate::solution::local::rows_at;
 use crate::solution::tables::{Table, Tables};
 
@@ -78,7 +79,9 @@ impl<'a> Solver<'a> {
         let symbols = Symbols::of(platform);
         let rate = |zero: bool| if zero { "0" } else { "1" };
         let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
-        let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES;
+        // turns of torquer errors hold pi, and their drift sums of rates: neither is among the symbols
+        let torquers = platform.scheme().unknowns.have(Source::Rate);
+        let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES && !torquers;
         let mut text = Vec::new();
         if usable {
             text = rows_at(platform, &text_point, &tables.observables);
@@ -155,18 +158,19 @@ impl<'a> Solver<'a> {
         let split = self.split_rates(&images)?;
         let mut text = None;
         let terms = columns.into_iter().zip(split).map(|(c, (rates, numbers))| {
-            let number = self.recover(&numbers).map_or_else(
-                || {
+            let number = match self.recover(&numbers) {
+                Some(radical) => Number::Radical(radical),
+                None if self.platform.scheme().unknowns.have(Source::Rate) => return None,
+                None => {
                     let rows = text.get_or_insert_with(|| {
                         rows_at(self.platform, &self.text_point, &self.tables.observables)
                     });
                     self.text_number(rows[row][c].clone())
-                },
-                Number::Radical,
-            );
-            (c, Coefficient { number, rates })
+                }
+            };
+            Some((c, Coefficient { number, rates }))
         });
-        Some(Functional { terms: terms.collect(), images })
+        Some(Functional { terms: terms.collect::<Option<_>>()?, images })
     }
 
     /// The value of a coefficient without rates; `None` for one in generic angles.
@@ -264,11 +268,9 @@ impl<'a> Solver<'a> {
 }
 
 pub(super) fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point<Float> {
-    let attitudes =
-        platform.scheme().stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
     let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
     let (w_n, w_u) = (rate(tables.zeros.w_n, rates.0), rate(tables.zeros.w_u, rates.1));
-    Point { ring: Float, w_n, w_u, attitudes }
+    Point::in_floats(platform, w_n, w_u, |_| 1.0)
 }
 
 /// Zero for what rounding left over.

@@ -5,11 +5,11 @@ use super::solver::Frame;
 use super::turning::{attitude_derivative, drift_derivative};
 use crate::model::Platform;
 use crate::model::attitude::Matrix3;
-use crate::model::platform::{Block, LOCAL, Point, local_dynamics, local_output};
+use crate::model::platform::{AZIMUTH, Block, LOCAL, PSI_EPS, Point, local_dynamics, local_output};
 use crate::model::ring::Ring;
 use crate::model::scheme::Station;
 
-/// `psi^n`, `eps^n` and `eps^n'`.
+/// The local unknowns and `eps^n'`.
 const MOVING: usize = LOCAL + 3;
 
 /// The platform at one point, ready for substitution.
@@ -34,10 +34,10 @@ impl<'a, R: Ring> Substitution<'a, R> {
         let mut local = local_dynamics(ring, &point.w_n, &point.w_u).into_iter();
         let mut dynamics: [[R::Element; MOVING]; MOVING] =
             std::array::from_fn(|_| local.next().map_or_else(|| std::array::from_fn(|_| ring.zero()), wide));
-        for i in 3..LOCAL {
-            dynamics[i][3 + i] = ring.one();
+        for i in 3..PSI_EPS {
+            dynamics[i][LOCAL + i - 3] = ring.one();
         }
-        let output = local_output(ring, platform.scheme().measured_azimuth);
+        let output = local_output(ring, platform.observed());
         Self {
             platform,
             point,
@@ -65,12 +65,12 @@ impl<'a, R: Ring> Substitution<'a, R> {
             let row = self.derivative(term, &rate);
             let block = &self.blocks[term.station];
             for (k, &column) in block.columns.iter().enumerate() {
-                let entry = ring.dot((0..LOCAL).map(|i| (&row[i], &block.rows[i][k])));
+                let entry = block.entry(ring, &row[..LOCAL], k);
                 out[column] = ring.add(&out[column], &ring.mul(coefficient, &entry));
             }
             let Some(turned) = &station.turned else { continue };
             let c = &self.point.attitudes[term.station];
-            let slopes = drift_derivative(self.platform, ring, c, turned.axis);
+            let slopes = drift_derivative(self.platform, self.point, c, turned.axis);
             let first = out.len() - self.platform.coefficients();
             for (k, slot) in out[first..].iter_mut().enumerate() {
                 let entry = ring.dot((0..3).map(|i| (&row[LOCAL + i], &slopes[i][k])));
@@ -80,7 +80,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
         out
     }
 
-    /// The derivative of Z that a term names, as a functional of `(psi^n, eps^n, eps^n')`.
+    /// The derivative of Z that a term names, as a functional of the local unknowns and `eps^n'`.
     fn derivative(&self, term: &Term, rate: &R::Element) -> [R::Element; MOVING] {
         let ring = &self.point.ring;
         // Z^n^(k) as measured
@@ -92,7 +92,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
             })
         };
         if self.frame == Frame::N || term.azimuth {
-            return in_n(term.component, term.order);
+            return in_n(if term.azimuth { AZIMUTH } else { term.component }, term.order);
         }
         // Z^c = C_n^c Z^n, and C_n^c changes where the platform turns: sum of binomials times (w^j d^j C_n^c) Z^n^(k-j)
         let c = &self.point.attitudes[term.station];
@@ -104,7 +104,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
                 Some(t) => Some(attitude_derivative(ring, c, t.axis, j)),
                 None => (j == 0).then(|| c.clone()),
             };
-            for n in [1, 3] {
+            for n in 1..=3 {
                 let Some(slope) = &slope else { continue };
                 let weight = ring.mul(&power, &slope[n - 1][term.component - 1]);
                 let row = in_n(n, term.order - j);

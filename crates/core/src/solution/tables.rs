@@ -47,7 +47,7 @@ impl Tables {
     pub(crate) fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Self {
         let scheme = platform.scheme();
         let zeros = RateZeros::of(platform);
-        let observables = local_observables(zeros, scheme.measured_azimuth);
+        let observables = local_observables(zeros, platform.observed());
         let mut rng = scheme.random(seed, "other rates");
         let mut rates = |roots: &RootField| {
             let p = roots.field.modulus();

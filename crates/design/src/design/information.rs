@@ -2,9 +2,10 @@
 //! times.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::slew::W_IE;
+use obsdeg_core::model::slew::{Slew, W_IE};
 use obsdeg_core::model::{
-    Carry, Euler, Float, Gimbals, LOCAL, Matrix3, Platform, Scheme, c_n_f64, local_dynamics, local_output,
+    Carry, Euler, Float, Gimbals, Matrix3, PSI_EPS, Platform, Scheme, c_n_f64, earth_rate_in, local_dynamics,
+    local_output,
 };
 use obsdeg_ekf::integrate::van_loan;
 use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, latitude_of, si_per_shown, steps};
@@ -42,9 +43,9 @@ pub struct Evaluator {
     /// Dwell of each position, in s.
     dwell_s: f64,
     /// Information of one position on its `(psi^n, eps^n)`.
-    pub(super) local: [[f64; LOCAL]; LOCAL],
+    pub(super) local: [[f64; PSI_EPS]; PSI_EPS],
     /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
-    phi: [[f64; LOCAL]; 3],
+    phi: [[f64; PSI_EPS]; 3],
     pub(super) candidates: Vec<Candidate>,
     /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
     pub(super) ways: Vec<Way>,
@@ -117,8 +118,8 @@ impl Evaluator {
             n: d + 3,
             w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
             dwell_s: conditions.dwell_s,
-            local: [[0.0; LOCAL]; LOCAL],
-            phi: [[0.0; LOCAL]; 3],
+            local: [[0.0; PSI_EPS]; PSI_EPS],
+            phi: [[0.0; PSI_EPS]; 3],
             candidates: Vec::new(),
             ways: Vec::new(),
             dph: si_per_shown("deg/h"),
@@ -132,7 +133,7 @@ impl Evaluator {
     /// # Errors
     /// [`DesignError::Filter`].
     pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
-        let mut f = DMatrix::zeros(LOCAL, LOCAL);
+        let mut f = DMatrix::zeros(PSI_EPS, PSI_EPS);
         for i in 0..3 {
             for j in 0..3 {
                 f[(i, j)] = self.w[i][j];
@@ -140,18 +141,19 @@ impl Evaluator {
             f[(i, i + 3)] = 1.0;
         }
         let steps = steps(dwell_s, self.conditions.step_s)?;
-        let none = DMatrix::zeros(LOCAL, LOCAL);
+        let none = DMatrix::zeros(PSI_EPS, PSI_EPS);
         let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
-        let outputs = local_output(&Float, self.platform.scheme().measured_azimuth);
-        let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
-        self.local = [[0.0; LOCAL]; LOCAL];
+        let outputs = local_output(&Float, self.platform.observed());
+        let mut now: DMatrix<f64> = DMatrix::identity(PSI_EPS, PSI_EPS);
+        self.local = [[0.0; PSI_EPS]; PSI_EPS];
         for _ in 0..steps {
             now = &step * now;
             for (component, h) in &outputs {
                 let weight = 1.0 / Plan::output_sigma(*component, &self.conditions).powi(2);
-                let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
-                for i in 0..LOCAL {
-                    for j in 0..LOCAL {
+                let row: [f64; PSI_EPS] =
+                    std::array::from_fn(|j| (0..PSI_EPS).map(|i| h[i] * now[(i, j)]).sum());
+                for i in 0..PSI_EPS {
+                    for j in 0..PSI_EPS {
                         self.local[i][j] += weight * row[i] * row[j];
                     }
                 }
@@ -166,12 +168,21 @@ impl Evaluator {
         Ok(self)
     }
 
+    /// The rows of `eps^n` at an attitude, while the platform turns as `slew` says.
+    pub(super) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
+        let rate = || {
+            let earth = earth_rate_in(&Float, c, &-self.w[0][2], &self.w[1][2]);
+            std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
+        };
+        self.platform.drift_rows(&Float, c, rate)
+    }
+
     /// The candidates without the ways between them.
     pub(super) fn stand_at(&mut self, attitudes: &[Matrix3<f64>]) {
         self.candidates = attitudes
             .iter()
             .map(|c| {
-                let drift = self.ordered_columns(self.platform.drift_rows(&Float, c));
+                let drift = self.ordered_columns(self.drift_rows(c, None));
                 Candidate { own: self.information_alone(c, &drift), drift, c: *c }
             })
             .collect();
@@ -184,7 +195,7 @@ impl Evaluator {
             return Vec::new();
         }
         let n = self.n;
-        let mut local = [[0.0; MAX]; LOCAL];
+        let mut local = [[0.0; MAX]; PSI_EPS];
         for r in 0..3 {
             local[r][..3].copy_from_slice(&c[r]);
             local[3 + r][3..n].copy_from_slice(&drift[r]);
@@ -217,9 +228,9 @@ impl Evaluator {
     }
 
     /// `G L` for the functionals L of `(psi^n, eps^n)` at a position (6 x n).
-    fn weighted(&self, local: &[[f64; MAX]; LOCAL]) -> [[f64; MAX]; LOCAL] {
+    fn weighted(&self, local: &[[f64; MAX]; PSI_EPS]) -> [[f64; MAX]; PSI_EPS] {
         let n = self.n;
-        let mut weighted = [[0.0; MAX]; LOCAL];
+        let mut weighted = [[0.0; MAX]; PSI_EPS];
         for (i, row) in weighted.iter_mut().enumerate() {
             for (k, l) in local.iter().enumerate() {
                 let g = self.local[i][k];
@@ -278,7 +289,7 @@ impl Evaluator {
             }
             return;
         }
-        let mut local = [[0.0; MAX]; LOCAL];
+        let mut local = [[0.0; MAX]; PSI_EPS];
         for r in 0..3 {
             match turn {
                 _ if carry == Carry::Platform => {

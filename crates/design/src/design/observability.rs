@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use obsdeg_core::degree::{EnsembleError, local_chain};
-use obsdeg_core::model::{Carry, Euler, Gimbals, LOCAL, Matrix3, Platform, RandomValues, Scheme};
+use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme};
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field};
 use rayon::prelude::*;
@@ -456,13 +456,13 @@ impl InField {
     fn new(platform: &Platform, values: &RandomValues, leading: usize) -> Self {
         let sample = values.sample(platform.scheme(), 1);
         let (f, point) = (sample.point.ring, &sample.point);
-        let chain = local_chain(&f, point.w_n, point.w_u, platform.scheme().measured_azimuth);
+        let chain = local_chain(&f, point.w_n, point.w_u, platform.observed());
         let n = platform.names().len();
         let blocks = platform.blocks(point);
         let up_to = |order: usize| -> Vec<Vec<Vec<u64>>> {
             let rows = blocks.iter().map(|block| {
                 let rows = chain.iter().filter(|local| local.order <= order).map(|local| {
-                    let entry = |k: usize| f.dot(0, (0..LOCAL).map(|i| (local.row[i], block.rows[i][k])));
+                    let entry = |k: usize| block.entry(&f, &local.row, k);
                     (0..n).map(entry).collect::<Vec<u64>>()
                 });
                 if leading > 0 { without_leading(f, rows.collect(), leading) } else { rows.collect() }

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use obsdeg_exact::{Field, SplitMix64};
 
-use obsdeg_core::model::{Matrix3, Platform, product};
+use obsdeg_core::model::{Matrix3, Platform, earth_rate_in, product};
 
 /// The orbits of the candidates.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -110,13 +110,16 @@ fn rotations(f: &Field) -> Vec<Matrix3<u64>> {
 }
 
 /// Whether turning the platform axes by `p` renames the coefficients, those that count alike among themselves. The
-/// columns are polynomials in C: equal at a random matrix, they are equal.
+/// columns (of the drift and of Z) are polynomials in C: equal at a random matrix, they are equal.
 fn renames(f: &Field, platform: &Platform, p: &Matrix3<u64>, same: &dyn Fn(usize, usize) -> bool) -> bool {
     let mut rng = SplitMix64::new(0x7261_6e64_6f6d_2043);
     let c: Matrix3<u64> = std::array::from_fn(|_| std::array::from_fn(|_| rng.below(f.modulus())));
-    let columns = |c: &Matrix3<u64>| -> Vec<[u64; 3]> {
-        let rows = platform.drift_rows(f, c);
-        (0..platform.coefficients()).map(|k| std::array::from_fn(|r| rows[r][k])).collect()
+    let [w_n, w_u] = [0; 2].map(|_| rng.below(f.modulus()));
+    let columns = |c: &Matrix3<u64>| -> Vec<[u64; 6]> {
+        let drift = platform.drift_rows(f, c, || earth_rate_in(f, c, &w_n, &w_u));
+        let of_z = platform.accelerometer_rows(f, c);
+        let entry = |r: usize, k: usize| if r < 3 { drift[r][k] } else { of_z[r - 3][k] };
+        (0..platform.coefficients()).map(|k| std::array::from_fn(|r| entry(r, k))).collect()
     };
     let (before, after) = (columns(&c), columns(&product(f, &c, p)));
     let mut used = vec![false; before.len()];

@@ -1,7 +1,7 @@
 //! The ways from one candidate to another, where turning takes time: the shortest, and of half turns both.
 
 use obsdeg_core::model::slew::{Slew, Turn};
-use obsdeg_core::model::{Float, Matrix3, SlewTo};
+use obsdeg_core::model::{Matrix3, SlewTo};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -100,7 +100,7 @@ impl Evaluator {
         let n = self.n;
         let steps = (slew.turned(slew.duration_s) / TURN_STEP).ceil().max(1.0);
         let dt = slew.duration_s / steps;
-        let drift_at = |t: f64| self.ordered_columns(self.platform.drift_rows(&Float, &slew.at(t)));
+        let drift_at = |t: f64| self.ordered_columns(self.drift_rows(&slew.at(t), Some(slew)));
         let slope = |x: &[Vec<f64>; 3], drift: &[Vec<f64>; 3]| -> [Vec<f64>; 3] {
             std::array::from_fn(|i| {
                 let own = |k: usize| if k < 3 { 0.0 } else { drift[i][k - 3] };

@@ -4,7 +4,8 @@ use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::{Degrees, EnsembleError, Status, judge, local_chain};
 use obsdeg_core::model::{
-    Angle, Carry, Platform, RandomValues, Sample, Scheme, Unknowns, cardinal, cardinal_names, parse_attitude,
+    Angle, Carry, PSI_EPS, Platform, RandomValues, Sample, Scheme, Unknowns, cardinal, cardinal_names,
+    parse_attitude,
 };
 use obsdeg_exact::{Echelon, SplitMix64};
 
@@ -94,16 +95,17 @@ fn common_mode(seed: u64) -> Result<CommonMode, AnalysisError> {
     let mut out = CommonMode { vertical: true, unseen: true, ends_at_two: true, unseen_at_pole: true };
     for sample in samples(&platform, seed)? {
         let f = sample.point.ring;
-        let drift = platform.drift_rows(&f, &sample.point.attitudes[0]);
+        let drift = platform.drift_rows(&f, &sample.point.attitudes[0], || [0; 3]);
         let first = platform.names().len() - platform.coefficients();
         let along = |row: &[u64]| {
             ["D_IX", "D_IY", "D_IZ"].iter().fold(0, |sum, n| f.add(sum, row[column(&platform, n) - first]))
         };
         out.vertical &= drift.each_ref().map(|row| along(row)) == [0, f.neg(f.one()), 0];
-        let chain = local_chain(&f, sample.point.w_n, sample.point.w_u, false);
+        let chain = local_chain(&f, sample.point.w_n, sample.point.w_u, platform.observed());
         out.unseen &= chain.iter().all(|r| r.order > 1 || r.row[4] == 0);
         out.ends_at_two &= chain.iter().all(|r| r.order <= 2);
-        out.unseen_at_pole &= local_chain(&f, 0, sample.point.w_u, false).iter().all(|r| r.row[4] == 0);
+        out.unseen_at_pole &=
+            local_chain(&f, 0, sample.point.w_u, platform.observed()).iter().all(|r| r.row[4] == 0);
     }
     Ok(out)
 }
@@ -127,9 +129,9 @@ fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
             .each_ref()
             .map(|row| f.dot(0, row.iter().copied().zip(block.columns.iter().map(|&k| direction[k]))));
         let expected = [0, f.one(), 0, 0, 0, w_n];
-        let chain = local_chain(&f, w_n, sample.point.w_u, false);
+        let chain = local_chain(&f, w_n, sample.point.w_u, platform.observed());
         let seen = chain.iter().any(|r| f.dot(0, r.row.iter().copied().zip(local)) != 0);
-        if local != expected || seen {
+        if local[..PSI_EPS] != expected || seen {
             return Ok(false);
         }
     }
@@ -155,7 +157,7 @@ impl Told {
             let f = sample.point.ring;
             let mut span = Echelon::new(f, n);
             for c in &sample.point.attitudes {
-                span.insert(&platform.drift_rows(&f, c)[row]);
+                span.insert(&platform.drift_rows(&f, c, || [0; 3])[row]);
             }
             for (c, single) in out.single.iter_mut().enumerate() {
                 *single &= span.has_unit(c);

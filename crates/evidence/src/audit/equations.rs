@@ -93,7 +93,7 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisErr
         put(name, value);
     }
     let dynamics = local_dynamics(&f, &w_n, &w_u);
-    for (component, row) in local_output(&f, false) {
+    for (component, row) in local_output(&f, platform.observed()) {
         let mut row = row;
         for primes in ["", "p", "pp"] {
             put(&format!("Z{component}{primes}"), f.dot(0, row.iter().copied().zip(local)));

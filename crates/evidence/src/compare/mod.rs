@@ -249,13 +249,16 @@ fn quantities(
     Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
 }
 
-/// Per position and coefficient: the length of its column of `eps^n = C E(g) D` at a position, its root mean square
-/// over the arc of a rotating segment (the columns of C are orthonormal, so this is the product of components of g).
+/// Per position and coefficient: the length of its column of `eps^n = C E D` or of the error of the accelerometers at a position, its root
+/// mean square over the arc of a rotating segment (the columns of C are orthonormal, so this is the product of components of g, f, or of the
+/// earth rate).
 fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
     let (plan, platform) = (&judged.plan, judged.platform());
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
-        let rows = platform.drift_rows(&Float, c);
-        (0..platform.coefficients()).map(|d| rows.iter().map(|r| r[d] * r[d]).sum()).collect()
+        let rows = plan.drift_rows(c, None);
+        let seen = platform.accelerometer_rows(&Float, c);
+        let square = |d: usize| rows.iter().chain(&seen).map(|r| r[d] * r[d]).sum();
+        (0..platform.coefficients()).map(square).collect()
     };
     let of = |(i, position): (usize, &Position)| -> Vec<f64> {
         let Some(turn) = &position.rotation else {

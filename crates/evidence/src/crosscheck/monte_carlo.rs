@@ -135,11 +135,8 @@ impl<'a> Prepared<'a> {
         let first = unknowns - experiment.truth.platform.coefficients();
         let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).take(unknowns).skip(first);
         // six sigma
-        check_drifts(
-            experiment.truth,
-            conditions,
-            drawn.map(|(mean, sigma)| mean.abs() + 6.0 * sigma).sum(),
-        )?;
+        let drawn: Vec<f64> = drawn.map(|(mean, sigma)| mean.abs() + 6.0 * sigma).collect();
+        check_drifts(experiment.truth, conditions, experiment.truth.drift_bound(&drawn))?;
         let total: usize = filter.segments.iter().map(|s| s.steps).sum();
         let points = CHECKPOINTS.min(total);
         let checkpoints: Vec<usize> = (1..=points).map(|i| (i * total).div_ceil(points) - 1).collect();

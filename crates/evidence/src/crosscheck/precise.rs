@@ -6,7 +6,7 @@
 //! in units of the earth rate.
 
 use astro_float_num::{BigFloat, Consts, RoundingMode, WORD_BIT_SIZE};
-use obsdeg_core::model::{Angle, Carry, Dwell, Geometry, Scheme, Term, Unknowns};
+use obsdeg_core::model::{Angle, Carry, Dwell, Geometry, PathStep, Scheme, Source, Term, Unknowns};
 
 /// A number of many digits.
 pub(super) type Real = BigFloat;
@@ -98,10 +98,21 @@ impl Constants {
     }
 }
 
-/// A local unknown at the start of a position as a functional: six rows (psi^n, eps^n), one entry per column.
+/// Local unknowns: psi^n, eps^n, and the error a^n of the accelerometers.
+const LOCAL: usize = 9;
+
+/// A local unknown at the start of a position as a functional: nine rows, one entry per column.
 struct Local {
     columns: Vec<usize>,
-    rows: [Vector; 6],
+    rows: [Vector; LOCAL],
+}
+
+/// What is observed: an entry of psi^n, its sign, and an entry of a^n.
+#[derive(Clone, Copy)]
+struct Output {
+    psi: Option<(usize, bool)>,
+    error: Option<usize>,
+    azimuth: bool,
 }
 
 /// A scheme in numbers.
@@ -112,11 +123,15 @@ struct Model {
     attitudes: Vec<[Vector; 3]>,
     /// `eps^n` as a functional of the coefficients.
     drifts: Vec<[Vector; 3]>,
+    /// `a^n` as a functional of the coefficients.
+    errors: Vec<[Vector; 3]>,
+    /// What torquer errors have added to `psi^n` in all turns up to a position, as a functional of the coefficients.
+    torqued: Vec<[Vector; 3]>,
     /// Dwells in those of the first position.
     ratios: Vec<Real>,
     /// `psi x omega_ie` as a matrix.
     turning: [Vector; 3],
-    components: Vec<usize>,
+    outputs: Vec<Output>,
 }
 
 /// `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19).
@@ -132,32 +147,136 @@ fn attitude(d: Digits, angles: &[Angle; 3], constants: &mut Constants) -> [Vecto
     times(&times(&x, &y), &z).map(|row| row.to_vec())
 }
 
-/// `eps^n = C_c^n eps^c`, and of each gyro `eps^c = D I` times the components of `g^c` along the axes that the letters
-/// of its term name (3): three rows, a column per coefficient.
-fn drift(d: Digits, c: &[Vector; 3], geometry: &Geometry, terms: &[Term]) -> [Vector; 3] {
-    // g^c = C_n^c (0, -1, 0)
-    let along = |v: &Vector, axis: [i32; 3]| -> Real {
-        v.iter().zip(axis).fold(d.int(0), |sum, (x, k)| d.add(&sum, &d.mul(x, &d.int(k.into()))))
-    };
-    let gravity: Vector = c[1].iter().map(Real::neg).collect();
-    let mut out: [Vector; 3] = std::array::from_fn(|_| Vec::new());
-    for term in terms {
-        for gyro in [&geometry.X, &geometry.Y, &geometry.Z] {
-            let letters = term.letters().chars().filter(|l| *l != 'F');
-            let excitation = letters.fold(d.int(1), |product, letter| {
-                let axis = match letter {
-                    'I' => gyro.I,
-                    'O' => gyro.O,
-                    _ => gyro.S,
-                };
-                d.mul(&product, &along(&gravity, axis.vector()))
-            });
-            for (row, c) in out.iter_mut().zip(c) {
-                row.push(d.mul(&excitation, &along(c, gyro.I.vector())));
-            }
+/// The components of a vector of n in the axes of c.
+fn in_c(d: Digits, c: &[Vector; 3], v: &[Real; 3]) -> Vector {
+    (0..3).map(|j| d.dot((0..3).map(|i| (&c[i][j], &v[i])))).collect()
+}
+
+/// The component along a signed axis.
+fn along(d: Digits, v: &[Real], axis: [i32; 3]) -> Real {
+    v.iter().zip(axis).fold(d.int(0), |sum, (x, k)| d.add(&sum, &d.mul(x, &d.int(k.into()))))
+}
+
+/// What the coefficients of `terms` are multiplied with and along which axis of c they act, by their definitions (IEEE Std 517, 529, 1293): those
+/// of `source`, others with zero. `x` is `g^c`, the torqued rate, or the specific force, in c.
+fn acting(
+    d: Digits,
+    geometry: &Geometry,
+    terms: &[Term],
+    source: Source,
+    x: &[Real],
+) -> Vec<([i32; 3], Real)> {
+    let gyros = [&geometry.X, &geometry.Y, &geometry.Z];
+    let of_gyros = gyros.map(|g| g.I.vector());
+    let a = &geometry.accelerometers;
+    let of_accelerometers = [a.X.vector(), a.Y.vector(), a.Z.vector()];
+    let mut out = Vec::new();
+    for &term in terms {
+        let inputs = if term.source() == Source::Force { of_accelerometers } else { of_gyros };
+        for i in 0..3 {
+            let own = along(d, x, inputs[i]);
+            let square = d.mul(&own, &own);
+            let others = |first: usize| (0..3).filter(move |&j| j != i && (first == 3 || j < i));
+            let factors: Vec<Real> = match term {
+                Term::GS | Term::K1 => vec![own],
+                Term::GM | Term::M6 => others(3).map(|j| along(d, x, inputs[j])).collect(),
+                Term::GM3 | Term::M3 => others(0).map(|j| along(d, x, inputs[j])).collect(),
+                Term::K0 => vec![d.int(1)],
+                Term::K2 => vec![square],
+                Term::K3 => vec![d.mul(&square, &own)],
+                Term::Kx => others(3).map(|j| d.mul(&own, &along(d, x, inputs[j]))).collect(),
+                _ => {
+                    let letters = term.letters().chars().filter(|l| *l != 'F');
+                    vec![letters.fold(d.int(1), |product, letter| {
+                        let axis = match letter {
+                            'I' => gyros[i].I,
+                            'O' => gyros[i].O,
+                            _ => gyros[i].S,
+                        };
+                        d.mul(&product, &along(d, x, axis.vector()))
+                    })]
+                }
+            };
+            let counts = term.source() == source;
+            out.extend(factors.into_iter().map(|f| (inputs[i], if counts { f } else { d.int(0) })));
         }
     }
     out
+}
+
+/// What acts along axes of c, in n: three rows, a column per coefficient.
+fn in_n(d: Digits, c: &[Vector; 3], acting: &[([i32; 3], Real)]) -> [Vector; 3] {
+    std::array::from_fn(|r| acting.iter().map(|(axis, x)| d.mul(x, &along(d, &c[r], *axis))).collect())
+}
+
+fn plus(d: Digits, a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
+    std::array::from_fn(|r| a[r].iter().zip(&b[r]).map(|(x, y)| d.add(x, y)).collect())
+}
+
+/// `[v x]` applied to columns.
+fn crossed(d: Digits, v: &[Real], m: &[Vector; 3]) -> [Vector; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        m[j].iter().zip(&m[k]).map(|(y, z)| d.sub(&d.mul(&v[j], z), &d.mul(&v[k], y))).collect()
+    })
+}
+
+/// `exp([u x] angle) m` and the integral of `exp([u x] t) m` over t from 0 to `angle`, by their series.
+fn turned(d: Digits, u: &[Real], angle: &Real, m: &[Vector; 3]) -> [[Vector; 3]; 2] {
+    let mut power = m.clone();
+    let (mut rotated, mut integral) =
+        (m.clone(), m.clone().map(|row| row.iter().map(|_| d.int(0)).collect::<Vector>()));
+    for order in 1.. {
+        // power = ([u x] angle)^(order-1)/(order-1)! m
+        let factor = d.div(angle, &d.int(order));
+        let step: [Vector; 3] = std::array::from_fn(|r| power[r].iter().map(|x| d.mul(x, &factor)).collect());
+        integral = plus(d, &integral, &step);
+        power = crossed(d, u, &step);
+        rotated = plus(d, &rotated, &power);
+        if power.iter().flatten().all(|x| log2(x).is_none_or(|e| e < -(d.bits as f64) - 8.0)) {
+            return [rotated, integral];
+        }
+    }
+    [rotated, integral]
+}
+
+/// The unit vector in c about which the platform turns from `from`, where it stands at `to` afterwards.
+fn axis_of(
+    d: Digits,
+    step: &PathStep,
+    from: &[Vector; 3],
+    to: &[Vector; 3],
+    constants: &mut Constants,
+) -> Vector {
+    let unit = |i: usize| -> [Real; 3] { std::array::from_fn(|k| d.int(i64::from(k == i))) };
+    match step {
+        PathStep::Named { axis, .. } if axis.geographic => in_c(d, from, &unit(axis.index)),
+        PathStep::Named { axis, .. } => unit(axis.index).to_vec(),
+        PathStep::Middle { gamma, .. } => {
+            // Mz^T e_y, the second row of Mz
+            let (c, s) = d.cos_sin(gamma.nanodeg(), constants);
+            vec![s.neg(), c, d.int(0)]
+        }
+        PathStep::Direct { about, .. } => {
+            // R = C_to C_from^T = cos + (1 - cos) u u^T + sin [u x]
+            let r = |i: usize, j: usize| d.dot(to[i].iter().zip(&from[j]));
+            let odd: Vector =
+                (0..3).map(|i| d.sub(&r((i + 2) % 3, (i + 1) % 3), &r((i + 1) % 3, (i + 2) % 3))).collect();
+            let norm = |v: &Vector| d.dot(v.iter().zip(v)).sqrt(d.bits, ROUNDING);
+            let long = norm(&odd);
+            let v: Vector = if log2(&long).is_some_and(|e| e > -(d.bits as f64) / 2.0) {
+                odd.iter().map(|x| d.div(x, &long)).collect()
+            } else {
+                // half a turn: R + 1 = 2 u u^T
+                let k = (0..3).max_by(|a, b| about[*a].abs().total_cmp(&about[*b].abs())).unwrap_or(0);
+                let column: Vector = (0..3).map(|i| d.add(&r(i, k), &d.int(i64::from(i == k)))).collect();
+                let long = norm(&column);
+                let forward = if about[k] < 0.0 { long.neg() } else { long };
+                column.iter().map(|x| d.div(x, &forward)).collect()
+            };
+            in_c(d, from, &[v[0].clone(), v[1].clone(), v[2].clone()])
+        }
+    }
 }
 
 impl Model {
@@ -173,29 +292,76 @@ impl Model {
             Unknowns::Coefficients(terms) if scheme.carry == Carry::Reset => (3 * attitudes.len(), terms),
             Unknowns::Coefficients(terms) => (3, terms),
         };
+        let geometry = &scheme.geometry;
+        let of = |c: &[Vector; 3], source, v: [Real; 3]| acting(d, geometry, terms, source, &in_c(d, c, &v));
+        let zero = || d.int(0);
+        let down = || [zero(), d.int(-1), zero()];
+        let up = || [zero(), d.int(1), zero()];
+        let earth = || [w_n.clone(), w_u.clone(), zero()];
         let drifts: Vec<[Vector; 3]> = match &scheme.unknowns {
-            Unknowns::Coefficients(_) => {
-                attitudes.iter().map(|c| drift(d, c, &scheme.geometry, terms)).collect()
-            }
+            Unknowns::Coefficients(_) => attitudes
+                .iter()
+                .map(|c| {
+                    let gravity = in_n(d, c, &of(c, Source::Gravity, down()));
+                    plus(d, &gravity, &in_n(d, c, &of(c, Source::Rate, earth())))
+                })
+                .collect(),
             // the total drift in n is unknown itself
             Unknowns::Drift => {
                 let unit = |r: usize| (0..3).map(|k| d.int(i64::from(r == k))).collect();
                 vec![std::array::from_fn(unit); attitudes.len()]
             }
         };
+        let none: [Vector; 3] = std::array::from_fn(|r| drifts[0][r].iter().map(|_| zero()).collect());
+        let errors = match &scheme.unknowns {
+            Unknowns::Coefficients(_) => {
+                attitudes.iter().map(|c| in_n(d, c, &of(c, Source::Force, up()))).collect()
+            }
+            Unknowns::Drift => vec![none.clone(); attitudes.len()],
+        };
+        let mut torqued = vec![none; attitudes.len()];
+        for (i, steps) in scheme.paths().ok()?.iter().enumerate().skip(1) {
+            let mut from = attitudes[i - 1].clone();
+            let mut sum = torqued[i - 1].clone();
+            for step in steps {
+                let u = axis_of(d, step, &from, &attitudes[i], &mut constants);
+                let half_turns = d.div(&d.int(step.angle().nanodeg()), &d.int(180_000_000_000));
+                let angle = d.mul(&half_turns, &constants.pi(d.bits));
+                // E(u) in c, then turned on
+                let unit: [Vector; 3] =
+                    std::array::from_fn(|r| (0..3).map(|k| d.int(i64::from(r == k))).collect());
+                let act = in_n(d, &unit, &acting(d, geometry, terms, Source::Rate, &u));
+                let [_, left] = turned(d, &u, &angle, &act);
+                let to_n = |c: &[Vector; 3], m: &[Vector; 3]| -> [Vector; 3] {
+                    std::array::from_fn(|r| {
+                        (0..m[0].len()).map(|k| d.dot((0..3).map(|j| (&c[r][j], &m[j][k])))).collect()
+                    })
+                };
+                sum = plus(d, &sum, &to_n(&from, &left));
+                let [on, _] = turned(d, &u, &angle, &unit);
+                from = to_n(&from, &on);
+            }
+            torqued[i] = sum;
+        }
         let seconds = |i: usize| scheme.positions[i].dwell.unwrap_or(Dwell::PAPER).seconds();
         let ratios =
             (0..attitudes.len()).map(|i| d.div(&d.double(seconds(i)), &d.double(seconds(0)))).collect();
-        let zero = || d.int(0);
         let turning = [
             vec![zero(), zero(), w_u.neg()],
             vec![zero(), zero(), w_n.clone()],
-            vec![w_u, w_n.neg(), zero()],
+            vec![w_u.clone(), w_n.neg(), zero()],
         ];
-        // Z^n = (psi_z, 0, -psi_x), and psi_y where the azimuth is measured
-        let components = if scheme.measured_azimuth { vec![2, 0, 1] } else { vec![2, 0] };
+        // Z^n = (psi_z, 0, -psi_x) + a^n, and psi_y where the azimuth is measured
+        let z = |psi: Option<(usize, bool)>, error: usize| Output { psi, error: Some(error), azimuth: false };
+        let mut outputs = vec![z(Some((2, false)), 0), z(Some((0, true)), 2)];
+        if scheme.unknowns.have(Source::Force) {
+            outputs.push(z(None, 1));
+        }
+        if scheme.measured_azimuth {
+            outputs.push(Output { psi: Some((1, false)), error: None, azimuth: true });
+        }
         let unknowns = psi + drifts[0][0].len();
-        Some(Self { digits, unknowns, attitudes, drifts, ratios, turning, components })
+        Some(Self { digits, unknowns, attitudes, drifts, errors, torqued, ratios, turning, outputs })
     }
 
     /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6): the series of `psi' = psi x omega + eps`.
@@ -226,16 +392,24 @@ impl Model {
         sum
     }
 
-    /// The information of samples over a dwell on the local unknowns at its start (6 x 6).
+    /// The information of samples over a dwell on the local unknowns at its start (9 x 9).
     fn gram(&self, dwell: &Real, azimuth: f64) -> Vec<Vector> {
         let d = self.digits;
         let step = d.div(dwell, &d.int(SAMPLES));
-        let mut out = vec![vec![d.int(0); 6]; 6];
+        let mut out = vec![vec![d.int(0); LOCAL]; LOCAL];
         for k in 1..=SAMPLES {
             let moved = self.moved(&d.mul(&step, &d.int(k)));
-            for &component in &self.components {
-                let row = &moved[component];
-                let weight = if component == 1 { &d.mul(&step, &d.double(azimuth)) } else { &step };
+            for output in &self.outputs {
+                let mut row = vec![d.int(0); LOCAL];
+                if let Some((psi, negative)) = output.psi {
+                    for (x, y) in row.iter_mut().zip(&moved[psi]) {
+                        *x = if negative { y.neg() } else { y.clone() };
+                    }
+                }
+                if let Some(k) = output.error {
+                    row[6 + k] = d.int(1);
+                }
+                let weight = if output.azimuth { &d.mul(&step, &d.double(azimuth)) } else { &step };
                 for (i, entries) in out.iter_mut().enumerate() {
                     for (j, entry) in entries.iter_mut().enumerate() {
                         *entry = d.add(entry, &d.mul(weight, &d.mul(&row[i], &row[j])));
@@ -311,11 +485,17 @@ impl Information {
             }
             let own = if reset { 3 * i } else { 0 };
             let columns: Vec<usize> = (own..own + 3).chain(first..n).collect();
-            let rows: [Vector; 6] = std::array::from_fn(|r| match r {
+            let behind =
+                |row: &Vector| (0..3).map(|_| d.int(0)).chain(row.iter().cloned()).collect::<Vector>();
+            // in turns at once torquers add to psi^n, not to the psi that is carried
+            let torqued: [Vector; 3] = std::array::from_fn(|r| behind(&model.torqued[i][r]));
+            let rows: [Vector; LOCAL] = std::array::from_fn(|r| match r {
                 0..3 => {
-                    (0..columns.len()).map(|k| d.dot((0..3).map(|j| (&to_n[r][j], &psi[j][k])))).collect()
+                    let carried = |k: usize| d.dot((0..3).map(|j| (&to_n[r][j], &psi[j][k])));
+                    (0..columns.len()).map(|k| d.add(&carried(k), &torqued[r][k])).collect()
                 }
-                _ => (0..3).map(|_| d.int(0)).chain(drift[r - 3].iter().cloned()).collect(),
+                3..6 => behind(&drift[r - 3]),
+                _ => behind(&model.errors[i][r - 6]),
             });
             let local = Local { columns, rows };
             let dwell = d.mul(&model.ratios[i], &d.double(dwell));
@@ -323,9 +503,8 @@ impl Information {
             if between == Between::Dwell && !reset {
                 let moved = model.moved(&dwell);
                 let after: [Vector; 3] = std::array::from_fn(|r| {
-                    (0..local.columns.len())
-                        .map(|k| d.dot((0..6).map(|j| (&moved[r][j], &local.rows[j][k]))))
-                        .collect()
+                    let moved = |k: usize| d.dot((0..6).map(|j| (&moved[r][j], &local.rows[j][k])));
+                    (0..local.columns.len()).map(|k| d.sub(&moved(k), &torqued[r][k])).collect()
                 });
                 psi = std::array::from_fn(|j| {
                     (0..local.columns.len())

@@ -16,7 +16,7 @@ use super::slopes::{self, slopes};
 use super::{rules, spaces};
 use crate::prediction::{Combination, PredictedUnknown, Prediction};
 use crate::simulation::batch::{batch, diffuse_prior};
-use crate::simulation::conditions::{shown_unit, si_per_shown};
+use crate::simulation::conditions::{is_rate, shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
@@ -80,7 +80,7 @@ pub(super) fn structure(
     let inflation = inflation(&filter, &known)?;
     let weak = is_weak(&filter, conditions, &inflation.prior);
     let (null_space, defect) = null_evidence(truth, &filter, prediction, &shown, &inflation.correlation)?;
-    let is_psi = |c: usize| filter.platform.units()[c] == "rad";
+    let is_psi = |c: usize| !is_rate(filter.platform.units()[c]);
     let same = truth.platform.names() == filter.platform.names();
     let mut quantities = quantities(truth, &names, prediction, &functionals, &shown, &inflation.ratios);
     let mut null_space = null_space;
@@ -121,7 +121,7 @@ fn is_weak(filter: &Plan, conditions: &Conditions, prior: &[f64]) -> bool {
     let density = conditions.step_s.sqrt();
     let noise =
         [conditions.accelerometer_noise_g, conditions.azimuth_noise_deg.to_radians()].map(|s| s * density);
-    weakest(scheme, dwell_s, &|c| units[c] == "rad", prior, noise).is_none_or(|sigma| sigma > WEAK)
+    weakest(scheme, dwell_s, &|c| !is_rate(units[c]), prior, noise).is_none_or(|sigma| sigma > WEAK)
 }
 
 /// What samples show as the dwell goes to zero.
@@ -136,7 +136,7 @@ impl Shown {
     fn of(filter: &Plan, truth: &Plan, functionals: &[Option<Combination>]) -> Self {
         let scheme = filter.platform.scheme();
         let units = filter.platform.units();
-        let is_psi = |c: usize| units[c] == "rad";
+        let is_psi = |c: usize| !is_rate(units[c]);
         let questions = |at_end: bool| {
             // the coefficients of unknowns are exact, those of combinations doubles
             let present = functionals.iter().enumerate().filter_map(|(i, f)| Some((i, f.clone()?)));
@@ -233,7 +233,7 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let ratios = functionals.iter().map(ratio).collect::<Result<_, obsdeg_ekf::EkfError>>()?;
     let n = plan.unknowns();
     let sigma = small.sigmas();
-    let is_psi = |i: usize| plan.platform.units()[i] == "rad";
+    let is_psi = |i: usize| !is_rate(plan.platform.units()[i]);
     let largest = |psi: bool| (0..n).filter(|&i| is_psi(i) == psi).map(|i| sigma[i]).fold(0.0, f64::max);
     let lost = |c: &Combination| {
         let coefficient = c.iter().map(|(_, k)| k.abs()).fold(0.0, f64::max);
@@ -343,7 +343,7 @@ fn null_evidence(
     let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
     let units = filter.platform.units();
     let largest = |unit: &str| {
-        let own = lengths.iter().zip(units).filter(|(_, u)| (**u == "rad") == (unit == "rad"));
+        let own = lengths.iter().zip(units).filter(|(_, u)| is_rate(u) == is_rate(unit));
         own.map(|(x, _)| *x).fold(0.0, f64::max)
     };
     let norm = |(x, unit): (&f64, &&str)| match largest(unit) {

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
 
+use super::conditions::is_rate;
 use super::plan::Plan;
 
 /// How many times wider a prior that says nothing is than what the measurements alone say of one unknown, the others
@@ -83,16 +84,16 @@ pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     Ok(wider(plan, &information, WIDER_PSI, WIDER_DRIFT))
 }
 
-/// Standard deviations so many times wider than what `information` says of the best known psi and drift, all others
-/// known.
+/// Standard deviations so many times wider than what `information` says of the best known drift, and of the best known of the others (psi,
+/// and what is no rate), all others known.
 pub(crate) fn wider(plan: &Plan, information: &SquareRootInformation, psi: f64, drift: f64) -> Vec<f64> {
     let units = plan.platform.units();
     let sigma = |psi: bool, wider: f64| {
-        let own = information.root().column_iter().zip(units).filter(|(_, u)| (**u == "rad") == psi);
+        let own = information.root().column_iter().zip(units).filter(|(_, u)| is_rate(u) != psi);
         let largest = own.map(|(column, _)| column.norm()).fold(0.0, f64::max);
         // nothing is measured of any: any prior will do
         if largest > 0.0 { wider / largest } else { wider }
     };
     let (psi, drift) = (sigma(true, psi), sigma(false, drift));
-    units.iter().map(|u| if *u == "rad" { psi } else { drift }).collect()
+    units.iter().map(|u| if is_rate(u) { drift } else { psi }).collect()
 }

@@ -64,6 +64,17 @@ impl Default for Conditions {
         let drift = [("D_FX", 11.0), ("D_FY", 12.0), ("D_FZ", 13.0)].map(|(n, v)| assign(n, v));
         let values = [assign("D", 0.5), assign("psi", 0.1), assign("eps", 10.0)].into_iter();
         let priors = [assign("D", 1.0), assign("psi", 0.1), assign("eps", 20.0), assign("D_F", 20.0)];
+        // ppm, arcsec, ug, ug/g^2, ug/g^3: true value, prior, requirement
+        let others = [
+            ("GS", 100.0, 300.0, 10.0),
+            ("GM", 60.0, 120.0, 10.0),
+            ("K0", 300.0, 1000.0, 10.0),
+            ("K1", 100.0, 300.0, 10.0),
+            ("M", 60.0, 120.0, 10.0),
+            ("K2", 20.0, 50.0, 10.0),
+            ("K3", 10.0, 30.0, 10.0),
+            ("Kx", 10.0, 30.0, 10.0),
+        ];
         Self {
             truth: Truth::Linear,
             filter: None,
@@ -77,11 +88,22 @@ impl Default for Conditions {
             drift_noise_step_s: 10.0,
             gyro_noise: GyroNoise::default(),
             propagation: Propagation::Exponential,
-            values: values.chain(first_order(5.0)).chain(drift).collect(),
+            values: values
+                .chain(first_order(5.0))
+                .chain(drift)
+                .chain(others.map(|(name, value, ..)| assign(name, value)))
+                .collect(),
             drift_scale: 1.0,
             estimates: Vec::new(),
-            priors: priors.into_iter().chain(first_order(10.0)).collect(),
-            requirements: vec![assign("D", 0.1), assign("eps", 0.1), assign("psi", 0.01)],
+            priors: priors
+                .into_iter()
+                .chain(first_order(10.0))
+                .chain(others.map(|(name, _, prior, _)| assign(name, prior)))
+                .collect(),
+            requirements: [assign("D", 0.1), assign("eps", 0.1), assign("psi", 0.01)]
+                .into_iter()
+                .chain(others.map(|(name, .., required)| assign(name, required)))
+                .collect(),
         }
     }
 }
@@ -276,7 +298,18 @@ pub(crate) fn shown_unit(unit: &str) -> &str {
     if unit == "rad" { "deg" } else { unit }
 }
 
-/// SI units per shown unit of an unknown: rad per deg, rad/s per deg/h.
+/// Whether an unknown of this unit is a rate.
+pub(crate) fn is_rate(unit: &str) -> bool {
+    unit.starts_with("deg/h")
+}
+
+/// Units of the equations per shown unit of an unknown: rad per deg, rad/s per deg/h, 1 per ppm, rad per arcsec, g per ug.
 pub fn si_per_shown(unit: &str) -> f64 {
-    if unit == "rad" { 1f64.to_radians() } else { 1f64.to_radians() / 3600.0 }
+    match unit {
+        "rad" => 1f64.to_radians(),
+        "arcsec" => 1f64.to_radians() / 3600.0,
+        "ppm" => 1e-6,
+        _ if unit.starts_with("ug") => 1e-6,
+        _ => 1f64.to_radians() / 3600.0,
+    }
 }

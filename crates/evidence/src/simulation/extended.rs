@@ -6,8 +6,10 @@
 //!
 //! ```text
 //! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD        Gamma = d eps^p / d g^p,  N D = eps^n
-//! dZ^n   = -E^T [g^n x] delta
+//! dZ^n   = -E^T [g^n x] delta + C_c^n (M(f^p) dK - A C_n^p [g^n x] delta)        A = d a^p / d f^p,  M K = a^p,  f^p = -C_n^p g^n
 //! ```
+//!
+//! with the error `a^p` of the accelerometers and the torqued rate among what `eps^p` is a function of,
 //!
 //! which at `E = 1`, `D = 0` is the linear model (`[g^n x] delta` is what g gains in platform axes that turn by `delta`).
 
@@ -15,7 +17,7 @@ use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::slew::{apply, cross, rotation_vector, times, transpose};
-use obsdeg_core::model::{Carry, DriftTerm, Matrix3, SignedAxis};
+use obsdeg_core::model::{AZIMUTH, Carry, ErrorTerm, Matrix3, SignedAxis, Source};
 use obsdeg_ekf::{
     Covariance, EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Stage, Transition,
     Update,
@@ -29,36 +31,45 @@ use super::record::RunStart;
 use super::state::{PlatformState, inverse_left_jacobian, orthonormal};
 use super::truth::drift_turn;
 
-/// The drift in platform axes, with its derivatives.
-struct Drift {
-    /// `eps^p` in rad/s.
-    eps: [f64; 3],
-    /// `Gamma = d eps^p / d g^p`.
-    by_g: Matrix3<f64>,
+/// The drift `eps^p` (rad/s), or the error of the accelerometers (g), in platform axes.
+struct Errors {
+    /// All of it.
+    sum: [f64; 3],
+    /// Its derivative by `g^p`, or by the specific force.
+    slope: Matrix3<f64>,
 }
 
-/// Of the constants `d` where gravity is `g` (platform axes, in g), each times its weight; `by_d` becomes what each adds to
-/// its platform axis per unit: `(axis, value)`.
-fn drift(
-    terms: &[DriftTerm],
+/// Of the constants `d` where what they are functions of is as `of` says (platform axes; nothing: they have no part in it), each times its
+/// weight; the derivative is by the source `by`, and `by_d` becomes what each adds to its platform axis per unit: `(axis, value)`.
+fn errors<'a>(
+    terms: &[ErrorTerm],
     weights: &[f64],
     d: &[f64],
-    g: &[f64; 3],
+    of: impl Fn(Source) -> Option<&'a [f64; 3]>,
+    by: Source,
     by_d: &mut Vec<(usize, f64)>,
-) -> Drift {
-    let mut out = Drift { eps: [0.0; 3], by_g: [[0.0; 3]; 3] };
+) -> Errors {
+    let mut out = Errors { sum: [0.0; 3], slope: [[0.0; 3]; 3] };
     by_d.clear();
     let sign = |negative: bool| if negative { -1.0 } else { 1.0 };
     for ((term, weight), d) in terms.iter().zip(weights).zip(d) {
-        let (axis, along) = (term.input.axis, weight * sign(term.input.negative));
-        let factor = |a: &SignedAxis| sign(a.negative) * g[a.axis];
+        let axis = term.input.axis;
+        let Some(x) = of(term.source) else {
+            by_d.push((axis, 0.0));
+            continue;
+        };
+        let along = weight * sign(term.input.negative);
+        let factor = |a: &SignedAxis| sign(a.negative) * x[a.axis];
         let excitation = along * term.factors.iter().map(factor).product::<f64>();
         by_d.push((axis, excitation));
-        out.eps[axis] += excitation * d;
+        out.sum[axis] += excitation * d;
+        if term.source != by {
+            continue;
+        }
         for (k, one) in term.factors.iter().enumerate() {
             let others = term.factors.iter().enumerate().filter(|(j, _)| *j != k);
             let others: f64 = others.map(|(_, a)| factor(a)).product();
-            out.by_g[axis][one.axis] += along * sign(one.negative) * others * d;
+            out.slope[axis][one.axis] += along * sign(one.negative) * others * d;
         }
     }
     out
@@ -80,7 +91,7 @@ pub struct PlatformMotion<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
     /// How the constants of the state enter the drift.
-    terms: &'a [DriftTerm],
+    terms: &'a [ErrorTerm],
     segment: usize,
     /// `psi^n` of psi in the axes of the unknowns.
     to_n: &'a Matrix3<f64>,
@@ -105,13 +116,21 @@ impl PlatformMotion<'_> {
         by_d: &mut Vec<(usize, f64)>,
     ) -> Moving {
         let (e, earth) = (&moving.e, self.plan.earth_rate());
-        let c = times(e, &self.plan.attitude(self.segment, t));
+        let computed = self.plan.attitude(self.segment, t);
+        let c = times(e, &computed);
         let back = transpose(&c);
-        let drift = drift(self.terms, weights, d, &apply(&back, &G_N), by_d);
-        let (turned, eps) = (apply(e, &earth), apply(&c, &drift.eps));
+        let g = apply(&back, &G_N);
+        let torqued = self.plan.torqued_rate(&computed, self.plan.turns(self.segment));
+        let of = |source: Source| match source {
+            Source::Gravity => Some(&g),
+            Source::Rate => Some(&torqued),
+            Source::Force => None,
+        };
+        let drift = errors(self.terms, weights, d, of, Source::Gravity, by_d);
+        let (turned, eps) = (apply(e, &earth), apply(&c, &drift.sum));
         let rate: [f64; 3] = std::array::from_fn(|i| turned[i] - earth[i] + eps[i]);
         // -omega x + C Gamma C^T [g x]
-        let (omega, tilted) = (cross(&earth), times(&times(&c, &times(&drift.by_g, &back)), &cross(&G_N)));
+        let (omega, tilted) = (cross(&earth), times(&times(&c, &times(&drift.slope, &back)), &cross(&G_N)));
         let a: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| tilted[i][j] - omega[i][j]));
         let width = 3 + d.len();
         let mut rows = vec![0.0; moving.rows.len()];
@@ -129,6 +148,24 @@ impl PlatformMotion<'_> {
 }
 
 impl PlatformMotion<'_> {
+    /// `C_c^n` at the end of a step, the errors of the accelerometers there, and what each constant adds to its platform axis.
+    fn accelerometers(
+        &self,
+        e: &Matrix3<f64>,
+        x: &PlatformState,
+    ) -> (Matrix3<f64>, Errors, Vec<(usize, f64)>) {
+        let c = self.plan.attitude(self.segment, self.plan.segments[self.segment].dt);
+        let mut by_k = Vec::new();
+        if !self.plan.platform.observed().accelerometers {
+            return (c, Errors { sum: [0.0; 3], slope: [[0.0; 3]; 3] }, by_k);
+        }
+        let force = apply(&transpose(&times(e, &c)), &G_N).map(|x| -x);
+        let of = |source: Source| (source == Source::Force).then_some(&force);
+        let weights = vec![1.0; x.constants.len()];
+        let found = errors(self.terms, &weights, &x.constants, of, Source::Force, &mut by_k);
+        (c, found, by_k)
+    }
+
     /// What the segment is to a linear model.
     pub(super) fn stage(&self) -> &Stage {
         &self.plan.stages[self.segment]
@@ -160,7 +197,9 @@ impl PlatformMotion<'_> {
         let back = transpose(p);
         let mut now = Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
         let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
-        let turn = drift_turn(d.iter().map(|d| d.abs()).sum::<f64>() + kick, dt);
+        let (coefficients, biases) = d.split_at(self.plan.platform.coefficients());
+        let drifts = self.plan.drift_bound(coefficients) + biases.iter().map(|b| b.abs()).sum::<f64>();
+        let turn = drift_turn(drifts + kick, dt);
         if turn.is_nan() || turn > MOST_TURN {
             return Err(EkfError::Diverged {
                 what: "the estimated drifts turn the platform by a hundred radians in one step",
@@ -244,19 +283,30 @@ impl Measurement<PlatformState> for PlatformMotion<'_> {
     fn h(&self, _: f64, x: &PlatformState) -> DVector<f64> {
         let e = times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)));
         let seen = apply(&transpose(&e), &G_N);
-        let component = |&c: &usize| if c == 2 { rotation_vector(&e)[1] } else { G_N[c - 1] - seen[c - 1] };
+        let (c, errors, _) = self.accelerometers(&e, x);
+        let added = apply(&c, &errors.sum);
+        let of_z = |k: usize| G_N[k] - seen[k] + added[k];
+        let component = |&c: &usize| if c == AZIMUTH { rotation_vector(&e)[1] } else { of_z(c - 1) };
         DVector::from_iterator(self.outputs(), self.plan.components.iter().map(component))
     }
 
     fn jacobian(&self, _: f64, x: &PlatformState) -> DMatrix<f64> {
         let e = times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)));
         let horizontal = times(&transpose(&e), &cross(&G_N));
+        let (attitude, errors, by_k) = self.accelerometers(&e, x);
+        // f^p = -C_n^p g^n turns with delta
+        let force = times(&transpose(&times(&e, &attitude)), &cross(&G_N));
+        let tilted = times(&attitude, &times(&errors.slope, &force));
+        let first = 3 * x.attitudes.len();
         let mut out = DMatrix::zeros(self.outputs(), x.dimension());
         for (i, &c) in self.plan.components.iter().enumerate() {
-            let row = if c == 2 {
+            let row = if c == AZIMUTH {
                 inverse_left_jacobian(&rotation_vector(&e))[1]
             } else {
-                horizontal[c - 1].map(|x| -x)
+                for (k, &(axis, value)) in by_k.iter().enumerate() {
+                    out[(i, first + k)] = attitude[c - 1][axis] * value;
+                }
+                std::array::from_fn(|j| -horizontal[c - 1][j] - tilted[c - 1][j])
             };
             for j in 0..3 {
                 out[(i, 3 * self.block + j)] = (0..3).map(|r| row[r] * self.to_n[r][j]).sum();
@@ -278,7 +328,7 @@ pub struct Extended<'a> {
     /// Of every position: `psi^n` of psi in the axes of the unknowns, and which psi it is.
     carried: Vec<(Matrix3<f64>, usize)>,
     /// How the constants of the state enter the drift: coefficients, then biases of the gyros.
-    terms: Vec<DriftTerm>,
+    terms: Vec<ErrorTerm>,
     update: Update,
 }
 
@@ -304,6 +354,9 @@ impl<'a> Extended<'a> {
         if !plan.has_coefficients() {
             return Err(SimulationError::ExactDrift);
         }
+        if plan.torqued_at_once() {
+            return Err(SimulationError::TorquedAtOnce);
+        }
         let mut carried: Vec<(Matrix3<f64>, usize)> = Vec::with_capacity(plan.attitudes.len());
         for (i, c) in plan.attitudes.iter().enumerate() {
             carried.push(match (carried.last(), plan.platform.scheme().carry) {
@@ -317,8 +370,8 @@ impl<'a> Extended<'a> {
             });
         }
         let gyros = plan.platform.scheme().geometry.gyros();
-        let bias = |b: &Bias| DriftTerm { input: gyros[b.gyro].I, factors: Vec::new() };
-        let terms = plan.platform.drift_terms().iter().cloned().chain(plan.biases.iter().map(bias)).collect();
+        let bias = |b: &Bias| ErrorTerm::bias(gyros[b.gyro].I);
+        let terms = plan.platform.error_terms().iter().cloned().chain(plan.biases.iter().map(bias)).collect();
         Ok(Self { plan, conditions, carried, terms, update })
     }
 
@@ -402,11 +455,11 @@ mod tests {
     use crate::simulation::truth::{Noise, TruthModel};
 
     /// Three positions, the middle one turning, with terms of every order; slews where `slew` says so.
-    fn plan(carry: Carry, slew: Option<f64>, azimuth: bool) -> (Plan, Conditions) {
+    fn plan((carry, slew, azimuth, terms): (Carry, Option<f64>, bool, &str)) -> (Plan, Conditions) {
         let attitudes =
             ["10,25,40", "130,-50,70", "-95,33,-160"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry, measured_azimuth: azimuth, ..Scheme::of_angles(attitudes) };
-        scheme.unknowns = "F,I,O,S,II,SS,IO".parse().expect("terms");
+        scheme.unknowns = terms.parse().expect("terms");
         scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
         let conditions = Conditions {
             truth: Truth::Exact,
@@ -421,12 +474,16 @@ mod tests {
         (Plan::new(&scheme, &conditions).expect("a plan"), conditions)
     }
 
-    const CASES: [(Carry, Option<f64>, bool); 5] = [
-        (Carry::Platform, None, false),
-        (Carry::Inertial, None, true),
-        (Carry::Reset, None, false),
-        (Carry::Inertial, Some(1.0), false),
-        (Carry::Inertial, Some(0.3), true),
+    const GYROS: &str = "F,I,O,S,II,SS,IO";
+    const CASES: [(Carry, Option<f64>, bool, &str); 8] = [
+        (Carry::Platform, None, false, GYROS),
+        (Carry::Inertial, None, true, GYROS),
+        (Carry::Reset, None, false, GYROS),
+        (Carry::Inertial, Some(1.0), false, GYROS),
+        (Carry::Inertial, Some(0.3), true, GYROS),
+        (Carry::Inertial, Some(1.0), true, "F,I,O,S,GS,GM,K0,K1,M6,K2,K3,Kx"),
+        (Carry::Platform, None, false, "all"),
+        (Carry::Reset, None, true, "F,SS,GS,GM3,K0,M3,Kx"),
     ];
 
     fn random(plan: &Plan, rng: &mut SplitMix64, psi: f64, drift: f64) -> Vec<f64> {
@@ -438,8 +495,8 @@ mod tests {
     #[test]
     fn jacobians_are_derivatives() {
         let mut rng = SplitMix64::new(3);
-        for (carry, slew, azimuth) in CASES {
-            let (plan, conditions) = plan(carry, slew, azimuth);
+        for case in CASES {
+            let (carry, (plan, conditions)) = (case.0, plan(case));
             let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
             let n = plan.states();
             for segment in 0..plan.segments.len() {
@@ -478,8 +535,8 @@ mod tests {
     /// carries a second time.
     #[test]
     fn at_zero_it_is_the_linear_model() {
-        for (carry, slew, azimuth) in CASES {
-            let (plan, conditions) = plan(carry, slew, azimuth);
+        for case in CASES {
+            let (carry, (plan, conditions)) = (case.0, plan(case));
             let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
             let n = plan.states();
             let zero = PlatformState::of_unknowns(&vec![0.0; n], plan.constants());
@@ -505,8 +562,8 @@ mod tests {
     #[test]
     fn it_goes_with_the_exact_truth() {
         let mut rng = SplitMix64::new(5);
-        for (carry, slew, azimuth) in CASES {
-            let (plan, conditions) = plan(carry, slew, azimuth);
+        for case in CASES {
+            let (carry, (plan, conditions)) = (case.0, plan(case));
             let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
             let start = random(&plan, &mut rng, 0.02, 6e-5);
             let mut truth = TruthModel::new(&plan, &conditions, start.clone());

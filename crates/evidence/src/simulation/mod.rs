@@ -36,7 +36,7 @@ use obsdeg_ekf::EkfError;
 
 use crate::prediction::{Prediction, PredictionError};
 use crate::requirements::{Basis, Claim, Requirements, meets};
-use conditions::{REQUIRED, shown_unit};
+use conditions::{REQUIRED, is_rate, shown_unit};
 use consistency::Outcomes;
 
 /// Why a scheme cannot be simulated.
@@ -79,6 +79,12 @@ pub enum SimulationError {
     /// The exact truth turns an attitude by coefficients.
     #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
     ExactDrift,
+    /// Full attitudes have no turns at once.
+    #[error(
+        "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew rate (slew_rate_deg_s, --slew-rate), \
+         or filter = \"linear\" and truth = \"linear\""
+    )]
+    TorquedAtOnce,
     /// Too many unknowns for a full covariance.
     #[error("{found} unknowns; expected at most {} for a simulation", plan::MAX_UNKNOWNS)]
     TooManyUnknowns {
@@ -343,9 +349,9 @@ impl Validity {
         let dph = si_per_shown("deg/h");
         let requirements = resolve(REQUIRED, &plan.platform, &conditions.requirements, f64::NAN)?;
         let units = plan.platform.units();
-        let sensitive = units.iter().zip(start).filter(|(unit, _)| unit.contains("/g"));
+        let sensitive = units.iter().zip(start).filter(|(unit, _)| is_rate(unit) && unit.contains("/g"));
         let coefficient = sensitive.map(|(_, d)| d.abs()).fold(0.0, f64::max) / dph;
-        let smallest = units.iter().zip(&requirements).filter(|(unit, t)| **unit != "rad" && !t.is_nan());
+        let smallest = units.iter().zip(&requirements).filter(|(unit, t)| is_rate(unit) && !t.is_nan());
         let smallest = smallest.map(|(_, t)| *t).reduce(f64::min);
         let (neglected_g, neglected_dph) = (psi * psi / 2.0, coefficient * psi);
         let small = neglected_g <= conditions.accelerometer_noise_g;

@@ -1,11 +1,13 @@
 //! A scheme in numbers: the timeline of positions and slews, and the linear model of each as filter stages.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::Propagation;
-use obsdeg_core::model::slew::{Slew, Turn, W_IE, times, transpose};
+use obsdeg_core::model::slew::{Slew, Turn, W_IE, apply, times, transpose};
 use obsdeg_core::model::{
-    Block, Carry, Float, LOCAL, Matrix3, Platform, Point, Scheme, Station, Unknowns, local_dynamics,
-    local_output,
+    AZIMUTH, Block, Carry, ErrorTerm, Float, LOCAL, Matrix3, Path, Platform, Point, Scheme, Source, Station,
+    Unknowns, earth_rate_in, local_dynamics, local_output,
 };
 use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, SensorNoise, Stage, Transition};
@@ -93,7 +95,7 @@ pub struct Plan {
     pub attitudes: Vec<Matrix3<f64>>,
     /// `C_c^n` at the end of every position.
     pub ends: Vec<Matrix3<f64>>,
-    /// `S_i` at the start of every position.
+    /// `S_i` at the start of every position. What torquer errors leave in psi^n in turns at once is in it, and not in psi.
     pub blocks: Vec<Block<f64>>,
     /// Positions and slews in order.
     pub segments: Vec<Segment>,
@@ -105,7 +107,7 @@ pub struct Plan {
     pub biases: Vec<Bias>,
     /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the biases (rad/s).
     pub noise_roots: Vec<DMatrix<f64>>,
-    /// Components of Z that are used (1, 3, and 2 for a measured azimuth).
+    /// Components of Z that are used (1, 3, with errors of the accelerometers 2, and [`AZIMUTH`]).
     pub components: Vec<usize>,
 }
 
@@ -140,7 +142,7 @@ impl Plan {
         if n > MAX_UNKNOWNS {
             return Err(SimulationError::TooManyUnknowns { found: n });
         }
-        let point = point_of(&scheme);
+        let point = point_of(&platform, conditions);
         let stations = scheme.stations();
         // the attitude at the first station of every position, and at the last
         let bounds: Vec<(usize, usize)> = (0..scheme.positions.len())
@@ -154,7 +156,7 @@ impl Plan {
         let segments = timeline(&scheme, conditions, n, &attitudes, &ends)?;
         let mut blocks: Vec<Option<Block<f64>>> = platform.blocks(&point).into_iter().map(Some).collect();
         let blocks: Vec<_> = bounds.iter().filter_map(|b| blocks[b.0].take()).collect();
-        let outputs = local_output(&Float, scheme.measured_azimuth);
+        let outputs = local_output(&Float, platform.observed());
         let components = outputs.iter().map(|(c, _)| *c).collect();
         let gyros = conditions.gyro_noise.sensors();
         let mut plan = Self {
@@ -252,26 +254,34 @@ impl Plan {
     /// `psi^n` of the unknowns `x` at a segment's position (during a slew: psi^n is carried).
     pub fn psi_n(&self, segment: usize, x: &[f64]) -> [f64; 3] {
         let block = &self.blocks[self.segments[segment].position];
-        std::array::from_fn(|r| (0..3).map(|k| block.rows[r][k] * x[block.columns[k]]).sum())
+        let row = |r: usize| block.rows[r].iter().zip(&block.columns).map(|(a, &c)| a * x[c]).sum();
+        std::array::from_fn(row)
     }
 
-    /// The standard deviation of a component of Z (1, 3: g; 2: the azimuth in rad).
+    /// The standard deviation of a component of Z (in g), or of the azimuth (in rad).
     pub fn output_sigma(component: usize, conditions: &Conditions) -> f64 {
-        if component == 2 {
+        if component == AZIMUTH {
             conditions.azimuth_noise_deg.to_radians()
         } else {
             conditions.accelerometer_noise_g
         }
     }
 
-    /// The rows of Z at a position (one per component), as functionals of the unknowns.
-    pub(crate) fn output_rows(&self, position: usize) -> Vec<Vec<(usize, f64)>> {
-        let block = &self.blocks[position];
-        local_output(&Float, self.components.contains(&2))
+    /// The rows of Z at the end of a step of a segment (one per component), as functionals of the unknowns.
+    pub(crate) fn output_rows(&self, segment: usize) -> Vec<Vec<(usize, f64)>> {
+        let s = &self.segments[segment];
+        let mut block = Cow::Borrowed(&self.blocks[s.position]);
+        if let (SegmentKind::Rotation(turn), true) = (&s.kind, self.platform.observed().accelerometers) {
+            let rows = self.platform.accelerometer_rows(&Float, &turn.at(s.dt));
+            for (old, new) in block.to_mut().rows[LOCAL - 3..].iter_mut().zip(rows) {
+                old[3..].copy_from_slice(&new);
+            }
+        }
+        local_output(&Float, self.platform.observed())
             .iter()
             .map(|(_, local)| {
-                let entry = |k: usize| (0..LOCAL).map(|r| local[r] * block.rows[r][k]).sum::<f64>();
-                let entries = block.columns.iter().enumerate().map(|(k, &c)| (c, entry(k)));
+                let entries =
+                    block.columns.iter().enumerate().map(|(k, &c)| (c, block.entry(&Float, local, k)));
                 entries.filter(|(_, x)| *x != 0.0).collect()
             })
             .collect()
@@ -332,7 +342,7 @@ impl Plan {
         let outputs = match s.kind {
             SegmentKind::Slew(_) => Vec::new(),
             SegmentKind::Dwell | SegmentKind::Rotation(_) => self
-                .output_rows(s.position)
+                .output_rows(segment)
                 .into_iter()
                 .zip(&self.components)
                 .map(|(h, &c)| ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) })
@@ -354,15 +364,15 @@ impl Plan {
         let (local, _) = van_loan(&f, &DMatrix::zeros(LOCAL, LOCAL), dt)?;
         let n = self.unknowns();
         let mut phi = DMatrix::identity(n, n);
-        // psi+ = P^T (A P psi + B E D); in local unknowns (drift alone) P = 1
-        for (i, &row) in block.columns[..3].iter().enumerate() {
-            for (k, &column) in block.columns.iter().enumerate() {
-                phi[(row, column)] = (0..3)
-                    .map(|r| {
-                        let to_n = block.rows[r][i];
-                        to_n * (0..LOCAL).map(|l| local[(r, l)] * block.rows[l][k]).sum::<f64>()
-                    })
-                    .sum();
+        // psi+ = P^T (A (P psi + J D) + B E D - J D); in local unknowns (drift alone) P = 1
+        for (k, &column) in block.columns.iter().enumerate() {
+            let after: [f64; 3] = std::array::from_fn(|r| {
+                let of_local: Vec<f64> = (0..LOCAL).map(|l| local[(r, l)]).collect();
+                let torqued = if k < 3 { 0.0 } else { block.rows[r][k] };
+                block.entry(&Float, &of_local, k) - torqued
+            });
+            for (i, &row) in block.columns[..3].iter().enumerate() {
+                phi[(row, column)] = (0..3).map(|r| block.rows[r][i] * after[r]).sum();
             }
         }
         Ok(phi)
@@ -389,13 +399,52 @@ impl Plan {
     }
 }
 
-/// Rates and attitudes of a scheme with a latitude and without generic angles.
-fn point_of(scheme: &Scheme) -> Point<Float> {
+/// Rates, attitudes and turns at once of a scheme with a latitude and without generic angles.
+fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
+    let scheme = platform.scheme();
     let (c, s) =
         scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
-    let attitudes =
-        scheme.stations().iter().map(|s| s.attitude(&Float, |a| a.turn().cos_sin_f64())).collect();
-    Point { ring: Float, w_n: W_IE * c, w_u: W_IE * s, attitudes }
+    let turning = |i: usize| {
+        let p = &scheme.positions[i];
+        let seconds = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
+        p.rotation.as_ref().map_or(0.0, |r| (r.angle.nanodeg() as f64 / 1e9).to_radians() / seconds)
+    };
+    let mut point = Point::in_floats(platform, W_IE * c, W_IE * s, turning);
+    // turns that take time, and those of rotating segments, are integrated
+    for (station, turns) in scheme.stations().iter().zip(&mut point.turns) {
+        if station.continues || conditions.slew_rate(station.position).is_some() {
+            turns.clear();
+        }
+    }
+    point
+}
+
+/// The turns to a position at a rate in rad/s: one, or one of each gimbal.
+fn slews(
+    scheme: &Scheme,
+    position: usize,
+    attitudes: &[Matrix3<f64>],
+    ends: &[Matrix3<f64>],
+    rate_rad_s: f64,
+) -> Result<Vec<Slew>, SimulationError> {
+    let p = &scheme.positions[position];
+    let misses = || SimulationError::SlewMisses { name: p.name.clone() };
+    let how = p.slew.clone().unwrap_or_default();
+    if how.axis.is_none() && scheme.path == Some(Path::Gimbals) {
+        let steps = Path::gimbals(&scheme.positions[position - 1], p).ok_or_else(misses)?;
+        let mut from = ends[position - 1];
+        return Ok(steps
+            .iter()
+            .map(|step| {
+                let turn = step.at_f64(&from);
+                let slew = Slew::by(&from, &turn.axis.map(|x| x * turn.angle), rate_rad_s);
+                from = slew.at(slew.duration_s);
+                slew
+            })
+            .collect());
+    }
+    let slew = Slew::to(&ends[position - 1], &attitudes[position], &how, rate_rad_s);
+    Ok(slew.map_err(|_| misses())?.into_iter().collect())
 }
 
 /// The positions and slews in order; what there would be too much of is refused before it is made.
@@ -416,10 +465,7 @@ fn timeline(
     let (mut all, mut turning, mut integration) = (0.0, 0.0, 0.0);
     for (position, p) in scheme.positions.iter().enumerate() {
         if let (Some(rate), true) = (conditions.slew_rate(p), position > 0) {
-            let how = p.slew.clone().unwrap_or_default();
-            let slew = Slew::to(&ends[position - 1], &attitudes[position], &how, rate.to_radians());
-            let name = || p.name.clone();
-            if let Some(slew) = slew.map_err(|_| SimulationError::SlewMisses { name: name() })? {
+            for slew in slews(scheme, position, attitudes, ends, rate.to_radians())? {
                 let duration = slew.duration_s;
                 all += 1.0;
                 integration += slew.turned(duration) / MAX_TURN;
@@ -476,17 +522,17 @@ impl PlatformProcess<'_> {
         let to_psi = transpose(&p);
         let turning = times(&to_psi, &times(&w, &p));
         let drift: [Vec<f64>; 3] = match &segment.kind {
-            SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => {
-                plan.platform.drift_rows(&Float, &slew.at(t))
-            }
+            SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => plan.drift_rows(&slew.at(t), Some(slew)),
             SegmentKind::Dwell => std::array::from_fn(|r| block.rows[3 + r][3..].to_vec()),
         };
+        // psi^n = P psi + J D
+        let torqued = |r: usize, k: usize| (0..3).map(|j| w[r][j] * block.rows[j][k]).sum::<f64>();
         let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; plan.unknowns()]);
         for (i, row) in rows.iter_mut().enumerate() {
             for (k, &c) in block.columns.iter().enumerate() {
                 row[c] = match k {
                     0..3 => turning[i][k],
-                    _ => (0..3).map(|r| to_psi[i][r] * drift[r][k - 3]).sum(),
+                    _ => (0..3).map(|r| to_psi[i][r] * (drift[r][k - 3] + torqued(r, k))).sum(),
                 };
             }
         }
@@ -527,6 +573,54 @@ impl Process for PlatformProcess<'_> {
 pub(super) const G_N: [f64; 3] = [0.0, -1.0, 0.0];
 
 impl Plan {
+    /// The rows of `eps^n` at an attitude: torquers act with the earth rate, and with the rate at which a slew turns (rad/s).
+    pub(crate) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
+        self.platform.drift_rows(&Float, c, || self.torqued_rate(c, slew))
+    }
+
+    /// The rate with which the gyros are torqued where `C_c^n` is `c`, in the axes of c (rad/s).
+    pub(super) fn torqued_rate(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [f64; 3] {
+        let earth = earth_rate_in(&Float, c, &self.point.w_n, &self.point.w_u);
+        std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
+    }
+
+    /// How a segment turns the platform, if it does.
+    pub(super) fn turns(&self, segment: usize) -> Option<&Slew> {
+        match &self.segments[segment].kind {
+            SegmentKind::Dwell => None,
+            SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => Some(slew),
+        }
+    }
+
+    /// Whether torquer errors act in turns at once: full attitudes have no such turns.
+    pub(crate) fn torqued_at_once(&self) -> bool {
+        self.point.turns.iter().any(|turns| !turns.is_empty())
+    }
+
+    /// A bound on the rate at which coefficients turn the platform, in rad/s: g is one at most, and torquers have the earth rate and
+    /// that of the fastest turn.
+    pub(crate) fn drift_bound(&self, coefficients: &[f64]) -> f64 {
+        let fastest = (0..self.segments.len()).filter_map(|i| self.turns(i)).map(|s| s.turned(1.0));
+        let fastest = fastest.fold(W_IE, f64::max);
+        let of = |(term, d): (&ErrorTerm, &f64)| match term.source {
+            Source::Gravity => d.abs(),
+            Source::Rate => d.abs() * fastest,
+            Source::Force => 0.0,
+        };
+        self.platform.error_terms().iter().zip(coefficients).map(of).sum()
+    }
+
+    /// What the accelerometers add to `Z^n` where `C_c^n` is `c` and the specific force in their axes is `f`.
+    pub(super) fn accelerometer_error(
+        &self,
+        c: &Matrix3<f64>,
+        f: &[f64; 3],
+        coefficients: &[f64],
+    ) -> [f64; 3] {
+        let rows = self.platform.accelerometer_columns(&Float, f);
+        apply(c, &rows.map(|row| row.iter().zip(coefficients).map(|(a, k)| a * k).sum()))
+    }
+
     /// `omega_ie^n` in rad/s.
     pub fn earth_rate(&self) -> [f64; 3] {
         [self.point.w_n, self.point.w_u, 0.0]

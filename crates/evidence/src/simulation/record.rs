@@ -7,7 +7,9 @@ use obsdeg_ekf::{Covariance, Form, Manifold, Update};
 
 use super::SimulationError;
 use super::answer::{FilterReason, FilterReport, Validity};
-use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, resolve, shown_unit, si_per_shown};
+use super::conditions::{
+    Conditions, ESTIMATE, PRIOR, TRUE_VALUE, is_rate, resolve, shown_unit, si_per_shown,
+};
 use super::extended::{Ended, Extended};
 use super::iterated::{MAX_ITERATED_STEPS, iterated};
 use super::plan::Plan;
@@ -38,7 +40,7 @@ impl RunStart {
         let p = &plan.platform;
         let si = |values: Vec<f64>, scaled: bool| -> Vec<f64> {
             let units = p.units().iter();
-            let scale = |u: &str| if scaled && u != "rad" { conditions.drift_scale } else { 1.0 };
+            let scale = |u: &str| if scaled && is_rate(u) { conditions.drift_scale } else { 1.0 };
             units.zip(values).map(|(u, v)| v * si_per_shown(u) * scale(u)).collect()
         };
         let sigma = resolve(PRIOR, p, &conditions.priors, 1.0)?;
@@ -206,7 +208,7 @@ fn sampled(
 ) -> Result<Sampled, SimulationError> {
     let n = plan.unknowns();
     let first = n - plan.platform.coefficients();
-    check_drifts(plan, conditions, start.truth[first..n].iter().map(|d| d.abs()).sum())?;
+    check_drifts(plan, conditions, plan.drift_bound(&start.truth[first..n]))?;
     let mut noise = Noise::new(seed, 0);
     let mut from = start.truth.clone();
     for (x, sigma) in from.iter_mut().zip(&start.sigma).skip(n) {

@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::slew::{W_IE, apply, cross, rotation, rotation_vector, times, transpose};
-use obsdeg_core::model::{Carry, Float, Matrix3};
+use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3};
 use obsdeg_exact::SplitMix64;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -37,14 +37,17 @@ pub(super) fn drift_turn(drifts: f64, dt: f64) -> f64 {
     (drifts + W_IE) * dt.abs()
 }
 
-/// Refuses an exact truth whose drifts take too many integration steps: `drifts` bounds the sum of the coefficients, in
-/// rad/s.
+/// Refuses an exact truth whose drifts take too many integration steps, and one with torquer errors in turns at once: `drifts` bounds the
+/// rate that the coefficients make, in rad/s.
 ///
 /// # Errors
 /// [`SimulationError::TooManySteps`].
 pub(crate) fn check_drifts(plan: &Plan, conditions: &Conditions, drifts: f64) -> Result<(), SimulationError> {
     if conditions.truth != Truth::Exact {
         return Ok(());
+    }
+    if plan.torqued_at_once() {
+        return Err(SimulationError::TorquedAtOnce);
     }
     let mut turn = 0.0;
     for s in &plan.segments {
@@ -157,7 +160,7 @@ impl<'a> TruthModel<'a> {
         let (parts, held) = self.held(segment);
         let mut kick = [0; 3].map(|_| held * noise.normal());
         let kicked = kick.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let drifts = self.coefficients().iter().map(|d| d.abs()).sum::<f64>();
+        let drifts = plan.drift_bound(self.coefficients());
         // as many as have been counted before the run
         let turn = drift_turn(drifts + kicked + plan.random_rate(s.dt), s.dt);
         let substeps = plan.substeps(segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
@@ -185,10 +188,14 @@ impl<'a> TruthModel<'a> {
         for (k, &column) in block.columns[..3].iter().enumerate() {
             self.x[column] = (0..3).map(|r| block.rows[r][k] * psi_n[r]).sum();
         }
-        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n
+        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n; what the accelerometers add
         let seen = apply(&transpose(&e), &G_N);
+        let c = plan.attitude(segment, (step + 1) as f64 * s.dt);
+        let force = apply(&transpose(&c), &seen).map(|x| -x);
+        let error = plan.accelerometer_error(&c, &force, self.coefficients());
         for (z, &component) in z.iter_mut().zip(&plan.components) {
-            *z = if component == 2 { psi_n[1] } else { G_N[component - 1] - seen[component - 1] };
+            let of_z = |k: usize| G_N[k] - seen[k] + error[k];
+            *z = if component == AZIMUTH { psi_n[1] } else { of_z(component - 1) };
         }
     }
 
@@ -226,7 +233,8 @@ impl<'a> TruthModel<'a> {
         let earth = self.plan.earth_rate();
         let slope = |t: f64, e: &Matrix3<f64>| {
             let c = times(e, &self.plan.attitude(segment, t));
-            let (turned, noise, drift) = (apply(e, &earth), apply(&c, kick), self.drift_n(&c));
+            let rate = || self.plan.torqued_rate(&self.plan.attitude(segment, t), self.plan.turns(segment));
+            let (turned, noise, drift) = (apply(e, &earth), apply(&c, kick), self.drift_n(&c, rate));
             times(&cross(&std::array::from_fn(|i| turned[i] - earth[i] + drift[i] + noise[i])), e)
         };
         let moved = |k: &Matrix3<f64>, h: f64| -> Matrix3<f64> {
@@ -242,13 +250,13 @@ impl<'a> TruthModel<'a> {
         orthonormal(&next)
     }
 
-    /// `eps^n = C_p^n E(g^p) D` at the true attitude.
-    fn drift_n(&self, c: &Matrix3<f64>) -> [f64; 3] {
-        let rows = self.plan.platform.drift_rows(&Float, c);
+    /// `eps^n = C_p^n E(g^p) D` at the true attitude; torquers have the rate that is commanded.
+    fn drift_n(&self, c: &Matrix3<f64>, rate: impl FnOnce() -> [f64; 3]) -> [f64; 3] {
+        let rows = self.plan.platform.drift_rows(&Float, c, rate);
         std::array::from_fn(|r| rows[r].iter().zip(self.coefficients()).map(|(a, d)| a * d).sum())
     }
 
-    /// The true drift coefficients.
+    /// The true coefficients.
     fn coefficients(&self) -> &[f64] {
         let n = self.plan.unknowns();
         &self.x[n - self.plan.platform.coefficients()..n]

@@ -40,6 +40,14 @@ pub(crate) fn symbol(name: &str) -> String {
         Some(("eps", axis)) if dotted => format!("\\dot{{\\varepsilon}}_{{{axis}}}"),
         Some(("eps", axis)) => format!("\\varepsilon_{{{axis}}}"),
         Some(("D", rest)) => format!("D_{{{rest}}}"),
+        // of the axes X, Y, Z: a torquer, an accelerometer, and the error of all of them
+        Some((family @ ("GS" | "GM" | "M"), axes)) if sensors(axes) => {
+            format!("\\mathit{{{family}}}_{{{axes}}}")
+        }
+        Some((family @ ("K0" | "K1" | "K2" | "K3" | "Kx"), axes)) if sensors(axes) => {
+            format!("K_{{{},{axes}}}", &family[1..])
+        }
+        Some(("a", axis)) if !frame.is_empty() => format!("a_{{{axis}}}"),
         _ => match base {
             "wN" => "\\omega_N".into(),
             "wU" => "\\omega_U".into(),
@@ -53,6 +61,11 @@ pub(crate) fn symbol(name: &str) -> String {
         None => String::new(),
     };
     format!("{body}{frame}{position}")
+}
+
+/// Whether a text names one or two sensors.
+fn sensors(axes: &str) -> bool {
+    (1..=2).contains(&axes.len()) && axes.bytes().all(|b| b"XYZ".contains(&b))
 }
 
 /// A name of a model: `gamma` is Greek, `k21`, `k_on`, `v[1]` and `C[1,2]` have an index.

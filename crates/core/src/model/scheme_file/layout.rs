@@ -6,10 +6,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_spanned::Spanned;
 
-use crate::model::geometry::{Geometry, Term};
+use crate::model::geometry::Geometry;
+use crate::model::path::Path;
 use crate::model::ranges;
 use crate::model::scheme::Carry;
 use crate::model::settings::{DriftNoise, FilterKind, Propagation, Truth};
+use crate::model::terms::{DefinedBy, Term};
 
 /// A number as it is written.
 pub(super) type Literal = Option<Spanned<toml::Value>>;
@@ -32,13 +34,21 @@ pub struct SchemeFile {
     /// Latitude in degrees; generic when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = -90, "maximum" = 90))]
     pub(super) latitude_deg: Literal,
-    /// Unknown terms of the gyro model, for instance `["F", "I", "O", "S"]`, or `"drift"`.
-    #[schemars(with = "Option<Vec<Term>>", extend("type" = ["array", "string", "null"]))]
+    /// Unknown terms, for instance `["F", "I", "O", "S"]` or `["gyros", "K0"]`, or `"drift"`.
+    #[schemars(with = "Option<Vec<TermEntry>>", extend("type" = ["array", "string", "null"]))]
     pub(super) terms: Literal,
+    /// Which sensors define the platform axes, and so which misalignments `gyros`, `accelerometers` and `all` among the terms have:
+    /// accelerometers (default; GM, M3), gyros (GM3, M6) or body (GM, M6).
+    #[schemars(with = "Option<DefinedBy>")]
+    pub(super) frame: Option<Spanned<String>>,
+    /// How the platform is turned from one position to the next, where a position does not say: one-axis (the shortest way) or
+    /// gimbals (alpha, beta, gamma). Torquer errors (GS, GM, GM3) act on the way.
+    #[schemars(with = "Option<Path>")]
+    pub(super) path: Option<Spanned<String>>,
     /// Whether psi_y^n is measured too.
     #[serde(default)]
     pub(super) measured_azimuth: bool,
-    /// Axes of the gyros; the paper's when left out.
+    /// Axes of the gyros, the paper's when left out; and of the accelerometers, X_p, Y_p, Z_p when left out.
     #[schemars(with = "Option<Geometry>")]
     pub(super) geometry: Option<Spanned<Geometry>>,
     /// Linear combinations of unknowns to be judged, for instance `"D_IX - D_IY"`.
@@ -181,6 +191,15 @@ pub(super) struct SlewEntry {
 enum PerGyroEntry {
     All(#[schemars(extend("minimum" = 0, "maximum" = ranges::GYRO_NOISE.high))] f64),
     Each(#[schemars(extend("items" = none_or(ranges::GYRO_NOISE)))] [f64; 3]),
+}
+
+/// A term, or a family of them.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "says what a file may hold")]
+enum TermEntry {
+    Term(Term),
+    Family(#[schemars(extend("enum" = ["gyros", "accelerometers", "all"]))] String),
 }
 
 /// An axis by its name, or a direction in n.

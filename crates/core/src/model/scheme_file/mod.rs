@@ -14,10 +14,11 @@ pub use write::write;
 
 use super::angle::parse_decimal;
 use super::file_error::explain;
-use super::geometry::Unknowns;
+use super::path::{Path, PathError};
 use super::per_gyro::PerGyro;
 use super::platform::Platform;
 use super::scheme::{Latitude, Scheme};
+use super::terms::{DefinedBy, Unknowns};
 use crate::model::settings::Settings;
 use crate::model::{combination, settings};
 use layout::{GimbalEntry, Literal, Numbers, SimulationEntry};
@@ -130,8 +131,12 @@ impl Reader<'_> {
         })
     }
 
-    /// `["F", "I"]`, or `"F,I"`.
-    fn terms(&self, terms: &Spanned<toml::Value>) -> Result<Unknowns, SchemeFileError> {
+    /// `["F", "I"]`, or `"F,I"`, and the frame that says which misalignments there are.
+    fn terms(
+        &self,
+        terms: &Spanned<toml::Value>,
+        frame: Option<DefinedBy>,
+    ) -> Result<Unknowns, SchemeFileError> {
         let kind = |found: &str| {
             let message = format!("found {found}; expected a list such as [\"F\", \"I\"], or \"drift\"");
             self.at(terms.span(), message)
@@ -145,7 +150,7 @@ impl Reader<'_> {
             toml::Value::Array(list) => list.iter().map(text).collect::<Result<Vec<_>, _>>()?.join(","),
             other => text(other)?,
         };
-        joined.parse().map_err(|e: super::geometry::TermError| self.at(terms.span(), e.to_string()))
+        Unknowns::of(&joined, frame).map_err(|e| self.at(terms.span(), e.to_string()))
     }
 
     fn gimbals(&self, g: &GimbalEntry, scheme: &mut Scheme) -> Result<(), SchemeFileError> {
@@ -237,9 +242,20 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         let parsed: Result<Latitude, _> = r.number(latitude)?.parse();
         scheme.latitude = Some(parsed.map_err(|e| r.at(latitude.span(), e.to_string()))?);
     }
+    let frame = file.frame.as_ref();
+    let frame = frame
+        .map(|f| f.get_ref().parse::<DefinedBy>().map_err(|e| r.at(f.span(), e.to_string())))
+        .transpose()?;
     if let Some(terms) = &file.terms {
         r.places.insert("terms".into(), terms.span());
-        scheme.unknowns = r.terms(terms)?;
+        scheme.unknowns = r.terms(terms, frame)?;
+    } else if let Some(f) = &file.frame {
+        return Err(r.at(f.span(), "a frame without terms; expected terms such as [\"all\"]"));
+    }
+    if let Some(path) = &file.path {
+        r.places.insert("path".into(), path.span());
+        let parsed: Result<Path, PathError> = path.get_ref().parse();
+        scheme.path = Some(parsed.map_err(|e| r.at(path.span(), e.to_string()))?);
     }
     r.gimbals(&file.gimbals, &mut scheme)?;
     if file.positions.is_empty() {

@@ -31,6 +31,14 @@ pub fn write(scheme: &Scheme) -> String {
             let axes = format!("{{ I = \"{}\", O = \"{}\", S = \"{}\" }}", g.I, g.O, g.S);
             line(&mut out, &format!("geometry.{letter}"), &axes);
         }
+        if !scheme.geometry.accelerometers.is_default() {
+            let [x, y, z] = scheme.geometry.accelerometers.inputs();
+            let axes = format!("{{ X = \"{x}\", Y = \"{y}\", Z = \"{z}\" }}");
+            line(&mut out, "geometry.accelerometers", &axes);
+        }
+    }
+    if let Some(path) = scheme.path {
+        line(&mut out, "path", &quoted(path.name()));
     }
     if scheme.measured_azimuth {
         line(&mut out, "measured_azimuth", "true");
@@ -170,6 +178,7 @@ fn position(out: &mut String, p: &Position) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Path;
     use crate::model::scheme_file::read;
     use crate::model::settings::DriftNoise;
     use crate::model::{Carry, Dwell, Gimbals, Rotation, SlewTo, Term};
@@ -243,7 +252,7 @@ mod tests {
             description in any::<String>(),
             carry in prop::sample::select(Carry::ALL.to_vec()),
             latitude in prop::option::of(-90_000_000_000i64..=90_000_000_000),
-            terms in prop::sample::subsequence(Term::ALL.to_vec(), 1..=10),
+            terms in prop::sample::subsequence(Term::ALL.to_vec(), 1..=20),
             drift in any::<bool>(),
             measured_azimuth in any::<bool>(),
             combination in any::<bool>(),
@@ -253,6 +262,7 @@ mod tests {
             first in place(true),
             rest in prop::collection::vec(place(false), 0..4),
             mirrored in any::<bool>(),
+            path in prop::option::of(prop::sample::select(Path::ALL.to_vec())),
         ) -> Scheme {
             let alone = drift && rest.is_empty() && first.rotation.is_none();
             let mut positions: Vec<Position> = std::iter::once(first).chain(rest).collect();
@@ -262,6 +272,8 @@ mod tests {
             let mut geometry = Geometry::default();
             if mirrored {
                 (geometry.X.O, geometry.X.S) = (geometry.X.S, "+z".parse().expect("an axis"));
+                let accelerometers = &mut geometry.accelerometers;
+                (accelerometers.X, accelerometers.Y) = (accelerometers.Y, "-x".parse().expect("an axis"));
             }
             let limits = limit.map(|(low, high)| [low * 1_234_567_891, high * 1_000_000_000]);
             Scheme {
@@ -270,6 +282,7 @@ mod tests {
                 geometry,
                 unknowns: if alone { Unknowns::Drift } else { Unknowns::Coefficients(terms) },
                 measured_azimuth,
+                path,
                 combinations: if combination && !alone { vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()] } else { Vec::new() },
                 simulation,
                 requirements,

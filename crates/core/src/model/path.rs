@@ -1,0 +1,369 @@
+//! The way from one position to the next, exactly: turns whose axes and angles have images in a prime field.
+//!
+//! A torquer error acts while the platform turns, so what a slew leaves in psi depends on its path: a turn by `phi` about the unit vector `u`
+//! of c adds `C_c^n(from) J E(u)` to `psi^n`, `J = sin(phi) I + (1 - cos(phi)) [u x] + (phi - sin(phi)) u u^T`, which is the integral of
+//! `exp([u x] t)` from 0 to `phi` (fast against the earth rate).
+
+use std::fmt;
+use std::str::FromStr;
+
+use obsdeg_exact::{Radical, Ratio, RootField};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::angle::Angle;
+use super::attitude::{Matrix3, Turned, c_n, c_n_f64, elementary, product};
+use super::ring::{Float, Ring};
+use super::rotation::{Axis, SlewAxis};
+use super::scheme::Position;
+use super::slew::Slew;
+
+/// How the platform is turned from one position to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Path {
+    /// By one turn, the shortest (half turns about the axis in n whose first component that is not zero is positive).
+    OneAxis,
+    /// Gimbal by gimbal: alpha (about N), beta, gamma (about Z_p), each by the difference of its Euler angles.
+    Gimbals,
+}
+
+impl Path {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::OneAxis, Self::Gimbals];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OneAxis => "one-axis",
+            Self::Gimbals => "gimbals",
+        }
+    }
+}
+
+impl Path {
+    /// The turns of the gimbals from one position to the next; `None` for generic angles, and where a rotation has left the Euler angles.
+    pub fn gimbals(from: &Position, to: &Position) -> Option<Vec<PathStep>> {
+        if from.rotation.is_some() {
+            return None;
+        }
+        // a passive matrix Mx(a) is a turn by -a about N of n, Mz(a) by -a about Z_p
+        let constant = |a: &Angle| a.generic().is_none().then(|| a.nanodeg());
+        let back =
+            |k: usize| Some(Angle::from_nanodeg(constant(&from.angles[k])? - constant(&to.angles[k])?));
+        let axis = |index, geographic| Axis { index, geographic };
+        let steps = [
+            PathStep::Named { axis: axis(0, true), angle: back(0)? },
+            PathStep::Middle { gamma: from.angles[2].clone(), angle: back(1)? },
+            PathStep::Named { axis: axis(2, false), angle: back(2)? },
+        ];
+        Some(steps.into_iter().filter(|s| s.angle().nanodeg() != 0).collect())
+    }
+}
+
+impl FromStr for Path {
+    type Err = PathError;
+    fn from_str(text: &str) -> Result<Self, PathError> {
+        let found = Self::ALL.into_iter().find(|p| p.name() == text);
+        found.ok_or_else(|| PathError::Name { found: text.into() })
+    }
+}
+
+/// Why there is no exact way to a position.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PathError {
+    /// Not a path.
+    #[error("`{found}` is no way to turn; expected one-axis or gimbals")]
+    Name {
+        /// The text found.
+        found: String,
+    },
+    /// No slew is stated, and the verdict depends on it.
+    #[error(
+        "torquer errors ({terms}) are unknown under inertial carry, and nothing says how `{name}` is reached: they act while the platform turns, so a \
+         repositioning at once would give a verdict that is wrong in kind; expected path = \"one-axis\" or \"gimbals\", a slew rate, or a slew of \
+         the position"
+    )]
+    NotStated {
+        /// The position.
+        name: String,
+        /// Its index.
+        index: usize,
+        /// GS, GM, GM3.
+        terms: String,
+    },
+    /// A turn that does not lead there.
+    #[error("the slew to `{name}` does not lead there")]
+    NoWay {
+        /// The position.
+        name: String,
+        /// Its index.
+        index: usize,
+    },
+    /// An angle or axis without an image in a field.
+    #[error(
+        "the turn to `{name}` ({found}) has no exact form; expected a turn about X_p, Y_p, Z_p, N, U or E by decimal degrees, a turn by 15 \
+         degrees or a multiple between such attitudes, or path = \"gimbals\""
+    )]
+    NotExact {
+        /// The position.
+        name: String,
+        /// Its index.
+        index: usize,
+        /// The turn, in words.
+        found: String,
+    },
+}
+
+impl PathError {
+    /// The key of the offender in a scheme file.
+    pub fn key(&self) -> Option<String> {
+        match self {
+            Self::Name { .. } => Some("path".into()),
+            Self::NotStated { .. } => None,
+            Self::NoWay { index, .. } | Self::NotExact { index, .. } => Some(format!("position.{index}")),
+        }
+    }
+}
+
+/// One turn of a way.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PathStep {
+    /// About one of the six axes.
+    Named {
+        /// The axis.
+        axis: Axis,
+        /// Right-handed.
+        angle: Angle,
+    },
+    /// About the middle gimbal axis, on the platform at the attitude of these Euler angles: `Mz(gamma)^T e_y`, against the hands of the passive
+    /// matrices.
+    Middle {
+        /// gamma.
+        gamma: Angle,
+        /// By so much.
+        angle: Angle,
+    },
+    /// The shortest turn to the next attitude, or about a direction of n.
+    Direct {
+        /// Of n (North, Up, East), of length one.
+        about: [f64; 3],
+        /// Right-handed about it, above 0.
+        angle: Angle,
+    },
+}
+
+impl fmt::Display for PathStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Named { axis, angle } => write!(f, "{axis}:{angle}"),
+            Self::Middle { gamma, angle } => write!(f, "middle gimbal at {gamma}:{angle}"),
+            Self::Direct { about: [n, u, e], angle } => write!(f, "({n:.9},{u:.9},{e:.9}):{angle}"),
+        }
+    }
+}
+
+/// A turn at one point of a ring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TurnAt<E> {
+    /// The unit vector that it turns about, in c (constant while it turns).
+    pub axis: [E; 3],
+    /// Cosine and sine of the angle.
+    pub cos_sin: (E, E),
+    /// The angle in rad.
+    pub angle: E,
+}
+
+impl<E: Clone> TurnAt<E> {
+    /// `J = sin(phi) I + (1 - cos(phi)) [u x] + (phi - sin(phi)) u u^T`.
+    pub fn integral<R: Ring<Element = E>>(&self, ring: &R) -> Matrix3<E> {
+        let (c, s) = &self.cos_sin;
+        let versine = ring.add(&ring.one(), &ring.neg(c));
+        let rest = ring.add(&self.angle, &ring.neg(s));
+        let cross = cross(ring, &self.axis);
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let outer = ring.mul(&self.axis[i], &self.axis[j]);
+                let sum = ring.add(&ring.mul(&versine, &cross[i][j]), &ring.mul(&rest, &outer));
+                if i == j { ring.add(&sum, s) } else { sum }
+            })
+        })
+    }
+
+    /// `exp([u x] phi) = cos(phi) I + sin(phi) [u x] + (1 - cos(phi)) u u^T`.
+    pub fn rotation<R: Ring<Element = E>>(&self, ring: &R) -> Matrix3<E> {
+        let (c, s) = &self.cos_sin;
+        let versine = ring.add(&ring.one(), &ring.neg(c));
+        let cross = cross(ring, &self.axis);
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let outer = ring.mul(&self.axis[i], &self.axis[j]);
+                let sum = ring.add(&ring.mul(s, &cross[i][j]), &ring.mul(&versine, &outer));
+                if i == j { ring.add(&sum, c) } else { sum }
+            })
+        })
+    }
+}
+
+/// `[v x]`.
+fn cross<R: Ring>(ring: &R, v: &[R::Element; 3]) -> Matrix3<R::Element> {
+    let mut out: Matrix3<R::Element> = std::array::from_fn(|_| std::array::from_fn(|_| ring.zero()));
+    for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        out[k][j] = v[i].clone();
+        out[j][k] = ring.neg(&v[i]);
+    }
+    out
+}
+
+/// The way from one position, with all that it turns, to the next.
+///
+/// # Errors
+/// [`StepError`].
+pub(super) fn steps(from: &Position, to: &Position, path: Path) -> Result<Vec<PathStep>, StepError> {
+    let own = to.slew.as_ref().filter(|s| s.axis.is_some());
+    if let (None, Path::Gimbals) = (own, path) {
+        let no_gimbals = "gimbal by gimbal between generic angles, or from the end of a rotation";
+        return Path::gimbals(from, to).ok_or_else(|| StepError::NotExact(no_gimbals.into()));
+    }
+    if from.angles.iter().chain(&to.angles).any(|a| a.generic().is_some()) {
+        return Err(generic());
+    }
+    let turned = from.rotation.as_ref().map(|r| Turned { axis: r.axis, angle: r.angle.clone() });
+    let start = c_n(&Float, &from.angles, turned.as_ref(), |a| a.turn().cos_sin_f64());
+    let how = own.cloned().unwrap_or_default();
+    let Some(turn) =
+        Slew::to(&start, &c_n_f64(&to.angles), &how, 1.0).map_err(|_| StepError::NoWay)?.map(|s| s.turn())
+    else {
+        return Ok(Vec::new());
+    };
+    if let (Some(SlewAxis::Named(axis)), Some(angle)) = (&how.axis, &how.angle) {
+        return Ok(vec![PathStep::Named { axis: *axis, angle: angle.clone() }]);
+    }
+    let found = || {
+        let [n, u, e] = turn.about;
+        StepError::NotExact(format!("{} deg about N {n:.6}, U {u:.6}, E {e:.6}", turn.angle_deg))
+    };
+    // an angle is known to a tenth of the last of nine decimals
+    let nanodeg = (turn.angle_deg * 1e9).round();
+    if (turn.angle_deg * 1e9 - nanodeg).abs() > 0.01 || nanodeg < 1.0 {
+        return Err(found());
+    }
+    Ok(vec![PathStep::Direct { about: turn.about, angle: Angle::from_nanodeg(nanodeg as i64) }])
+}
+
+fn generic() -> StepError {
+    StepError::NotExact("between generic angles".into())
+}
+
+/// Why there are no exact steps.
+pub(super) enum StepError {
+    NoWay,
+    NotExact(String),
+}
+
+impl PathStep {
+    /// By how much it turns, right-handed about its axis.
+    pub fn angle(&self) -> &Angle {
+        match self {
+            Self::Named { angle, .. } | Self::Middle { angle, .. } | Self::Direct { angle, .. } => angle,
+        }
+    }
+
+    /// In floating point, from the attitude `from` (`C_c^n`).
+    pub fn at_f64(&self, from: &Matrix3<f64>) -> TurnAt<f64> {
+        let phi = (self.angle().nanodeg() as f64 / 1e9).to_radians();
+        let axis = match self {
+            Self::Direct { about, .. } => into_c(&Float, from, about),
+            other => other.named(&Float, from, |a| a.turn().cos_sin_f64()),
+        };
+        TurnAt { axis, cos_sin: self.angle().turn().cos_sin_f64(), angle: phi }
+    }
+
+    /// In a prime field where pi has the image `pi`; `None` when the axis has none, or the turn is not what the floating-point one
+    /// seemed to be: `to` is the attitude after it.
+    pub(super) fn at_field(
+        &self,
+        roots: &RootField,
+        from: &Matrix3<u64>,
+        to: Option<&Matrix3<u64>>,
+        pi: u64,
+        cos_sin: impl Fn(&Angle) -> (u64, u64),
+    ) -> Option<TurnAt<u64>> {
+        let f = roots.field;
+        let (c, s) = cos_sin(self.angle());
+        let angle = f.mul(pi, f.from_ratio(self.angle().nanodeg(), 180_000_000_000));
+        let axis = match self {
+            Self::Direct { about, .. } => direct(roots, from, to?, (c, s), about)?,
+            other => other.named(&f, from, cos_sin),
+        };
+        Some(TurnAt { axis, cos_sin: (c, s), angle })
+    }
+
+    /// The axis in c of a turn about an axis that is named.
+    fn named<R: Ring>(
+        &self,
+        ring: &R,
+        from: &Matrix3<R::Element>,
+        cos_sin: impl Fn(&Angle) -> (R::Element, R::Element),
+    ) -> [R::Element; 3] {
+        let unit = |i: usize| std::array::from_fn(|j| if i == j { ring.one() } else { ring.zero() });
+        match self {
+            Self::Named { axis, .. } if axis.geographic => into_c(ring, from, &unit(axis.index)),
+            Self::Named { axis, .. } => unit(axis.index),
+            // C = Mx My Mz, so a turn of My is one about Mz^T e_y of c
+            Self::Middle { gamma, .. } => {
+                let m = elementary(ring, 2, &cos_sin(gamma));
+                m[1].clone()
+            }
+            Self::Direct { .. } => unit(0),
+        }
+    }
+}
+
+/// `C_n^c v`.
+fn into_c<R: Ring>(ring: &R, c: &Matrix3<R::Element>, v: &[R::Element; 3]) -> [R::Element; 3] {
+    std::array::from_fn(|j| ring.dot((0..3).map(|i| (&c[i][j], &v[i]))))
+}
+
+/// The axis in c of the turn from one attitude to another by an angle of the given cosine and sine, which has the direction `about` in
+/// floating point; `None` when the angle is another, or the axis has no image.
+fn direct(
+    roots: &RootField,
+    from: &Matrix3<u64>,
+    to: &Matrix3<u64>,
+    (c, s): (u64, u64),
+    about: &[f64; 3],
+) -> Option<[u64; 3]> {
+    let f = roots.field;
+    // in n: exp([u x] phi) = C_to C_from^T
+    let back: Matrix3<u64> = std::array::from_fn(|i| std::array::from_fn(|j| from[j][i]));
+    let r = product(&f, to, &back);
+    let u = if s != 0 {
+        let half = f.inv(f.add(s, s));
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            f.mul(half, f.sub(r[k][j], r[j][k]))
+        })
+    } else {
+        let images: Option<Vec<u64>> = about.iter().map(|x| recognised(roots, *x)).collect();
+        images?.try_into().ok()?
+    };
+    let turn = TurnAt { axis: u, cos_sin: (c, s), angle: 0 };
+    (turn.rotation(&f) == r && f.dot(0, u.iter().map(|x| (*x, *x))) == f.one()).then(|| into_c(&f, from, &u))
+}
+
+/// The image of a component of a unit vector that is a square root of a ratio of small numbers.
+fn recognised(roots: &RootField, x: f64) -> Option<u64> {
+    for (place, radicand) in [1.0f64, 2.0, 3.0, 6.0].into_iter().enumerate() {
+        for den in 1..=6 {
+            let num = (x / radicand.sqrt() * f64::from(den)).round();
+            if (num * radicand.sqrt() / f64::from(den) - x).abs() < 1e-9 {
+                let mut coefficients = [Ratio { num: 0, den: 1 }; 4];
+                coefficients[place] = Ratio { num: num as i64, den: i64::from(den) };
+                return Some(Radical { coefficients }.image(roots));
+            }
+        }
+    }
+    None
+}

@@ -1,0 +1,434 @@
+//! Accelerometers, torquers and mounting (section 10 of the method): the reference verdicts, a second path that shares nothing with the
+//! engine, and laws on random schemes.
+
+use obsdeg_core::degree::{Degrees, judge};
+use obsdeg_core::model::{Carry, Path, Platform, Scheme, Unknowns, c_n_f64, cardinal_names, parse_attitude};
+use obsdeg_exact::SplitMix64;
+
+fn unknowns(terms: &str) -> Unknowns {
+    terms.parse().expect("terms")
+}
+
+fn at(attitudes: &[&str]) -> Scheme {
+    Scheme::of_angles(attitudes.iter().map(|a| parse_attitude(a).expect("an attitude")))
+}
+
+fn cardinals() -> Scheme {
+    let names = cardinal_names();
+    at(&names.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// Positions that follow each other by turns of 90 degrees about platform axes.
+fn walk(positions: usize, seed: u64) -> Scheme {
+    let mut rng = SplitMix64::new(seed);
+    let names = cardinal_names();
+    let columns: Vec<[[i64; 3]; 3]> = names.iter().map(|n| integer_attitude(n)).collect();
+    let mut here = columns.iter().position(|c| *c == integer_attitude("NUE")).expect("one of them");
+    let mut visited = vec![names[here].clone()];
+    while visited.len() < positions {
+        let (axis, back) = (rng.below(3) as usize, rng.below(2) == 1);
+        // C exp([e x] 90 deg): the axes j and k become k and -j, or -k and j
+        let c = columns[here];
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut next = c;
+        let sign = if back { -1 } else { 1 };
+        for r in 0..3 {
+            next[r][j] = sign * c[r][k];
+            next[r][k] = -sign * c[r][j];
+        }
+        here = columns.iter().position(|c| *c == next).expect("a cardinal attitude");
+        visited.push(names[here].clone());
+    }
+    let mut scheme = at(&visited.iter().map(String::as_str).collect::<Vec<_>>());
+    scheme.carry = Carry::Inertial;
+    scheme.path = Some(Path::OneAxis);
+    scheme
+}
+
+/// `C_c^n` by the letters: column j is the direction of platform axis j in North, Up, East.
+fn integer_attitude(name: &str) -> [[i64; 3]; 3] {
+    let mut c = [[0; 3]; 3];
+    for (j, letter) in name.chars().enumerate() {
+        let (row, sign) = match letter {
+            'N' => (0, 1),
+            'S' => (0, -1),
+            'U' => (1, 1),
+            'D' => (1, -1),
+            'E' => (2, 1),
+            _ => (2, -1),
+        };
+        c[row][j] = sign;
+    }
+    c
+}
+
+fn exact(scheme: &Scheme) -> (Vec<String>, Degrees) {
+    let platform = Platform::new(scheme.clone()).expect("a scheme");
+    let degrees = judge(&platform, 1).expect("verdicts").degrees;
+    (platform.names().to_vec(), degrees)
+}
+
+/// Coefficients by degree: how many of degree 0, 1, 2 and not observable.
+fn by_degree((names, degrees): &(Vec<String>, Degrees)) -> [usize; 4] {
+    let mut out = [0; 4];
+    for (_, degree) in names.iter().zip(&degrees.degree).filter(|(n, _)| !n.starts_with("psi")) {
+        out[degree.unwrap_or(3)] += 1;
+    }
+    out
+}
+
+/// The rows of the table: 24 cardinal attitudes.
+#[test]
+fn cardinal_attitudes() {
+    type Row<'a> = (&'a str, [(&'a [usize], [usize; 4]); 3]);
+    let table: [Row<'_>; 3] = [
+        (
+            "F,I,O,S,K0,K1",
+            [(&[9, 18, 21], [6, 9, 3, 0]), (&[8, 18, 21], [6, 9, 3, 0]), (&[54, 87, 90], [6, 9, 3, 0])],
+        ),
+        (
+            "F,I,O,S,K0,K1,M3",
+            [(&[12, 21, 24], [9, 9, 3, 0]), (&[11, 21, 24], [9, 9, 3, 0]), (&[54, 87, 93], [6, 6, 9, 0])],
+        ),
+        (
+            "F,I,O,S,K0,K1,M3,K2",
+            [(&[15, 24, 27], [12, 9, 3, 0]), (&[14, 24, 27], [12, 9, 3, 0]), (&[54, 87, 96], [3, 3, 18, 0])],
+        ),
+    ];
+    for (terms, rows) in table {
+        for (carry, (profile, degrees)) in Carry::ALL.into_iter().zip(rows) {
+            let found = exact(&Scheme { carry, unknowns: unknowns(terms), ..cardinals() });
+            assert_eq!(found.1.rank_profile, profile, "{terms} {carry}");
+            assert_eq!(by_degree(&found), degrees, "{terms} {carry}");
+        }
+    }
+}
+
+/// The rows of the table: slews, 31 positions.
+#[test]
+fn self_calibration_with_slews() {
+    for seed in [1, 2, 3] {
+        for (terms, observable) in [
+            ("F,I,O,S,GS,GM,K0,K1,M3,K2", Some([21, 9, 3, 0])),
+            ("F,I,O,S,GS,GM3,K0,K1,M6,K2", Some([21, 9, 3, 0])),
+            ("F,I,O,S,GS,GM,K0,K1,M6,K2", None),
+        ] {
+            let found = exact(&Scheme { unknowns: unknowns(terms), ..walk(31, seed) });
+            assert_eq!(found.1.rank_profile, [23, 33, 36], "{terms} {seed}");
+            match observable {
+                Some(expected) => assert_eq!(by_degree(&found), expected, "{terms} {seed}"),
+                None => assert_eq!(found.0.len(), 39),
+            }
+        }
+    }
+}
+
+/// A second path: rows in floating point, written from the equations in n, slews integrated step by step. It takes nothing of the engine
+/// but the list of terms.
+mod floats {
+    use obsdeg_core::model::Carry;
+    use obsdeg_ekf::decomposition::singular_values;
+
+    type M = [[f64; 3]; 3];
+
+    /// A sensor that measures along x, y or z: mountings of the paper, and accelerometers along the axes.
+    const GYROS: [[[f64; 3]; 3]; 3] = [
+        // input, output, spin
+        [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]],
+        [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+    ];
+
+    fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+        (0..3).map(|i| a[i] * b[i]).sum()
+    }
+
+    /// `(axis, value)` in c of one unit of every coefficient of a term, for gravity g, torqued rate w and specific force f in c: drift first,
+    /// error of the accelerometers second.
+    fn unit_effects(term: &str, g: &[f64; 3], w: &[f64; 3], f: &[f64; 3]) -> Vec<(usize, f64, f64)> {
+        let mut out = Vec::new();
+        for i in 0..3 {
+            let [input, output, spin] = &GYROS[i];
+            let [gi, go, gs] = [dot(g, input), dot(g, output), dot(g, spin)];
+            let mut drift = |x: f64| out.push((i, x, 0.0));
+            match term {
+                "F" => drift(1.0),
+                "I" => drift(gi),
+                "O" => drift(go),
+                "S" => drift(gs),
+                "II" => drift(gi * gi),
+                "OO" => drift(go * go),
+                "SS" => drift(gs * gs),
+                "GS" => drift(w[i]),
+                "GM" => (0..3).filter(|j| *j != i).for_each(|j| drift(w[j])),
+                "GM3" => (0..i).for_each(|j| drift(w[j])),
+                _ => {}
+            }
+            let mut error = |x: f64| out.push((i, 0.0, x));
+            match term {
+                "K0" => error(1.0),
+                "K1" => error(f[i]),
+                "M6" => (0..3).filter(|j| *j != i).for_each(|j| error(f[j])),
+                "M3" => (0..i).for_each(|j| error(f[j])),
+                "K2" => error(f[i] * f[i]),
+                "K3" => error(f[i].powi(3)),
+                "Kx" => (0..3).filter(|j| *j != i).for_each(|j| error(f[i] * f[j])),
+                _ => {}
+            }
+        }
+        out
+    }
+
+    /// `(eps^n, a^n)` per unit of every coefficient at the attitude `c` (rows in n).
+    fn columns(terms: &[&str], c: &M, w: &[f64; 3]) -> [Vec<[f64; 3]>; 2] {
+        let in_c =
+            |v: [f64; 3]| -> [f64; 3] { std::array::from_fn(|j| (0..3).map(|i| c[i][j] * v[i]).sum()) };
+        let (g, f) = (in_c([0.0, -1.0, 0.0]), in_c([0.0, 1.0, 0.0]));
+        let all: Vec<_> = terms.iter().flat_map(|t| unit_effects(t, &g, w, &f)).collect();
+        let along = |axis: usize, x: f64| -> [f64; 3] { std::array::from_fn(|r| c[r][axis] * x) };
+        [
+            all.iter().map(|&(axis, eps, _)| along(axis, eps)).collect(),
+            all.iter().map(|&(axis, _, a)| along(axis, a)).collect(),
+        ]
+    }
+
+    /// `exp([u x] t)` by repeated squaring of a Taylor step.
+    fn turn(u: &[f64; 3], t: f64) -> M {
+        let small = t / 1024.0;
+        let k = |m: &M| -> M {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+                    small * (u[a] * m[b][j] - u[b] * m[a][j])
+                })
+            })
+        };
+        let one: M = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+        let (k1, mut out) = (k(&one), one);
+        let (k2, k3) = (k(&k1), k(&k(&k1)));
+        for i in 0..3 {
+            for j in 0..3 {
+                out[i][j] += k1[i][j] + k2[i][j] / 2.0 + k3[i][j] / 6.0;
+            }
+        }
+        (0..10).fold(out, |m, _| times(&m, &m))
+    }
+
+    pub(super) fn times(a: &M, b: &M) -> M {
+        std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+    }
+
+    /// A turn to a position: axis in c, angle in rad.
+    pub(super) type Turn = ([f64; 3], f64);
+
+    /// Ranks of V_0, V_1, V_2, and of each unknown the smallest order whose span holds it.
+    pub(super) fn judge(
+        terms: &[&str],
+        attitudes: &[M],
+        turns: &[Option<Turn>],
+        carry: Carry,
+    ) -> (Vec<usize>, Vec<Option<usize>>) {
+        let (w_n, w_u) = (0.63, 0.41);
+        let [eps, _] = columns(terms, &attitudes[0], &[1.0; 3]);
+        let k = eps.len();
+        let psi = if carry == Carry::Reset { 3 * attitudes.len() } else { 3 };
+        let n = psi + k;
+        // psi' = psi x w
+        let w: M = [[0.0, 0.0, -w_u], [0.0, 0.0, w_n], [w_u, -w_n, 0.0]];
+        let mut torqued = vec![[0.0; 3]; k];
+        let mut rows: Vec<Vec<Vec<f64>>> = vec![Vec::new(); 3];
+        for (i, c) in attitudes.iter().enumerate() {
+            if let (Some((u, angle)), Carry::Inertial) = (turns[i], carry) {
+                // psi^n' = C(t) E(u) k by the midpoint rule in many parts, extrapolated
+                let integral = |parts: usize| -> Vec<[f64; 3]> {
+                    let h = angle / parts as f64;
+                    let mut sum = vec![[0.0; 3]; k];
+                    for part in 0..parts {
+                        let there = times(&attitudes[i - 1], &turn(&u, (part as f64 + 0.5) * h));
+                        let only: Vec<&str> = terms.to_vec();
+                        let [eps, _] = columns(&only, &there, &u);
+                        let [still, _] = columns(&only, &there, &[0.0; 3]);
+                        for (s, (e, e0)) in sum.iter_mut().zip(eps.iter().zip(&still)) {
+                            (0..3).for_each(|r| s[r] += h * (e[r] - e0[r]));
+                        }
+                    }
+                    sum
+                };
+                let (coarse, fine, finest) = (integral(60), integral(120), integral(240));
+                for (j, t) in torqued.iter_mut().enumerate() {
+                    for r in 0..3 {
+                        let first = (4.0 * fine[j][r] - coarse[j][r]) / 3.0;
+                        let second = (4.0 * finest[j][r] - fine[j][r]) / 3.0;
+                        t[r] += (16.0 * second - first) / 15.0;
+                    }
+                }
+            }
+            let earth: [f64; 3] = std::array::from_fn(|j| c[0][j] * w_n + c[1][j] * w_u);
+            let [eps, a] = columns(terms, c, &earth);
+            let to_n = if carry == Carry::Inertial { &attitudes[0] } else { c };
+            let first = if carry == Carry::Reset { 3 * i } else { 0 };
+            let row = |f: &dyn Fn(usize) -> f64, of_psi: &dyn Fn(usize) -> f64| -> Vec<f64> {
+                (0..n)
+                    .map(|c| match c {
+                        c if c >= psi => f(c - psi),
+                        c if (first..first + 3).contains(&c) => of_psi(c - first),
+                        _ => 0.0,
+                    })
+                    .collect()
+            };
+            // psi^n, psi^n', psi^n'' as rows
+            let mut now: Vec<Vec<f64>> = (0..3).map(|r| row(&|j| torqued[j][r], &|j| to_n[r][j])).collect();
+            let drift: Vec<Vec<f64>> = (0..3).map(|r| row(&|j| eps[j][r], &|_| 0.0)).collect();
+            let error: Vec<Vec<f64>> = (0..3).map(|r| row(&|j| a[j][r], &|_| 0.0)).collect();
+            for (order, rows) in rows.iter_mut().enumerate() {
+                let z = |r: usize, sign: f64, e: usize| -> Vec<f64> {
+                    now[r]
+                        .iter()
+                        .zip(&error[e])
+                        .map(|(x, y)| sign * x + if order == 0 { *y } else { 0.0 })
+                        .collect()
+                };
+                rows.extend([z(2, 1.0, 0), z(0, -1.0, 2), z(0, 0.0, 1)]);
+                now = (0..3)
+                    .map(|r| {
+                        (0..n)
+                            .map(|c| {
+                                let turned: f64 = (0..3).map(|j| w[r][j] * now[j][c]).sum();
+                                turned + if order == 0 { drift[r][c] } else { 0.0 }
+                            })
+                            .collect()
+                    })
+                    .collect();
+            }
+        }
+        let rank = |rows: &[Vec<f64>]| {
+            let m = nalgebra::DMatrix::from_fn(rows.len(), n, |i, j| rows[i][j]);
+            let (values, _) = singular_values(&m).expect("finite");
+            values.iter().filter(|v| **v > 1e-9 * values[0]).count()
+        };
+        let (mut profile, mut degrees, mut all) = (Vec::new(), vec![None; n], Vec::new());
+        for (order, rows) in rows.into_iter().enumerate() {
+            all.extend(rows);
+            let here = rank(&all);
+            profile.push(here);
+            for (c, degree) in degrees.iter_mut().enumerate().filter(|(_, d)| d.is_none()) {
+                let unit: Vec<f64> = (0..n).map(|j| f64::from(u8::from(j == c))).collect();
+                all.push(unit);
+                if rank(&all) == here {
+                    *degree = Some(order);
+                }
+                all.pop();
+            }
+        }
+        (profile, degrees)
+    }
+}
+
+/// What the second path says of a scheme.
+fn by_floats(scheme: &Scheme) -> (Vec<usize>, Vec<Option<usize>>) {
+    let platform = Platform::new(scheme.clone()).expect("a scheme");
+    let attitudes: Vec<_> = scheme.positions.iter().map(|p| c_n_f64(&p.angles)).collect();
+    let terms = scheme.unknowns.to_string();
+    let terms: Vec<&str> = terms.split(',').collect();
+    let back = |m: &[[f64; 3]; 3]| std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]));
+    let turns: Vec<Option<floats::Turn>> = (0..attitudes.len())
+        .map(|i| {
+            platform.paths().get(i).filter(|p| !p.is_empty())?;
+            // a turn of less than half: its axis is that of the odd part of C_from^T C_to
+            let r = floats::times(&back(&attitudes[i - 1]), &attitudes[i]);
+            let odd = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]];
+            let sine = odd.iter().map(|x| x * x).sum::<f64>().sqrt() / 2.0;
+            let cosine = (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0;
+            assert!(sine > 1e-3, "no half turns here");
+            Some((odd.map(|x| x / (2.0 * sine)), sine.atan2(cosine)))
+        })
+        .collect();
+    floats::judge(&terms, &attitudes, &turns, scheme.carry)
+}
+
+fn both_paths_agree(scheme: &Scheme) {
+    let (names, degrees) = exact(scheme);
+    let (profile, found) = by_floats(scheme);
+    let rest = profile.len().min(degrees.rank_profile.len());
+    assert_eq!(profile[..rest], degrees.rank_profile[..rest], "{} {}", scheme.unknowns, scheme.carry);
+    assert_eq!(profile.last(), degrees.rank_profile.last());
+    for ((name, exact), float) in names.iter().zip(&degrees.degree).zip(&found) {
+        assert_eq!(exact, float, "{name} of {} {}", scheme.unknowns, scheme.carry);
+    }
+}
+
+/// The reference table by the second path, and sets of terms and attitudes drawn at random, with slews of 90 and 120 degrees and others.
+#[test]
+fn a_second_path() {
+    for terms in ["F,I,O,S,K0,K1", "F,I,O,S,K0,K1,M3,K2"] {
+        for carry in Carry::ALL {
+            both_paths_agree(&Scheme { carry, unknowns: unknowns(terms), ..cardinals() });
+        }
+    }
+    for terms in ["all", "F,I,O,S,GS,GM3,K0,K1,M6,K2", "F,I,O,S,GS,GM,K0,K1,M6,K2"] {
+        both_paths_agree(&Scheme { unknowns: unknowns(terms), ..walk(31, 5) });
+    }
+    let all =
+        ["F", "I", "O", "S", "II", "OO", "SS", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
+    let mut rng = SplitMix64::new(11);
+    for case in 0..30 {
+        let mut chosen: Vec<&str> = all.into_iter().filter(|_| rng.below(2) == 0).collect();
+        for (whole, triangle) in [("GM", "GM3"), ("M6", "M3")] {
+            if chosen.contains(&whole) {
+                chosen.retain(|t| *t != triangle);
+            }
+        }
+        if chosen.is_empty() {
+            continue;
+        }
+        let carry = Carry::ALL[case % 3];
+        let positions = 3 + rng.below(6) as usize;
+        let mut scheme = walk(positions, rng.next_u64());
+        if case % 2 == 1 {
+            // any attitudes, each reached from the one before by a turn about a platform axis
+            let start = ["10,25,40", "-70,15,130"][case % 4 / 2];
+            scheme = turned_about(start, positions, &mut rng);
+        }
+        both_paths_agree(&Scheme { carry, unknowns: unknowns(&chosen.join(",")), ..scheme });
+    }
+}
+
+/// Positions reached gimbal by gimbal, one gimbal at a time.
+fn turned_about(start: &str, positions: usize, rng: &mut SplitMix64) -> Scheme {
+    let mut angles: Vec<i64> = start.split(',').map(|a| a.parse().expect("degrees")).collect();
+    let mut list = vec![start.to_string()];
+    while list.len() < positions {
+        angles[rng.below(3) as usize] += [35, -50, 90, 120, -15][rng.below(5) as usize];
+        list.push(angles.iter().map(ToString::to_string).collect::<Vec<_>>().join(","));
+    }
+    let mut scheme = at(&list.iter().map(String::as_str).collect::<Vec<_>>());
+    scheme.carry = Carry::Inertial;
+    scheme.path = Some(Path::Gimbals);
+    scheme
+}
+
+/// Fewest generic positions that make all coefficients observable, and positions with slews that suffice for 33 unknowns.
+#[test]
+fn fewest_positions() {
+    let mut rng = SplitMix64::new(3);
+    let generic: Vec<String> = (0..9)
+        .map(|_| {
+            (0..3)
+                .map(|_| format!("{:.1}", rng.below(3500) as f64 / 10.0 - 175.0))
+                .collect::<Vec<_>>()
+                .join(",")
+        })
+        .collect();
+    for (terms, fewest) in
+        [("F,I,O,S,K0,K1", [4, 5, 6]), ("F,I,O,S,K0,K1,M3", [4, 5, 7]), ("F,I,O,S,K0,K1,M3,K2", [5, 5, 8])]
+    {
+        for (carry, expected) in Carry::ALL.into_iter().zip(fewest) {
+            let enough = |positions: usize| {
+                let attitudes: Vec<&str> = generic[..positions].iter().map(String::as_str).collect();
+                by_degree(&exact(&Scheme { carry, unknowns: unknowns(terms), ..at(&attitudes) }))[3] == 0
+            };
+            let found = (1..=9).find(|&k| enough(k));
+            assert_eq!(found, Some(expected), "{terms} {carry}");
+        }
+    }
+}
