@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
-use obsdeg_core::model::ranges::SLEW_RATE_DEG_S;
+use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Scheme, parse_decimal};
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, design,
-    design_merged, design_part, scheme_found,
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions, design,
+    design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
@@ -76,6 +76,10 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     terms: TermArguments,
+
+    /// With --minimum and torquer errors (GS, GM, GM3): the largest turn from one position to the next, in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 90.0, value_parser = within(TURN_DEG))]
+    max_turn: f64,
 
     /// How many schemes are listed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -220,6 +224,9 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         free: (a.candidates == "free").then_some(round),
         seed: a.seed,
     };
+    if a.minimum && is_walk(&base) {
+        return fewest_of_walks(a, &base, options);
+    }
     let parts = a.merge.iter().map(|path| Ok((path.display().to_string(), read_part(path)?)));
     let parts: Vec<(String, Part)> = parts.collect::<Result<_, Failure>>()?;
     let going_on = a.part.and_then(|_| a.output.target.existing()).map(read_part).transpose()?;
@@ -266,6 +273,27 @@ fn write_part(part: &Part, output: &Output) -> Result<(), Failure> {
             Err(Failure::unfinished(format!("{what} so far: interrupted; the same command goes on with it")))
         }
     }
+}
+
+/// The fewest positions where the way between them counts.
+fn fewest_of_walks(a: &Arguments, base: &Scheme, options: DesignOptions) -> Result<(), Failure> {
+    let options = WalkOptions {
+        candidates: options.candidates,
+        required: options.required,
+        most_turn_deg: a.max_turn,
+        seed: options.seed,
+    };
+    let bar = Bar::start(1, "searching walks", a.output.target.quiet);
+    let interrupted = interrupt::flag()?;
+    let found = walks(base, &options, &|| !interrupted.load(Ordering::Relaxed));
+    drop(bar);
+    let found = found?;
+    let winner = || -> Result<Vec<File>, Failure> {
+        let scheme = scheme_of_walk(&found, base);
+        let file = |s: Scheme| File { name: "winner.toml".into(), bytes: write(&s).into_bytes() };
+        Ok(scheme.map(file).into_iter().collect())
+    };
+    a.output.write_folder(&found, "walks.json", winner)
 }
 
 /// What a shared option says here.

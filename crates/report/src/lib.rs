@@ -20,6 +20,7 @@ mod simulation;
 mod system;
 mod table;
 mod visible;
+mod walks;
 mod words;
 
 pub use document::Document;

@@ -23,6 +23,9 @@ pub const STEP_S: Range = range(1e-6, 1e6, "s");
 /// The dwell of a position.
 pub const DWELL_S: Range = range(1e-3, 1e6, "s");
 /// The rate of a slew.
+/// The largest turn from one position to the next.
+pub const TURN_DEG: Range = range(1e-3, 180.0, "degrees");
+/// The rate of slews.
 pub const SLEW_RATE_DEG_S: Range = range(1e-3, 1e4, "deg/s");
 /// White noise of the observation.
 pub const NOISE_G: Range = range(1e-15, 1e3, "g");

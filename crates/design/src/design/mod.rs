@@ -19,6 +19,7 @@ pub(crate) mod search;
 pub(crate) mod symmetry;
 mod task;
 pub(crate) mod ties;
+pub(crate) mod walks;
 pub(crate) mod ways;
 mod winner;
 
@@ -38,12 +39,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use obsdeg_ekf::EkfError;
 
 pub use ties::Ties;
+pub use walks::{WalkOptions, Walks, is_walk, scheme_of_walk, walks};
 pub use winner::scheme as scheme_found;
 
 use candidates::MAX_CANDIDATES;
 use certify::excess;
 use obsdeg_core::degree::EnsembleError;
-use obsdeg_core::model::{Angle, Carry, Scheme, SchemeError, format_decimal};
+use obsdeg_core::model::{Angle, Carry, Scheme, SchemeError, Source, format_decimal};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, SimulationError, latitude_of};
 use task::Task;
 use ties::TIE;
@@ -212,6 +214,28 @@ pub enum DesignError {
     /// No verdict.
     #[error(transparent)]
     Verdict(#[from] EnsembleError),
+    /// No turn, or too many, between candidates whose way counts.
+    #[error(
+        "{found} turns between candidates; expected 1 to {most}: take a larger or smaller --max-turn, or other candidates"
+    )]
+    Turns {
+        /// Their number.
+        found: usize,
+        /// The most.
+        most: usize,
+    },
+    /// What is searched over sets only.
+    #[error(
+        "torquer errors act on the way between positions, so schemes are walks: of these --minimum finds the fewest positions; sigmas are not \
+         searched (use `obsdeg compare` on a scheme with slew_rate_deg_s)"
+    )]
+    Walks,
+    /// Sigmas of a search are those of drifts.
+    #[error(
+        "errors of the accelerometers are unknown: --minimum finds the fewest positions, but sigmas with them are not searched (use `obsdeg compare` on \
+         schemes)"
+    )]
+    Accelerometers,
     /// A number is not finite.
     #[error(transparent)]
     Filter(#[from] EkfError),
@@ -348,6 +372,12 @@ impl<'a> Prepared<'a> {
         options: &'a DesignOptions,
         going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
+        if is_walk(base) {
+            return Err(DesignError::Walks);
+        }
+        if options.positions.is_some() && base.unknowns.have(Source::Force) {
+            return Err(DesignError::Accelerometers);
+        }
         let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
         let task = Task::new(base, conditions, options, reached)?;
         let every: Vec<usize> = (0..task.rows.candidates()).collect();

@@ -1,0 +1,74 @@
+//! The fewest positions where the way between them counts.
+
+use obsdeg_design::design::Walks;
+
+use crate::Answer;
+use crate::document::{Block, Document, left, right};
+
+/// What was examined, and what that says.
+fn examined(w: &Walks) -> Vec<String> {
+    let mut out = vec![format!(
+        "a position adds so many rows that fewer than {} are never enough for {} required coefficients",
+        w.counting_bound,
+        w.required.len()
+    )];
+    out.extend(
+        w.none_of.iter().map(|[positions, walks]| {
+            format!("none of the {walks} walks of {positions} does, by exhaustion")
+        }),
+    );
+    out.push(match (w.positions, w.proven) {
+        (Some(k), true) => format!(
+            "so {k} positions are the fewest of these candidates and turns (wrong with probability below {:.0e})",
+            w.error_bound
+        ),
+        (Some(k), false) if w.interrupted => format!("interrupted: whether fewer than {k} do is not known"),
+        (Some(k), false) => format!("longer walks are too many to be examined: whether fewer than {k} do is not known"),
+        (None, _) => "no walk was found that does".into(),
+    });
+    out
+}
+
+impl Answer for Walks {
+    fn document(&self) -> Document {
+        let row = |(i, (name, angles)): (usize, (&String, &String))| {
+            vec![format!("p{}", i + 1), name.clone(), angles.clone()]
+        };
+        let columns = vec![left("position"), left("X_p Y_p Z_p"), right("alpha, beta, gamma [deg]")];
+        let rows = self.walk.iter().zip(&self.angles).enumerate().map(row);
+        let title = match self.positions {
+            Some(k) => format!(
+                "{k} positions that make every required coefficient observable, by turns of at most {} degrees",
+                self.most_turn_deg
+            ),
+            None => format!(
+                "No walk by turns of at most {} degrees makes every required coefficient observable",
+                self.most_turn_deg
+            ),
+        };
+        let summary = format!(
+            "{} of {} unknowns are determined; inertial carry, torquer errors act in every turn",
+            self.rank[0], self.rank[1]
+        );
+        Document {
+            title,
+            lead: vec![summary],
+            blocks: vec![
+                Block::table("", columns, rows),
+                Block::list("Fewer", examined(self)),
+                Block::list(
+                    "Searched",
+                    vec![
+                        format!(
+                            "{} candidates, {} turns about one axis, the shortest way",
+                            self.candidates.len(),
+                            self.turns
+                        ),
+                        format!("unknown terms {}; required: {}", self.terms, self.required.join(", ")),
+                        format!("seed {}", self.seed),
+                    ],
+                ),
+            ],
+        }
+    }
+}
