@@ -11,6 +11,8 @@ use crate::program::{obsdeg, run, stdout};
 
 /// Command lines of each command.
 const DRAWN: usize = 8;
+/// And with fair values only.
+const FAIR: usize = 8;
 
 const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n[requirements]\nD_F = 0.1\n\
     [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\nangles_deg = [180, 0, 90]\n";
@@ -45,7 +47,23 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "model" => &["m.toml", "s.toml", "none.json", "."],
         "carry" => &["inertial", "platform", "reset", "none"],
         "latitude" => &["28.2", "0", "90", "-90", "-60", "45.000000001", "91", "x"],
-        "terms" => &["F", "F,I,O,S", "drift", "I,II", "F,I,O,S,II,OO,SS,IO,IS,OS", "F,F", "Q", ""],
+        "terms" => &[
+            "F",
+            "F,I,O,S",
+            "drift",
+            "I,II",
+            "F,I,O,S,II,OO,SS,IO,IS,OS",
+            "accelerometers",
+            "all",
+            "F,GS,GM,K0,K3,Kx",
+            "GM,GM3",
+            "F,F",
+            "Q",
+            "",
+        ],
+        "axes" => &["accelerometers", "gyros", "body", "x"],
+        "path" => &["one-axis", "gimbals", "x"],
+        "max-turn" => &["90", "180", "0.001", "0", "x"],
         "combination" => &[
             "D_IX - D_IY",
             "psi_y + D_FX",
@@ -235,7 +253,7 @@ fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let fair = ["man", "schema", "completions"].contains(&command);
     assert!(fair || options.len() > 4, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
-    for _ in 0..if fair { 4 } else { DRAWN } {
+    for _ in 0..if fair { FAIR } else { DRAWN } {
         let folder = folder();
         let arguments = line(command, &options, &mut rng);
         let (code, stderr) = done(folder.path(), &arguments);

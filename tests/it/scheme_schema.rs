@@ -191,9 +191,9 @@ fn schema_and_reader_agree() {
         assert!(!broken(&text).is_empty(), "{keys}");
     }
     let all = format!(
-        "name = \"n\"\ndescription = \"d\"\ncarry = \"inertial\"\nlatitude_deg = -3.5\nterms = [\"F\", \"I\"]\nmeasured_azimuth = true
+        "name = \"n\"\ndescription = \"d\"\ncarry = \"inertial\"\nlatitude_deg = -3.5\nterms = [\"F\", \"I\", \"M6\"]\nframe = \"gyros\"\npath = \"one-axis\"\nmeasured_azimuth = true
 combinations = [\"D_IX - D_IY\"]
-geometry = {{ X = {{ I = \"+x\", O = \"-z\", S = \"+y\" }}, Y = {{ I = \"+y\", O = \"-z\", S = \"-x\" }}, Z = {{ I = \"+z\", O = \"+x\", S = \"+y\" }} }}
+geometry = {{ X = {{ I = \"+x\", O = \"-z\", S = \"+y\" }}, Y = {{ I = \"+y\", O = \"-z\", S = \"-x\" }}, Z = {{ I = \"+z\", O = \"+x\", S = \"+y\" }}, accelerometers = {{ X = \"+x\", Y = \"+y\", Z = \"+z\" }} }}
 {position}name = \"a\"\ndwell_s = 5\nrotation = {{ about = \"N\", rate_deg_s = 1 }}
 [[position]]\nattitude = \"NUE\"\nslew = {{ rate_deg_s = 1, about = \"X_p\", angle_deg = 90 }}
 [simulation]\ntruth = \"exact\"\nfilter = \"extended\"\nstep_s = 1\ndwell_s = 2\nslew_rate_deg_s = 3\naccelerometer_noise_g = 1e-5\nazimuth_noise_deg = 1
