@@ -10,9 +10,7 @@ use obsdeg_exact::SplitMix64;
 use crate::program::{obsdeg, run, stdout};
 
 /// Command lines of each command.
-const DRAWN: usize = 8;
-/// And with fair values only.
-const FAIR: usize = 8;
+const DRAWN: usize = 16;
 
 const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n[requirements]\nD_F = 0.1\n\
     [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\nangles_deg = [180, 0, 90]\n";
@@ -253,7 +251,7 @@ fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let fair = ["man", "schema", "completions"].contains(&command);
     assert!(fair || options.len() > 4, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
-    for _ in 0..if fair { FAIR } else { DRAWN } {
+    for _ in 0..if fair { 4 } else { DRAWN } {
         let folder = folder();
         let arguments = line(command, &options, &mut rng);
         let (code, stderr) = done(folder.path(), &arguments);
