@@ -143,12 +143,6 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         || "generic: wN and wU independent, not zero".to_string(),
         |l| format!("{l} deg: wN = w_ie cos, wU = w_ie sin"),
     );
-    let z = match a.frame {
-        Frame::N => {
-            "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
-        }
-        Frame::Platform => "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives",
-    };
     let terms: Vec<Term> = a.terms.parse::<Unknowns>().map(|u| u.terms().to_vec()).unwrap_or_default();
     let has = |source: Source| terms.iter().any(|t| t.source() == source);
     let has_others = has(Source::Rate) || has(Source::Force);
@@ -157,6 +151,20 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         has(Source::Force).then_some("K0 and K2 in g, K1 and M as numbers, "),
     ];
     let units: String = units.into_iter().flatten().collect();
+    let z = match (a.frame, has(Source::Force)) {
+        (Frame::N, false) => {
+            "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
+        }
+        (Frame::N, true) => {
+            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; primes are time derivatives"
+        }
+        (Frame::Platform, false) => {
+            "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives"
+        }
+        (Frame::Platform, true) => {
+            "Z = -[g x] psi + a in platform axes: Zx, Zy, Zz; primes are time derivatives"
+        }
+    };
     let mut out = vec![
         format!("carry {carry}"),
         format!("latitude {latitude}"),
@@ -175,9 +183,8 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         let inputs = ["X", "Y", "Z"].iter().zip(a.geometry.accelerometers.inputs());
         let inputs: Vec<String> = inputs.map(|(name, axis)| format!("{name}: I={axis}")).collect();
         out.push(format!(
-            "accelerometers {}; their error a (K0, and K1, M, K2, K3, Kx times components of the specific force f = -g) is part of Z: {}",
-            inputs.join(", "),
-            if a.frame == Frame::N { "Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n" } else { "in all three axes" }
+            "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific force f = -g",
+            inputs.join(", ")
         ));
     }
     if has(Source::Rate) {
@@ -307,7 +314,31 @@ pub(crate) fn null_vector(v: &[Component]) -> String {
         Some(k) => format!("{} = {k}", c.name),
         None => c.name.clone(),
     };
-    v.iter().map(part).collect::<Vec<_>>().join(", ")
+    let turned = if rotates_the_axes(v) {
+        " (all that is mounted turns: a rotation of the platform axes)"
+    } else {
+        ""
+    };
+    format!("{}{turned}", v.iter().map(part).collect::<Vec<_>>().join(", "))
+}
+
+/// Whether a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd part: what a rotation of the platform
+/// axes does to them.
+fn rotates_the_axes(v: &[Component]) -> bool {
+    let number = |name: &str| {
+        let found = v.iter().find(|c| c.name == name);
+        found.map_or(Some(0.0), |c| c.coefficient.as_ref()?.parse::<f64>().ok())
+    };
+    let odd = |family: &str| {
+        ["XY", "YZ", "ZX"].iter().all(|pair| {
+            let (there, back) =
+                (format!("{family}_{pair}"), format!("{family}_{}{}", &pair[1..], &pair[..1]));
+            matches!((number(&there), number(&back)), (Some(x), Some(y)) if x == -y)
+        })
+    };
+    let of = |family: &str| v.iter().any(|c| c.name.starts_with(family));
+    let only = v.iter().all(|c| ["psi_", "GM_", "M_"].iter().any(|f| c.name.starts_with(f)));
+    only && of("psi_") && of("GM_") && of("M_") && odd("GM") && odd("M")
 }
 
 /// What the list of degenerate angles holds.

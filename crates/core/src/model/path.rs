@@ -208,10 +208,10 @@ impl<E: Clone> TurnAt<E> {
 /// `[v x]`.
 fn cross<R: Ring>(ring: &R, v: &[R::Element; 3]) -> Matrix3<R::Element> {
     let mut out: Matrix3<R::Element> = std::array::from_fn(|_| std::array::from_fn(|_| ring.zero()));
-    for i in 0..3 {
+    for (i, x) in v.iter().enumerate() {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        out[k][j] = v[i].clone();
-        out[j][k] = ring.neg(&v[i]);
+        out[k][j] = x.clone();
+        out[j][k] = ring.neg(x);
     }
     out
 }

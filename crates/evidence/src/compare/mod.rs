@@ -8,7 +8,8 @@ pub use answer::*;
 use std::collections::BTreeMap;
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::{Carry, Float, Matrix3, Platform, Position, Scheme, slew};
+use obsdeg_core::model::slew::W_IE;
+use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, Source, slew};
 use obsdeg_ekf::SquareRootInformation;
 use rayon::prelude::*;
 
@@ -16,7 +17,7 @@ use crate::prediction::Prediction;
 use crate::requirements::{Basis, Requirements};
 use crate::simulation::answer::MeasurementReport;
 use crate::simulation::batch::batch;
-use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
+use crate::simulation::conditions::{Conditions, is_rate, resolve, shown_unit, si_per_shown};
 use crate::simulation::iterated::at_own_drifts;
 use crate::simulation::plan::MAX_UNKNOWNS;
 use crate::simulation::{Plan, SimulationError, no_prior, noise_floor, predict};
@@ -135,7 +136,7 @@ impl Judged {
         [self.prediction.rank, self.platform().names().len()]
     }
 
-    /// The largest sigma of a coefficient, if all are observable.
+    /// The largest sigma of a drift coefficient, if all are observable.
     fn worst(&self) -> Option<Worst> {
         self.worst_of(&|_| true)
     }
@@ -147,10 +148,10 @@ impl Judged {
         determined.map(|c| names[c].clone()).collect()
     }
 
-    /// The largest sigma of a coefficient that counts, if all of these are observable.
+    /// The largest sigma of a drift coefficient that counts, if all of these are observable: other coefficients have other units.
     fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
         let units = self.platform().units();
-        let counts = |c: &usize| units[*c] != "rad" && counts(&self.platform().names()[*c]);
+        let counts = |c: &usize| is_rate(units[*c]) && counts(&self.platform().names()[*c]);
         let drifts = (0..units.len()).filter(counts);
         let mut worst: Option<Worst> = None;
         for c in drifts {
@@ -257,8 +258,10 @@ fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
         let rows = plan.drift_rows(c, None);
         let seen = platform.accelerometer_rows(&Float, c);
-        let square = |d: usize| rows.iter().chain(&seen).map(|r| r[d] * r[d]).sum();
-        (0..platform.coefficients()).map(square).collect()
+        // the rate of a torquer in that of the earth
+        let unit = |t: &ErrorTerm| if t.source == Source::Rate { W_IE } else { 1.0 };
+        let square = |(d, t)| rows.iter().chain(&seen).map(|r| (r[d] / unit(t)).powi(2)).sum();
+        platform.error_terms().iter().enumerate().map(square).collect()
     };
     let of = |(i, position): (usize, &Position)| -> Vec<f64> {
         let Some(turn) = &position.rotation else {
