@@ -260,7 +260,9 @@ fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
         let seen = platform.accelerometer_rows(&Float, c);
         // the rate of a torquer in that of the earth
         let unit = |t: &ErrorTerm| if t.source == Source::Rate { W_IE } else { 1.0 };
-        let square = |(d, t)| rows.iter().chain(&seen).map(|r| (r[d] / unit(t)).powi(2)).sum();
+        let square = |(d, t): (usize, &ErrorTerm)| -> f64 {
+            rows.iter().chain(&seen).map(|r| (r[d] / unit(t)).powi(2)).sum()
+        };
         platform.error_terms().iter().enumerate().map(square).collect()
     };
     let of = |(i, position): (usize, &Position)| -> Vec<f64> {
