@@ -432,3 +432,83 @@ fn fewest_positions() {
         }
     }
 }
+
+/// Laws on random schemes: an unknown more never lowers a degree; GM with M6 hides three directions at least, GM with M3 (of which one triad
+/// defines the axes) no more than M3 alone does without them; what is seen of the relative mounting is the same in every frame.
+#[test]
+fn laws() {
+    let mut rng = SplitMix64::new(23);
+    let gyros = ["F", "I", "O", "S", "GS"];
+    let accelerometers = ["K0", "K1", "K2", "K3", "Kx"];
+    for case in 0..40 {
+        let carry = Carry::ALL[case % 3];
+        let positions = 2 + rng.below(8) as usize;
+        let scheme = if case % 2 == 0 {
+            walk(positions, case as u64)
+        } else {
+            turned_about("5,20,-35", positions, &mut rng)
+        };
+        let mut terms: Vec<&str> =
+            gyros.into_iter().chain(accelerometers).filter(|_| rng.below(2) == 0).collect();
+        let of =
+            |terms: &[&str]| exact(&Scheme { carry, unknowns: unknowns(&terms.join(",")), ..scheme.clone() });
+        let defect = |(names, degrees): &(Vec<String>, Degrees)| names.len() - degrees.rank();
+        terms.push("GM");
+        let (small, with_m3, with_m6) =
+            (of(&terms), of(&[&terms[..], &["M3"]].concat()), of(&[&terms[..], &["M6"]].concat()));
+        let larger = |a: &(Vec<String>, Degrees), b: &(Vec<String>, Degrees)| {
+            for (name, degree) in a.0.iter().zip(&a.1.degree) {
+                let there = b.0.iter().position(|n| n == name).expect("an unknown of both");
+                let never = |d: Option<usize>| d.unwrap_or(usize::MAX);
+                assert!(never(b.1.degree[there]) >= never(*degree), "{name} {terms:?} {carry}");
+            }
+        };
+        larger(&small, &with_m3);
+        larger(&with_m3, &with_m6);
+        let rotations = if carry == Carry::Reset { 0 } else { 3 };
+        assert!(defect(&with_m6) >= defect(&with_m3) + rotations, "{terms:?} {carry}");
+        assert!(defect(&with_m6) >= 3, "{terms:?} {carry}");
+        // the frame of the gyros: the same directions, but for those that define it
+        terms.retain(|t| *t != "GM");
+        let with_gm3 = of(&[&terms[..], &["GM3", "M6"]].concat());
+        assert_eq!(with_gm3.1.rank(), with_m3.1.rank(), "{terms:?} {carry}");
+        for (a, b) in with_m3.0.iter().zip(&with_m3.1.degree) {
+            let Some(there) = with_gm3.0.iter().position(|n| n == a) else { continue };
+            let mounting = a.starts_with("psi") || a.starts_with("GM") || a.starts_with("M_");
+            assert!(mounting || with_gm3.1.degree[there] == *b, "{a} of {terms:?} {carry}");
+        }
+    }
+}
+
+/// Wrong use is refused, or explained.
+#[test]
+fn wrong_use_has_a_reason() {
+    use obsdeg_core::analysis::{AnalysisOptions, analyze};
+    let inertial = |terms: &str| Scheme {
+        carry: Carry::Inertial,
+        unknowns: unknowns(terms),
+        ..at(&["NUE", "NED", "DNE"])
+    };
+    let refused = Platform::new(inertial("F,GS")).expect_err("no path").to_string();
+    assert!(refused.contains("GS") && refused.contains("path = \"one-axis\""), "{refused}");
+    let odd = Scheme { path: Some(Path::OneAxis), ..inertial("F,GS") };
+    let odd = Scheme { positions: at(&["10,20,30", "-40,70,5"]).positions, ..odd };
+    let refused = Platform::new(odd).expect_err("no exact turn").to_string();
+    assert!(refused.contains("no exact form") && refused.contains("gimbals"), "{refused}");
+    let notes = |scheme: &Scheme| {
+        let options = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
+        analyze(scheme, options, None).expect("an answer").notes.join("\n")
+    };
+    let cardinal = inertial("K1,K3,Kx,F,II,OO,SS");
+    let told = notes(&cardinal);
+    for part in ["K1 and K3 are not told apart", "Kx is not excited", "are never told apart"] {
+        assert!(told.contains(part), "{told}");
+    }
+    assert!(
+        notes(&Scheme { carry: Carry::Platform, ..inertial("F,GS") })
+            .contains("under platform carry a repositioning")
+    );
+    let (names, degrees) = exact(&cardinal);
+    let degree = |name: &str| degrees.degree[names.iter().position(|n| n == name).expect("known")];
+    assert!(degree("K1_X").is_none() && degree("K3_X").is_none());
+}

@@ -106,3 +106,15 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     let c = check(&paper(Carry::Inertial), &small, FilterChange::default());
     assert!(c.passed && c.validity.holds, "{:?}", c.disagreements);
 }
+
+/// Drifts, torquers, accelerometers and mounting: the filter with full attitudes on exact truth, which integrates them all, is what it
+/// believes to be.
+#[test]
+fn the_whole_platform_is_consistent() {
+    let text = std::fs::read_to_string("examples/self-calibration/scheme.toml").expect("the example");
+    let scheme = obsdeg_core::model::scheme_file::read(&text).expect("a scheme");
+    let conditions = Conditions { truth: Truth::Exact, ..Conditions::of(&scheme) };
+    let (filter, anees, nis) = statistics(&scheme, &conditions, 60);
+    assert!(filter == FilterKind::Iterated && anees.pass && nis.pass, "{anees:?} {nis:?}");
+    assert_eq!((anees.expected, nis.expected), (36.0, 3.0));
+}

@@ -30,6 +30,8 @@ const ROUNDING_BELOW: f64 = 11.0 / 16.0;
 /// What is left of a functional whose coefficients are doubles, beside its largest coefficient (drifts in units of the earth rate), in bits: what
 /// their rounding spreads to other unknowns, and far below the 1e-11 by which positions differ at least.
 const NEGLIGIBLE: f64 = -46.0;
+/// A sum of errors is at most so many bits more than the largest of them.
+const SUMMED: f64 = 8.0;
 
 /// Arithmetic of so many bits.
 #[derive(Debug, Clone, Copy)]
@@ -689,18 +691,29 @@ impl Seen {
         let d = self.digits;
         let free: Vec<usize> =
             (0..self.own.len()).filter(|c| self.excited[*c] && !self.pivots.contains(c)).collect();
-        // from the last pivot up
+        // from the last pivot up; what rounding may make of an entry comes from its own pivot, or from entries below
         let mut rows: Vec<Vector> = Vec::new();
+        let mut errors: Vec<Vec<f64>> = Vec::new();
         for (k, column) in self.columns.iter().enumerate().rev() {
             let below = &self.pivots[k + 1..];
-            let row = free.iter().enumerate().map(|(j, &f)| {
+            let pivot = &column[self.pivots[k]];
+            let (mut row, mut error) = (Vec::new(), Vec::new());
+            for (j, &f) in free.iter().enumerate() {
                 let known = below.iter().map(|&p| &column[p]).zip(rows.iter().rev().map(|r: &Vector| &r[j]));
-                let x = d.div(&d.sub(&column[f], &d.dot(known)), &column[self.pivots[k]]);
-                let scale = (self.own[f] - self.sizes[k]) / 2.0;
-                if log2(&x).is_none_or(|x| x - scale < self.rounding()) { d.int(0) } else { x }
-            });
-            let row = row.collect();
+                let x = d.div(&d.sub(&column[f], &d.dot(known)), pivot);
+                let own = (self.own[f] - self.sizes[k]) / 2.0 + self.rounding();
+                let inherited = below
+                    .iter()
+                    .zip(errors.iter().rev())
+                    .filter_map(|(&p, e)| Some(log2(&column[p])? + e[j]));
+                let inherited =
+                    log2(pivot).map_or(f64::MIN, |size| inherited.fold(f64::MIN, f64::max) - size);
+                let rounded = own.max(inherited + SUMMED);
+                row.push(if log2(&x).is_none_or(|x| x < rounded) { d.int(0) } else { x });
+                error.push(rounded);
+            }
             rows.push(row);
+            errors.push(error);
         }
         rows.reverse();
         (free, rows)
