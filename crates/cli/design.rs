@@ -8,8 +8,8 @@ use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Scheme, parse_decimal};
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions, design,
-    design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions,
+    design, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, design_figures, visible};
