@@ -311,6 +311,16 @@ fn quantities(
                 let found = partners.as_ref().map(|p| p[c].as_slice());
                 spaces::named(&u.partners, found, truth.platform.names())
             };
+            // the coefficients of a combination are doubles, so that what is left of it below 2^-46 counts as rounding: so does what dwells add to
+            // it, a part as small as the dwell, and the slope is then that of the degree
+            let rounded = |check: Check, order: Option<usize>| {
+                let hides = c >= n && order.zip(degree).is_some_and(|(order, degree)| order > degree);
+                let of_degree = rules::slope(degree, check.measured).outcome == Agreement::Agrees;
+                if check.fails() && hides && of_degree {
+                    return Check { outcome: Agreement::NotResolvable, ..check };
+                }
+                check
+            };
             QuantityEvidence {
                 name: name.clone(),
                 status,
@@ -321,8 +331,8 @@ fn quantities(
                 status_measured,
                 status_outcome,
                 partners: prediction.unknowns.get(c).filter(|_| comparable).map(named),
-                slope: slope(orders[0], modelled, courses[1]),
-                slope_at_end: slope(orders[1], modelled, courses[2]),
+                slope: rounded(slope(orders[0], modelled, courses[1]), orders[0]),
+                slope_at_end: rounded(slope(orders[1], modelled, courses[2]), orders[1]),
                 inflation: rules::LINEAR.check(at_end, found.map(|(_, (_, ratio))| *ratio)),
             }
         })
