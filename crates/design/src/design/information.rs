@@ -221,9 +221,9 @@ impl Evaluator {
     pub(super) fn drift_information(&self) -> Matrix3<f64> {
         let mut all = [[0.0; MAX]; MAX];
         for (row, local) in all.iter_mut().zip(&self.local) {
-            row[..LOCAL].copy_from_slice(local);
+            row[..PSI_EPS].copy_from_slice(local);
         }
-        eliminate(&mut all, LOCAL, 3);
+        eliminate(&mut all, PSI_EPS, 3);
         std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
     }
 

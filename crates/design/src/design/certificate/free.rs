@@ -7,7 +7,7 @@
 //! Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))` over a net that is never further than h.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::{Angle, Carry, Euler, Float, Matrix3, c_n_f64};
+use obsdeg_core::model::{Angle, Carry, Euler, Matrix3, c_n_f64};
 use rayon::prelude::*;
 
 use super::super::criterion::{Criterion, Limits};
@@ -97,7 +97,7 @@ impl Evaluator {
 
     /// `d(C)` for one position, X in units of deg/h.
     fn energy(&self, c: &Matrix3<f64>, x: &DMatrix<f64>) -> f64 {
-        let rows = self.ordered_columns(self.platform.drift_rows(&Float, c));
+        let rows = self.ordered_columns(self.drift_rows(c, None));
         let g = self.drift_information();
         let mut sum = 0.0;
         for column in x.column_iter() {
@@ -109,7 +109,7 @@ impl Evaluator {
 
     /// Degree of `d` along a rotation.
     fn degree(&self) -> usize {
-        let factors = self.platform.drift_terms().iter().map(|t| t.factors.len()).max().unwrap_or(0);
+        let factors = self.platform.error_terms().iter().map(|t| t.factors.len()).max().unwrap_or(0);
         2 * (1 + factors)
     }
 }
