@@ -61,10 +61,9 @@ fn drawn_whole(seed: u64) -> Scheme {
     scheme
 }
 
-/// Checks schemes drawn at random: no verdict disagrees, and at most one in a hundred checks (one in ten of schemes that are `near`) is
-/// not resolvable.
+/// Checks schemes drawn at random: no verdict disagrees, and at most one check in so many is not resolvable.
 #[expect(clippy::print_stdout, reason = "the figures of a long run")]
-fn sweep(seeds: std::ops::Range<u64>, near: bool, scheme: impl Fn(u64) -> Scheme) {
+fn sweep(seeds: std::ops::Range<u64>, one_in: usize, scheme: impl Fn(u64) -> Scheme) {
     let mut counts = [0; 3];
     for seed in seeds {
         let s = scheme(seed);
@@ -79,30 +78,30 @@ fn sweep(seeds: std::ops::Range<u64>, near: bool, scheme: impl Fn(u64) -> Scheme
     }
     let [agree, open, untested] = counts;
     println!("{agree} agree, {open} not resolvable, {untested} not tested");
-    assert!(open * if near { 10 } else { 100 } <= agree, "{counts:?}");
+    assert!(open * one_in <= agree, "{counts:?}");
 }
 
 #[test]
 fn schemes_drawn_at_random_agree() {
-    sweep(0..25, false, |seed| drawn(seed, false));
+    sweep(0..25, 100, |seed| drawn(seed, false));
     // a psi that is not excited, but for what cosines of right angles leave of its column
-    sweep(296..297, false, |seed| drawn(seed, false));
-    sweep(1000..1010, true, |seed| drawn(seed, true));
+    sweep(296..297, 100, |seed| drawn(seed, false));
+    sweep(1000..1010, 10, |seed| drawn(seed, true));
     // sines of right angles are rounded, times a psi that nobody sees
-    sweep(1060..1061, true, |seed| drawn(seed, true));
+    sweep(1060..1061, 10, |seed| drawn(seed, true));
 }
 
-/// Accelerometers, torquers and mounting: the same checks.
+/// Accelerometers, torquers and mounting: the same checks. What dwells add to combinations is not resolvable.
 #[test]
 fn whole_platforms_drawn_at_random_agree() {
-    sweep(2000..2012, false, drawn_whole);
+    sweep(2000..2012, 20, drawn_whole);
 }
 
 /// Minutes: `cargo test --test it -- --ignored many_schemes --nocapture`.
 #[test]
 #[ignore = "minutes"]
 fn many_schemes_drawn_at_random_agree() {
-    sweep(0..500, false, |seed| drawn(seed, false));
-    sweep(1000..1100, true, |seed| drawn(seed, true));
-    sweep(2000..2200, false, drawn_whole);
+    sweep(0..500, 100, |seed| drawn(seed, false));
+    sweep(1000..1100, 10, |seed| drawn(seed, true));
+    sweep(2000..2200, 20, drawn_whole);
 }

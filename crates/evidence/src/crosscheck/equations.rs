@@ -14,7 +14,7 @@ use crate::simulation::state::PlatformState;
 const LIMIT: f64 = 1e-7;
 
 /// The largest difference of Phi and H of any step, each column in units of its largest entry; `None` where the unknowns are
-/// the drift itself, for which there are no such equations.
+/// the drift itself, for which there are no such equations, and where torquer errors act in turns at once, which full attitudes do not have.
 ///
 /// # Errors
 /// [`SimulationError::Filter`] when a number is none.
@@ -22,7 +22,7 @@ pub(super) fn difference(
     plan: &Plan,
     conditions: &Conditions,
 ) -> Result<Option<Difference>, SimulationError> {
-    if !plan.has_coefficients() {
+    if !plan.has_coefficients() || plan.torqued_at_once() {
         return Ok(None);
     }
     let filter = Extended::new(plan, conditions, Update::default())?;

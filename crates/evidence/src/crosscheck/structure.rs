@@ -314,7 +314,7 @@ fn quantities(
             // the coefficients of a combination are doubles, so that what is left of it below 2^-46 counts as rounding: so does what dwells add to
             // it, a part as small as the dwell, and the slope is then that of the degree
             let rounded = |check: Check, order: Option<usize>| {
-                let hides = c >= n && order.zip(degree).is_some_and(|(order, degree)| order > degree);
+                let hides = c >= n && degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
                 let of_degree = rules::slope(degree, check.measured).outcome == Agreement::Agrees;
                 if check.fails() && hides && of_degree {
                     return Check { outcome: Agreement::NotResolvable, ..check };

@@ -286,7 +286,7 @@ fn bent(
 
 /// Validity of the small-angle model, and standard deviations at the end (SI units, by state), of a run at the drifts that
 /// `conditions` say, by equations of full attitudes linearised along it: with the prior, without noise of the drift. `None`
-/// where the unknowns are the drift itself, or for a run of too many steps.
+/// where the unknowns are the drift itself, where torquer errors act in turns at once, or for a run of too many steps.
 ///
 /// # Errors
 /// [`SimulationError`] for conditions that cannot be, and numbers that are none.
@@ -295,7 +295,7 @@ pub(crate) fn at_own_drifts(
     conditions: &Conditions,
 ) -> Result<Option<(Validity, Vec<f64>)>, SimulationError> {
     let steps = plan.segments.iter().map(|s| s.steps).sum::<usize>();
-    if !plan.has_coefficients() || steps > MAX_ITERATED_STEPS {
+    if !plan.has_coefficients() || plan.torqued_at_once() || steps > MAX_ITERATED_STEPS {
         return Ok(None);
     }
     let start = RunStart::new(plan, conditions)?;
