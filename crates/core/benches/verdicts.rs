@@ -6,8 +6,9 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::degree::{PlatformRows, climb};
-use obsdeg_core::model::{Carry, Platform, RandomValues, Sample, Scheme, parse_attitude};
+use obsdeg_core::model::{Carry, Path, Platform, RandomValues, Sample, Scheme, parse_attitude};
 use obsdeg_exact::{Echelon, SplitMix64};
 
 fn main() {
@@ -17,8 +18,13 @@ fn main() {
 const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
 
 fn platform(carry: Carry) -> Platform {
+    of_terms(carry, "F,I,O,S")
+}
+
+fn of_terms(carry: Carry, terms: &str) -> Platform {
     let angles = S6.iter().filter_map(|a| parse_attitude(a).ok());
-    match Platform::new(Scheme { carry, ..Scheme::of_angles(angles) }) {
+    let unknowns = terms.parse().expect("terms");
+    match Platform::new(Scheme { carry, unknowns, ..Scheme::of_angles(angles) }) {
         Ok(platform) => platform,
         Err(e) => panic!("{e}"),
     }
@@ -70,4 +76,30 @@ fn six_positions_prepared(bencher: Bencher<'_, '_>, carry: Carry) {
     bencher
         .counter(ItemsCount::new(1usize))
         .bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
+}
+
+/// Drifts and accelerometers: 21 coefficients, Z of three components.
+#[divan::bench(args = CARRIES)]
+fn six_positions_of_21_unknowns(bencher: Bencher<'_, '_>, carry: Carry) {
+    let platform = of_terms(carry, "F,I,O,S,K0,K1,M3");
+    let sample = &samples(&platform)[0];
+    let mut rows = PlatformRows::new(&platform, sample);
+    let mut basis = Echelon::new(sample.point.ring, platform.names().len());
+    bencher
+        .counter(ItemsCount::new(1usize))
+        .bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
+}
+
+/// Torquers, accelerometers and mounting with drifts, 33 coefficients: what `analyze` says without solutions of seven positions with slews.
+#[divan::bench]
+fn self_calibration(bencher: Bencher<'_, '_>) {
+    let attitudes = ["DNE", "SDE", "USE", "WSU", "WUN", "SUW", "SWD"];
+    let scheme = Scheme {
+        carry: Carry::Inertial,
+        unknowns: "all".parse().expect("terms"),
+        path: Some(Path::OneAxis),
+        ..Scheme::of_angles(attitudes.iter().filter_map(|a| parse_attitude(a).ok()))
+    };
+    let options = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
+    bencher.bench_local(|| analyze(black_box(&scheme), options, None).map(|a| a.rank));
 }

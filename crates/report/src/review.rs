@@ -79,10 +79,17 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
     blocks.push(Block::Text(verdict::sentences(s, review, &coefficients)));
     if s.simulation.timeline.iter().any(|t| t.slew) {
-        let text = "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be told apart, formulas and the fewest \
-                    positions are exact and of repositioning at once; predicted sigmas, requirements and the run are with the slews, by which psi \
-                    moves and which may determine more, or less.";
-        blocks.push(Block::Text(text.into()));
+        let exact = if a.positions.iter().any(|p| !p.turns.is_empty()) {
+            "are exact and of turns fast against the earth rate, in which torquer errors act"
+        } else {
+            "are exact and of repositioning at once"
+        };
+        let text = format!(
+            "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be told apart, formulas and the fewest \
+             positions {exact}; predicted sigmas, requirements and the run are with the slews, by which psi moves and which may determine \
+             more, or less."
+        );
+        blocks.push(Block::Text(text));
     }
     blocks.extend(simulation::warning(&s.simulation.conditions).map(Block::Text));
     blocks.push(section(level, "Unknowns"));

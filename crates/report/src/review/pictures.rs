@@ -102,7 +102,7 @@ pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name:
     let svg = heat("Excitation", &rows, positions, values, 0.0);
     still(
         name,
-        "Excitation map: how each coefficient moves the drift at each position (0 white, 1 blue)",
+        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 white, 1 blue; a torquer by the earth rate)",
         svg,
     )
 }

@@ -19,6 +19,7 @@ fn capital(text: &str) -> String {
 fn kind(coefficients: &[&Quantity]) -> &'static str {
     match coefficients.first() {
         Some(q) if q.name.starts_with("eps") => "components of the drift",
+        _ if coefficients.iter().any(|q| !q.name.starts_with("D_")) => "coefficients",
         _ => "gyro coefficients",
     }
 }
