@@ -100,9 +100,11 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     let orders = degrees.rank_profile.len();
     let unknowns = platform.names().len();
     let factors = scheme.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0).max(2);
+    // of a row: psi of its position, and the coefficients
+    let entries = 3 + platform.coefficients();
     let torquers = usize::from(scheme.unknowns.have(Source::Rate));
     // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
-    let bits = 16.0 + 3.0 * (factors - 2) as f64 + (unknowns as f64 / 15.0).log2().max(0.0) / 2.0;
+    let bits = 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0;
     Claim {
         unknowns,
         decisions: orders * (1 + unknowns),

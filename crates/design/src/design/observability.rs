@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use obsdeg_core::degree::{EnsembleError, local_chain};
-use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme};
+use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme, Source};
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field};
 use rayon::prelude::*;
@@ -95,6 +95,8 @@ impl Rows {
         let scheme = Scheme { positions, carry, combinations: Vec::new(), gimbals, ..base.clone() };
         let platform = Platform::new(scheme)?;
         let first = if reset { 3 } else { 0 };
+        let entries = 3 + platform.coefficients();
+        let factors = base.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0).max(2);
         let mut rng = platform.scheme().random(seed, "sets of candidates");
         let (mut fields, mut miss) = (Vec::new(), 1.0);
         while fields.len() < 2 || f64::powi(miss, fields.len() as i32) > MISS {
@@ -108,9 +110,9 @@ impl Rows {
                 unknowns: platform.coefficients() + psi,
                 decisions: 1,
                 order: values.roots().order,
-                row_degree: orders,
-                // |entry| <= 6, denominators 2^9, 15 entries of norm at most sqrt(15) together, w/ margin
-                row_bits: 16.0,
+                row_degree: orders + usize::from(base.unknowns.have(Source::Rate)),
+                // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
+                row_bits: 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0,
             };
             miss = error_bound(&claim, 1);
             fields.push(here);

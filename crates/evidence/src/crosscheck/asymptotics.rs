@@ -24,7 +24,8 @@ pub(super) fn method() -> Vec<String> {
         ),
         format!(
             "a: a slope counts where it changes by less than {SETTLED} between these dwells, for a combination whether its coefficients are \
-             taken to 1e-7 or to 1e-12; it is not resolvable elsewhere"
+             taken to 1e-7 or to 1e-12; it is not resolvable elsewhere, nor is what dwells \
+             add to a combination beyond its degree (coefficients are doubles, and dwells smaller than their rounding)"
         ),
     ]
 }
