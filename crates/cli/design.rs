@@ -78,8 +78,9 @@ pub(crate) struct Arguments {
     terms: TermArguments,
 
     /// With --minimum and torquer errors (GS, GM, GM3): the largest turn from one position to the next, in degrees
-    #[arg(long, value_name = "DEG", default_value_t = 90.0, value_parser = within(TURN_DEG))]
-    max_turn: f64,
+    /// (default: 90)
+    #[arg(long, value_name = "DEG", value_parser = within(TURN_DEG))]
+    max_turn: Option<f64>,
 
     /// How many schemes are listed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -224,6 +225,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         free: (a.candidates == "free").then_some(round),
         seed: a.seed,
     };
+    if a.max_turn.is_some() && !(a.minimum && is_walk(&base)) {
+        return Err(Failure::input(
+            "--max-turn is for --minimum with torquer errors (GS, GM, GM3) under inertial carry".into(),
+        ));
+    }
     if a.minimum && is_walk(&base) {
         return fewest_of_walks(a, &base, options);
     }
@@ -277,10 +283,24 @@ fn write_part(part: &Part, output: &Output) -> Result<(), Failure> {
 
 /// The fewest positions where the way between them counts.
 fn fewest_of_walks(a: &Arguments, base: &Scheme, options: DesignOptions) -> Result<(), Failure> {
+    let w = &a.wanted;
+    let given = [
+        ("--max-degree", !w.max_degree.is_empty()),
+        ("--meet", w.meet),
+        ("--max-time", w.max_time.is_some()),
+        ("--max-slew", w.max_slew.is_some()),
+        ("--gimbal", !base.gimbals.are_free()),
+    ];
+    if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
+        let text = format!(
+            "{option} is not taken where torquer errors make a scheme a walk; expected --max-turn, --observable"
+        );
+        return Err(Failure::input(text));
+    }
     let options = WalkOptions {
         candidates: options.candidates,
         required: options.required,
-        most_turn_deg: a.max_turn,
+        most_turn_deg: a.max_turn.unwrap_or(90.0),
         seed: options.seed,
     };
     let bar = Bar::start(1, "searching walks", a.output.target.quiet);

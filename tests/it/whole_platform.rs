@@ -512,3 +512,41 @@ fn wrong_use_has_a_reason() {
     let degree = |name: &str| degrees.degree[names.iter().position(|n| n == name).expect("known")];
     assert!(degree("K1_X").is_none() && degree("K3_X").is_none());
 }
+
+/// A rotating segment is judged with drifts alone.
+#[test]
+fn rotations_are_of_drifts() {
+    let mut scheme = Scheme { carry: Carry::Inertial, unknowns: unknowns("F,GM,M3"), ..at(&["NDW"]) };
+    scheme.positions[0].rotation = Some(obsdeg_core::model::Rotation::new("E", "360").expect("a rotation"));
+    let refused = Platform::new(scheme.clone()).expect_err("refused").to_string();
+    assert!(refused.contains("GM, M3") && refused.contains("drifts alone"), "{refused}");
+    assert!(Platform::new(Scheme { unknowns: unknowns("F,I,II"), ..scheme }).is_ok());
+}
+
+/// Seven positions by quarter turns, proven; what no tour determines is said at once.
+#[test]
+fn fewest_positions_of_walks() {
+    use obsdeg_design::design::{Candidates, WalkOptions, scheme_of_walk, walks};
+    let base = Scheme { carry: Carry::Inertial, unknowns: unknowns("F,GS,GM,K0,K1"), ..Scheme::default() };
+    let options = WalkOptions {
+        candidates: Candidates::cardinals(),
+        required: Vec::new(),
+        most_turn_deg: 90.0,
+        seed: 1,
+    };
+    let found = walks(&base, &options, &|| true).expect("walks");
+    let fewest = found.positions.expect("a walk");
+    assert!(found.proven && found.never.is_empty() && found.walk.len() == fewest, "{found:?}");
+    let (names, degrees) = exact(&scheme_of_walk(&found, &base).expect("a scheme"));
+    let seen = |(n, d): (&String, &Option<usize>)| n.starts_with("psi") || d.is_some();
+    assert!(names.iter().zip(&degrees.degree).all(seen));
+    // no walk of one position less, drawn at random, does
+    for seed in 0..300 {
+        let scheme = Scheme { unknowns: base.unknowns.clone(), ..walk(fewest - 1, seed) };
+        let (names, degrees) = exact(&scheme);
+        assert!(!names.iter().zip(&degrees.degree).all(seen), "{seed}");
+    }
+    let hidden = Scheme { unknowns: unknowns("F,GS,K1,K3"), ..base };
+    let none = walks(&hidden, &options, &|| true).expect("walks");
+    assert!(none.positions.is_none() && none.never.contains(&"K1_X".to_string()) && !none.proven, "{none:?}");
+}

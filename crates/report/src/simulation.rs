@@ -197,7 +197,11 @@ impl Answer for Simulation {
         let table =
             |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
         let end = self.timeline.last().map_or(0.0, |t| t.end_s);
-        let degree = if self.timeline.iter().any(|t| t.slew) {
+        // torquer errors act in slews, which verdicts then take as fast
+        let torqued = self.quantities.iter().any(|q| q.name.starts_with("GS_") || q.name.starts_with("GM_"));
+        let degree = if torqued && self.timeline.iter().any(|t| t.slew) {
+            "exact verdict of turns fast against the earth rate, - not observable; verdict: with the slews"
+        } else if self.timeline.iter().any(|t| t.slew) {
             "exact verdict of repositioning at once, - not observable; verdict: with the slews"
         } else {
             "exact verdict, - not observable"

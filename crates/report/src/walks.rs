@@ -18,12 +18,16 @@ fn examined(w: &Walks) -> Vec<String> {
         }),
     );
     out.push(match (w.positions, w.proven) {
+        (Some(k), true) if w.none_of.is_empty() => format!("so {k} positions are the fewest, by counting"),
         (Some(k), true) => format!(
             "so {k} positions are the fewest of these candidates and turns (wrong with probability below {:.0e})",
             w.error_bound
         ),
         (Some(k), false) if w.interrupted => format!("interrupted: whether fewer than {k} do is not known"),
         (Some(k), false) => format!("longer walks are too many to be examined: whether fewer than {k} do is not known"),
+        (None, _) if !w.never.is_empty() => {
+            format!("even a tour of all {} turns leaves {} unobservable: no walk was sought", w.turns, w.never.join(", "))
+        }
         (None, _) => "no walk was found that does".into(),
     });
     out
@@ -65,7 +69,13 @@ impl Answer for Walks {
                             self.turns
                         ),
                         format!("unknown terms {}; required: {}", self.terms, self.required.join(", ")),
-                        format!("seed {}", self.seed),
+                        match self.latitude_deg {
+                            Some(l) => format!("latitude {l} deg; seed {}", self.seed),
+                            None => format!(
+                                "latitude generic: wN and wU independent, not zero; seed {}",
+                                self.seed
+                            ),
+                        },
                     ],
                 ),
             ],

@@ -275,9 +275,9 @@ fn notes(scheme: &Scheme) -> Vec<String> {
     let mut out = Vec::new();
     let mut say = |holds: bool, text: &str| out.extend(holds.then(|| text.to_string()));
     say(
-        have(&[Term::GM, Term::M6]),
+        have(&[Term::GM, Term::M6]) && !scheme.measured_azimuth,
         "GM and M6 together leave the platform axes undefined: turning psi, GM and M6 by one rotation changes no output, so three directions are \
-         not observable by any scheme; let the accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
+         not observable by any scheme that has Z alone; let the accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
     );
     say(
         have(&[Term::GM3, Term::M3]),

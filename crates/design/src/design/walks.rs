@@ -74,6 +74,10 @@ pub struct Walks {
     pub angles: Vec<String>,
     /// Its rank, and the number of unknowns.
     pub rank: [usize; 2],
+    /// The latitude in degrees; null when generic.
+    pub latitude_deg: Option<f64>,
+    /// Coefficients that even the tour of all turns leaves unobservable; no walk is sought then.
+    pub never: Vec<String>,
     /// No fewer can do: that many rows are needed.
     pub counting_bound: usize,
     /// `[positions, walks]`: none of these does, by exhaustion.
@@ -230,6 +234,20 @@ impl Space {
         self.does(&walk.basis)
     }
 
+    /// The way through some places, in the first field; a place that no turn leads to begins anew.
+    fn along(&self, places: &[usize]) -> Walk {
+        let field = &self.fields[0];
+        let mut walk = field.start(places[0]);
+        for &to in &places[1..] {
+            let here = walk.places[walk.places.len() - 1];
+            match self.neighbours[here].iter().find(|n| n.1 == to) {
+                Some(&(turn, _)) => walk = field.go(&walk, turn, to),
+                None => field.arrive(&mut walk, to),
+            }
+        }
+        walk
+    }
+
     /// The number of walks of so many positions.
     fn walks(&self, length: usize) -> u64 {
         let n = self.neighbours.len();
@@ -336,7 +354,10 @@ pub fn walks(
         // as of a verdict, and of so many turns by parts of half a turn
         row_bits: 60.0 + (length as f64).log2(),
     };
-    let shortest = space.short(options.seed, going);
+    let whole = space.along(&tour);
+    let lost = space.required.iter().filter(|c| !whole.basis.has_unit(3 + **c));
+    let never: Vec<String> = lost.map(|&c| all[c].clone()).collect();
+    let shortest = if never.is_empty() { space.short(options.seed, going) } else { None };
     let longest = shortest.as_ref().map_or(LONGEST, |w| w.places.len());
     let mut out = Walks {
         schema: WALKS_SCHEMA.into(),
@@ -350,6 +371,8 @@ pub fn walks(
         walk: Vec::new(),
         angles: Vec::new(),
         rank: [0, 3 + d],
+        latitude_deg: base.latitude.map(|l| l.degrees()),
+        never,
         counting_bound,
         none_of: Vec::new(),
         proven: false,
@@ -359,7 +382,8 @@ pub fn walks(
     };
     let mut best = shortest.map(|w| w.places);
     let mut complete = true;
-    for length in counting_bound..longest {
+    let lengths = if out.never.is_empty() { counting_bound..longest } else { 0..0 };
+    for length in lengths {
         let count = space.walks(length);
         if count > MOST_WALKS {
             complete = false;
@@ -388,18 +412,8 @@ pub fn walks(
         out.error_bound += count as f64 * error_bound(&claim(length), 2);
     }
     if let Some(places) = &best {
-        let of = |w: &[usize]| -> Walk {
-            let mut walk = space.fields[0].start(w[0]);
-            for &to in &w[1..] {
-                let here = walk.places[walk.places.len() - 1];
-                if let Some(&(turn, _)) = space.neighbours[here].iter().find(|n| n.1 == to) {
-                    walk = space.fields[0].go(&walk, turn, to);
-                }
-            }
-            walk
-        };
         out.positions = Some(places.len());
-        out.rank[0] = of(places).basis.rank();
+        out.rank[0] = space.along(places).basis.rank();
         let angles = |&c: &usize| attitudes[c].each_ref().map(ToString::to_string).join(",");
         out.angles = places.iter().map(angles).collect();
         out.walk = places.iter().map(|&c| names[c].clone()).collect();

@@ -460,7 +460,9 @@ mod tests {
             ["10,25,40", "130,-50,70", "-95,33,-160"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry, measured_azimuth: azimuth, ..Scheme::of_angles(attitudes) };
         scheme.unknowns = terms.parse().expect("terms");
-        scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
+        if terms == GYROS {
+            scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
+        }
         let conditions = Conditions {
             truth: Truth::Exact,
             slew_rate_deg_s: slew,
