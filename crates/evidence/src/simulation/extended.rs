@@ -447,7 +447,7 @@ pub(super) fn check_measurements(plan: &Plan, z: &[f64]) -> Result<(), EkfError>
 #[cfg(test)]
 mod tests {
     use obsdeg_core::model::settings::{DriftNoise, Truth};
-    use obsdeg_core::model::{Rotation, Scheme, parse_attitude};
+    use obsdeg_core::model::{Path, Rotation, Scheme, parse_attitude};
     use obsdeg_ekf::Manifold;
     use obsdeg_exact::SplitMix64;
 
@@ -460,6 +460,8 @@ mod tests {
             ["10,25,40", "130,-50,70", "-95,33,-160"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry, measured_azimuth: azimuth, ..Scheme::of_angles(attitudes) };
         scheme.unknowns = terms.parse().expect("terms");
+        // torquer errors need turns that are exact
+        scheme.path = (terms != GYROS).then_some(Path::Gimbals);
         if terms == GYROS {
             scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
         }
