@@ -587,7 +587,8 @@ mod tests {
                     }
                 }
             }
-            assert!(truth.largest_psi > 0.03, "something moved");
+            // with fewer drifts psi stays about what it was
+            assert!(truth.largest_psi > if case.3 == GYROS { 0.03 } else { 0.01 }, "something moved");
         }
     }
 }
