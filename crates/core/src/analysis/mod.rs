@@ -339,7 +339,7 @@ fn turns(platform: &Platform) -> Vec<Vec<Turn>> {
     if platform.paths().is_empty() {
         return Vec::new();
     }
-    let point = Point::in_floats(platform, 1.0, 1.0, |_| 0.0);
+    let point = Point::in_floats(platform, 1.0, 1.0);
     let stations = platform.scheme().stations();
     let mut out = vec![Vec::new(); platform.scheme().positions.len()];
     for (i, station) in stations.iter().enumerate().filter(|(_, s)| !s.continues) {

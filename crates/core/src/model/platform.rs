@@ -61,8 +61,6 @@ pub struct Point<R: Ring> {
     /// The turns on which torquer errors act: to a station that is the start of a position, from the end of the position before; to another
     /// of a rotation, from its start. Empty where there are no such errors.
     pub turns: Vec<Vec<TurnAt<R::Element>>>,
-    /// The rate at which every station turns, in rad/s. Empty where there are no such errors.
-    pub turning: Vec<R::Element>,
 }
 
 /// `S_i`: how the local unknowns of one position depend on the unknowns of the scheme.
@@ -206,7 +204,10 @@ impl Platform {
                 torqued.advance(self, point, i, station.continues);
             }
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
-            let drift = self.drift_rows(ring, c, || point.torqued_rate(i, station));
+            // Where the platform turns at the rate w, Z' holds w times the derivative by the angle of what torquers and
+            // accelerometers put into Z: it lies in the span of Z along the arc (`Scheme::stations`), as that of eps^n does in
+            // that of Z'. So degrees are those of the attitudes of the arc, and the rate is that of the earth.
+            let drift = self.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
             let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
             let jump = |r: usize| -> Vec<R::Element> {
                 torqued.psi.as_ref().map_or_else(|| zeros(self.terms.len()).collect(), |j| j[r].clone())
@@ -323,20 +324,6 @@ pub fn earth_rate_in<R: Ring>(
     w_u: &R::Element,
 ) -> [R::Element; 3] {
     std::array::from_fn(|j| ring.dot([(&c[0][j], w_n), (&c[1][j], w_u)]))
-}
-
-impl<R: Ring> Point<R> {
-    /// The rate with which the gyros are torqued at a station, in c: the earth rate, and where it turns the rate of that.
-    fn torqued_rate(&self, i: usize, station: &Station<'_>) -> [R::Element; 3] {
-        let (ring, c) = (&self.ring, &self.attitudes[i]);
-        let rate = earth_rate_in(ring, c, &self.w_n, &self.w_u);
-        let Some(turned) = &station.turned else { return rate };
-        let unit = |k: usize| if k == turned.axis.index { ring.one() } else { ring.zero() };
-        std::array::from_fn(|j| {
-            let along = if turned.axis.geographic { c[turned.axis.index][j].clone() } else { unit(j) };
-            ring.add(&rate[j], &ring.mul(&along, &self.turning[i]))
-        })
-    }
 }
 
 impl Platform {
@@ -468,8 +455,8 @@ pub struct RandomValues {
     rates: (u64, u64),
     /// `exp(i angle)` of every generic angle.
     generic: Vec<(String, u64)>,
-    /// The image of pi, and the rate at which every position turns: where torquer errors are unknown.
-    torquers: Option<(u64, Vec<u64>)>,
+    /// The image of pi, where torquer errors are unknown.
+    pi: Option<u64>,
 }
 
 impl RandomValues {
@@ -489,11 +476,8 @@ impl RandomValues {
         let mut nonzero = || 1 + rng.below(p - 1);
         let rates = (nonzero(), nonzero());
         let generic = scheme.generic_names().into_iter().map(|n| (n, nonzero())).collect();
-        let torquers = scheme
-            .unknowns
-            .have(Source::Rate)
-            .then(|| (nonzero(), scheme.positions.iter().map(|_| nonzero()).collect()));
-        Ok(Self { roots, rates, generic, torquers })
+        let pi = scheme.unknowns.have(Source::Rate).then(nonzero);
+        Ok(Self { roots, rates, generic, pi })
     }
 
     /// The field.
@@ -556,7 +540,7 @@ impl RandomValues {
     /// The turns to every station ([`Point::turns`]).
     ///
     /// # Errors
-    /// The index of the first position whose way has no image.
+    /// The index of the first position whose way has no image, or does not lead there.
     fn turns(
         &self,
         scheme: &Scheme,
@@ -564,10 +548,13 @@ impl RandomValues {
         roots: &RootField,
         attitudes: &[Matrix3<u64>],
     ) -> Result<Vec<Vec<TurnAt<u64>>>, usize> {
-        let Some((pi, _)) = self.torquers else { return Ok(Vec::new()) };
+        let Some(pi) = self.pi else { return Ok(Vec::new()) };
         let f = roots.field;
         let cos_sin = |angle: &Angle| self.angle_cos_sin(roots, angle);
-        turns_of(&f, scheme, paths, attitudes, |step, from, to| step.at_field(roots, from, to, pi, cos_sin))
+        let at = |step: &PathStep, from: &Matrix3<u64>, to: Option<&Matrix3<u64>>| {
+            step.at_field(roots, from, to, pi, cos_sin)
+        };
+        turns_of(&f, scheme, paths, attitudes, at, |reached, to| reached == to)
     }
 
     /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
@@ -586,25 +573,22 @@ impl RandomValues {
         let paths = scheme.paths().unwrap_or_default();
         let turns = self.turns(scheme, &paths, &roots, &attitudes);
         let turns = turns.expect("the ways of a platform have images in the fields of its angles");
-        let stations = scheme.stations();
-        let turning =
-            self.torquers.as_ref().map(|(_, rates)| stations.iter().map(|s| rates[s.index]).collect());
-        let turning = turning.unwrap_or_default();
-        Sample { roots, point: Point { ring: f, w_n, w_u, attitudes, turns, turning } }
+        Sample { roots, point: Point { ring: f, w_n, w_u, attitudes, turns } }
     }
 }
 
 /// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an attitude, and ends at another where
-/// it is the only one.
+/// it is the only one; `arrives` says whether a way ends where it should.
 ///
 /// # Errors
-/// The index of the first position whose way `at` does not know.
+/// The index of the first position whose way `at` does not know, or does not lead there.
 fn turns_of<R: Ring>(
     ring: &R,
     scheme: &Scheme,
     paths: &[Vec<PathStep>],
     attitudes: &[Matrix3<R::Element>],
     at: impl Fn(&PathStep, &Matrix3<R::Element>, Option<&Matrix3<R::Element>>) -> Option<TurnAt<R::Element>>,
+    arrives: impl Fn(&Matrix3<R::Element>, &Matrix3<R::Element>) -> bool,
 ) -> Result<Vec<Vec<TurnAt<R::Element>>>, usize> {
     let mut out = Vec::with_capacity(attitudes.len());
     let mut start = 0;
@@ -624,6 +608,10 @@ fn turns_of<R: Ring>(
                 attitude = product(ring, &attitude, &turn.rotation(ring));
                 turns.push(turn);
             }
+            // no path is given where torquer errors do not act on slews
+            if !paths.is_empty() && i > 0 && !arrives(&attitude, &attitudes[i]) {
+                return Err(station.index);
+            }
         }
         out.push(turns);
     }
@@ -631,21 +619,19 @@ fn turns_of<R: Ring>(
 }
 
 impl Point<Float> {
-    /// The platform in floating point at these rates of the earth, and of every position that turns.
-    pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64, turning: impl Fn(usize) -> f64) -> Self {
+    /// The platform in floating point at these rates of the earth.
+    pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64) -> Self {
         let scheme = platform.scheme();
-        let stations = scheme.stations();
         let cos_sin = |angle: &Angle| angle.turn().cos_sin_f64();
-        let attitudes: Vec<_> = stations.iter().map(|s| s.attitude(&Float, cos_sin)).collect();
-        let (mut turns, mut rates) = (Vec::new(), Vec::new());
+        let attitudes: Vec<_> = scheme.stations().iter().map(|s| s.attitude(&Float, cos_sin)).collect();
+        let mut turns = Vec::new();
         if scheme.unknowns.have(Source::Rate) {
-            turns = turns_of(&Float, scheme, &platform.paths, &attitudes, |step, from, _| {
-                Some(step.at_f64(from))
-            })
-            .unwrap_or_default();
-            rates = stations.iter().map(|s| turning(s.index)).collect();
+            // where they lead was found when the platform was made
+            let at = |step: &PathStep, from: &Matrix3<f64>, _: Option<&Matrix3<f64>>| Some(step.at_f64(from));
+            turns =
+                turns_of(&Float, scheme, &platform.paths, &attitudes, at, |_, _| true).unwrap_or_default();
         }
-        Self { ring: Float, w_n, w_u, attitudes, turns, turning: rates }
+        Self { ring: Float, w_n, w_u, attitudes, turns }
     }
 }
 

@@ -91,14 +91,7 @@ impl Symbols {
     pub fn point(&self, platform: &Platform, w_n: &str, w_u: &str) -> Point<Text> {
         let attitudes =
             platform.scheme().stations().iter().map(|s| s.attitude(&Text, |a| self.cos_sin(a))).collect();
-        Point {
-            ring: Text,
-            w_n: w_n.into(),
-            w_u: w_u.into(),
-            attitudes,
-            turns: Vec::new(),
-            turning: Vec::new(),
-        }
+        Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), attitudes, turns: Vec::new() }
     }
 
     /// Whether the sine and cosine of an angle are among the symbols.

@@ -256,7 +256,6 @@ fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
         w_u: rate(solver.tables.zeros.w_u),
         attitudes: platform.scheme().stations().iter().map(|s| s.attitude(&Text, cos_sin)).collect(),
         turns: Vec::new(),
-        turning: Vec::new(),
     }
 }
 

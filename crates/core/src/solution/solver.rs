@@ -270,7 +270,7 @@ impl<'a> Solver<'a> {
 pub(super) fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point<Float> {
     let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
     let (w_n, w_u) = (rate(tables.zeros.w_n, rates.0), rate(tables.zeros.w_u, rates.1));
-    Point::in_floats(platform, w_n, w_u, |_| 1.0)
+    Point::in_floats(platform, w_n, w_u)
 }
 
 /// Zero for what rounding left over.

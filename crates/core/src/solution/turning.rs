@@ -114,7 +114,7 @@ mod tests {
             let (minus, zero, plus) = (at("-0.01"), at("0"), at("0.01"));
             let h = 0.01f64.to_radians();
             let [first, second] = [1, 2].map(|k| attitude_derivative(&Float, &zero, axis, k));
-            let point = Point::in_floats(&platform, 0.8, 0.5, |_| 0.0);
+            let point = Point::in_floats(&platform, 0.8, 0.5);
             let drift = drift_derivative(&platform, &point, &zero, axis);
             let rows = [&minus, &plus]
                 .map(|c| platform.drift_rows(&Float, c, || earth_rate_in(&Float, c, &point.w_n, &point.w_u)));

@@ -404,12 +404,7 @@ fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
     let scheme = platform.scheme();
     let (c, s) =
         scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
-    let turning = |i: usize| {
-        let p = &scheme.positions[i];
-        let seconds = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
-        p.rotation.as_ref().map_or(0.0, |r| (r.angle.nanodeg() as f64 / 1e9).to_radians() / seconds)
-    };
-    let mut point = Point::in_floats(platform, W_IE * c, W_IE * s, turning);
+    let mut point = Point::in_floats(platform, W_IE * c, W_IE * s);
     // turns that take time, and those of rotating segments, are integrated
     for (station, turns) in scheme.stations().iter().zip(&mut point.turns) {
         if station.continues || conditions.slew_rate(station.position).is_some() {
