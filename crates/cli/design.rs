@@ -32,11 +32,13 @@ Examples:
   obsdeg design --positions 6 --criterion margin --requirement D=0.05 --requirement D_F=0.01 --meet
   obsdeg design --positions 5 --carry inertial --candidates grid:45 --gimbal beta=-60:60 --refine
   obsdeg design --positions 12 --carry reset --candidates free --round 5
+  obsdeg design --positions 12 --terms all --carry inertial --slew-rate 1 --criterion d
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --positions 7 --carry inertial --merge part-*.json
 
 Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. Under reset carry
-information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. With slews
+information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units
+differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
 winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error, 130 interrupted before anything was found.";
@@ -373,10 +375,19 @@ fn scheme_file(
     let scheme = scheme_found(best, base, conditions)?;
     let all = found.required.len() + 3 >= best.rank[1];
     let what = if all { "all coefficients".into() } else { found.required.join(", ") };
+    let search = found.search.as_ref();
+    let unit = search.and_then(|s| s.unit.as_deref());
+    let reached = match (unit, best.worst_sigma_dph) {
+        (Some("deg/h"), Some(sigma)) => format!("largest sigma of {what} {sigma:.3e} deg/h (per g)"),
+        _ => {
+            let name = search.map_or("", |s| s.criterion.as_str());
+            let unit = unit.map_or_else(String::new, |u| format!(" {u}"));
+            format!("criterion {name} of {what} {:.3e}{unit}", best.value)
+        }
+    };
     Ok(format!(
-        "# {proven} of {} candidates: largest sigma of {what} {:.3e} deg/h (per g) in {:.0} s, no prior, no drift noise, seed {}\n# {}\n{}",
+        "# {proven} of {} candidates: {reached} in {:.0} s, no prior, no drift noise, seed {}\n# {}\n{}",
         found.candidates.len(),
-        best.worst_sigma_dph,
         best.total_s,
         found.seed,
         visible(&positions),

@@ -45,6 +45,7 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
     let evaluator = Evaluator::new(&base, &candidates, &ALL, &Conditions::default()).expect("an evaluator");
     let search = Search {
         rows: &rows,
+        walks: false,
         evaluator: &evaluator,
         criterion: &Criterion::Worst,
         constraints: &Constraints::default(),

@@ -21,6 +21,15 @@ fn criterion(name: &str) -> &'static str {
     }
 }
 
+/// ` [deg/h, /g]`: the unit of the criterion, if it has one.
+fn unit(s: &SearchReport) -> String {
+    match s.unit.as_deref() {
+        Some(unit @ ("deg/h" | "ug")) => format!(" [{unit}, /g]"),
+        Some(unit) => format!(" [{unit}]"),
+        None => String::new(),
+    }
+}
+
 /// `NUE (-N) NDW`: the positions in order, with the axes of the half turns between them.
 fn route(f: &Found) -> String {
     let mut out = Vec::new();
@@ -58,7 +67,9 @@ fn table(heading: &str, found: &[Found]) -> Block {
             f.worst_degree.to_string(),
             f.worst_accuracy_order.map_or_else(|| "-".into(), |o| o.to_string()),
             number(f.value),
-            format!("{} ({})", number(f.worst_sigma_dph), f.worst),
+            f.worst_sigma_dph
+                .zip(f.worst.as_ref())
+                .map_or_else(|| "-".into(), |(sigma, name)| format!("{} ({name})", number(sigma))),
             margin(&f.requirements),
             format!("{} of {}", f.rank[0], f.rank[1]),
         ]
@@ -147,9 +158,17 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     );
     if s.conditions.slew_rate_deg_s.is_some() {
         out.push(
-            "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at once; only what is observable so is \
-             listed, and its samples determine it with the slews; what slews alone would determine is not sought"
-                .into(),
+            match s.degree_floor {
+                Some(_) => {
+                    "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at once; only what is observable so \
+                     is listed, and its samples determine it with the slews; what slews alone would determine is not sought"
+                }
+                None => {
+                    "degrees, accuracy orders and ranks are those of turns fast against the earth rate, in which torquer errors act; only what \
+                     is observable so is listed, and its samples determine it with the slews"
+                }
+            }
+            .into(),
         );
         out.push(
             "half turns are tried in both directions, which are different schemes: the axis about which they are right-handed stands \
@@ -157,11 +176,16 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
                 .into(),
         );
     }
-    out.push(format!(
-        "a smaller worst degree comes first (no scheme of these candidates is below {}), then the criterion, {}",
-        s.degree_floor,
-        criterion(&s.criterion)
-    ));
+    let by = criterion(&s.criterion);
+    out.push(match s.degree_floor {
+        Some(floor) => format!(
+            "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the criterion, {by}"
+        ),
+        None => format!(
+            "torquer errors act in every turn, so that only a whole scheme has degrees: schemes are ordered by the criterion alone, {by}; what is \
+             listed is observable by the exact verdict"
+        ),
+    });
     out.extend(s.constraints.iter().map(|c| format!("constraint: {c}")));
     out
 }
@@ -263,6 +287,9 @@ fn minimum(d: &Design) -> Vec<String> {
     }
     let mut out = match m.positions {
         Some(k) => vec![format!("{k} positions: {}", m.witness.join(" "))],
+        None if d.search.as_ref().is_some_and(|s| s.degree_floor.is_none()) => {
+            vec!["not asked: torquer errors act in every turn (see `obsdeg design --minimum`)".into()]
+        }
         None => vec!["not known: the sets are too many to examine all".into()],
     };
     out.extend((m.positions.is_some() && !m.proven).then_some(chance));
@@ -377,8 +404,8 @@ pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
     let last = d.front.last().map(|f| (f.total_s, f.value));
     let label = match search.criterion.as_str() {
         "margin" => "largest sigma over requirement".into(),
-        "worst" => "largest sigma [deg/h, /g]".into(),
-        other => format!("{other}-criterion [deg/h, /g]"),
+        "worst" => format!("largest sigma{}", unit(search)),
+        other => format!("{other}-criterion{}", unit(search)),
     };
     let slews =
         search.conditions.slew_rate_deg_s.map_or_else(String::new, |r| format!(", slews at {r} deg/s"));

@@ -7,6 +7,7 @@ mod orders;
 mod parts;
 mod search;
 mod sigmas;
+mod whole;
 
 use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo, cardinal};
 use obsdeg_design::design::{Candidates, Design, DesignOptions, Evaluator, Found, Progress, Rows, design};
@@ -52,6 +53,11 @@ fn scheme_of(names: &[String], carry: Carry) -> Scheme {
 
 fn quiet() -> Conditions {
     Conditions { drift_noise: "0 deg/h".parse().expect("a drift noise"), ..Conditions::default() }
+}
+
+/// Its largest sigma of a drift.
+fn worst(found: &Found) -> f64 {
+    found.worst_sigma_dph.expect("a drift is required")
 }
 
 /// A scheme that was found, with its half turns as they were found.

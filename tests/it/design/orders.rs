@@ -347,6 +347,7 @@ fn both_searches_order_as_brute_force() {
             // exchange is not sure to find the best, but what it finds is what it seems, and never better than the best
             let search = Search {
                 rows: &all.rows,
+                walks: false,
                 evaluator: &all.evaluator,
                 criterion: &all.criterion,
                 constraints: &all.constraints,

@@ -84,6 +84,8 @@ pub struct SearchReport {
     pub prior: Option<String>,
     /// What makes a scheme better: worst, A, D, E or margin.
     pub criterion: String,
+    /// Its unit: deg/h (per g), ug (per g), ppm or arcsec; null for margin, and for D of coefficients in several units, each in its own.
+    pub unit: Option<String>,
     /// Sequences whose sigma was computed.
     pub examined: u64,
     /// Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
@@ -98,8 +100,8 @@ pub struct SearchReport {
     pub order_matters: bool,
     /// Whether the search was interrupted; if the first is proven nevertheless, before the front was complete.
     pub interrupted: bool,
-    /// The smallest worst degree that all candidates together allow.
-    pub degree_floor: usize,
+    /// The smallest worst degree that all candidates together allow; null where torquer errors act on the way, so that sets have no degree.
+    pub degree_floor: Option<usize>,
     /// The constraints in words.
     pub constraints: Vec<String>,
     /// How good the best can be; null where no such bound is known: under platform and inertial carry information is no sum over positions.
@@ -178,12 +180,13 @@ pub struct Found {
     pub dwell_s: f64,
     /// Total time with turns, in s.
     pub total_s: f64,
-    /// The criterion: a sigma in deg/h (per g), or for margin the largest sigma over its requirement, psi's too where it counts.
+    /// The criterion: a sigma in its unit, or for margin the largest sigma over its requirement, psi's too where it counts.
     pub value: f64,
-    /// The largest sigma of a required coefficient in deg/h (per g): information of all samples, no prior, no drift noise.
-    pub worst_sigma_dph: f64,
+    /// The largest sigma of a required drift coefficient in deg/h (per g): information of all samples, no prior, no drift noise; null when none is
+    /// required.
+    pub worst_sigma_dph: Option<f64>,
     /// The coefficient that has it.
-    pub worst: String,
+    pub worst: Option<String>,
     /// What became of the requirements on what must be observable, and on psi (of the start, under reset carry of every position) when that is
     /// every coefficient.
     pub requirements: Requirements,

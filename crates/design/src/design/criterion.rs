@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use obsdeg_core::model::Carry;
 
-use super::information::{Evaluator, MAX, State};
+use super::information::{Evaluator, MAX, MAX_DRIFTS, State};
 use super::ways::Stop;
 
 /// What makes one scheme better than another, of the coefficients that count.
@@ -106,8 +106,15 @@ impl Evaluator {
 
     /// The variance of unknown `i`: the square of column i of the inverse of the root `l`.
     fn variance(&self, l: &[f64], i: usize) -> f64 {
+        match self.n {
+            0..=MAX_DRIFTS => self.variance_in::<MAX_DRIFTS>(l, i),
+            _ => self.variance_in::<MAX>(l, i),
+        }
+    }
+
+    fn variance_in<const N: usize>(&self, l: &[f64], i: usize) -> f64 {
         let n = self.n;
-        let mut column = [0.0; MAX];
+        let mut column = [0.0; N];
         column[i] = 1.0 / l[i * n + i];
         let mut variance = column[i] * column[i];
         for r in i + 1..n {

@@ -4,8 +4,8 @@
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, W_IE};
 use obsdeg_core::model::{
-    Carry, Euler, Float, Gimbals, Matrix3, PSI_EPS, Platform, Scheme, c_n_f64, earth_rate_in, local_dynamics,
-    local_output,
+    Carry, Euler, Float, Gimbals, LOCAL, Matrix3, PSI_EPS, Platform, Scheme, c_n_f64, earth_rate_in,
+    local_dynamics, local_output,
 };
 use obsdeg_ekf::integrate::van_loan;
 use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, latitude_of, si_per_shown, steps};
@@ -13,15 +13,18 @@ use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, latitude_of
 use super::DesignError;
 use super::ways::{Stop, Way};
 
-/// Most unknowns of a search: psi and the coefficients of ten terms.
-pub(crate) const MAX: usize = 33;
+/// Most unknowns of a search: psi and the coefficients of all terms.
+pub(crate) const MAX: usize = 66;
+/// The same without errors of the accelerometers.
+pub(super) const MAX_DRIFTS: usize = 33;
 
-/// One candidate: its attitude, and how coefficients become drift there.
+/// One candidate: its attitude, and what coefficients make of drift and accelerometers there.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
     pub(super) c: Matrix3<f64>,
-    /// `C E(g)` (3 x d), columns in the order of the evaluator.
-    pub(super) drift: [Vec<f64>; 3],
+    /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the order of the evaluator; the last three
+    /// are empty where none is unknown.
+    pub(super) effects: [Vec<f64>; LOCAL - 3],
     /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower triangle): what it
     /// adds to any scheme under reset carry; empty under the others.
     pub(super) own: Vec<f64>,
@@ -36,20 +39,24 @@ pub struct Evaluator {
     order: Vec<usize>,
     /// How many coefficients do not count.
     pub(super) nuisance: usize,
+    /// The unit of every coefficient that is shown as 1, in `dph`, in the order of the evaluator.
+    scale: Vec<f64>,
     /// Unknowns: psi, then d coefficients.
     pub(super) n: usize,
+    /// Local unknowns of a position.
+    locals: usize,
     /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
     pub(super) w: Matrix3<f64>,
     /// Dwell of each position, in s.
     dwell_s: f64,
-    /// Information of one position on its `(psi^n, eps^n)`.
-    pub(super) local: [[f64; PSI_EPS]; PSI_EPS],
+    /// Information of one position on its local unknowns.
+    pub(super) local: [[f64; LOCAL]; LOCAL],
     /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
     phi: [[f64; PSI_EPS]; 3],
     pub(super) candidates: Vec<Candidate>,
     /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
     pub(super) ways: Vec<Way>,
-    /// deg/h per unit of each coefficient.
+    /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its coefficient.
     pub(super) dph: f64,
 }
 
@@ -104,25 +111,30 @@ impl Evaluator {
         }
         let platform = Platform::new(scheme)?;
         let d = platform.coefficients();
+        let dph = si_per_shown("deg/h");
         if d + 3 > MAX {
             return Err(DesignError::TooManyUnknowns { found: d + 3 });
         }
         let f = local_dynamics(&Float, &(W_IE * latitude.0), &(W_IE * latitude.1));
         let counts = |c: &usize| required.contains(c);
         let order: Vec<usize> = (0..d).filter(|c| !counts(c)).chain((0..d).filter(|c| counts(c))).collect();
+        let locals = platform.observed().locals();
+        let units = platform.units()[platform.units().len() - d..].to_vec();
         let empty = Self {
             platform,
             conditions: conditions.clone(),
             nuisance: d - required.len(),
+            scale: order.iter().map(|&c| si_per_shown(units[c]) / dph).collect(),
             order,
             n: d + 3,
+            locals,
             w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
             dwell_s: conditions.dwell_s,
-            local: [[0.0; PSI_EPS]; PSI_EPS],
+            local: [[0.0; LOCAL]; LOCAL],
             phi: [[0.0; PSI_EPS]; 3],
             candidates: Vec::new(),
             ways: Vec::new(),
-            dph: si_per_shown("deg/h"),
+            dph,
         };
         let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(c_n_f64).collect();
         empty.with_dwell(conditions.dwell_s)?.among(&attitudes, going)
@@ -133,27 +145,21 @@ impl Evaluator {
     /// # Errors
     /// [`DesignError::Filter`].
     pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
-        let mut f = DMatrix::zeros(PSI_EPS, PSI_EPS);
-        for i in 0..3 {
-            for j in 0..3 {
-                f[(i, j)] = self.w[i][j];
-            }
-            f[(i, i + 3)] = 1.0;
-        }
+        let f = local_dynamics(&Float, &self.w[1][2], &-self.w[0][2]);
+        let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
         let steps = steps(dwell_s, self.conditions.step_s)?;
-        let none = DMatrix::zeros(PSI_EPS, PSI_EPS);
+        let none = DMatrix::zeros(LOCAL, LOCAL);
         let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
         let outputs = local_output(&Float, self.platform.observed());
-        let mut now: DMatrix<f64> = DMatrix::identity(PSI_EPS, PSI_EPS);
-        self.local = [[0.0; PSI_EPS]; PSI_EPS];
+        let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
+        self.local = [[0.0; LOCAL]; LOCAL];
         for _ in 0..steps {
             now = &step * now;
             for (component, h) in &outputs {
                 let weight = 1.0 / Plan::output_sigma(*component, &self.conditions).powi(2);
-                let row: [f64; PSI_EPS] =
-                    std::array::from_fn(|j| (0..PSI_EPS).map(|i| h[i] * now[(i, j)]).sum());
-                for i in 0..PSI_EPS {
-                    for j in 0..PSI_EPS {
+                let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
+                for i in 0..LOCAL {
+                    for j in 0..LOCAL {
                         self.local[i][j] += weight * row[i] * row[j];
                     }
                 }
@@ -171,10 +177,20 @@ impl Evaluator {
     /// The rows of `eps^n` at an attitude, while the platform turns as `slew` says.
     pub(super) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
         let rate = || {
-            let earth = earth_rate_in(&Float, c, &-self.w[0][2], &self.w[1][2]);
+            let earth = earth_rate_in(&Float, c, &self.w[1][2], &-self.w[0][2]);
             std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
         };
         self.platform.drift_rows(&Float, c, rate)
+    }
+
+    /// [`Candidate::effects`] of an attitude.
+    pub(super) fn effects(&self, c: &Matrix3<f64>) -> [Vec<f64>; LOCAL - 3] {
+        let [x, y, z] = self.ordered_columns(self.drift_rows(c, None));
+        let [a, b, c] = match self.platform.observed().accelerometers {
+            true => self.ordered_columns(self.platform.accelerometer_rows(&Float, c)),
+            false => Default::default(),
+        };
+        [x, y, z, a, b, c]
     }
 
     /// The candidates without the ways between them.
@@ -182,23 +198,25 @@ impl Evaluator {
         self.candidates = attitudes
             .iter()
             .map(|c| {
-                let drift = self.ordered_columns(self.drift_rows(c, None));
-                Candidate { own: self.information_alone(c, &drift), drift, c: *c }
+                let effects = self.effects(c);
+                Candidate { own: self.information_alone(c, &effects), effects, c: *c }
             })
             .collect();
         self.ways.clear();
     }
 
     /// Information of one position on the coefficients with a psi of its own; empty where psi goes on.
-    fn information_alone(&self, c: &Matrix3<f64>, drift: &[Vec<f64>; 3]) -> Vec<f64> {
+    fn information_alone(&self, c: &Matrix3<f64>, effects: &[Vec<f64>; LOCAL - 3]) -> Vec<f64> {
         if self.carry() != Carry::Reset {
             return Vec::new();
         }
         let n = self.n;
-        let mut local = [[0.0; MAX]; PSI_EPS];
+        let mut local = [[0.0; MAX]; LOCAL];
         for r in 0..3 {
             local[r][..3].copy_from_slice(&c[r]);
-            local[3 + r][3..n].copy_from_slice(&drift[r]);
+        }
+        for (row, effect) in local[3..self.locals].iter_mut().zip(effects) {
+            row[3..n].copy_from_slice(effect);
         }
         let weighted = self.weighted(&local);
         let mut own = [[0.0; MAX]; MAX];
@@ -217,23 +235,22 @@ impl Evaluator {
             .collect()
     }
 
-    /// Information of a position on its drift in n, its psi eliminated (3 x 3).
-    pub(super) fn drift_information(&self) -> Matrix3<f64> {
+    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi eliminated.
+    pub(super) fn information_of_effects(&self) -> [[f64; LOCAL - 3]; LOCAL - 3] {
         let mut all = [[0.0; MAX]; MAX];
         for (row, local) in all.iter_mut().zip(&self.local) {
-            row[..PSI_EPS].copy_from_slice(local);
+            row[..LOCAL].copy_from_slice(local);
         }
-        eliminate(&mut all, PSI_EPS, 3);
+        eliminate(&mut all, LOCAL, 3);
         std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
     }
 
-    /// `G L` for the functionals L of `(psi^n, eps^n)` at a position (6 x n).
-    fn weighted(&self, local: &[[f64; MAX]; PSI_EPS]) -> [[f64; MAX]; PSI_EPS] {
+    /// `G L` for the functionals L of the local unknowns at a position (of n unknowns each).
+    fn weighted<const L: usize, const N: usize>(&self, local: &[[f64; N]; L]) -> [[f64; N]; L] {
         let n = self.n;
-        let mut weighted = [[0.0; MAX]; PSI_EPS];
-        for (i, row) in weighted.iter_mut().enumerate() {
-            for (k, l) in local.iter().enumerate() {
-                let g = self.local[i][k];
+        let mut weighted = [[0.0; N]; L];
+        for (row, weights) in weighted.iter_mut().zip(&self.local) {
+            for (l, &g) in local.iter().zip(weights) {
                 if g != 0.0 {
                     for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
                         *x += g * y;
@@ -244,8 +261,9 @@ impl Evaluator {
         weighted
     }
 
+    /// Rows on the coefficients in SI units, in the order and the units of the evaluator.
     pub(super) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
-        rows.map(|row| self.order.iter().map(|&c| row[c]).collect())
+        rows.map(|row| self.order.iter().zip(&self.scale).map(|(&c, scale)| row[c] * scale).collect())
     }
 
     /// Nothing yet.
@@ -275,9 +293,17 @@ impl Evaluator {
 
     /// Adds a position to `state`; the result goes to `out`.
     pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
+        // sizes that the compiler knows
+        match self.locals {
+            PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, out),
+            _ => self.extend_in::<LOCAL, MAX>(state, stop, out),
+        }
+    }
+
+    fn extend_in<const L: usize, const N: usize>(&self, state: &State, stop: Stop, out: &mut State) {
         let n = self.n;
         let carry = self.carry();
-        let Candidate { c, drift, own } = &self.candidates[stop.candidate];
+        let Candidate { c, effects, own } = &self.candidates[stop.candidate];
         let turn = self.way_to(state.path.last().copied(), stop);
         out.path.clone_from(&state.path);
         out.path.push(stop.candidate);
@@ -289,7 +315,10 @@ impl Evaluator {
             }
             return;
         }
-        let mut local = [[0.0; MAX]; PSI_EPS];
+        let mut local = [[0.0; N]; L];
+        for (row, effect) in local[3..].iter_mut().zip(effects) {
+            row[3..n].copy_from_slice(effect);
+        }
         for r in 0..3 {
             match turn {
                 _ if carry == Carry::Platform => {
@@ -307,7 +336,6 @@ impl Evaluator {
                     }
                 }
             }
-            local[3 + r][3..n].copy_from_slice(&drift[r]);
         }
         // L^T (G L)
         let weighted = self.weighted(&local);
@@ -320,7 +348,7 @@ impl Evaluator {
                 }
             }
         }
-        let mut after = [[0.0; MAX]; 3];
+        let mut after = [[0.0; N]; 3];
         for (row, phi) in after.iter_mut().zip(&self.phi) {
             for (l, p) in local.iter().zip(phi) {
                 for (x, y) in row[..n].iter_mut().zip(&l[..n]) {

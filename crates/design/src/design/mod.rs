@@ -45,7 +45,7 @@ pub use winner::scheme as scheme_found;
 use candidates::MAX_CANDIDATES;
 use certify::excess;
 use obsdeg_core::degree::EnsembleError;
-use obsdeg_core::model::{Angle, Carry, Scheme, SchemeError, Source, format_decimal};
+use obsdeg_core::model::{Angle, Carry, Euler, Path, Scheme, SchemeError, c_n_f64, format_decimal};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, SimulationError, latitude_of};
 use task::Task;
 use ties::TIE;
@@ -226,16 +226,24 @@ pub enum DesignError {
     },
     /// What is searched over sets only.
     #[error(
-        "torquer errors act on the way between positions, so schemes are walks: of these --minimum finds the fewest positions; sigmas are not \
-         searched (use `obsdeg compare` on a scheme with slew_rate_deg_s)"
+        "torquer errors act on the way between positions, so schemes are walks: found {found}; expected slews that take time (--slew-rate), about one \
+         axis, between cardinal attitudes, by exchange (no --refine, --part, or cap of degrees); --minimum finds the fewest positions"
     )]
-    Walks,
-    /// Sigmas of a search are those of drifts.
+    Walks {
+        /// What is not of walks.
+        found: String,
+    },
+    /// No sigma is the largest of several units.
     #[error(
-        "errors of the accelerometers are unknown: --minimum finds the fewest positions, but sigmas with them are not searched (use `obsdeg compare` on \
-         schemes)"
+        "{criterion} compares sigmas in one unit, but {units} are required; expected criterion margin (over requirements), or D (their geometric mean), or \
+         --observable with coefficients of one unit: the others are estimated with them"
     )]
-    Accelerometers,
+    Units {
+        /// The criterion.
+        criterion: &'static str,
+        /// An example of every unit.
+        units: String,
+    },
     /// A number is not finite.
     #[error(transparent)]
     Filter(#[from] EkfError),
@@ -373,13 +381,13 @@ impl<'a> Prepared<'a> {
         going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         if is_walk(base) {
-            return Err(DesignError::Walks);
-        }
-        if options.positions.is_some() && base.unknowns.have(Source::Force) {
-            return Err(DesignError::Accelerometers);
+            check_walks(base, conditions, options)?;
         }
         let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
         let task = Task::new(base, conditions, options, reached)?;
+        if options.positions.is_some() {
+            task.unit()?;
+        }
         let every: Vec<usize> = (0..task.rows.candidates()).collect();
         let degrees = task.rows.degrees(&every);
         let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
@@ -393,6 +401,7 @@ impl<'a> Prepared<'a> {
     fn search<'s>(&'s self, progress: &'s (dyn Fn(Progress) -> bool + Sync)) -> Search<'s> {
         Search {
             rows: &self.task.rows,
+            walks: self.task.walks,
             evaluator: &self.evaluator,
             criterion: &self.task.criterion,
             constraints: &self.task.constraints,
@@ -413,6 +422,9 @@ impl<'a> Prepared<'a> {
                 self.conditions.dwell_s
             ));
         }
+        if self.task.walks {
+            return Ok(());
+        }
         let never: Vec<&str> = self.task.never(&self.degrees).collect();
         match never.is_empty() {
             true => Ok(()),
@@ -422,8 +434,29 @@ impl<'a> Prepared<'a> {
 
     /// The number of sets and of sequences of an exhaustive search.
     fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
+        if self.task.walks {
+            return Err(DesignError::Walks { found: "a search of all sequences".into() });
+        }
         let too_many = DesignError::TooMany { positions: k, candidates: self.task.rows.candidates() };
         self.task.space(k, &self.evaluator).ok_or(too_many)
+    }
+}
+
+/// Refuses what is not done where torquer errors act on the way between positions.
+fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> Result<(), DesignError> {
+    let whole = |x: &f64| (x - x.round()).abs() < 1e-12;
+    let cardinal = |a: &Euler| c_n_f64(a).as_flattened().iter().all(whole);
+    let other = options.candidates.attitudes.iter().position(|a| !cardinal(a));
+    let found = [
+        conditions.slew_rate_deg_s.is_none().then(|| "repositioning at once".into()),
+        (base.path == Some(Path::Gimbals)).then(|| "slews gimbal by gimbal".into()),
+        other.map(|i| format!("candidate {}", options.candidates.names[i])),
+        options.refine.then(|| "--refine".into()),
+        (!options.degree_caps.is_empty()).then(|| "a cap of degrees".into()),
+    ];
+    match found.into_iter().flatten().next() {
+        Some(found) => Err(DesignError::Walks { found }),
+        None => Ok(()),
     }
 }
 
@@ -571,13 +604,14 @@ fn answered(
             drift_noise: None,
             prior: None,
             criterion: task.criterion.name().into(),
+            unit: task.unit().ok().flatten().map(Into::into),
             examined: best.examined,
             lost: best.lost,
             proven: all && out.error_bound < PROOF,
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),
             interrupted: stopped.load(Ordering::Relaxed),
-            degree_floor: search.floor,
+            degree_floor: (!task.walks).then_some(search.floor),
             constraints: task.constraints_in_words(),
             certificate,
         });

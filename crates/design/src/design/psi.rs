@@ -57,12 +57,15 @@ impl Evaluator {
     /// not determined.
     pub(super) fn psi_by_coefficients(&self, candidate: usize, k: usize) -> Option<(f64, Vec<f64>)> {
         let (n, c) = (self.n, &self.candidates[candidate].c);
-        let drift = &self.candidates[candidate].drift;
+        let effects = &self.candidates[candidate].effects;
         let local = |i: usize, j: usize| self.local[i][j];
         // information on psi^c, and between psi^c and the coefficients
         let weighted = |k: usize, j: usize| (0..3).map(|r| c[r][k] * local(r, j)).sum::<f64>();
         let own = |i: usize, k: usize| (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();
-        let cross = |i: usize, d: usize| (0..3).map(|r| weighted(i, 3 + r) * drift[r][d]).sum::<f64>();
+        let cross = |i: usize, d: usize| {
+            let of = |(r, row): (usize, &Vec<f64>)| row.get(d).map_or(0.0, |x| weighted(i, 3 + r) * x);
+            effects.iter().enumerate().map(of).sum::<f64>()
+        };
         let mut l = [0.0; 9];
         for i in 0..3 {
             for j in 0..=i {

@@ -208,8 +208,10 @@ fn before(a: &Scored, b: &Scored) -> bool {
 
 /// What every search shares.
 pub struct Search<'a> {
-    /// Exact verdicts.
+    /// Exact verdicts of sets.
     pub rows: &'a Rows,
+    /// Torquer errors act on the way: then a set has no verdict, and those sequences count whose samples determine what is required.
+    pub walks: bool,
     /// Sigmas.
     pub evaluator: &'a Evaluator,
     /// What is to be small.
@@ -415,6 +417,9 @@ impl Search<'_> {
     /// The worst degree of every observable set, where it is known beforehand: none is better than all candidates
     /// together, none worse than the last order.
     fn only_degree(&self) -> Option<usize> {
+        if self.walks {
+            return Some(0);
+        }
         (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
     }
 
@@ -554,6 +559,9 @@ impl Search<'_> {
     /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at
     /// once, does not.
     fn judged(&self, mut scored: Scored) -> Scored {
+        if self.walks {
+            return scored;
+        }
         let degrees = self.rows.likely_degrees(&candidates(&scored.sequence));
         scored.worth.violation += degrees.iter().filter(|d| d.is_none()).count() as f64;
         scored

@@ -3,7 +3,7 @@
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::concerns;
-use obsdeg_core::model::{Euler, Platform, Scheme, Unknowns, c_n_f64};
+use obsdeg_core::model::{Carry, Euler, Path, Platform, Scheme, Unknowns, c_n_f64};
 use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::{Conditions, latitude_of, resolve};
 use rayon::prelude::*;
@@ -15,8 +15,9 @@ use super::information::Evaluator;
 use super::observability::Rows;
 use super::search::{Best, Constraints, Scored, Search};
 use super::symmetry::Symmetry;
+use super::walks::is_walk;
 use super::ways::Stop;
-use super::{CriterionName, Design, DesignError, DesignOptions, EXHAUSTIVE, refine};
+use super::{CriterionName, Design, DesignError, DesignOptions, EXHAUSTIVE, refine, winner};
 
 /// Most sets whose keys are held.
 const MOST_SETS: u64 = 5_000_000;
@@ -44,6 +45,10 @@ pub(super) struct Task<'a> {
     pub(super) symmetry: Symmetry,
     /// Whether repositioning takes time.
     slews: bool,
+    /// The units of all coefficients.
+    units: Vec<&'static str>,
+    /// Whether torquer errors act on the way between positions: sets have no verdict then.
+    pub(super) walks: bool,
 }
 
 impl<'a> Task<'a> {
@@ -123,7 +128,10 @@ impl<'a> Task<'a> {
             CriterionName::Margin => Criterion::Margin(limits.clone()),
         };
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
-        let rows = Rows::new(base, &candidates.attitudes, &indices, options.seed)?;
+        let walks = is_walk(base);
+        // of walks these say which attitudes are the same
+        let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
+        let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
         // an attitude counts once
         let repeated = rows.repeated();
         let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
@@ -165,7 +173,29 @@ impl<'a> Task<'a> {
             rows,
             symmetry,
             slews: conditions.slew_rate_deg_s.is_some(),
+            units: platform.units()[first..].to_vec(),
+            walks,
         })
+    }
+
+    /// The unit of the criterion; none when it has none, or several.
+    ///
+    /// # Errors
+    /// [`DesignError::Units`] when no unit is that of what the criterion compares.
+    pub(super) fn unit(&self) -> Result<Option<&'static str>, DesignError> {
+        let families = [("deg/h", "deg/h"), ("ug", "ug"), ("ppm", "ppm"), ("arcsec", "arcsec")];
+        let named = |family: &str| self.required.iter().find(|r| self.units[r.1].starts_with(family));
+        let found: Vec<_> = families.iter().filter_map(|(f, unit)| Some((*unit, &named(f)?.0))).collect();
+        match (&self.criterion, &found[..]) {
+            (Criterion::Margin(_), _) => Ok(None),
+            (_, [(unit, _)]) => Ok(Some(*unit)),
+            (Criterion::D, _) => Ok(None),
+            (criterion, _) => {
+                let units = found.iter().map(|(unit, name)| format!("{name} [{unit}]"));
+                let units = units.collect::<Vec<_>>().join(", ");
+                Err(DesignError::Units { criterion: criterion.name(), units })
+            }
+        }
     }
 
     /// The required coefficients that all candidates together, of these degrees, leave unobservable.
@@ -189,11 +219,14 @@ impl<'a> Task<'a> {
             witness: Vec::new(),
             counting_bound: self.rows.counting_bound(),
             none_of: Vec::new(),
-            never: self.never(best_degrees).map(Into::into).collect(),
+            never: if self.walks { Vec::new() } else { self.never(best_degrees).map(Into::into).collect() },
             proven: true,
         };
         if !out.never.is_empty() {
             return Ok(out);
+        }
+        if self.walks {
+            return Ok(Minimum { counting_bound: 0, proven: false, ..out });
         }
         let firsts = self.symmetry.representatives();
         let asked = self.options.positions.is_none();
@@ -222,6 +255,9 @@ impl<'a> Task<'a> {
     /// The number of sets behind an exhaustive search of `k` positions, and of sequences up to symmetry; `None` where
     /// there are too many to hold, or to count.
     pub(super) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<(u64, u64)> {
+        if self.walks {
+            return None;
+        }
         let n = self.rows.candidates() as u64;
         let sets: u64 = (1..=k as u64).try_fold(0u64, |sum, size| sum.checked_add(choose(n, size)?))?;
         let searched = if evaluator.ordered() {
@@ -261,8 +297,14 @@ impl<'a> Task<'a> {
     ) -> Result<Option<Found>, DesignError> {
         let angles = attitudes.iter().map(|a| a.each_ref().map(ToString::to_string).join(","));
         let angles = angles.collect();
+        let mut stops = Scheme::of_angles(attitudes).positions;
+        let half_turns = evaluator.half_turns(sequence);
+        for (k, turn) in &half_turns {
+            stops[*k].slew = self.walks.then(|| winner::half_turn(&turn.about));
+        }
         let scheme = Scheme {
-            positions: Scheme::of_angles(attitudes).positions,
+            positions: stops,
+            path: if self.walks { Some(Path::OneAxis) } else { self.base.path },
             latitude: latitude_of(self.base),
             combinations: Vec::new(),
             ..self.base.clone()
@@ -277,10 +319,13 @@ impl<'a> Task<'a> {
         let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
         let order_of = |c: usize| accuracy.as_ref().and_then(|a| a.order[c]);
         let orders = columns().map(order_of).collect::<Option<Vec<_>>>();
-        let half_turns = evaluator.half_turns(sequence).into_iter();
         let sigmas = evaluator.sigmas(sequence);
-        let worst = sigmas.iter().zip(&self.required).max_by(|a, b| a.0.total_cmp(b.0));
-        let Some((&worst_sigma_dph, (worst, _))) = worst else { return Ok(None) };
+        if sigmas.is_empty() {
+            return Ok(None);
+        }
+        let drifts = sigmas.iter().zip(&self.required).filter(|(_, r)| self.units[r.1].starts_with("deg/h"));
+        let (worst_sigma_dph, worst) =
+            drifts.max_by(|a, b| a.0.total_cmp(b.0)).map(|(s, r)| (*s, r.0.clone())).unzip();
         let determined = |c: usize| match accuracy {
             Some(_) => order_of(c).is_some(),
             None => verdicts.degrees.degree[c].is_some(),
@@ -309,13 +354,16 @@ impl<'a> Task<'a> {
         Ok(Some(Found {
             positions,
             angles,
-            half_turns: half_turns.map(|(k, turn)| HalfTurn { to: k + 1, about: turn.about }).collect(),
+            half_turns: half_turns
+                .into_iter()
+                .map(|(k, turn)| HalfTurn { to: k + 1, about: turn.about })
+                .collect(),
             refined: false,
             dwell_s: evaluator.dwell_s(),
             total_s: evaluator.state_of(sequence).seconds,
             value,
             worst_sigma_dph,
-            worst: worst.clone(),
+            worst,
             requirements,
             worst_degree: degrees.into_iter().max().unwrap_or(0),
             worst_accuracy_order: orders.and_then(|o| o.into_iter().max()),

@@ -50,7 +50,7 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
 }
 
 /// Half a turn about a direction in n: an axis by its name, others by components of which the largest is 1.
-fn half_turn(about: &[f64; 3]) -> SlewTo {
+pub(super) fn half_turn(about: &[f64; 3]) -> SlewTo {
     let largest = about.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let direction = about.map(|x| (x / largest * 1e12).round() / 1e12 + 0.0);
     let named = ["N", "U", "E"].iter().zip(direction).filter(|(_, x)| *x != 0.0).collect::<Vec<_>>();

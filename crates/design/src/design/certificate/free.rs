@@ -7,7 +7,7 @@
 //! Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))` over a net that is never further than h.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::{Angle, Carry, Euler, Matrix3, c_n_f64};
+use obsdeg_core::model::{Angle, Carry, Euler, LOCAL, Matrix3, c_n_f64};
 use rayon::prelude::*;
 
 use super::super::criterion::{Criterion, Limits};
@@ -97,12 +97,14 @@ impl Evaluator {
 
     /// `d(C)` for one position, X in units of deg/h.
     fn energy(&self, c: &Matrix3<f64>, x: &DMatrix<f64>) -> f64 {
-        let rows = self.ordered_columns(self.drift_rows(c, None));
-        let g = self.drift_information();
+        let rows = self.effects(c);
+        let g = self.information_of_effects();
         let mut sum = 0.0;
         for column in x.column_iter() {
-            let y: [f64; 3] = [0, 1, 2].map(|r| rows[r].iter().zip(column.iter()).map(|(a, b)| a * b).sum());
-            sum += (0..3).map(|i| (0..3).map(|j| y[i] * g[i][j] * y[j]).sum::<f64>()).sum::<f64>();
+            let y: [f64; LOCAL - 3] =
+                rows.each_ref().map(|row| row.iter().zip(column.iter()).map(|(a, b)| a * b).sum());
+            let weighted = g.iter().map(|row| row.iter().zip(&y).map(|(g, y)| g * y).sum::<f64>());
+            sum += weighted.zip(&y).map(|(g, y)| g * y).sum::<f64>();
         }
         sum
     }
