@@ -2,6 +2,10 @@
 
 use std::cmp::Ordering;
 
+mod sum;
+
+pub use sum::BallSum;
+
 /// A real number `+-mantissa 2^(exponent - 64 N)`, known up to `error` units of its last place.
 ///
 /// Every operation bounds what it loses, so that a ball that does not hold zero is a number that is not zero. A ball
@@ -229,7 +233,9 @@ impl<const N: usize> Ball<N> {
                     _ => Self { negative: false, mantissa: [0; N], error: error * SLACK, ..out },
                 };
             }
-            Ordering::Greater => subtract_from(&mut out.mantissa, &small),
+            Ordering::Greater => {
+                subtract_from(&mut out.mantissa, &small);
+            }
             Ordering::Less => {
                 out.mantissa = small;
                 subtract_from(&mut out.mantissa, &x.mantissa);
@@ -404,25 +410,22 @@ impl<const N: usize> Ball<N> {
 }
 
 /// The high N limbs of a product and the limb below them; what is left out lies below a unit of the last place.
+#[inline(always)]
 fn product<const N: usize>(a: &[u64; N], b: &[u64; N]) -> ([u64; N], u64) {
-    let mut out = [0; N];
-    // columns from N - 2 on: those below add less than N / 2^64 units of the last place
-    let mut below = 0;
-    let (mut sum, mut over) = (0u128, 0u64);
-    for column in N - 2..2 * N - 1 {
-        for i in (column + 1).saturating_sub(N)..=column.min(N - 1) {
-            let (next, carry) = sum.overflowing_add(u128::from(a[i]) * u128::from(b[column - i]));
-            sum = next;
-            over += u64::from(carry);
+    // row by row, a limb further up each; columns below N - 2 are left out and add less than N / 2^64 units of the last place
+    let (mut out, mut below) = ([0; N], 0);
+    for (i, &x) in a.iter().enumerate() {
+        let mut carry = 0;
+        for j in (N - 2).saturating_sub(i)..N {
+            let sum = u128::from(x) * u128::from(b[j]) + u128::from(out[j]) + u128::from(carry);
+            carry = (sum >> 64) as u64;
+            match j {
+                0 => below = sum as u64,
+                _ => out[j - 1] = sum as u64,
+            }
         }
-        match column.checked_sub(N) {
-            Some(high) => out[high] = sum as u64,
-            None => below = sum as u64,
-        }
-        sum = sum >> 64 | u128::from(over) << 64;
-        over = 0;
+        out[N - 1] = carry;
     }
-    out[N - 1] = sum as u64;
     (out, below)
 }
 
@@ -477,8 +480,8 @@ fn add_to<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
     carry
 }
 
-/// `a - b` for `a > b`.
-fn subtract_from<const N: usize>(a: &mut [u64; N], b: &[u64; N]) {
+/// `a - b`, and whether it is below zero.
+fn subtract_from<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
     let mut borrow = false;
     for (x, &y) in a.iter_mut().zip(b) {
         let (rest, first) = x.overflowing_sub(y);
@@ -486,6 +489,7 @@ fn subtract_from<const N: usize>(a: &mut [u64; N], b: &[u64; N]) {
         *x = rest;
         borrow = first || second;
     }
+    borrow
 }
 
 fn compare<const N: usize>(a: &[u64; N], b: &[u64; N]) -> Ordering {
@@ -493,7 +497,7 @@ fn compare<const N: usize>(a: &[u64; N], b: &[u64; N]) -> Ordering {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use num_bigint::BigInt;
     use num_rational::BigRational;
@@ -504,7 +508,7 @@ mod tests {
         if k < 0 { big.recip() } else { big }
     }
 
-    fn exact<const N: usize>(ball: &Ball<N>) -> BigRational {
+    pub(crate) fn exact<const N: usize>(ball: &Ball<N>) -> BigRational {
         let digits =
             ball.mantissa.iter().rev().fold(BigInt::from(0), |x, limb| (x << 64) + BigInt::from(*limb));
         let size = BigRational::from_integer(digits) * two(ball.exponent - Ball::<N>::BITS);
@@ -512,7 +516,7 @@ mod tests {
     }
 
     /// Whether a number lies in the ball.
-    fn holds<const N: usize>(ball: &Ball<N>, x: &BigRational) -> bool {
+    pub(crate) fn holds<const N: usize>(ball: &Ball<N>, x: &BigRational) -> bool {
         let radius =
             BigRational::from_float(ball.error).expect("finite") * two(ball.exponent - Ball::<N>::BITS);
         let off = exact(ball) - x;
@@ -520,7 +524,7 @@ mod tests {
     }
 
     /// Numbers of any size, some close to each other, some with few digits, some uncertain; with a number they hold.
-    fn numbers() -> impl Strategy<Value = (Ball<2>, BigRational)> {
+    pub(crate) fn numbers() -> impl Strategy<Value = (Ball<2>, BigRational)> {
         let places = prop_oneof![Just(0i64), -3..3i64, -140..140i64];
         let digits = prop_oneof![any::<i128>(), (-9..9i128), (i128::MAX - 3..i128::MAX)];
         (digits, places, -200.0..0.0f64, 0..3u8, -1.0..1.0f64).prop_map(|(m, place, wide, kind, inside)| {

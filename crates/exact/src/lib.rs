@@ -41,7 +41,7 @@ pub mod series;
 pub mod transform;
 pub mod turn;
 
-pub use ball::Ball;
+pub use ball::{Ball, BallSum};
 pub use echelon::Echelon;
 pub use field::Field;
 pub use gcd::gcd;

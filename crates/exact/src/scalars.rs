@@ -98,12 +98,15 @@ impl Scalars for Field {
     type Sum = u128;
     type Space = Echelon;
 
+    #[inline]
     fn zero(&self) -> u64 {
         0
     }
+    #[inline]
     fn one(&self) -> u64 {
         Field::one(self)
     }
+    #[inline]
     fn integer(&self, x: i64) -> u64 {
         self.from_i64(x)
     }
@@ -127,12 +130,15 @@ impl Scalars for Field {
     fn mul(&self, a: &u64, b: &u64) -> u64 {
         Field::mul(self, *a, *b)
     }
+    #[inline]
     fn inverse(&self, a: &u64) -> Option<u64> {
         (*a != 0).then(|| self.inv(*a))
     }
+    #[inline]
     fn dot<'a>(&self, start: &u64, terms: impl Iterator<Item = (&'a u64, &'a u64)>) -> u64 {
         Field::dot(self, *start, terms.map(|(&a, &b)| (a, b)))
     }
+    #[inline]
     fn no_sum(&self) -> u128 {
         0
     }
@@ -157,6 +163,7 @@ impl Scalars for Field {
     fn reduce(&self, sum: &u128) -> u64 {
         if *sum == 0 { 0 } else { Field::reduce(self, *sum) }
     }
+    #[inline]
     fn rational(&self, a: &u64) -> Option<(i64, i64)> {
         Ratio::recover(self, *a).map(|r| (r.num, r.den))
     }

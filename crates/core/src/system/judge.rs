@@ -308,7 +308,7 @@ pub fn judge_in_digits(
 ) -> Result<Judgement, ModelError> {
     let layout = checked_layout(model, compiled, bound)?;
     let mut reason = String::new();
-    for pair in [pair::<4, 8>, pair::<8, 16>, pair::<16, 32>] {
+    for pair in [pair::<4, 6>, pair::<6, 10>, pair::<10, 16>, pair::<16, 32>] {
         match pair(model, compiled, &layout, seed)? {
             Ok(judged) => return Ok(judged),
             Err(why) => reason = why,
@@ -342,19 +342,22 @@ fn pair<const A: usize, const B: usize>(
     seed: u64,
 ) -> Result<Result<Judgement, String>, ModelError> {
     let random = |i: usize| model.random(seed, &format!("verdicts, {A} and {B} words, point {i}"));
-    let first = climb_at(model, compiled, layout, Reals::<A>, &mut random(0))?;
-    let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1))?;
     let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
     let digits = [A, B].map(|n| decimal(64.0 * n as f64) as usize);
-    let clear = [first.gap.is_decisive(64 * A as i64), second.gap.is_decisive(64 * B as i64)];
-    if clear != [true, true] {
-        let gap = if clear[0] { second.gap } else { first.gap };
-        let digits = if clear[0] { digits[1] } else { digits[0] };
-        return Ok(Err(format!(
+    let unclear = |gap: Gap, digits: usize| {
+        format!(
             "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of the rest is 10^{:.0}",
             decimal(gap.zero),
             decimal(gap.nonzero)
-        )));
+        )
+    };
+    let first = climb_at(model, compiled, layout, Reals::<A>, &mut random(0))?;
+    if !first.gap.is_decisive(64 * A as i64) {
+        return Ok(Err(unclear(first.gap, digits[0])));
+    }
+    let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1))?;
+    if !second.gap.is_decisive(64 * B as i64) {
+        return Ok(Err(unclear(second.gap, digits[1])));
     }
     if !first.agrees(&second) {
         return Ok(Err(format!("two random points disagree with {} and {} digits", digits[0], digits[1])));

@@ -11,8 +11,10 @@ use crate::degree::rows::DerivativeRows;
 
 /// Orders that are followed where no end is proven, at least.
 const ORDERS: usize = 60;
-/// From so many lanes on rows are computed backwards: before that memory is no matter, and lanes are as fast.
-pub(super) const MANY: usize = 48;
+/// Rows are computed backwards where there are so many lanes for each output: with fewer there are few orders, and lanes are faster.
+const LONG: usize = 48;
+/// And from so many lanes on anyway, for the memory.
+const MANY: usize = 256;
 
 /// An unknown of a system.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -278,6 +280,9 @@ impl<'a, S: Values> Maker<'a, '_, S> {
 
     /// Gives states the values of their formulas, all at once.
     fn set_states(&self, point: &mut Point<S>, formulas: &[(usize, usize)]) -> Result<(), Singular> {
+        if formulas.is_empty() {
+            return Ok(());
+        }
         let nodes: Vec<usize> = formulas.iter().map(|f| f.1).collect();
         let seen = self.look(point, &nodes)?;
         for &(state, node) in formulas {
@@ -372,6 +377,11 @@ impl<'a, S: Values> Maker<'a, '_, S> {
 
     /// The rows of a run without lanes in every node, where there are many.
     fn adjoint(&self, point: &Point<S>, lanes: usize) -> Option<Adjoint<'a, S>> {
+        let outputs = self.compiled.outputs(point.experiment).len();
+        if lanes < MANY && lanes < LONG * outputs { None } else { self.backwards(point, lanes) }
+    }
+
+    fn backwards(&self, point: &Point<S>, lanes: usize) -> Option<Adjoint<'a, S>> {
         let outputs = self.compiled.outputs(point.experiment);
         let (dag, f) = (&self.compiled.dag, self.field.clone());
         let values = self.series(point, 0).ok()?;
@@ -387,7 +397,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         self.set_states(&mut point, &given(&self.compiled.starts)).expect("starts");
         let lanes = self.layout.unknowns.len();
         let forward = self.series(&point, lanes).expect("a point");
-        (forward, self.adjoint(&point, lanes).expect("no unknown inputs"))
+        (forward, self.backwards(&point, lanes).expect("no unknown inputs"))
     }
 
     /// The rank that the rows of a run cannot exceed: the one at a generic point, where every state is an unknown, the time is
@@ -424,7 +434,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                 }
             }
             let Ok(mut taylor) = self.series(&generic, lanes) else { continue };
-            let mut adjoint = if lanes < MANY { None } else { self.adjoint(&generic, lanes) };
+            let mut adjoint = self.adjoint(&generic, lanes);
             let mut whole = S::Space::new(f.clone(), lanes);
             let mut seen = S::Space::new(f.clone(), unknowns);
             for row in known {
@@ -566,7 +576,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 };
                 let own = S::Space::new(f.clone(), lanes);
                 let outputs = compiled.outputs(experiment);
-                let adjoint = if lanes < MANY { None } else { maker.adjoint(&point, lanes) };
+                let adjoint = maker.adjoint(&point, lanes);
                 let known = known.clone();
                 runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
             }

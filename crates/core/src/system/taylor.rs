@@ -1,8 +1,8 @@
 //! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a dual lane
 //! each), in any field.
 //!
-//! A node has lanes only for what it can depend on, and orders are kept only where a later one needs them: as a factor
-//! of a product of two that change.
+//! A node has lanes only for what it can depend on (a weight of a function none at all: of `dF = weight du` its values are
+//! enough), and orders are kept only where a later one needs them: as a factor of a product of two that change.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -78,6 +78,8 @@ pub(crate) struct Taylor<'a, S: Values> {
     rng: SplitMix64,
     /// What takes part.
     needed: Vec<bool>,
+    /// Whether the duals of a node are needed: of a weight that nothing else uses the values are enough.
+    differentiated: Vec<bool>,
     /// Whether a node is constant in time.
     constant: Vec<bool>,
     /// Whether a node depends on no unknown.
@@ -121,6 +123,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             signals,
             rng,
             needed: vec![false; n],
+            differentiated: vec![false; n],
             constant: vec![false; n],
             known: vec![false; n],
             kept: vec![false; n],
@@ -190,15 +193,33 @@ impl<'a, S: Values> Taylor<'a, S> {
                 }
             }
         }
-        for i in (0..self.dag.ops.len()).filter(|&i| self.needed[i]) {
+        left.extend(roots);
+        while let Some(i) = left.pop() {
+            if std::mem::replace(&mut self.differentiated[i], true) {
+                continue;
+            }
+            match self.dag.ops[i] {
+                Op::Number { .. } | Op::Pi => {}
+                Op::Slot(s) => {
+                    if let Signal::State { rate } = self.signals[s]
+                        && moving
+                    {
+                        left.push(rate);
+                    }
+                }
+                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
+                    left.extend([a, b]);
+                }
+                Op::Primitive { of, .. } => left.push(of),
+            }
+        }
+        for i in (0..self.dag.ops.len()).filter(|&i| self.differentiated[i]) {
             match self.dag.ops[i] {
                 Op::Multiply(a, b) if !self.constant[a] && !self.constant[b] => {
                     (self.kept[a], self.kept[b]) = (true, true);
                 }
                 Op::Divide(_, b) if !self.constant[b] => (self.kept[i], self.kept[b]) = (true, true),
-                Op::Primitive { of, weight, .. } if !self.constant[of] => {
-                    (self.kept[of], self.kept[weight]) = (true, true);
-                }
+                Op::Primitive { of, .. } if !self.constant[of] => self.kept[of] = true,
                 _ => {}
             }
         }
@@ -323,7 +344,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     fn start_duals(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
         let f = self.f.clone();
         for i in 0..self.dag.ops.len() {
-            if self.known[i] || !self.needed[i] || self.lanes == 0 {
+            if self.known[i] || !self.differentiated[i] || self.lanes == 0 {
                 continue;
             }
             let mut sums = std::mem::take(&mut self.sums);
@@ -493,7 +514,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             }
         }
         for i in 0..if self.lanes == 0 { 0 } else { self.dag.ops.len() } {
-            if self.needed[i] && !self.constant[i] && !self.known[i] {
+            if self.differentiated[i] && !self.constant[i] && !self.known[i] {
                 self.next_dual(i, k);
             }
         }
@@ -603,12 +624,10 @@ impl<'a, S: Values> Taylor<'a, S> {
                 scale = Some(self.reciprocal(b));
             }
             Op::Primitive { of: u, weight, .. } => {
-                for j in 1..=k {
-                    let count = f.integer(j as i64);
-                    self.gather(&mut sums, &mut pending, u, j, &f.mul(&count, &of(weight, k - j)));
-                    self.gather(&mut sums, &mut pending, weight, k - j, &f.mul(&count, &of(u, j)));
+                // dF = weight du
+                for j in 0..=k {
+                    self.gather(&mut sums, &mut pending, u, j, &of(weight, k - j));
                 }
-                scale = Some(self.inverses[k]);
             }
         }
         self.store(i, k, &mut sums, scale.as_ref(), own.as_slice());
