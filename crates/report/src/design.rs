@@ -100,6 +100,13 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     } else {
         String::new()
     };
+    let evaluated = match s.excluded {
+        0 => format!("{} evaluated{images}", s.examined),
+        excluded => format!(
+            "{} evaluated, {excluded} excluded by a bound on what their last two positions can add{images}",
+            s.examined
+        ),
+    };
     let mut out = vec![if s.proven {
         let unrefined = if d.found.first().is_some_and(|f| f.refined) {
             "the first that is not refined"
@@ -108,13 +115,13 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         };
         format!(
             "{unrefined} is proven to be the best: of all sequences of {} of the candidates within the constraints none has a smaller worst \
-             degree, or the same and a smaller criterion ({} evaluated{images})",
-            s.positions, s.examined
+             degree, or the same and a smaller criterion ({evaluated})",
+            s.positions
         )
     } else if s.ties.is_some() {
         format!(
-            "not proven: all sequences were searched ({} evaluated{images}), but one may be overlooked with a probability of {:.0e}",
-            s.examined, d.error_bound
+            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a probability of {:.0e}",
+            d.error_bound
         )
     } else if s.interrupted {
         let known = s.certificate.as_ref().map_or_else(String::new, |c| {

@@ -4,7 +4,7 @@ use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Scheme};
 use obsdeg_design::design::{
     Candidates, Constraints, Criterion, CriterionName, Design, DesignError, DesignOptions, Evaluator, Limits,
-    Rows, Search, Stop, design,
+    Rows, Search, Stop, Symmetry, design,
 };
 use obsdeg_evidence::compare::predicted;
 use obsdeg_evidence::simulation::{Conditions, Plan};
@@ -142,6 +142,13 @@ struct Judged {
 }
 
 fn judged(t: &Task) -> Judged {
+    let (mut out, caps, limits) = prepared(t);
+    out.kept = out.all(t, &caps, &limits);
+    out
+}
+
+/// The same before any sequence is looked at; caps on the degrees and limits of what is required.
+fn prepared(t: &Task) -> (Judged, Vec<usize>, Vec<f64>) {
     let (reached, _) = t.options.candidates.clone().within(&t.base.gimbals);
     let mut candidates = Candidates::default();
     for (name, attitude) in reached.names.iter().zip(&reached.attitudes) {
@@ -192,10 +199,8 @@ fn judged(t: &Task) -> Judged {
     let best = rows.degrees(&every);
     let never = best.iter().any(Option::is_none);
     let floor = best.into_iter().flatten().max().unwrap_or(0);
-    let mut out =
-        Judged { candidates, rows, evaluator, criterion, constraints, floor, kept: Vec::new(), never };
-    out.kept = out.all(t, &caps, &limits);
-    out
+    let out = Judged { candidates, rows, evaluator, criterion, constraints, floor, kept: Vec::new(), never };
+    (out, caps, limits)
 }
 
 impl Judged {
@@ -377,6 +382,42 @@ fn both_searches_order_as_brute_force() {
     let (possible, agree, refined) = (count(|o| o.0), count(|o| o.1), count(|o| o.2));
     assert_eq!(outcomes.len(), 200);
     assert!((80..150).contains(&possible) && agree > 190 && refined >= 4, "{possible} {agree} {refined}");
+}
+
+/// Branch and bound keeps what exhaustion keeps: schemes, front and ties, whatever is asked for; and it does leave sequences out.
+#[test]
+fn what_a_bound_leaves_out_is_not_missed() {
+    let outcomes: Vec<(bool, u64)> = (0..400u64)
+        .into_par_iter()
+        .map(|seed| {
+            let t = task(seed);
+            let all = prepared(&t).0;
+            let search = Search {
+                rows: &all.rows,
+                evaluator: &all.evaluator,
+                criterion: &all.criterion,
+                constraints: &all.constraints,
+                keep: 1 + seed as usize % 4,
+                floor: all.floor,
+                progress: &on,
+            };
+            let (symmetry, k) =
+                (Symmetry::none(all.candidates.names.len()), t.options.positions.expect("a number"));
+            let (whole, pruned) = (search.exhaust(&symmetry, k), search.exhaust_pruned(&symmetry, k, seed));
+            assert_eq!(pruned.found, whole.found, "{seed}");
+            assert_eq!(pruned.front, whole.front, "{seed}");
+            assert_eq!(pruned.ties, whole.ties, "{seed}");
+            assert!(
+                pruned.complete && pruned.examined <= whole.examined && pruned.lost <= whole.lost,
+                "{seed}"
+            );
+            assert!(pruned.excluded + pruned.examined >= whole.examined, "{seed}: {pruned:?}");
+            (!whole.found.is_empty(), pruned.excluded)
+        })
+        .collect();
+    let (found, excluded) =
+        (outcomes.iter().filter(|o| o.0).count(), outcomes.iter().map(|o| o.1).sum::<u64>());
+    assert!(found > 150 && excluded > 5_000, "{found} {excluded}");
 }
 
 /// Six candidates of which five positions do, within turns of a quarter: with six, repeating one costs no turn.

@@ -91,8 +91,11 @@ pub struct SearchReport {
     /// Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
     /// required coefficient as far as double precision tells: they count as worse than all others.
     pub lost: u64,
-    /// Whether no sequence of candidates within the constraints is better than the first, by exhaustion: none has a smaller worst degree, or
-    /// the same and a smaller criterion.
+    /// Sequences, observable or not, that were not examined because a bound leaves no doubt: as far as double precision tells their criterion is
+    /// larger than that of all listed.
+    pub excluded: u64,
+    /// Whether no sequence of candidates within the constraints is better than the first, by exhaustion, or because a bound excludes the rest:
+    /// none has a smaller worst degree, or the same and a smaller criterion.
     pub proven: bool,
     /// How many sequences are as good as the first; null where not all were searched.
     pub ties: Option<TiesReport>,

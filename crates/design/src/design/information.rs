@@ -66,7 +66,7 @@ pub struct State {
     /// Information (n x n), row by row, lower triangle.
     pub(super) information: Vec<f64>,
     /// psi in the carried axes as a functional of the unknowns (3 x n).
-    psi: [Vec<f64>; 3],
+    pub(super) psi: [Vec<f64>; 3],
     /// The candidates in order.
     pub(super) path: Vec<usize>,
     /// Dwells and turns, in s.

@@ -15,6 +15,7 @@ pub(crate) mod observability;
 mod part;
 mod psi;
 mod refine;
+mod screen;
 pub(crate) mod search;
 pub(crate) mod symmetry;
 mod task;
@@ -30,6 +31,7 @@ pub use criterion::{Criterion, Limits};
 pub use information::{Evaluator, State};
 pub use observability::{Patience, Rows};
 pub use part::{Level, PART_SCHEMA, Part, PartError, design_merged, design_part, design_starts};
+pub(crate) use search::Pruning;
 pub use search::{Best, Constraints, Progress, Scored, Search, Worth};
 pub use symmetry::Symmetry;
 pub use ways::Stop;
@@ -52,6 +54,10 @@ use ties::TIE;
 
 /// Most sequences that are searched exhaustively, up to symmetry.
 pub const EXHAUSTIVE: u64 = 50_000_000;
+/// Most sequences, up to symmetry, where order matters and a bound leaves most of them out.
+pub const PRUNED: u64 = 300_000_000;
+/// From so many sequences on it is worth while to seek those that are good beforehand, and to leave out what is worse.
+const MANY: u64 = 1_000_000;
 /// Under reset carry: so many are searched without asking first whether a bound makes it unnecessary.
 const QUICK: u64 = 2_000_000;
 /// What may be wrong with a larger probability is not proven.
@@ -432,6 +438,12 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// What is left out of an exhaustive search.
+    fn pruning<'s>(&self, search: &'s Search<'_>, k: usize) -> Option<Pruning<'s>> {
+        let (_, sequences) = self.task.space(k, &self.evaluator)?;
+        (sequences >= MANY).then(|| search.pruning(&self.task.symmetry, k, self.task.options.seed))?
+    }
+
     /// The number of sets and of sequences of an exhaustive search.
     fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
         if self.task.walks {
@@ -543,7 +555,12 @@ fn answered(
         let best = if let Some(elsewhere) = elsewhere {
             elsewhere(&prepared, k)?
         } else {
-            exhaustive = exhaustive.filter(|space| space.1 <= EXHAUSTIVE);
+            let most = match (evaluator.ordered(), options.within > 0.0) {
+                (true, true) => PRUNED,
+                (true, false) => u64::MAX,
+                (false, _) => EXHAUSTIVE,
+            };
+            exhaustive = exhaustive.filter(|space| space.1 <= most);
             let mut tried = None;
             if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, &bound)
                 && options.within > 0.0
@@ -557,6 +574,7 @@ fn answered(
                 }
             }
             tried.unwrap_or_else(|| match exhaustive {
+                Some((_, MANY..)) => search.exhaust_pruned(&task.symmetry, k, options.seed),
                 Some(_) => search.exhaust(&task.symmetry, k),
                 None => search.exchange(k, &[], options.restarts, options.seed),
             })
@@ -606,6 +624,7 @@ fn answered(
             criterion: task.criterion.name().into(),
             unit: task.unit().ok().flatten().map(Into::into),
             examined: best.examined,
+            excluded: best.excluded,
             lost: best.lost,
             proven: all && out.error_bound < PROOF,
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),

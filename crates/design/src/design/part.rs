@@ -181,6 +181,8 @@ pub fn design_part(
             let why = PartError::Starts { found: out.starts, expected, part };
             return Err(DesignError::Part { name: "the part to go on with".into(), why });
         }
+        let symmetry = &prepared.task.symmetry;
+        let pruning = prepared.pruning(&search, k);
         let Some(levels) = search.levels_of(k) else { return Ok(out) };
         let mut all = Best { complete: true, ..Best::default() };
         for (i, level) in levels.iter().enumerate() {
@@ -191,7 +193,8 @@ pub fn design_part(
             let here = &mut out.levels[i];
             while here.next < own.end {
                 let to = (here.next + CHUNK).min(own.end);
-                let done = search.exhaust_starts(&starts[here.next..to], &prepared.task.symmetry, k, level);
+                let done =
+                    search.exhaust_starts(&starts[here.next..to], symmetry, k, level, pruning.as_ref());
                 if !done.complete {
                     return Ok(out);
                 }

@@ -13,12 +13,15 @@ use serde::{Deserialize, Serialize};
 use super::criterion::{Criterion, Limits};
 use super::information::{Evaluator, State};
 use super::observability::{Patience, Rows};
+use super::screen::{Scratch, Screen};
 use super::symmetry::Symmetry;
-use super::ties::Ties;
+use super::ties::{TIE, Ties};
 use super::ways::Stop;
 
 /// Rounds of one exchange before it is given up.
 const ROUNDS: usize = 50;
+/// Restarts of the exchange that finds what an exhaustive search is pruned by.
+const KNOWN_RESTARTS: u64 = 24;
 /// Sequences between two questions whether to go on.
 const PATIENCE: u64 = 256;
 
@@ -133,7 +136,9 @@ pub struct Best {
     pub complete: bool,
     /// Sequences whose sigma was computed.
     pub examined: u64,
-    /// Of these, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what
+    /// Sequences, observable or not, that a bound left out: they are worse than those kept.
+    pub excluded: u64,
+    /// Of those examined, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what
     /// is required, as far as double precision tells.
     pub lost: u64,
 }
@@ -189,6 +194,14 @@ impl Best {
         }
     }
 
+    /// The largest criterion that may still count where all sequences take the same time: among the best `keep`, or as a tie of
+    /// the first. `known` were found before, of the same worst degree.
+    fn limit(&self, keep: usize, known: &Self) -> f64 {
+        let value = |of: &Self, place: usize| of.found.get(place).map_or(f64::INFINITY, |s| s.worth.value);
+        let least = |place: usize| value(self, place).min(value(known, place));
+        least(keep - 1).max(least(0) * (1.0 + TIE))
+    }
+
     /// Takes over what another found.
     pub(super) fn merge(&mut self, keep: usize, other: Self) {
         for s in other.found.into_iter().chain(other.front) {
@@ -197,6 +210,7 @@ impl Best {
         self.ties.merge(other.ties);
         self.complete &= other.complete;
         self.examined += other.examined;
+        self.excluded += other.excluded;
         self.lost += other.lost;
     }
 }
@@ -232,6 +246,21 @@ pub(super) enum SearchLevel {
     Degree(usize, HashSet<u128>),
     /// All sets, where order does not matter.
     Sets,
+}
+
+/// What lets an exhaustive search leave out what is worse than sequences that are known beforehand.
+pub(crate) struct Pruning<'a> {
+    screen: Screen<'a>,
+    /// The best sequences and the front known, by worst degree.
+    known: BTreeMap<usize, Best>,
+}
+
+/// The pruning of one walk.
+struct Pruned<'a> {
+    screen: &'a Screen<'a>,
+    known: &'a Best,
+    scratch: Scratch,
+    alive: Vec<bool>,
 }
 
 /// What the workers of a search report to.
@@ -305,6 +334,7 @@ struct Walk<'a> {
     root: Vec<f64>,
     sequence: Vec<Stop>,
     best: Best,
+    pruned: Option<Pruned<'a>>,
     /// Positions that were put behind others.
     pushed: u64,
     stopped: bool,
@@ -319,6 +349,7 @@ impl<'a> Walk<'a> {
             root: Vec::new(),
             sequence: Vec::with_capacity(k),
             best: Best::default(),
+            pruned: None,
             pushed: 0,
             stopped: false,
         }
@@ -374,6 +405,13 @@ impl<'a> Walk<'a> {
             self.score(degree, 1);
             return;
         }
+        if self.sequence.len() + 2 == k
+            && let Some(mut pruned) = self.pruned.take()
+        {
+            self.visit_pairs(sets, degree, key, &mut pruned);
+            self.pruned = Some(pruned);
+            return;
+        }
         let (rows, evaluator) = (self.search.rows, self.search.evaluator);
         let before = self.sequence.last().map(|s| s.candidate);
         let last = self.sequence.len() + 1 == k;
@@ -391,6 +429,41 @@ impl<'a> Walk<'a> {
                 if self.stopped {
                     return;
                 }
+            }
+        }
+    }
+
+    /// The same of the last two positions, those left out that a bound excludes.
+    fn visit_pairs(&mut self, sets: &HashSet<u128>, degree: usize, key: u128, pruned: &mut Pruned<'_>) {
+        let (rows, depth) = (self.search.rows, self.sequence.len());
+        let Pruned { screen, known, scratch, alive } = pruned;
+        let candidates = rows.candidates();
+        alive.clear();
+        alive.resize(candidates * candidates, true);
+        let limit = self.best.limit(self.search.keep, known);
+        screen.pairs(&self.states[depth], limit, alive, scratch);
+        self.best.excluded += alive.iter().filter(|alive| !**alive).count() as u64;
+        let with = |walk: &Self, key: u128, c: usize| {
+            if walk.sequence.iter().any(|s| s.candidate == c) { key } else { key ^ rows.key(c) }
+        };
+        for (first, alive) in alive.chunks_exact(candidates).enumerate().filter(|(_, a)| a.contains(&true)) {
+            let key = with(self, key, first);
+            if self.push(first.into()) {
+                for second in (0..candidates).filter(|&c| alive[c]) {
+                    if sets.contains(&with(self, key, second)) {
+                        if self.push(second.into()) {
+                            self.score(degree, 1);
+                        }
+                        self.sequence.pop();
+                    }
+                    if self.stopped {
+                        break;
+                    }
+                }
+            }
+            self.sequence.pop();
+            if self.stopped {
+                return;
             }
         }
     }
@@ -427,16 +500,50 @@ impl Search<'_> {
     /// orbit (where order does not matter: that have one of them as their smallest). As many of the best as are kept:
     /// worst degrees that are too large for these are not looked at.
     pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
+        self.exhausted(symmetry, k, None)
+    }
+
+    /// The same, where order matters without those that a bound leaves out: what is kept is the same. The bound is held
+    /// against what an exchange from `seed` finds first.
+    pub fn exhaust_pruned(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Best {
+        let Some(pruning) = self.pruning(symmetry, k, seed) else { return self.exhaust(symmetry, k) };
+        let mut best = self.exhausted(symmetry, k, Some(&pruning));
+        if !best.complete {
+            pruning.known.into_values().for_each(|known| best.merge(self.keep, known));
+        }
+        best
+    }
+
+    fn exhausted(&self, symmetry: &Symmetry, k: usize, pruning: Option<&Pruning<'_>>) -> Best {
         let Some(levels) = self.levels_of(k) else { return Best::default() };
         let starts = self.starts(symmetry, k);
         let mut best = Best { complete: true, ..Best::default() };
         for level in levels {
-            best.merge(self.keep, self.exhaust_starts(&starts, symmetry, k, &level));
+            best.merge(self.keep, self.exhaust_starts(&starts, symmetry, k, &level, pruning));
             if !best.complete || best.found.len() >= self.keep.max(1) {
                 break;
             }
         }
         best
+    }
+
+    /// What lets a search of `k` positions leave sequences out; `None` where nothing does.
+    pub(super) fn pruning(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Option<Pruning<'_>> {
+        if k < 3 || self.keep == 0 {
+            return None;
+        }
+        let screen = Screen::new(self.evaluator, self.criterion)?;
+        let firsts = symmetry.representatives();
+        let exchanged = self.exchange_from(k, &[], KNOWN_RESTARTS, seed, Some(&firsts));
+        let mut known: BTreeMap<usize, Best> = BTreeMap::new();
+        for mut scored in exchanged.found.into_iter().chain(exchanged.front) {
+            // as in the sets that are searched
+            if let Some(degree) = self.worst(self.rows.degrees(&candidates(&scored.sequence))) {
+                scored.worth.degree = degree;
+                known.entry(degree).or_default().add(self.keep, scored);
+            }
+        }
+        Some(Pruning { screen, known })
     }
 
     /// What every sequence of an exhaustive search begins with, in order: its first one or two positions.
@@ -469,10 +576,14 @@ impl Search<'_> {
         symmetry: &Symmetry,
         k: usize,
         level: &SearchLevel,
+        pruning: Option<&Pruning<'_>>,
     ) -> Best {
         let meter = Meter::new(self, starts.len());
         let from = |start: &Vec<Stop>| match level {
-            SearchLevel::Degree(degree, sets) => self.exhaust_sequences(&meter, start, k, *degree, sets),
+            SearchLevel::Degree(degree, sets) => {
+                let known = pruning.and_then(|p| Some((&p.screen, p.known.get(degree)?)));
+                self.exhaust_sequences(&meter, start, k, (*degree, sets), known)
+            }
             SearchLevel::Sets => self.exhaust_sets(&meter, start, k, symmetry),
         };
         let parts = starts.par_iter().map(|start| meter.part(|| from(start))).collect();
@@ -485,10 +596,16 @@ impl Search<'_> {
         meter: &Meter<'_>,
         start: &[Stop],
         k: usize,
-        degree: usize,
-        sets: &HashSet<u128>,
+        (degree, sets): (usize, &HashSet<u128>),
+        known: Option<(&Screen<'_>, &Best)>,
     ) -> Best {
         let mut walk = Walk::new(self, meter, k);
+        walk.pruned = known.map(|(screen, known)| Pruned {
+            screen,
+            known,
+            scratch: screen.scratch(),
+            alive: Vec::new(),
+        });
         let (a, b) = (start[0].candidate, start[start.len() - 1].candidate);
         let key = if a == b { self.rows.key(a) } else { self.rows.key(a) ^ self.rows.key(b) };
         if walk.go_to(start) && (start.len() < k || sets.contains(&key)) {
@@ -581,12 +698,31 @@ impl Search<'_> {
     /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of
     /// half turns, then any two change places, until none helps. From the sequences given, then from random ones.
     pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
+        self.exchange_from(k, given, restarts, seed, None)
+    }
+
+    /// The same; with `firsts` the sequences begin with one of them, and what is tried on the way is kept too.
+    fn exchange_from(
+        &self,
+        k: usize,
+        given: &[Vec<Stop>],
+        restarts: u64,
+        seed: u64,
+        firsts: Option<&[usize]>,
+    ) -> Best {
         let candidates = self.rows.candidates();
         let total = given.len() + restarts as usize;
         let meter = Meter::new(self, total);
         let from = |start: u64| {
             let mut rng = SplitMix64::new(seed ^ start.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-            let random = || (0..k).map(|_| Stop::from(rng.below(candidates as u64) as usize)).collect();
+            let mut draw = |n: usize| rng.below(n as u64) as usize;
+            let random = || {
+                let place = |place: usize| match firsts {
+                    Some(firsts) if place == 0 => firsts[draw(firsts.len())],
+                    _ => draw(candidates),
+                };
+                (0..k).map(place).map(Stop::from).collect()
+            };
             let mut now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
             let mut best = Best::default();
             let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
@@ -594,6 +730,11 @@ impl Search<'_> {
             let mut try_out = |now: &[Stop], held: &mut Scored| {
                 best.examined += 1;
                 let other = self.worth(now);
+                if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {
+                    let mut other = self.judged(other.clone());
+                    self.evaluator.tidy(&mut other.sequence);
+                    best.add(self.keep, other);
+                }
                 if other.worth.better_than(&held.worth) {
                     let other = self.judged(other);
                     if other.worth.better_than(&held.worth) {
@@ -606,7 +747,8 @@ impl Search<'_> {
             'rounds: for _ in 0..ROUNDS {
                 let round = held.worth;
                 for place in 0..k {
-                    for (stop, next) in self.choices(&now, place) {
+                    let first = |stop: Stop| place > 0 || firsts.is_none_or(|f| f.contains(&stop.candidate));
+                    for (stop, next) in self.choices(&now, place).into_iter().filter(|c| first(c.0)) {
                         now[place] = stop;
                         next.into_iter().for_each(|next| now[place + 1] = next);
                         if !try_out(&now, &mut held) {
@@ -616,7 +758,8 @@ impl Search<'_> {
                     now.copy_from_slice(&held.sequence);
                 }
                 for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
-                    if self.evaluator.ordered() && now[a].candidate != now[b].candidate {
+                    let first = b > 0 || firsts.is_none_or(|f| f.contains(&now[a].candidate));
+                    if first && self.evaluator.ordered() && now[a].candidate != now[b].candidate {
                         now.swap(a, b);
                         if !try_out(&now, &mut held) {
                             break 'rounds;
