@@ -33,11 +33,13 @@ Examples:
   obsdeg design --positions 5 --carry inertial --candidates grid:45 --gimbal beta=-60:60 --refine
   obsdeg design --positions 12 --carry reset --candidates free --round 5
   obsdeg design --positions 12 --terms all --carry inertial --slew-rate 1 --criterion d
+  obsdeg design --positions 8 --carry platform --within 0
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --positions 7 --carry inertial --merge part-*.json
 
-Up to 50 million sequences are searched exhaustively, which proves the best; beyond, coordinate exchange from random starts. Under reset carry
-information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units
+Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random
+starts. Where order matters and repositioning takes no time, a bound on what the last two positions can add leaves most of many sequences out (branch
+and bound): eight of the 24 cardinal attitudes in some minutes. Under reset carry information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units
 differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
 winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
@@ -93,7 +95,8 @@ pub(crate) struct Arguments {
     restarts: u64,
 
     /// Under reset carry, where many sequences would have to be searched: a scheme found by exchange is enough when it is within so many percent
-    /// of what is possible at all (0: all are searched)
+    /// of what is possible at all. 0: all sequences are searched, however long that takes, under any carry (beyond
+    /// 5 million sets of candidates: exchange)
     #[arg(long, value_name = "PERCENT", default_value_t = 0.01, value_parser = percent)]
     within: f64,
 
@@ -110,7 +113,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "I/N", value_parser = part, requires = "output", conflicts_with_all = ["minimum", "merge"])]
     part: Option<[usize; 2]>,
 
-    /// Put the parts of a search together to the answer of the whole; all other options as they were
+    /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0); all other options as they were
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "minimum")]
     merge: Vec<PathBuf>,
 

@@ -81,6 +81,7 @@ fn pruned(carry: Carry, k: usize) -> Best {
         constraints: &Constraints::default(),
         keep: 10,
         floor: 2,
+        walks: false,
         progress: &|_| true,
     };
     search.exhaust_pruned(&rows.symmetry(&|_, _| true), k, 1)

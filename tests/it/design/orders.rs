@@ -399,6 +399,7 @@ fn what_a_bound_leaves_out_is_not_missed() {
                 constraints: &all.constraints,
                 keep: 1 + seed as usize % 4,
                 floor: all.floor,
+                walks: false,
                 progress: &on,
             };
             let (symmetry, k) =

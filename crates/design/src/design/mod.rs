@@ -54,8 +54,6 @@ use ties::TIE;
 
 /// Most sequences that are searched exhaustively, up to symmetry.
 pub const EXHAUSTIVE: u64 = 50_000_000;
-/// Most sequences, up to symmetry, where order matters and a bound leaves most of them out.
-pub const PRUNED: u64 = 300_000_000;
 /// From so many sequences on it is worth while to seek those that are good beforehand, and to leave out what is worse.
 const MANY: u64 = 1_000_000;
 /// Under reset carry: so many are searched without asking first whether a bound makes it unnecessary.
@@ -284,7 +282,7 @@ pub struct DesignOptions {
     /// Numbers of positions for the front of total time, besides that asked for.
     pub front: Vec<usize>,
     /// Where many sequences would have to be searched and information adds (reset carry): a scheme found by exchange whose
-    /// criterion is within this part of what is possible at all is enough; 0: all are searched.
+    /// criterion is within this part of what is possible at all is enough; 0: all are searched, however many they are, under any carry.
     pub within: f64,
     /// Whether the bound over all attitudes is sought too (reset carry).
     pub everywhere: bool,
@@ -555,11 +553,7 @@ fn answered(
         let best = if let Some(elsewhere) = elsewhere {
             elsewhere(&prepared, k)?
         } else {
-            let most = match (evaluator.ordered(), options.within > 0.0) {
-                (true, true) => PRUNED,
-                (true, false) => u64::MAX,
-                (false, _) => EXHAUSTIVE,
-            };
+            let most = if options.within > 0.0 { EXHAUSTIVE } else { u64::MAX };
             exhaustive = exhaustive.filter(|space| space.1 <= most);
             let mut tried = None;
             if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, &bound)

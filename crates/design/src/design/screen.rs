@@ -472,7 +472,7 @@ mod tests {
         for task in 0..400 {
             let mut below = |n: u64| rng.below(n) as usize;
             let carry = [Carry::Platform, Carry::Inertial][below(2)];
-            let terms = ["F", "F,I", "O,S", "F,I,O,S"][below(4)];
+            let terms = ["F", "F,I", "O,S", "F,I,O,S", "F,O,K0", "F,I,K1,M3"][below(6)];
             let base = Scheme {
                 carry,
                 latitude: (10 + below(70)).to_string().parse().ok(),
