@@ -1,7 +1,10 @@
 //! Searches with errors of the accelerometers and the torquers.
 
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
-use obsdeg_design::design::{Candidates, CriterionName, DesignError, DesignOptions, Evaluator, design};
+use obsdeg_design::design::{
+    Best, Candidates, Constraints, Criterion, CriterionName, DesignError, DesignOptions, Evaluator, Rows,
+    Search, Symmetry, design,
+};
 use obsdeg_evidence::compare::predicted;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_exact::SplitMix64;
@@ -164,4 +167,50 @@ fn walks_by_sigma() {
     odd.add(parse_attitude("20,-40,70").expect("an attitude"));
     let odd = DesignOptions { candidates: odd, ..options };
     assert!(refused(&conditions, odd).contains("found candidate 20,-40,70"));
+}
+
+/// What turns of the platform axes make of each other is as good: the best of all sequences is that of those that are searched, and as many are
+/// as good.
+#[test]
+fn turned_schemes_are_equally_good() {
+    let candidates = Candidates::cardinals();
+    let mut orders = Vec::new();
+    for terms in ["F,K0", "F,K1", "F,M3", "F,M6", "F,K0,K2", "F,GM3", "F,GS"] {
+        for carry in [Carry::Platform, Carry::Reset] {
+            // three torqued rates of which the earth's is all: rounding decides what ties
+            if (terms, carry) == ("F,GM3", Carry::Reset) {
+                continue;
+            }
+            let like = whole(terms, carry);
+            let rows = Rows::new(&like, &candidates.attitudes, &[0, 1, 2], 1).expect("rows");
+            let evaluator =
+                Evaluator::new(&like, &candidates.attitudes, &[0, 1, 2], &quiet()).expect("an evaluator");
+            let of = |symmetry: &Symmetry| {
+                let search = Search {
+                    rows: &rows,
+                    walks: false,
+                    evaluator: &evaluator,
+                    criterion: &Criterion::Worst,
+                    constraints: &Constraints::default(),
+                    keep: 1,
+                    floor: 0,
+                    progress: &on,
+                };
+                search.exhaust(symmetry, 3)
+            };
+            let symmetry = rows.symmetry(&|i, j| (i < 3) == (j < 3));
+            orders.push(symmetry.order);
+            let (some, all) = (of(&symmetry), of(&Symmetry::none(24)));
+            let best = |of: &Best| of.found.first().map(|f| f.worth.value);
+            match best(&some).zip(best(&all)) {
+                Some((some, all)) => {
+                    assert!((some / all - 1.0).abs() < 1e-7, "{terms} {carry}: {some} {all}")
+                }
+                None => assert_eq!(best(&some), best(&all), "{terms} {carry}"),
+            }
+            assert_eq!(some.ties.total(symmetry.order), all.ties.total(1), "{terms} {carry}");
+        }
+    }
+    // a triangle of misalignments is none when it is turned; bias and scale factor are
+    assert!(orders.contains(&24) && orders.iter().any(|o| *o < 24), "{orders:?}");
 }

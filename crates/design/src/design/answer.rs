@@ -164,7 +164,7 @@ pub struct Weight {
 pub struct TiesReport {
     /// How many, the best and all their images under turns of the platform axes among them.
     pub sequences: u64,
-    /// Two tie when their worst degrees are equal and their criteria differ by less than this part.
+    /// Two tie when their worst degrees are equal and their criteria, as double precision gives them, differ by less than this part.
     pub within: f64,
 }
 
