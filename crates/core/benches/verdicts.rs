@@ -66,28 +66,25 @@ fn six_positions_two_fields(bencher: Bencher<'_, '_>, carry: Carry) {
     });
 }
 
-/// One field, from the rows of each attitude: what a search over schemes of known attitudes repeats.
-#[divan::bench(args = CARRIES)]
-fn six_positions_prepared(bencher: Bencher<'_, '_>, carry: Carry) {
-    let platform = platform(carry);
-    let sample = &samples(&platform)[0];
-    let mut rows = PlatformRows::new(&platform, sample);
+fn prepared(bencher: Bencher<'_, '_>, platform: &Platform) {
+    let sample = &samples(platform)[0];
+    let mut rows = PlatformRows::new(platform, sample);
     let mut basis = Echelon::new(sample.point.ring, platform.names().len());
     bencher
         .counter(ItemsCount::new(1usize))
         .bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
 }
 
+/// One field, from the rows of each attitude: what a search over schemes of known attitudes repeats.
+#[divan::bench(args = CARRIES)]
+fn six_positions_prepared(bencher: Bencher<'_, '_>, carry: Carry) {
+    prepared(bencher, &platform(carry));
+}
+
 /// Drifts and accelerometers: 21 coefficients, Z of three components.
 #[divan::bench(args = CARRIES)]
 fn six_positions_of_21_unknowns(bencher: Bencher<'_, '_>, carry: Carry) {
-    let platform = of_terms(carry, "F,I,O,S,K0,K1,M3");
-    let sample = &samples(&platform)[0];
-    let mut rows = PlatformRows::new(&platform, sample);
-    let mut basis = Echelon::new(sample.point.ring, platform.names().len());
-    bencher
-        .counter(ItemsCount::new(1usize))
-        .bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
+    prepared(bencher, &of_terms(carry, "F,I,O,S,K0,K1,M3"));
 }
 
 /// Torquers, accelerometers and mounting with drifts, 33 coefficients: what `analyze` says without solutions of seven positions with slews.

@@ -208,7 +208,7 @@ fn dwell_rows<R: LiftField>(
     for (i, block) in blocks.iter().enumerate() {
         // of psi^n what torquer errors have added in turns is a part of its own
         let torqued = |r: usize, c: usize| (c >= 3).then(|| &block.rows[r][c]).filter(|x| !ring.is_zero(x));
-        let local: [Vec<R::Element>; LOCAL] = std::array::from_fn(|r| {
+        let local: [Box<[R::Element]>; LOCAL] = std::array::from_fn(|r| {
             if r >= 3 {
                 return block.rows[r].clone();
             }

@@ -3,7 +3,9 @@
 use obsdeg_exact::{Echelon, Field};
 
 use super::rows::DerivativeRows;
-use crate::model::platform::{Block, LOCAL, Observed, Platform, Sample, local_dynamics, local_output};
+use crate::model::platform::{
+    Block, LOCAL, Observed, PSI_EPS, Platform, Sample, local_dynamics, local_output,
+};
 
 /// A row of the local chain: `Z_component^(order)` as a functional of the local unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,18 +22,23 @@ pub struct LocalRow {
 /// `V_{k+1} = V_k + V_k F`, so only rows that were new at order k need a derivative.
 pub fn local_chain(field: &Field, w_n: u64, w_u: u64, observed: Observed) -> Vec<LocalRow> {
     let f = local_dynamics(field, &w_n, &w_u);
-    let mut basis = Echelon::new(*field, LOCAL);
+    let locals = observed.locals();
+    let mut basis = Echelon::new(*field, locals);
     let mut chain: Vec<LocalRow> = Vec::new();
     let mut candidates: Vec<LocalRow> = local_output(field, observed)
         .into_iter()
         .map(|(component, row)| LocalRow { component, order: 0, row })
         .collect();
     while !candidates.is_empty() {
-        candidates.retain(|r| basis.insert(&r.row));
+        candidates.retain(|r| basis.insert(&r.row[..locals]));
         chain.extend_from_slice(&candidates);
         for r in &mut candidates {
             let old = r.row;
-            r.row = std::array::from_fn(|j| field.dot(0, (0..LOCAL).map(|i| (old[i], f[i][j]))));
+            r.row = [0; LOCAL];
+            // only psi^n moves
+            for (j, x) in r.row[..PSI_EPS].iter_mut().enumerate() {
+                *x = field.dot(0, (0..3).map(|i| (old[i], f[i][j])));
+            }
             r.order += 1;
         }
     }
@@ -45,6 +52,8 @@ pub struct PlatformRows {
     columns: usize,
     chain: Vec<LocalRow>,
     blocks: Vec<Block<u64>>,
+    /// Whether turns leave torquer errors in psi^n; `None`: the unknowns are the local ones.
+    apart: Option<bool>,
     scratch: Vec<u64>,
 }
 
@@ -57,6 +66,7 @@ impl PlatformRows {
             columns: platform.names().len(),
             chain: local_chain(&p.ring, p.w_n, p.w_u, platform.observed()),
             blocks: platform.blocks(p),
+            apart: (platform.coefficients() > 0).then_some(!p.turns.is_empty()),
             scratch: vec![0; platform.names().len()],
         }
     }
@@ -77,11 +87,23 @@ impl DerivativeRows for PlatformRows {
         let f = self.field;
         for block in &self.blocks {
             for local in self.chain.iter().filter(|r| r.order == order) {
+                // where there are no errors of the accelerometers, nothing of them is in a row
+                let mut used = [(0, &block.rows[0][..]); LOCAL];
+                let (mut n, mut of_psi) = (0, 0);
+                for (i, (x, row)) in local.row.iter().zip(&block.rows).enumerate().filter(|(_, r)| *r.0 != 0)
+                {
+                    used[n] = (*x, row);
+                    n += 1;
+                    of_psi += usize::from(i < 3);
+                }
+                // psi of the scheme is in psi^n alone, and coefficients are in it where torquers act
+                let (psi, rest) = match self.apart {
+                    Some(torqued) => (&used[..of_psi], &used[if torqued { 0 } else { of_psi }..n]),
+                    None => (&used[..n], &used[..n]),
+                };
                 for (k, &column) in block.columns.iter().enumerate() {
-                    // where there are no errors of the accelerometers, nothing of them is in a row
-                    let terms =
-                        (0..LOCAL).filter(|&i| local.row[i] != 0).map(|i| (local.row[i], block.rows[i][k]));
-                    self.scratch[column] = f.dot(0, terms);
+                    let used = if k < 3 { psi } else { rest };
+                    self.scratch[column] = f.dot(0, used.iter().map(|(x, row)| (*x, row[k])));
                 }
                 sink(&self.scratch);
             }

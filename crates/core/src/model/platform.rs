@@ -69,7 +69,7 @@ pub struct Block<E> {
     /// The columns (unknowns of the scheme) that occur: psi, then the coefficients.
     pub columns: Vec<usize>,
     /// One row per local unknown, one entry per column listed; the last three are empty where no error of the accelerometers is unknown.
-    pub rows: [Vec<E>; LOCAL],
+    pub rows: [Box<[E]>; LOCAL],
 }
 
 impl<E: Clone> Block<E> {
@@ -172,7 +172,7 @@ impl Platform {
         if self.scheme.unknowns == Unknowns::Drift {
             let rows = std::array::from_fn(|i| match i {
                 0..PSI_EPS => (0..PSI_EPS).map(|j| if i == j { ring.one() } else { ring.zero() }).collect(),
-                _ => Vec::new(),
+                _ => Box::default(),
             });
             return vec![Block { columns: (0..PSI_EPS).collect(), rows }];
         }
@@ -183,6 +183,13 @@ impl Platform {
         let mut composed;
         let mut handed_on: Option<Matrix3<R::Element>> = None;
         let mut torqued = Torqued::default();
+        let (no_psi, nothing) = ([0; 3].map(|_| ring.zero()), vec![ring.zero(); self.terms.len()]);
+        let row = |psi: &[R::Element; 3], rest: &[R::Element]| {
+            let mut row = Vec::with_capacity(3 + rest.len());
+            row.extend_from_slice(psi);
+            row.extend_from_slice(rest);
+            row.into_boxed_slice()
+        };
         let stations = self.scheme.stations();
         let mut out = Vec::with_capacity(stations.len());
         for (i, (station, c)) in stations.iter().zip(&point.attitudes).enumerate() {
@@ -208,17 +215,13 @@ impl Platform {
             // accelerometers put into Z: it lies in the span of Z along the arc (`Scheme::stations`), as that of eps^n does in
             // that of Z'. So degrees are those of the attitudes of the arc, and the rate is that of the earth.
             let drift = self.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
-            let zeros = |n: usize| std::iter::repeat_with(|| ring.zero()).take(n);
-            let jump = |r: usize| -> Vec<R::Element> {
-                torqued.psi.as_ref().map_or_else(|| zeros(self.terms.len()).collect(), |j| j[r].clone())
-            };
             let accelerometer =
                 if accelerometers { self.accelerometer_rows(ring, c) } else { Default::default() };
             let rows = std::array::from_fn(|r| match r {
-                0..3 => psi_block[r].iter().cloned().chain(jump(r)).collect(),
-                3..PSI_EPS => zeros(3).chain(drift[r - 3].iter().cloned()).collect(),
-                _ if !accelerometers => Vec::new(),
-                _ => zeros(3).chain(accelerometer[r - PSI_EPS].iter().cloned()).collect(),
+                0..3 => row(&psi_block[r], torqued.psi.as_ref().map_or(&nothing, |left| &left[r])),
+                3..PSI_EPS => row(&no_psi, &drift[r - 3]),
+                _ if !accelerometers => Box::default(),
+                _ => row(&no_psi, &accelerometer[r - PSI_EPS]),
             });
             let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
             out.push(Block { columns, rows });
@@ -384,15 +387,17 @@ impl Platform {
                     .fold(signed(first, &x[first.axis]), |e, a| ring.mul(&e, &signed(a, &x[a.axis]))),
             })
         };
-        let excitations: Vec<Option<R::Element>> = self.terms.iter().map(excitation).collect();
-        std::array::from_fn(|row| {
-            let along_input = |t: &ErrorTerm| signed(&t.input, &c[row][t.input.axis]);
-            let entry = |(t, e): (&ErrorTerm, &Option<R::Element>)| match e {
-                Some(e) => ring.mul(&along_input(t), e),
-                None => ring.zero(),
-            };
-            self.terms.iter().zip(&excitations).map(entry).collect()
-        })
+        let mut rows = [0; 3].map(|_| Vec::with_capacity(self.terms.len()));
+        for t in &self.terms {
+            let e = excitation(t);
+            for (row, c) in rows.iter_mut().zip(c) {
+                row.push(match &e {
+                    Some(e) => ring.mul(&signed(&t.input, &c[t.input.axis]), e),
+                    None => ring.zero(),
+                });
+            }
+        }
+        rows
     }
 
     /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift itself.

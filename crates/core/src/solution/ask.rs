@@ -90,7 +90,7 @@ impl Solver<'_> {
         let blocks = self.platform.blocks(&self.text_point).into_iter();
         let segments =
             blocks.zip(&self.stations).zip(&self.text_point.attitudes).map(|((block, station), c)| {
-                let entry = |row: &Vec<String>| -> String {
+                let entry = |row: &Box<[String]>| -> String {
                     let names: Vec<String> = block.columns.iter().map(|&c| unknown(c)).collect();
                     Text.dot(row.iter().zip(&names))
                 };
