@@ -10,6 +10,7 @@ use obsdeg_core::system::{
     Judgement, NumberOfSolutions, SystemCertainty, SystemOptions, Unknown, analyze_system, json, judge,
     model_file,
 };
+use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{Measurement, Process};
 use obsdeg_evidence::crosscheck::Agreement;
@@ -364,6 +365,21 @@ fn jacobians_against_differences() {
                 model.name
             );
         }
+    }
+}
+
+/// What starts forget is a direction that a linearised filter believes to know to any precision: no figure of the run rests on it.
+#[test]
+fn a_filter_is_not_asked_what_it_cannot_know() {
+    let of = |name: &str| simulate_system(&example(name), 1).expect("a run").0.consistency;
+    let forgotten = of("two-compartment");
+    // seven states, of which the fast mode of the start is a function of the rates; all seven together give 1e39
+    assert_eq!(forgotten.unresolved_directions, 1);
+    assert!(forgotten.nees > forgotten.nees_limit && forgotten.nees < 1e12, "{forgotten:?}");
+    let (_, limit) = chi_square_band(6.0, 1.0, 0.999);
+    assert_eq!(forgotten.nees_limit, limit);
+    for name in ["bearing-only", "sir", "unicycle-range"] {
+        assert_eq!(of(name).unresolved_directions, 0, "{name}");
     }
 }
 

@@ -84,14 +84,19 @@ fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
 }
 
 /// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank needs
-/// order 2n-1. With functions the last factor is sin(x_i).
-fn chain(n: usize, functions: bool) -> SystemModel {
+/// order 2n-1. With functions the last factor is sin(x_i); with related ones the other is sin(x_(i-1) - x_i).
+fn chain_of_links(n: usize, functions: bool, related: bool) -> SystemModel {
     let states: Vec<String> = (0..n).map(|i| format!("\"x{i}\"")).collect();
     let rates: Vec<String> = (0..n).map(|i| format!("\"a{i}\"")).collect();
     let factor = |i: usize| if functions { format!("sin(x{i})") } else { format!("x{i}") };
     let equation = |i: usize| match i {
         0 => format!("\"x0\": \"-a0*x0*{}\"", factor(0)),
-        _ => format!("\"x{i}\": \"a{i}*(x{} - x{i})*{}\"", i - 1, factor(i)),
+        _ => format!(
+            "\"x{i}\": \"a{i}*{}(x{} - x{i})*{}\"",
+            if related { "sin" } else { "" },
+            i - 1,
+            factor(i)
+        ),
     };
     let equations: Vec<String> = (0..n).map(equation).collect();
     let text = format!(
@@ -102,6 +107,10 @@ fn chain(n: usize, functions: bool) -> SystemModel {
         n - 1
     );
     json::read(&text).expect("a model")
+}
+
+fn chain(n: usize, functions: bool) -> SystemModel {
+    chain_of_links(n, functions, false)
 }
 
 /// The rank, which is full.
@@ -125,7 +134,14 @@ fn chain_of_functions(bencher: Bencher<'_, '_>, n: usize) {
     bencher.bench(|| rank_of(&model));
 }
 
-/// The same by true values in real numbers.
+/// And with sines of differences of their arguments, which addition theorems take apart.
+#[divan::bench(args = [4, 8, 16, 32], max_time = 3)]
+fn chain_of_related_functions(bencher: Bencher<'_, '_>, n: usize) {
+    let model = chain_of_links(n, true, true);
+    bencher.bench(|| rank_of(&model));
+}
+
+/// A sine in every link by true values in real numbers.
 #[divan::bench(args = [4, 8, 16], max_time = 3)]
 fn chain_of_functions_in_digits(bencher: Bencher<'_, '_>, n: usize) {
     let model = chain(n, true);

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::covariance::{Covariance, Form};
+use crate::decomposition::singular_values;
 use crate::error::EkfError;
 
 /// The probability that a statistic of a right model lies in its band.
@@ -75,6 +76,41 @@ impl Nees {
             }
         }
         Ok(sum)
+    }
+
+    /// The part of `e^T P^-1 e` (`e`: shape n) along directions of which P says no less than `least` of the components' own sigmas, and the number of
+    /// these directions: principal axes of the correlation matrix. Of the others a filter that is linearised in doubles knows less than it believes.
+    ///
+    /// ```
+    /// use obsdeg_ekf::consistency::Nees;
+    /// // two components that are one, but for 1e-9
+    /// let p = nalgebra::DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 1.0 + 1e-12]);
+    /// let nees = Nees::new(&p).expect("positive definite");
+    /// let (sum, directions) = nees.resolved(&[0.5, 0.5001], 1e-3).expect("two of two");
+    /// assert!((sum - 0.25).abs() < 1e-3 && directions == 1);
+    /// assert!(nees.of(&mut [0.5, 0.5001]).expect("two of two") > 1e3);
+    /// ```
+    ///
+    /// # Errors
+    /// [`EkfError`].
+    pub fn resolved(&self, e: &[f64], least: f64) -> Result<(f64, usize), EkfError> {
+        let n = self.d.len();
+        if e.len() != n {
+            return Err(EkfError::Shape { what: "e", expected: (n, 1), found: (e.len(), 1) });
+        }
+        let u = |i: usize, j: usize| if i == j { 1.0 } else { self.u[j * n + i] };
+        let mut root = DMatrix::from_fn(n, n, |j, i| if i > j { 0.0 } else { u(i, j) * self.d[j].sqrt() });
+        let sigmas: Vec<f64> = root.column_iter().map(|c| c.norm()).collect();
+        for (mut column, sigma) in root.column_iter_mut().zip(&sigmas) {
+            column /= *sigma;
+        }
+        if root.iter().any(|x| !x.is_finite()) {
+            return Ok((f64::NAN, n));
+        }
+        let (values, axes) = singular_values(&root)?;
+        let along = |k: usize| -> f64 { (0..n).map(|i| axes[(i, k)] * e[i] / sigmas[i]).sum() };
+        let seen = values.iter().take_while(|value| **value >= least).count();
+        Ok(((0..seen).map(|k| (along(k) / values[k]).powi(2)).sum(), seen))
     }
 
     /// `P^-1 b` (n x any).

@@ -494,10 +494,17 @@ pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
         },
         format!("mean NIS {} (95 %: {})", number(c.nis), band(c.nis_band)),
         format!(
-            "NEES at the end {} (95 %: {}; decides: at most {})",
+            "NEES at the end {} (95 %: {}; decides: at most {}){}",
             number(c.nees),
             band(c.nees_band),
-            number(c.nees_limit)
+            number(c.nees_limit),
+            match c.unresolved_directions {
+                0 => String::new(),
+                k => format!(
+                    "; without {k} {} in which the filter believes to know more than a million times more than of any unknown: not resolvable",
+                    if k == 1 { "direction" } else { "directions" }
+                ),
+            }
         ),
         format!("innovations white: probability {}", number(c.whiteness_probability)),
     ]

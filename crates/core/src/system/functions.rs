@@ -47,7 +47,7 @@ impl Dag {
     }
 
     /// `x^m`.
-    fn integer_power(&mut self, x: usize, m: i64) -> Result<usize, DagError> {
+    pub(super) fn integer_power(&mut self, x: usize, m: i64) -> Result<usize, DagError> {
         if m.abs() > MAX_POWER {
             return Err(DagError::TooLarge("an exponent above 1000"));
         }
@@ -96,7 +96,7 @@ impl Dag {
     }
 
     /// A function with its derivative.
-    fn function(&mut self, function: Function, of: usize) -> usize {
+    pub(super) fn function(&mut self, function: Function, of: usize) -> usize {
         if let Some(&known) = self.functions.get(&(function, of)) {
             return known;
         }
@@ -160,10 +160,12 @@ fn reduced(p: i64, q: i64) -> Option<(i64, i64)> {
     Some((p / g, q / g))
 }
 
-fn times((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
+/// Of rational numbers; `None` beyond small ones.
+pub(super) fn times((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
     reduced(a.checked_mul(c)?, b.checked_mul(d)?)
 }
 
-fn plus((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
+/// Of rational numbers; `None` beyond small ones.
+pub(super) fn plus((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
     reduced(a.checked_mul(d)?.checked_add(c.checked_mul(b)?)?, b.checked_mul(d)?)
 }

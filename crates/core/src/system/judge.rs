@@ -3,6 +3,7 @@
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
+use super::addition::written_apart;
 use super::dag::{Dag, Op};
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
@@ -246,10 +247,12 @@ pub fn judge_compiled(
     let rational = compiled.dag.is_rational();
     if !rational {
         let mut rng = model.random(seed, "values of functions");
-        let independent = independent_functions(model, compiled, &layout, &mut rng);
+        let apart = written_apart(compiled);
+        let apart = apart.as_ref().unwrap_or(compiled);
+        let independent = independent_functions(model, apart, &layout, &mut rng);
         // where prime fields fail, for whatever reason, digits say why
         if let Some(count) = independent
-            && let Ok(judged) = judge_in_fields(model, compiled, &layout, seed)
+            && let Ok(judged) = judge_in_fields(model, apart, &layout, seed)
         {
             return Ok(Judgement { independent_functions: Some(count), ..judged });
         }

@@ -4,8 +4,9 @@
 //! with a dual lane per unknown at a random point of a prime field (`taylor`, Sedoglavic 2002,
 //! doi:10.1006/jsco.2002.0532), and its outputs' duals are the derivative rows (`rows`).
 
+mod addition;
 mod adjoint;
-pub(crate) mod answer;
+mod answer;
 mod canonical;
 pub(crate) mod constraints;
 pub(crate) mod dag;

@@ -272,6 +272,30 @@ impl Compiled {
         false
     }
 
+    /// The same in another graph, which has these nodes for those of this one.
+    pub(super) fn with(&self, dag: Dag, nodes: &[usize]) -> Self {
+        let all = |list: &[usize]| list.iter().map(|&i| nodes[i]).collect();
+        let given = |list: &[Option<usize>]| list.iter().map(|i| i.map(|i| nodes[i])).collect();
+        let named = |list: &[(usize, usize)]| list.iter().map(|&(of, i)| (of, nodes[i])).collect();
+        let experiment = |e: &CompiledExperiment| CompiledExperiment {
+            rates: all(&e.rates),
+            outputs: all(&e.outputs),
+            constants: given(&e.constants),
+        };
+        let segment =
+            |s: &CompiledSegment| CompiledSegment { constants: named(&s.constants), carry: named(&s.carry) };
+        Self {
+            dag,
+            roles: self.roles.clone(),
+            experiments: self.experiments.iter().map(experiment).collect(),
+            starts: given(&self.starts),
+            segments: self.segments.iter().map(segment).collect(),
+            constraints: all(&self.constraints),
+            combinations: all(&self.combinations),
+            places: self.places.iter().map(|(i, place)| (nodes[*i], place.clone())).collect(),
+        }
+    }
+
     /// The node of what has this role; `None` where nothing uses it.
     pub(crate) fn node_of(&self, role: Role) -> Option<usize> {
         let slot = self.roles.iter().position(|r| *r == role)?;

@@ -38,8 +38,11 @@ pub struct Consistency {
     /// The band of 99.9 %, in which it must be.
     pub nis_wide_band: (f64, f64),
     /// Normalised estimation error squared at the end; its expectation is the number of states: unknowns, and the biases of the gyros where these
-    /// are states.
+    /// are states, but for the directions that are left out.
     pub nees: f64,
+    /// Directions that the NEES leaves out: known more than a million times better than the unknowns themselves, which a filter linearised at its
+    /// estimates believes but cannot know. None where the model is linear.
+    pub unresolved_directions: usize,
     /// Its band, 95 %.
     pub nees_band: (f64, f64),
     /// The upper end of its band of 99.9 %, which it must not exceed. A small one says nothing: true values are given, not drawn.
@@ -65,6 +68,8 @@ pub(crate) struct Outcomes<'a> {
     pub covariance: &'a Covariance,
     /// Name and error over sigma of what is reported.
     pub normalised: Vec<(&'a str, f64)>,
+    /// Directions with a sigma below this part of the unknowns' own are left out of the NEES.
+    pub resolution: f64,
 }
 
 impl Consistency {
@@ -73,11 +78,15 @@ impl Consistency {
     /// # Errors
     /// [`EkfError`] when the covariance is not positive definite.
     pub(crate) fn of(mut run: Outcomes<'_>) -> Result<Self, EkfError> {
-        let (n, outputs) = (run.error.len() as f64, run.outputs as f64);
+        let (states, outputs) = (run.error.len(), run.outputs as f64);
         let samples = run.whitened.len() / run.outputs;
         let count = samples as f64;
         let nis = run.whitened.iter().map(|v| v * v).sum::<f64>() / count;
-        let nees = Nees::of_covariance(run.covariance)?.of(&mut run.error)?;
+        let of = Nees::of_covariance(run.covariance)?;
+        let (nees, n) = match run.resolution {
+            0.0 => (of.of(&mut run.error)?, states),
+            least => of.resolved(&run.error, least)?,
+        };
         let lags = LAGS.min(samples / 4).max(1);
         let whiteness = (0..run.outputs)
             .map(|j| {
@@ -87,7 +96,7 @@ impl Consistency {
             // a number that is none stays one
             .fold(1.0, |least: f64, p| if p.is_nan() { p } else { least.min(p) });
         let nis_wide_band = chi_square_band(outputs, count, STRICT);
-        let (_, nees_limit) = chi_square_band(n, 1.0, STRICT);
+        let (_, nees_limit) = chi_square_band(n as f64, 1.0, STRICT);
         let beyond = run.normalised.iter().filter(|(_, x)| x.abs() > CREDIBLE);
         let beyond: Vec<String> = beyond.map(|(name, _)| name.to_string()).collect();
         let numbers = run.normalised.iter().map(|(_, x)| *x).chain([nis, nees, whiteness]);
@@ -105,7 +114,8 @@ impl Consistency {
             nis_band: chi_square_band(outputs, count, CONFIDENCE),
             nis_wide_band,
             nees,
-            nees_band: chi_square_band(n, 1.0, CONFIDENCE),
+            unresolved_directions: states - n,
+            nees_band: chi_square_band(n as f64, 1.0, CONFIDENCE),
             nees_limit,
             whiteness_probability: whiteness,
             beyond,
@@ -133,6 +143,7 @@ mod tests {
             error: error.to_vec(),
             covariance: &p,
             normalised: vec![("a", error[0]), ("b", error[1])],
+            resolution: 0.0,
         };
         Consistency::of(run).expect("judged")
     }

@@ -33,6 +33,9 @@ const HELD: f64 = 1e-9;
 const SINGULAR: f64 = 1e-7;
 /// Draws from the prior for what is left of a constraint beyond its differential.
 const DRAWS: usize = 64;
+/// What a run linearised at its estimates says of a direction below this part of the unknowns' sigmas is less than what linearising and
+/// rounding leave there.
+const RESOLUTION: f64 = 1e-6;
 
 /// A run of a system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -319,6 +322,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         error: (filter.x() - &truth).as_slice().to_vec(),
         covariance: filter.covariance(),
         normalised: estimates.iter().map(|e| (e.name.as_str(), e.error_over_sigma)).collect(),
+        resolution: RESOLUTION,
     });
     Ok((
         SystemRun {
