@@ -252,6 +252,19 @@ fn points_lie_where_the_model_is_defined() {
         "the output y: abs of zero, where it has no derivative; expected an argument that is not zero"
     );
     assert_eq!(refused("x/sin(pi)", ""), "the output y: division by zero at every point that was tried");
+    let from_zero = |output: &str| {
+        let text =
+            format!("name='m'\n[states]\nz={{equation='1', initial=0}}\nx='0'\n[outputs]\ny='{output}'");
+        judge(&model_file::read(&text).expect("a model"), 1, None).expect_err(output).to_string()
+    };
+    assert_eq!(
+        from_zero("x*sqrt(z)"),
+        "the output y: sqrt of zero, where it has no derivative; expected an argument that is not zero"
+    );
+    assert_eq!(
+        from_zero("x*acos(1 - z)"),
+        "the output y: acos at an end of its range, where it has no derivative; expected an argument between -1 and 1"
+    );
 }
 
 /// A definite value against the same model with the value written in by hand: the same verdicts, orders and ranks.

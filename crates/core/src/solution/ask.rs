@@ -90,11 +90,11 @@ impl Solver<'_> {
         let blocks = self.platform.blocks(&self.text_point).into_iter();
         let segments =
             blocks.zip(&self.stations).zip(&self.text_point.attitudes).map(|((block, station), c)| {
-                let entry = |row: &Box<[String]>| -> String {
+                let entry = |row: &[String]| -> String {
                     let names: Vec<String> = block.columns.iter().map(|&c| unknown(c)).collect();
                     Text.dot(row.iter().zip(&names))
                 };
-                let local = block.rows[..observed.locals()].iter().map(entry);
+                let local = block.rows[..observed.locals()].iter().map(|row| entry(row));
                 let moving: Vec<String> = match *station {
                     (position, Some(axis)) => drift_derivative(self.platform, &self.text_point, c, axis)
                         .iter()

@@ -209,6 +209,13 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
             node,
             format!("{} is not defined here at any of {points} points that were tried", name(function)),
         ),
+        Singular::Kink(node, function @ (Function::Asin | Function::Acos)) => (
+            node,
+            format!(
+                "{} at an end of its range, where it has no derivative; expected an argument between -1 and 1",
+                name(function)
+            ),
+        ),
         Singular::Kink(node, function) => (
             node,
             format!(

@@ -261,8 +261,13 @@ impl<'a, S: Values> Taylor<'a, S> {
             }
             Op::Primitive { function, of, .. } => {
                 let argument = value(of);
-                let bends = matches!(function, Function::Abs | Function::Sign);
-                if bends && f.is_zero(argument) && !(self.constant[of] && self.known[of]) {
+                // zero where there is no derivative
+                let edge = match function {
+                    Function::Abs | Function::Sign | Function::Sqrt => Some(*argument),
+                    Function::Asin | Function::Acos => Some(f.sub(&f.one(), &f.mul(argument, argument))),
+                    _ => None,
+                };
+                if edge.is_some_and(|x| f.is_zero(&x)) && !(self.constant[of] && self.known[of]) {
                     return Err(Singular::Kink(i, function));
                 }
                 f.function(function, argument).ok_or(Singular::Domain(i, function))?
