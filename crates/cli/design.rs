@@ -34,6 +34,7 @@ Examples:
   obsdeg design --positions 12 --carry reset --candidates free --round 5
   obsdeg design --positions 12 --terms all --carry inertial --slew-rate 1 --criterion d
   obsdeg design --positions 8 --carry platform --within 0
+  obsdeg design --positions 5 --carry inertial --divide
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --positions 7 --carry inertial --merge part-*.json
 
@@ -103,6 +104,10 @@ pub(crate) struct Arguments {
     /// Move the angles of the best scheme continuously, to hundredths of a degree
     #[arg(long)]
     refine: bool,
+
+    /// Divide the total time among the positions of the best scheme: dwells of their own, in steps of the samples
+    #[arg(long)]
+    divide: bool,
 
     /// Other numbers of positions for the front of total time against the criterion
     #[arg(long, value_name = "K", value_delimiter = ',')]
@@ -224,6 +229,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         keep: a.keep.into(),
         restarts: a.restarts,
         refine: a.refine,
+        divide: a.divide,
         front: a.front.clone(),
         within: a.within / 100.0,
         everywhere: true,
@@ -364,8 +370,9 @@ fn scheme_file(
     base: &Scheme,
     conditions: &Conditions,
 ) -> Result<String, DesignError> {
-    let proven = found.search.as_ref().is_some_and(|s| s.proven) && !best.refined;
-    let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| !best.refined);
+    let as_searched = !best.refined && best.dwells_s.is_empty();
+    let proven = found.search.as_ref().is_some_and(|s| s.proven) && as_searched;
+    let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| as_searched);
     let proven = match (proven, certificate) {
         (true, _) => "proven best".into(),
         (false, Some(c)) => {

@@ -152,7 +152,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "beta=-1e300:1e300",
         ],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
-        "measured-azimuth" | "formulas" | "minimum" | "refine" | "meet" | "force" | "quiet" | "help" => {
+        "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "force" | "quiet"
+        | "help" => {
             return None;
         }
         _ => number,

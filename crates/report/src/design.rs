@@ -58,11 +58,27 @@ fn requirements(r: &Requirements) -> Vec<String> {
     std::iter::once(words::requirements(r)).chain(check).collect()
 }
 
+/// ` (900, 1100 s)`: dwells that are not equal.
+fn dwells(f: &Found) -> String {
+    let listed: Vec<String> = f.dwells_s.iter().map(|s| number(*s)).collect();
+    if listed.is_empty() { String::new() } else { format!(" ({} s)", listed.join(", ")) }
+}
+
+/// The first scheme of those that were searched, in words.
+fn searched(d: &Design) -> &'static str {
+    match (d.found.iter().any(|f| f.refined), d.found.iter().any(|f| !f.dwells_s.is_empty())) {
+        (false, false) => "the first",
+        (true, false) => "the first that is not refined",
+        (false, true) => "the first of equal dwells",
+        (true, true) => "the first of equal dwells that is not refined",
+    }
+}
+
 fn table(heading: &str, found: &[Found]) -> Block {
     let row = |(i, f): (usize, &Found)| {
         vec![
             (i + 1).to_string(),
-            format!("{}{}", route(f), if f.refined { " (refined)" } else { "" }),
+            format!("{}{}{}", route(f), if f.refined { " (refined)" } else { "" }, dwells(f)),
             number(f.total_s),
             f.worst_degree.to_string(),
             f.worst_accuracy_order.map_or_else(|| "-".into(), |o| o.to_string()),
@@ -108,11 +124,7 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         ),
     };
     let mut out = vec![if s.proven {
-        let unrefined = if d.found.first().is_some_and(|f| f.refined) {
-            "the first that is not refined"
-        } else {
-            "the first"
-        };
+        let unrefined = searched(d);
         format!(
             "{unrefined} is proven to be the best: of all sequences of {} of the candidates within the constraints none has a smaller worst \
              degree, or the same and a smaller criterion ({evaluated})",
@@ -221,11 +233,7 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         };
         return vec![why];
     };
-    let first = if d.found.first().is_some_and(|f| f.refined) {
-        "the first that is not refined"
-    } else {
-        "the first"
-    };
+    let first = searched(d);
     let mut out = vec![
         format!(
             "{first} is within {} of the best possible of these candidates: no scheme of {} of them in equal dwells, of whatever degrees, has a \

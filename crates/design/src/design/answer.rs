@@ -179,8 +179,11 @@ pub struct Found {
     pub half_turns: Vec<HalfTurn>,
     /// Its angles were refined continuously.
     pub refined: bool,
-    /// Dwell of each position, in s.
+    /// Dwell of each position, in s; the mean where they have dwells of their own.
     pub dwell_s: f64,
+    /// Where the total time was divided among the positions: the dwell of each, in s; empty where they are equal. Moving a two hundred and
+    /// fifty-sixth of an equal dwell (at least the time between samples) from one position to another makes none of them better.
+    pub dwells_s: Vec<f64>,
     /// Total time with turns, in s.
     pub total_s: f64,
     /// The criterion: a sigma in its unit, or for margin the largest sigma over its requirement, psi's too where it counts.

@@ -28,6 +28,18 @@ pub(super) struct Candidate {
     /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower triangle): what it
     /// adds to any scheme under reset carry; empty under the others.
     pub(super) own: Vec<f64>,
+    /// Which of the dwells of the evaluator it has.
+    dwell: usize,
+}
+
+/// What a dwell makes of the local unknowns at a position.
+#[derive(Debug, Clone)]
+pub(super) struct Dwelling {
+    pub(super) seconds: f64,
+    /// Information of the position on its local unknowns.
+    pub(super) local: [[f64; LOCAL]; LOCAL],
+    /// `psi^n` behind it as a function of `(psi^n, eps^n)` before.
+    phi: [[f64; PSI_EPS]; 3],
 }
 
 /// What every evaluation shares.
@@ -47,12 +59,8 @@ pub struct Evaluator {
     locals: usize,
     /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
     pub(super) w: Matrix3<f64>,
-    /// Dwell of each position, in s.
-    dwell_s: f64,
-    /// Information of one position on its local unknowns.
-    pub(super) local: [[f64; LOCAL]; LOCAL],
-    /// `psi^n` after a position as a function of `(psi^n, eps^n)` before.
-    phi: [[f64; PSI_EPS]; 3],
+    /// That of all positions; where they have dwells of their own, of the first.
+    dwells: Vec<Dwelling>,
     pub(super) candidates: Vec<Candidate>,
     /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
     pub(super) ways: Vec<Way>,
@@ -129,9 +137,7 @@ impl Evaluator {
             n: d + 3,
             locals,
             w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
-            dwell_s: conditions.dwell_s,
-            local: [[0.0; LOCAL]; LOCAL],
-            phi: [[0.0; PSI_EPS]; 3],
+            dwells: Vec::new(),
             candidates: Vec::new(),
             ways: Vec::new(),
             dph,
@@ -145,6 +151,16 @@ impl Evaluator {
     /// # Errors
     /// [`DesignError::Filter`].
     pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
+        self.dwells = vec![self.dwelling(dwell_s)?];
+        let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
+        let ways = std::mem::take(&mut self.ways);
+        self.stand_at(&attitudes);
+        self.ways = ways;
+        Ok(self)
+    }
+
+    /// What so many seconds at a position are.
+    pub(super) fn dwelling(&self, dwell_s: f64) -> Result<Dwelling, DesignError> {
         let f = local_dynamics(&Float, &self.w[1][2], &-self.w[0][2]);
         let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
         let steps = steps(dwell_s, self.conditions.step_s)?;
@@ -152,7 +168,7 @@ impl Evaluator {
         let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
         let outputs = local_output(&Float, self.platform.observed());
         let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
-        self.local = [[0.0; LOCAL]; LOCAL];
+        let mut local = [[0.0; LOCAL]; LOCAL];
         for _ in 0..steps {
             now = &step * now;
             for (component, h) in &outputs {
@@ -160,18 +176,33 @@ impl Evaluator {
                 let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
                 for i in 0..LOCAL {
                     for j in 0..LOCAL {
-                        self.local[i][j] += weight * row[i] * row[j];
+                        local[i][j] += weight * row[i] * row[j];
                     }
                 }
             }
         }
-        self.phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
-        self.dwell_s = dwell_s;
-        let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
-        let ways = std::mem::take(&mut self.ways);
-        self.stand_at(&attitudes);
-        self.ways = ways;
-        Ok(self)
+        let phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
+        Ok(Dwelling { seconds: dwell_s, local, phi })
+    }
+
+    /// Every candidate with a dwell of its own, which [`Self::dwell_at`] changes.
+    pub(super) fn with_dwells(mut self) -> Self {
+        self.dwells = vec![self.dwells[0].clone(); self.candidates.len()];
+        self.candidates.iter_mut().enumerate().for_each(|(i, c)| c.dwell = i);
+        self
+    }
+
+    /// Changes the dwell of a candidate that has one of its own.
+    pub(super) fn dwell_at(&mut self, candidate: usize, dwelling: &Dwelling) {
+        let Candidate { c, effects, dwell, .. } = &self.candidates[candidate];
+        self.dwells[*dwell].clone_from(dwelling);
+        let own = self.information_alone(c, effects, dwelling);
+        self.candidates[candidate].own = own;
+    }
+
+    /// What the dwell of a candidate is.
+    pub(super) fn dwelling_of(&self, candidate: usize) -> &Dwelling {
+        &self.dwells[self.candidates[candidate].dwell]
     }
 
     /// The rows of `eps^n` at an attitude, while the platform turns as `slew` says.
@@ -199,14 +230,24 @@ impl Evaluator {
             .iter()
             .map(|c| {
                 let effects = self.effects(c);
-                Candidate { own: self.information_alone(c, &effects), effects, c: *c }
+                Candidate {
+                    own: self.information_alone(c, &effects, &self.dwells[0]),
+                    effects,
+                    c: *c,
+                    dwell: 0,
+                }
             })
             .collect();
         self.ways.clear();
     }
 
     /// Information of one position on the coefficients with a psi of its own; empty where psi goes on.
-    fn information_alone(&self, c: &Matrix3<f64>, effects: &[Vec<f64>; LOCAL - 3]) -> Vec<f64> {
+    fn information_alone(
+        &self,
+        c: &Matrix3<f64>,
+        effects: &[Vec<f64>; LOCAL - 3],
+        dwelling: &Dwelling,
+    ) -> Vec<f64> {
         if self.carry() != Carry::Reset {
             return Vec::new();
         }
@@ -218,7 +259,7 @@ impl Evaluator {
         for (row, effect) in local[3..self.locals].iter_mut().zip(effects) {
             row[3..n].copy_from_slice(effect);
         }
-        let weighted = self.weighted(&local);
+        let weighted = self.weighted(&local, dwelling);
         let mut own = [[0.0; MAX]; MAX];
         for (i, row) in own[..n].iter_mut().enumerate() {
             for (l, w) in local.iter().zip(&weighted) {
@@ -238,7 +279,7 @@ impl Evaluator {
     /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi eliminated.
     pub(super) fn information_of_effects(&self) -> [[f64; LOCAL - 3]; LOCAL - 3] {
         let mut all = [[0.0; MAX]; MAX];
-        for (row, local) in all.iter_mut().zip(&self.local) {
+        for (row, local) in all.iter_mut().zip(&self.dwells[0].local) {
             row[..LOCAL].copy_from_slice(local);
         }
         eliminate(&mut all, LOCAL, 3);
@@ -246,10 +287,14 @@ impl Evaluator {
     }
 
     /// `G L` for the functionals L of the local unknowns at a position (of n unknowns each).
-    fn weighted<const L: usize, const N: usize>(&self, local: &[[f64; N]; L]) -> [[f64; N]; L] {
+    fn weighted<const L: usize, const N: usize>(
+        &self,
+        local: &[[f64; N]; L],
+        dwelling: &Dwelling,
+    ) -> [[f64; N]; L] {
         let n = self.n;
         let mut weighted = [[0.0; N]; L];
-        for (row, weights) in weighted.iter_mut().zip(&self.local) {
+        for (row, weights) in weighted.iter_mut().zip(&dwelling.local) {
             for (l, &g) in local.iter().zip(weights) {
                 if g != 0.0 {
                     for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
@@ -286,9 +331,14 @@ impl Evaluator {
         self.platform.scheme().carry
     }
 
-    /// Dwell of each position, in s.
+    /// Largest time between samples, in s.
+    pub(super) fn step_s(&self) -> f64 {
+        self.conditions.step_s
+    }
+
+    /// Dwell of each position, in s; where they have dwells of their own, of the first.
     pub fn dwell_s(&self) -> f64 {
-        self.dwell_s
+        self.dwells[0].seconds
     }
 
     /// Adds a position to `state`; the result goes to `out`.
@@ -303,11 +353,12 @@ impl Evaluator {
     fn extend_in<const L: usize, const N: usize>(&self, state: &State, stop: Stop, out: &mut State) {
         let n = self.n;
         let carry = self.carry();
-        let Candidate { c, effects, own } = &self.candidates[stop.candidate];
+        let Candidate { c, effects, own, dwell } = &self.candidates[stop.candidate];
+        let dwelling = &self.dwells[*dwell];
         let turn = self.way_to(state.path.last().copied(), stop);
         out.path.clone_from(&state.path);
         out.path.push(stop.candidate);
-        out.seconds = state.seconds + self.dwell_s + turn.map_or(0.0, |t| t.seconds);
+        out.seconds = state.seconds + dwelling.seconds + turn.map_or(0.0, |t| t.seconds);
         if carry == Carry::Reset {
             // psi of the position is eliminated: information adds
             for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
@@ -338,7 +389,7 @@ impl Evaluator {
             }
         }
         // L^T (G L)
-        let weighted = self.weighted(&local);
+        let weighted = self.weighted(&local, dwelling);
         out.information.copy_from_slice(&state.information);
         for i in 0..n {
             let row = &mut out.information[i * n..=i * n + i];
@@ -349,7 +400,7 @@ impl Evaluator {
             }
         }
         let mut after = [[0.0; N]; 3];
-        for (row, phi) in after.iter_mut().zip(&self.phi) {
+        for (row, phi) in after.iter_mut().zip(&dwelling.phi) {
             for (l, p) in local.iter().zip(phi) {
                 for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
                     *x += p * y;

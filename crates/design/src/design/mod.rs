@@ -10,6 +10,7 @@ pub(crate) mod candidates;
 mod certificate;
 mod certify;
 pub(crate) mod criterion;
+mod divide;
 pub(crate) mod information;
 pub(crate) mod observability;
 mod part;
@@ -231,7 +232,7 @@ pub enum DesignError {
     /// What is searched over sets only.
     #[error(
         "torquer errors act on the way between positions, so schemes are walks: found {found}; expected slews that take time (--slew-rate), about one \
-         axis, between cardinal attitudes, by exchange (no --refine, --part, or cap of degrees); --minimum finds the fewest positions"
+         axis, between cardinal attitudes, by exchange (no --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
     )]
     Walks {
         /// What is not of walks.
@@ -279,6 +280,8 @@ pub struct DesignOptions {
     pub restarts: u64,
     /// Refine the angles of the best continuously.
     pub refine: bool,
+    /// Divide the total time among the positions of the best.
+    pub divide: bool,
     /// Numbers of positions for the front of total time, besides that asked for.
     pub front: Vec<usize>,
     /// Where many sequences would have to be searched and information adds (reset carry): a scheme found by exchange whose
@@ -308,6 +311,7 @@ impl Default for DesignOptions {
             keep: 10,
             restarts: 200,
             refine: false,
+            divide: false,
             front: Vec::new(),
             within: 1e-4,
             everywhere: false,
@@ -462,6 +466,7 @@ fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) 
         (base.path == Some(Path::Gimbals)).then(|| "slews gimbal by gimbal".into()),
         other.map(|i| format!("candidate {}", options.candidates.names[i])),
         options.refine.then(|| "--refine".into()),
+        options.divide.then(|| "--divide".into()),
         (!options.degree_caps.is_empty()).then(|| "a cap of degrees".into()),
     ];
     match found.into_iter().flatten().next() {
@@ -608,6 +613,11 @@ fn answered(
             let refined = task.refined(evaluator, first, &going)?;
             out.front.extend(refined.iter().cloned());
             out.found.splice(0..0, refined);
+        }
+        if options.divide && going() {
+            let divided = task.divided(evaluator, first, &going)?;
+            out.front.extend(divided.iter().cloned());
+            out.found.splice(0..0, divided);
         }
         out.front = pareto(std::mem::take(&mut out.front));
         out.search = Some(SearchReport {

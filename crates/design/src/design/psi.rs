@@ -58,7 +58,8 @@ impl Evaluator {
     pub(super) fn psi_by_coefficients(&self, candidate: usize, k: usize) -> Option<(f64, Vec<f64>)> {
         let (n, c) = (self.n, &self.candidates[candidate].c);
         let effects = &self.candidates[candidate].effects;
-        let local = |i: usize, j: usize| self.local[i][j];
+        let dwelling = self.dwelling_of(candidate);
+        let local = |i: usize, j: usize| dwelling.local[i][j];
         // information on psi^c, and between psi^c and the coefficients
         let weighted = |k: usize, j: usize| (0..3).map(|r| c[r][k] * local(r, j)).sum::<f64>();
         let own = |i: usize, k: usize| (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();

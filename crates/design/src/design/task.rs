@@ -17,7 +17,7 @@ use super::search::{Best, Constraints, Scored, Search};
 use super::symmetry::Symmetry;
 use super::walks::is_walk;
 use super::ways::Stop;
-use super::{CriterionName, Design, DesignError, DesignOptions, EXHAUSTIVE, refine, winner};
+use super::{CriterionName, Design, DesignError, DesignOptions, EXHAUSTIVE, divide, refine, winner};
 
 /// Most sets whose keys are held.
 const MOST_SETS: u64 = 5_000_000;
@@ -360,6 +360,7 @@ impl<'a> Task<'a> {
                 .collect(),
             refined: false,
             dwell_s: evaluator.dwell_s(),
+            dwells_s: Vec::new(),
             total_s: evaluator.state_of(sequence).seconds,
             value,
             worst_sigma_dph,
@@ -403,6 +404,27 @@ impl<'a> Task<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The best sequence with the total time divided among its positions, if that makes it better.
+    pub(super) fn divided(
+        &self,
+        evaluator: &Evaluator,
+        best: &Scored,
+        going: &dyn Fn() -> bool,
+    ) -> Result<Option<Found>, DesignError> {
+        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
+        let attitudes: Vec<Euler> = best.sequence.iter().map(attitude).collect();
+        let path: Vec<Stop> =
+            best.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s }).collect();
+        let along = evaluator.along(&attitudes.iter().map(c_n_f64).collect::<Vec<_>>());
+        let allowed = |there: &Evaluator| going() && self.constraints.keep(there, &path);
+        let divided = divide::divide(&along, &path, &self.criterion, &allowed)?;
+        let Some((value, there)) = divided else { return Ok(None) };
+        let names = best.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
+        let found = self.judged(&there, &path, attitudes, names, value)?;
+        let dwells_s: Vec<f64> = (0..path.len()).map(|i| there.dwelling_of(i).seconds).collect();
+        Ok(found.map(|f| Found { dwells_s, dwell_s: evaluator.dwell_s(), ..f }))
     }
 
     /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a

@@ -18,9 +18,9 @@ const HALF: i32 = 180;
 pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<Scheme, DesignError> {
     let attitudes = found.angles.iter().filter_map(|text| parse_attitude(text).ok());
     let mut positions = Scheme::of_angles(attitudes).positions;
-    let seconds = found.dwell_s.to_string();
-    let dwell = Dwell::from_seconds(found.dwell_s).ok_or(SchemeError::Dwell { found: seconds })?;
-    for p in &mut positions {
+    for (i, p) in positions.iter_mut().enumerate() {
+        let seconds = found.dwells_s.get(i).copied().unwrap_or(found.dwell_s);
+        let dwell = Dwell::from_seconds(seconds).ok_or(SchemeError::Dwell { found: seconds.to_string() })?;
         p.dwell = Some(dwell);
     }
     for turn in &found.half_turns {
