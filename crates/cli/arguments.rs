@@ -12,7 +12,10 @@ use crate::failure::Failure;
 use crate::input::{Input, Source};
 
 /// Options that a model takes as well as a scheme, or a model alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 10] = [
+const OF_MODELS: [&str; 13] = [
+    "files",
+    "starts",
+    "profile",
     "model",
     "order",
     "count_limit",

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+use obsdeg_calibration::CalibrationError;
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::solution::CombinationError;
 use obsdeg_design::design::DesignError;
@@ -105,6 +106,15 @@ impl From<SimulationError> for Failure {
                 "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
             )),
             SimulationError::Filter(_) => Self::internal(e.to_string()),
+            _ => Self::input(e.to_string()),
+        }
+    }
+}
+
+impl From<CalibrationError> for Failure {
+    fn from(e: CalibrationError) -> Self {
+        match e {
+            CalibrationError::Simulation(e) => e.into(),
             _ => Self::input(e.to_string()),
         }
     }

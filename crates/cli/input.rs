@@ -146,7 +146,7 @@ impl Source {
 
 /// Opens without waiting for somebody to write into a pipe; reading waits for whoever has it open.
 #[cfg(unix)]
-fn open(path: &Path) -> Io<std::fs::File> {
+pub(crate) fn open(path: &Path) -> Io<std::fs::File> {
     use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
     use std::os::unix::fs::OpenOptionsExt;
     let file = std::fs::File::options().read(true).custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
@@ -155,6 +155,6 @@ fn open(path: &Path) -> Io<std::fs::File> {
 }
 
 #[cfg(not(unix))]
-fn open(path: &Path) -> Io<std::fs::File> {
+pub(crate) fn open(path: &Path) -> Io<std::fs::File> {
     std::fs::File::open(path)
 }

@@ -3,6 +3,7 @@
 
 mod analyze;
 mod arguments;
+mod calibrate;
 mod compare;
 mod completions;
 mod conditions;
@@ -36,6 +37,7 @@ Examples:
   obsdeg analyze --scheme scheme.toml --carry inertial --format json -o verdicts.json
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
+  obsdeg calibrate scheme.toml record.csv
   obsdeg compare a.toml b.toml
   obsdeg design --positions 5 --carry inertial
   obsdeg report scheme.toml -o review.html
@@ -59,6 +61,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Hold the exact verdicts against a filter; exit code 1 when anything disagrees
     Crosscheck(crosscheck::Arguments),
+    /// Estimate what a scheme determines from the record of its run; exit code 1 when the model does not explain it
+    Calibrate(calibrate::Arguments),
     /// Judge schemes side by side: verdicts, predicted accuracy, what each position is for
     Compare(compare::Arguments),
     /// Find schemes: the fewest positions, or the best of a number of them
@@ -130,6 +134,7 @@ fn run() -> Result<(), ExitCode> {
         Command::Analyze(a) => analyze::run(&a),
         Command::Simulate(a) => simulate::run(&a),
         Command::Crosscheck(a) => crosscheck::run(&a),
+        Command::Calibrate(a) => calibrate::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Design(a) => design::run(&a),
         Command::Report(a) => report::run(&a),

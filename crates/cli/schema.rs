@@ -1,6 +1,7 @@
 //! `obsdeg schema`: JSON Schemas, generated from the types.
 
 use clap::{Args, ValueEnum};
+use obsdeg_calibration::{Calibration, SystemCalibration};
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
@@ -26,6 +27,8 @@ enum Kind {
     Simulation,
     /// The JSON of `obsdeg crosscheck`
     Crosscheck,
+    /// The JSON of `obsdeg calibrate`
+    Calibration,
     /// The JSON of `obsdeg compare`
     Comparison,
     /// The JSON of `obsdeg design`
@@ -38,6 +41,8 @@ enum Kind {
     System,
     /// The JSON of `obsdeg simulate --model`
     Run,
+    /// The JSON of `obsdeg calibrate --model`
+    SystemCalibration,
     /// The JSON of `obsdeg crosscheck --model`
     Evidence,
     /// Model files
@@ -56,12 +61,14 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         Kind::Audit => schema_for!(Audit),
         Kind::Simulation => schema_for!(Simulation),
         Kind::Crosscheck => schema_for!(CrossCheck),
+        Kind::Calibration => schema_for!(Calibration),
         Kind::Comparison => schema_for!(Comparison),
         Kind::Design => schema_for!(Design),
         Kind::Part => schema_for!(Part),
         Kind::Scheme => schema_for!(SchemeFile),
         Kind::System => schema_for!(SystemAnalysis),
         Kind::Run => schema_for!(SystemRun),
+        Kind::SystemCalibration => schema_for!(SystemCalibration),
         Kind::Evidence => schema_for!(SystemEvidence),
         Kind::Model => schema_for!(ModelFile),
     };

@@ -433,7 +433,18 @@ fn the_paper_is_audited() {
 
 #[test]
 fn schemas_help_completions_and_manual() {
-    for kind in ["analysis", "audit", "simulation", "crosscheck", "comparison", "design", "part", "scheme"] {
+    for kind in [
+        "analysis",
+        "audit",
+        "simulation",
+        "crosscheck",
+        "calibration",
+        "system-calibration",
+        "comparison",
+        "design",
+        "part",
+        "scheme",
+    ] {
         insta::assert_snapshot!(format!("schema_{kind}"), stdout(&run(&["schema", kind])));
     }
     let help = stdout(&run(&["analyze", "--help"]));

@@ -135,6 +135,10 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "keep" => &["1", "3", "0", "-1", "18446744073709551615"],
         "restarts" => &["2", "1", "0", "-1"],
         "round" => &["5", "0", "x"],
+        "starts" => &["2", "1", "0", "x"],
+        "profile" => &["x", "D_FX", ""],
+        "gravity" => &["9.81744", "9.80665", "9", "10.5", "1", "nan"],
+        "gate" => &["0.999", "1", "0.5", "0", "2", "nan"],
         "within" => &["0.01", "0", "x"],
         "front" => &["1", "3", "0", "2:4", "1,2", "x"],
         "observable" => &["D_F,D_O,D_S", "D_F", "D_FX", "psi", "D_Q", ""],
@@ -153,7 +157,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         ],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "force" | "quiet"
-        | "help" => {
+        | "help" | "estimate-noise" => {
             return None;
         }
         _ => number,
@@ -164,6 +168,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
 fn operands(command: &str) -> &'static [&'static str] {
     match command {
         "compare" | "report" => &["s.toml", "t.toml", "m.toml", "none.toml"],
+        "calibrate" => &["s.toml"],
         "schema" => &["analysis", "scheme", "model", "comparison", "design", "nothing"],
         "completions" => &["bash", "zsh", "nothing"],
         _ => &[],
@@ -194,6 +199,7 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
         "analyze",
         "simulate",
         "crosscheck",
+        "calibrate",
         "compare",
         "design",
         "report",
@@ -215,10 +221,24 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
 /// A folder with the files of the command lines.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL)] {
+    for (name, text) in [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL), ("r.csv", &record())] {
         fs::write(folder.path().join(name), text).expect("written");
     }
     folder
+}
+
+/// A record of s.toml, of no errors but noise.
+fn record() -> String {
+    let mut rng = SplitMix64::new(5);
+    // nearly normal: the sum of twelve
+    let mut noise =
+        || (0..12).map(|_| (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64).sum::<f64>() - 6.0;
+    let mut line = |t: usize| {
+        let position = if t <= 300 { "p1" } else { "p2" };
+        format!("{t},{position},{:e},{:e}\n", 1e-5 * noise(), 1e-5 * noise())
+    };
+    let lines: String = (1..=130).map(|k| line(10 * k)).collect();
+    format!("t [s],position,Z1 [g],Z3 [g]\n{lines}")
 }
 
 /// Beside a model an option is about models too, or is refused: none is passed over.
@@ -292,5 +312,8 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     let several = if ["compare", "report"].contains(&command) { 2 } else { 1 };
     let operands = operands(command);
     out.extend((0..several.min(operands.len())).map(|_| pick(rng, operands)));
+    if command == "calibrate" {
+        out.push(pick(rng, &["r.csv", "-", "none.csv"]));
+    }
     out
 }

@@ -2,6 +2,7 @@
 //! symbolic worker are apart: they hold the lock for which others would wait.
 
 mod browser;
+mod calibrate;
 mod cli;
 mod compare;
 mod crosscheck;

@@ -60,12 +60,12 @@ fn modules_of(name: &str) -> Imports {
 
 /// Modules of the crates that have more than a page of them.
 fn modules() -> Imports {
-    ["core", "evidence", "design"].into_iter().flat_map(modules_of).collect()
+    ["core", "evidence", "calibration", "design"].into_iter().flat_map(modules_of).collect()
 }
 
 /// Crates of the workspace and what they import from it.
 fn crates() -> Imports {
-    let names = ["exact", "ekf", "symbolic", "core", "evidence", "design", "report", "cli"];
+    let names = ["exact", "ekf", "symbolic", "core", "evidence", "calibration", "design", "report", "cli"];
     let imports = |name: &&str| {
         let place = root().join("crates").join(name);
         let place = if place.join("src").is_dir() { place.join("src") } else { place };

@@ -174,6 +174,25 @@ pub struct SmoothedStart {
     /// Its covariance (n x n). What the measurements leave of a prior variance is a difference: below 1e-16 of the prior variance
     /// it is rounding.
     pub covariance: DMatrix<f64>,
+    /// One per update, in order.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A measurement held against what all others of its run say of it: `u/D` is what it is off by, with variance `1/D`, and `r u` with
+/// variance `r^2 D` is what the estimate from all of them leaves of it (de Jong 1989, doi:10.1080/01621459.1989.10478853).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// `u`, its smoothed error over its variance.
+    pub u: f64,
+    /// `D`, the variance of u.
+    pub variance: f64,
+}
+
+impl LeftOut {
+    /// What it is off by, in units of its own standard deviation: a unit normal when the model is right.
+    pub fn normalised(&self) -> f64 {
+        self.u / self.variance.sqrt()
+    }
 }
 
 /// The estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times what the
@@ -203,6 +222,7 @@ pub fn smoothed_start(
     let (mut lambda, mut information) = (vec![0.0; n], DMatrix::zeros(n, n));
     let (mut update, mut against) = (updates, DVector::zeros(n));
     let mut scratch = Vec::with_capacity(n);
+    let mut left_out = Vec::with_capacity(updates);
     for stage in stages.iter().rev() {
         for _ in 0..stage.steps {
             for output in stage.outputs.iter().rev() {
@@ -215,6 +235,7 @@ pub fn smoothed_start(
                 // Lambda <- (I - k h)^T Lambda (I - k h) + h^T h/s
                 against.gemv(1.0, &information, &k, 0.0);
                 let both = against.dot(&k) + inverse_root * inverse_root;
+                left_out.push(LeftOut { u: seen, variance: both });
                 for &(i, c) in &output.h {
                     information.column_mut(i).axpy(-c, &against, 1.0);
                 }
@@ -233,8 +254,10 @@ pub fn smoothed_start(
         }
     }
     let covariance = p0 - p0 * information * p0;
+    left_out.reverse();
     Ok(SmoothedStart {
         correction: (p0 * DVector::from_vec(lambda)).as_slice().to_vec(),
         covariance: (&covariance + covariance.transpose()) / 2.0,
+        left_out,
     })
 }

@@ -358,6 +358,14 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
     assert!((0..2).all(|i| (x0[i] + start.correction[i] - states[i]).abs() < 1e-10));
     assert!((start.covariance - covariance.view((0, 0), (2, 2))).amax() < 1e-10);
     assert!((0..2).all(|i| (x[i] - states[n - 2 + i]).abs() < 1e-10));
+    // what the estimate of all of them leaves of a measurement, and the variance of that
+    let h = dmatrix![1.0, 0.5];
+    for (k, left) in start.left_out.iter().enumerate() {
+        let own = covariance.view((2 * k + 2, 2 * k + 2), (2, 2));
+        let of = (&h * own * h.transpose())[(0, 0)];
+        assert!((r * left.u - (z[k] - (&h * states.rows(2 * k + 2, 2))[0])).abs() < 1e-10, "update {k}");
+        assert!((r * r * left.variance - (r - of)).abs() < 1e-10, "update {k}");
+    }
     // both recursions at once are the two one after the other
     assert_eq!(gains, covariance_pass(stages, prior, |_, _| {}).expect("run"));
     let mut again = x0.as_slice().to_vec();

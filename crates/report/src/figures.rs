@@ -62,7 +62,12 @@ fn bracketed(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" [{unit}]") }
 }
 
-fn line(label: impl Into<String>, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)>) -> Line {
+pub(crate) fn line(
+    label: impl Into<String>,
+    color: &'static str,
+    stroke: Stroke,
+    points: Vec<(f64, f64)>,
+) -> Line {
     Line { label: label.into(), color, stroke, points }
 }
 

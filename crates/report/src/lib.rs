@@ -2,6 +2,7 @@
 
 mod analysis;
 mod audit;
+mod calibration;
 mod compare;
 mod crosscheck;
 mod csv_text;
@@ -18,15 +19,18 @@ mod review;
 mod series;
 mod simulation;
 mod system;
+mod system_calibration;
 mod table;
 mod visible;
 mod walks;
 mod words;
 
+pub use calibration::{calibration_figures, residuals_csv};
 pub use document::Document;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use series::{series_csv, series_parquet};
+pub use system_calibration::{system_calibration_figures, system_residuals_csv};
 pub use visible::visible;
 
 use std::fmt;

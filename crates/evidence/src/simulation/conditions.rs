@@ -294,7 +294,7 @@ pub fn resolve(
 }
 
 /// The unit in which an unknown is given and reported: degrees for psi.
-pub(crate) fn shown_unit(unit: &str) -> &str {
+pub fn shown_unit(unit: &str) -> &str {
     if unit == "rad" { "deg" } else { unit }
 }
 

@@ -175,7 +175,7 @@ impl PlatformMotion<'_> {
     ///
     /// # Errors
     /// As [`Motion::advance`].
-    pub(super) fn carry(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<(), EkfError> {
+    pub fn carry(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<(), EkfError> {
         self.integrate(t, dt, x, Vec::new())?;
         let behind = x.constants.len() - self.plan.biases.len();
         for (bias, x) in self.plan.biases.iter().zip(&mut x.constants[behind..]) {
@@ -376,7 +376,7 @@ impl<'a> Extended<'a> {
     }
 
     /// The motion of a segment.
-    pub(crate) fn motion(&self, segment: usize) -> PlatformMotion<'_> {
+    pub fn motion(&self, segment: usize) -> PlatformMotion<'_> {
         let (to_n, block) = &self.carried[self.plan.segments[segment].position];
         PlatformMotion {
             plan: self.plan,

@@ -165,7 +165,7 @@ pub fn sigmas_without_prior(
     // one step a position, then parts
     let whole = Conditions { step_s: f64::MAX, drift_noise, ..conditions.clone() };
     let plan = Plan::derived(&scaled, &whole)?;
-    let mut plan = plan.in_steps(&whole, |dwell| parts(dwell, conditions.step_s))?;
+    let mut plan = plan.in_steps(&whole, |s| parts(s.steps as f64 * s.dt, conditions.step_s))?;
     for (stage, segment) in plan.stages.iter_mut().zip(&plan.segments) {
         // the samples of one longer step, taken together
         let dwell = scaled.positions[segment.position].dwell.map_or(segment.dt, |d| d.seconds());

@@ -165,7 +165,7 @@ impl Plan {
 
     /// Standard deviations of the biases at the start. A filter takes positive ones: a random walk, which starts at none, has a millionth of
     /// what the shortest step makes of it.
-    pub(super) fn bias_sigmas(&self) -> Vec<f64> {
+    pub fn bias_sigmas(&self) -> Vec<f64> {
         let shortest = self.segments.iter().map(|s| s.dt).fold(f64::MAX, f64::min);
         let sigma = |b: &Bias| b.process.variance.max(1e-12 * b.process.density * shortest).sqrt();
         self.biases.iter().map(sigma).collect()

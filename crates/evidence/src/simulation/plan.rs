@@ -183,14 +183,14 @@ impl Plan {
         Ok(())
     }
 
-    /// The same with other steps: every segment at a position in parts of so many steps of so many s, as `parts` divides its length.
+    /// The same with other steps: every segment at a position in parts of so many steps of so many s, as `parts` divides it.
     ///
     /// # Errors
     /// [`SimulationError`], as [`Self::new`].
-    pub(super) fn in_steps(
+    pub fn in_steps(
         mut self,
         conditions: &Conditions,
-        parts: impl Fn(f64) -> Vec<(usize, f64)>,
+        parts: impl Fn(&Segment) -> Vec<(usize, f64)>,
     ) -> Result<Self, SimulationError> {
         let mut segments = Vec::new();
         for s in &self.segments {
@@ -199,7 +199,7 @@ impl Plan {
                 continue;
             }
             let mut t = 0.0;
-            for (steps, dt) in parts(s.steps as f64 * s.dt) {
+            for (steps, dt) in parts(s) {
                 let part = |kind, t: f64, steps| Segment { kind, start_s: s.start_s + t, steps, dt, ..*s };
                 match &s.kind {
                     // each step has a model of its own
@@ -247,7 +247,7 @@ impl Plan {
     }
 
     /// The psi states of a segment: the first three columns of its block.
-    pub(crate) fn psi_columns(&self, segment: usize) -> &[usize] {
+    pub fn psi_columns(&self, segment: usize) -> &[usize] {
         &self.blocks[self.segments[segment].position].columns[..3]
     }
 
@@ -588,7 +588,7 @@ impl Plan {
     }
 
     /// Whether torquer errors act in turns at once: full attitudes have no such turns.
-    pub(crate) fn torqued_at_once(&self) -> bool {
+    pub fn torqued_at_once(&self) -> bool {
         self.point.turns.iter().any(|turns| !turns.is_empty())
     }
 

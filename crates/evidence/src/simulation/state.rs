@@ -20,6 +20,11 @@ impl PlatformState {
         Self { attitudes, constants: d.to_vec() }
     }
 
+    /// The number of its attitudes.
+    pub fn attitudes(&self) -> usize {
+        self.attitudes.len()
+    }
+
     /// The unknowns, psi as rotation vectors.
     pub fn unknowns(&self) -> Vec<f64> {
         self.attitudes.iter().flat_map(rotation_vector).chain(self.constants.iter().copied()).collect()

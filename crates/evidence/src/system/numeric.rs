@@ -31,6 +31,8 @@ pub struct Numeric<'a> {
     inputs: Vec<Vec<Option<Expression>>>,
     /// Known constants, of every part.
     constants: Vec<Vec<f64>>,
+    /// Known inputs that are held at a value, whatever the time.
+    held: Vec<Option<f64>>,
     /// The state of the filter that a slot is, of every experiment.
     columns: Vec<Vec<Option<usize>>>,
 }
@@ -41,6 +43,18 @@ impl<'a> Numeric<'a> {
     /// # Errors
     /// [`ModelError`] naming what has no number, and for arbitrary unknown inputs.
     pub fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
+        Self::with_inputs(model, compiled, &[])
+    }
+
+    /// The same with known inputs that [`Self::hold`] gives values: `given` are their indices.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_inputs(
+        model: &SystemModel,
+        compiled: &'a Compiled,
+        given: &[usize],
+    ) -> Result<Self, ModelError> {
         let refuse = |what: String, message: &str| ModelError { what, message: message.into(), span: None };
         let experiments = model.experiments.max(1);
         let suffix = |experiment: usize| match experiments {
@@ -70,7 +84,7 @@ impl<'a> Numeric<'a> {
         }
         let (mut inputs, mut constants, mut columns) = (Vec::new(), Vec::new(), Vec::new());
         for experiment in 0..experiments {
-            inputs.push(inputs_of(model, experiment)?);
+            inputs.push(inputs_of(model, experiment, given)?);
             constants.extend(constants_of(model, experiment)?);
             let column = |role: &Role| {
                 let state = match *role {
@@ -83,7 +97,13 @@ impl<'a> Numeric<'a> {
             };
             columns.push(compiled.roles.iter().map(column).collect());
         }
-        Ok(Self { compiled, states, names, inputs, constants, columns })
+        let held = vec![None; model.known_inputs.len()];
+        Ok(Self { compiled, states, names, inputs, constants, held, columns })
+    }
+
+    /// Holds the known input `input` at a value from now on.
+    pub fn hold(&mut self, input: usize, value: f64) {
+        self.held[input] = Some(value);
     }
 
     /// A known constant in the first segment.
@@ -114,9 +134,11 @@ impl<'a> Numeric<'a> {
                         self.columns[experiment][s].map_or(f64::NAN, |c| x[c])
                     }
                     Role::Constant(k) => self.constants[part][k],
-                    Role::KnownInput(k) => self.inputs[experiment][k]
-                        .as_ref()
-                        .map_or(0.0, |e| evaluate_f64(e, &|name| if name == "t" { t } else { f64::NAN })),
+                    Role::KnownInput(k) => match (self.held[k], &self.inputs[experiment][k]) {
+                        (Some(value), _) => value,
+                        (None, Some(e)) => evaluate_f64(e, &|name| if name == "t" { t } else { f64::NAN }),
+                        (None, None) => 0.0,
+                    },
                     Role::Time => t,
                 },
                 Op::Add(a, b) => values[a] + values[b],
@@ -206,7 +228,7 @@ impl<'a> Numeric<'a> {
     }
 
     /// The starts of states that are given by formulas, from the other values.
-    pub(crate) fn set_known_starts(&self, x: &mut DVector<f64>) {
+    pub fn set_known_starts(&self, x: &mut DVector<f64>) {
         for experiment in 0..self.experiments() {
             let values = self.values(experiment * self.segments(), 0.0, x.as_slice());
             for (i, node) in self.compiled.starts.iter().enumerate() {
@@ -216,6 +238,16 @@ impl<'a> Numeric<'a> {
                 }
             }
         }
+    }
+
+    /// The values of the combinations that the model asks for, of the unknowns at the start of the first experiment, and their derivatives by the
+    /// states of the filter, a row each.
+    pub fn combinations(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
+        let (nodes, n) = (&self.compiled.combinations, self.states.len());
+        let values = self.values(0, 0.0, x.as_slice());
+        let duals = self.duals(0, &values);
+        let rows = DMatrix::from_fn(nodes.len(), n, |i, c| duals[nodes[i] * n + c]);
+        (nodes.iter().map(|&node| values[node]).collect(), rows)
     }
 
     /// The values of the constraints at the start of every experiment, which should be zero, and their derivatives by the states of the
@@ -240,13 +272,18 @@ impl<'a> Numeric<'a> {
 }
 
 /// The known inputs of an experiment as functions of time; `None` for those whose value is a node of the graph.
-fn inputs_of(model: &SystemModel, experiment: usize) -> Result<Vec<Option<Expression>>, ModelError> {
+fn inputs_of(
+    model: &SystemModel,
+    experiment: usize,
+    given: &[usize],
+) -> Result<Vec<Option<Expression>>, ModelError> {
     let nominal = &model.simulation.inputs;
     let of = |(k, (named, _)): (usize, &(Named, KnownInput))| {
         let own = nominal.get(&format!("{}@{}", named.name, experiment + 1)).or(nominal.get(&named.name));
         match (model.known_input(experiment, k), own) {
             (KnownInput::Function(_), _) => Ok(None),
             (_, Some(f)) => Ok(Some(f.expression.clone())),
+            (_, None) if given.contains(&k) => Ok(None),
             (_, None) => Err(ModelError {
                 what: format!("the known input {}", named.name),
                 message: "no function of time; expected one under [simulation.inputs]".into(),

@@ -1,0 +1,340 @@
+//! What a calibration says: plain data.
+
+use obsdeg_core::degree::Status;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the JSON layout.
+pub(crate) const SCHEMA: &str = "obsdeg.calibration/1";
+
+/// A calibration from records.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Calibration {
+    /// `obsdeg.calibration/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// Whether the model and its sigmas explain the records.
+    pub consistent: bool,
+    /// What speaks against that, the gravest first; empty when nothing does.
+    pub findings: Vec<Finding>,
+    /// Every unknown, psi of the start of each record.
+    pub unknowns: Vec<Estimated>,
+    /// Combinations of what is not told apart one by one, and those asked for.
+    pub combinations: Vec<Estimated>,
+    /// Of all that has an estimate.
+    pub covariance: CovarianceTable,
+    /// The whole fit.
+    pub fit: Fit,
+    /// By record and position.
+    pub positions: Vec<PositionFit>,
+    /// By component of Z.
+    pub channels: Vec<ChannelFit>,
+    /// Measurements that were left out.
+    pub outliers: Vec<Outlier>,
+    /// How many samples were left out in all.
+    pub outlier_count: usize,
+    /// The second path to the estimate.
+    pub second_path: SecondPath,
+    /// How far the coefficients of several records agree.
+    pub repeatability: Option<Repeatability>,
+    /// What was read.
+    pub records: Vec<RecordReport>,
+    /// What was assumed.
+    pub assumed: Assumed,
+    /// Every measurement and what the estimate leaves of it.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub residuals: Vec<Residual>,
+}
+
+/// What speaks against the model or its sigmas.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Finding {
+    /// The iteration did not settle.
+    NotSettled,
+    /// The specific force is not one g long, and no unknown explains that.
+    Force {
+        /// The record.
+        record: String,
+        /// Its mean length, in g.
+        length_g: f64,
+    },
+    /// A position fits worse than its measurements allow.
+    Position {
+        /// The record.
+        record: String,
+        /// The position.
+        position: String,
+        /// Chi-square per degree of freedom.
+        chi_square: f64,
+        /// How many times too small the sigmas are there: its root.
+        factor: f64,
+    },
+    /// All positions fit alike, and not as their sigmas say.
+    Noise {
+        /// Chi-square per degree of freedom.
+        chi_square: f64,
+        /// What the sigmas are to be multiplied by.
+        factor: f64,
+    },
+    /// A component of Z fits not as its sigma says.
+    Channel {
+        /// The component.
+        channel: String,
+        /// Chi-square per degree of freedom.
+        chi_square: f64,
+        /// What its sigma is to be multiplied by.
+        factor: f64,
+    },
+    /// The residuals of a component are not independent of each other.
+    Correlated {
+        /// The record.
+        record: String,
+        /// The component.
+        channel: String,
+        /// Probability that independent ones are correlated so.
+        probability: f64,
+    },
+    /// Too many measurements lie far off for all of them to be outliers; none of these was left out.
+    Outliers {
+        /// How many.
+        count: usize,
+        /// Of so many.
+        of: usize,
+    },
+    /// The records do not agree on the coefficients.
+    Repeatability {
+        /// Chi-square per degree of freedom.
+        chi_square: f64,
+    },
+    /// Filter and least squares do not agree.
+    SecondPath {
+        /// The largest difference, in sigma.
+        difference: f64,
+    },
+    /// What was known before does not agree with the records.
+    Known {
+        /// Chi-square per degree of freedom.
+        chi_square: f64,
+    },
+}
+
+/// An unknown or a combination.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Estimated {
+    /// Its name.
+    pub name: String,
+    /// Its unit: deg, deg/h, deg/h/g, ...
+    pub unit: String,
+    /// The exact verdict of the scheme.
+    pub status: Status,
+    /// The observable degree.
+    pub degree: Option<usize>,
+    /// Whether scheme and records determine it; otherwise there is no estimate.
+    pub determined: bool,
+    /// The estimate.
+    pub estimate: Option<f64>,
+    /// Its standard deviation, by the noise that was assumed.
+    pub sigma: Option<f64>,
+    /// The same times the root of chi-square per degree of freedom, where that is above one.
+    pub sigma_rescaled: Option<f64>,
+    /// What the scheme, run as it says, promised.
+    pub predicted_sigma: Option<f64>,
+    /// How far the prior of the scheme would move the estimate, in sigma.
+    pub prior_shift: Option<f64>,
+    /// What it would make of sigma: 1 where it does not matter.
+    pub prior_factor: Option<f64>,
+}
+
+/// Estimates with their covariance.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct CovarianceTable {
+    /// Names, in the order of rows and columns.
+    pub names: Vec<String>,
+    /// Their units.
+    pub units: Vec<String>,
+    /// Their estimates.
+    pub estimates: Vec<f64>,
+    /// The covariance of their errors, by the noise that was assumed.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+/// How well everything fits.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Fit {
+    /// The sum of squares of all residuals, in sigma.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees_of_freedom: f64,
+    /// Where chi-square per degree of freedom lies with a probability of 99.9 %.
+    pub band: (f64, f64),
+    /// The root of chi-square per degree of freedom: what sigmas are to be multiplied by.
+    pub factor: f64,
+    /// Linearisations.
+    pub passes: usize,
+}
+
+/// How well a position fits.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PositionFit {
+    /// The record.
+    pub record: String,
+    /// The position.
+    pub position: String,
+    /// From when, in s of the record's timeline.
+    pub start_s: f64,
+    /// To when.
+    pub end_s: f64,
+    /// Measurements: components of Z of bins.
+    pub measurements: usize,
+    /// Chi-square per degree of freedom.
+    pub chi_square: f64,
+    /// The degrees of freedom.
+    pub degrees_of_freedom: f64,
+    /// Without it: the unknown that moves most, in standard deviations of the move.
+    pub moves: Option<Moved>,
+    /// Without it these are not determined.
+    pub loses: Vec<String>,
+}
+
+/// An unknown that moves.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Moved {
+    /// Its name.
+    pub name: String,
+    /// By how much, in standard deviations.
+    pub sigmas: f64,
+}
+
+/// How well a component of Z fits.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ChannelFit {
+    /// `Z1`, `Z2`, `Z3` or `Za`.
+    pub channel: String,
+    /// Unit of its sigmas.
+    pub unit: String,
+    /// Of a sample, as it was used.
+    pub sigma: f64,
+    /// Of a sample, by the scatter of the samples of a bin about a line; null where bins have too few.
+    pub scatter: Option<f64>,
+    /// Chi-square per degree of freedom.
+    pub chi_square: f64,
+    /// The degrees of freedom.
+    pub degrees_of_freedom: f64,
+    /// Smallest probability over the records that independent residuals are correlated as these are; null for few.
+    pub whiteness_probability: Option<f64>,
+}
+
+/// A measurement that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Outlier {
+    /// The record.
+    pub record: String,
+    /// Its lines, from and to.
+    pub lines: (u64, u64),
+    /// When, in s of the record's timeline.
+    pub t_s: f64,
+    /// The component.
+    pub channel: String,
+    /// How far it is off, in standard deviations.
+    pub sigmas: f64,
+}
+
+/// The filter against least squares, with one wide prior for both.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SecondPath {
+    /// The largest difference of the estimates at the end of a record, in sigma.
+    pub difference: f64,
+    /// The largest difference of sigmas there, as a part.
+    pub sigma_difference: f64,
+}
+
+/// Several records, one platform.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Repeatability {
+    /// What the coefficients of the records differ by, as chi-square per degree of freedom.
+    pub chi_square: f64,
+    /// The degrees of freedom.
+    pub degrees_of_freedom: f64,
+    /// Where it lies with a probability of 99.9 %.
+    pub band: (f64, f64),
+}
+
+/// A record that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RecordReport {
+    /// Its name.
+    pub name: String,
+    /// Its samples.
+    pub samples: usize,
+    /// Samples at no position of the scheme.
+    pub unused: usize,
+    /// Bins.
+    pub bins: usize,
+    /// First and last time, in s as they are in the record.
+    pub span_s: (f64, f64),
+    /// What says where each sample was taken.
+    pub positions_by: PositionsBy,
+    /// Columns that nothing was made of.
+    pub ignored: Vec<String>,
+    /// The mean length of the specific force, in g, where the record has it.
+    pub force_g: Option<f64>,
+}
+
+/// What says where a sample was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PositionsBy {
+    /// A column of labels: a position ends with its last sample, and the next begins when the slew is over.
+    Labels,
+    /// The timeline of the scheme.
+    Timeline,
+    /// A column of labels that agrees with the timeline of the scheme, which says when a position begins and ends.
+    Both,
+}
+
+/// What was assumed.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Assumed {
+    /// In deg.
+    pub latitude_deg: f64,
+    /// Whether the scheme names no latitude.
+    pub latitude_by_default: bool,
+    /// What one g is.
+    pub gravity_m_s2: f64,
+    /// Samples within so many s are taken together.
+    pub bin_s: f64,
+    /// White noise of Z per sample and axis in g, as it was given.
+    pub accelerometer_noise_g: f64,
+    /// Whether the noise was estimated from the records.
+    pub noise_estimated: bool,
+    /// White drift.
+    pub drift_noise_deg_sqrt_h: f64,
+    /// Probability that no measurement of a right record is left out.
+    pub gate: f64,
+    /// Names taken from a calibration before.
+    pub known: Vec<String>,
+    /// Seed of the exact verdicts.
+    pub seed: u64,
+}
+
+/// A measurement and what is left of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residual {
+    /// Which record, from 0.
+    pub record: usize,
+    /// Which position, from 0.
+    pub position: usize,
+    /// Which channel, from 0.
+    pub channel: usize,
+    /// When, in s.
+    pub t_s: f64,
+    /// What is left of it, in g or rad.
+    pub residual: f64,
+    /// Its standard deviation by the noise that was assumed.
+    pub sigma: f64,
+    /// What all other measurements leave of it, in its own standard deviations.
+    pub normalised: f64,
+}

@@ -1,0 +1,223 @@
+//! Samples taken together: over a few seconds a channel is a line, and what is measured of it at the middle is one number with the weight of all
+//! samples. Samples that no line explains (spikes) are left out and listed. Only the samples of one bin are held.
+
+/// What the samples of one channel say of the middle of a bin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// The value there.
+    pub value: f64,
+    /// Its variance: this times that of a sample, or this alone where the record gives a sigma.
+    pub variance: f64,
+    /// Whether the record gives the sigma.
+    pub given: bool,
+    /// Samples that count.
+    pub samples: usize,
+    /// Their squared distances from the line.
+    pub scatter: f64,
+    /// Degrees of freedom of these.
+    pub free: usize,
+}
+
+/// A few seconds of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bin {
+    /// The middle: the mean of its times, in s.
+    pub t: f64,
+    /// First and last line of the record.
+    pub lines: (u64, u64),
+    /// Per channel; `None` where nothing was measured.
+    pub channels: Vec<Option<Mean>>,
+}
+
+/// A sample that no line explains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spike {
+    /// Its line in the record.
+    pub line: u64,
+    /// Its time in s.
+    pub t: f64,
+    /// The channel.
+    pub channel: usize,
+    /// How far it is off.
+    pub off: f64,
+    /// In standard deviations of the others.
+    pub sigmas: f64,
+}
+
+/// One sample: its line, its time, its channels, and their standard deviations where the record gives them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// The line.
+    pub line: u64,
+    /// In s.
+    pub t: f64,
+    /// Per channel.
+    pub z: Vec<Option<f64>>,
+    /// Per channel, where the record says so.
+    pub sigma: Option<Vec<f64>>,
+}
+
+/// Fewest samples of a line of which some may be spikes.
+const FEWEST: usize = 8;
+/// A spike is so many standard deviations off: of a million samples of a right record none is, but by a chance of one in five hundred.
+const SPIKE: f64 = 6.0;
+
+/// Takes samples together.
+#[derive(Debug, Clone)]
+pub struct Binner {
+    length_s: f64,
+    /// A standard deviation per channel, where the samples of a bin are all alike.
+    sigmas: Vec<f64>,
+    now: Vec<Sample>,
+}
+
+impl Binner {
+    /// Bins of at most `length_s`, of channels with about such standard deviations of a sample.
+    pub fn new(length_s: f64, sigmas: Vec<f64>) -> Self {
+        Self { length_s, sigmas, now: Vec::new() }
+    }
+
+    /// Takes a sample; gives the bin that it ends.
+    pub fn push(&mut self, sample: Sample, spikes: &mut Vec<Spike>) -> Option<Bin> {
+        // a hair less, so that samples every 10 s are bins of 10 s
+        let ends = self.now.first().is_some_and(|first| {
+            sample.sigma.is_some() || sample.t - first.t >= self.length_s * (1.0 - 1e-9)
+        });
+        let bin = if ends { self.end(spikes) } else { None };
+        self.now.push(sample);
+        bin
+    }
+
+    /// The bin of what there is, if there is anything.
+    pub fn end(&mut self, spikes: &mut Vec<Spike>) -> Option<Bin> {
+        let now = std::mem::take(&mut self.now);
+        let (first, last) = (now.first()?, now.last()?);
+        let t = first.t + now.iter().map(|s| s.t - first.t).sum::<f64>() / now.len() as f64;
+        let channels = (0..self.sigmas.len()).map(|c| self.channel(&now, c, t, spikes)).collect();
+        Some(Bin { t, lines: (first.line, last.line), channels })
+    }
+
+    fn channel(&self, now: &[Sample], c: usize, t: f64, spikes: &mut Vec<Spike>) -> Option<Mean> {
+        let mut points: Vec<(f64, f64, u64)> =
+            now.iter().filter_map(|s| Some((s.t - t, s.z[c]?, s.line))).collect();
+        if let ([(_, value, _)], Some(sigma)) = (&points[..], now.first().and_then(|s| s.sigma.as_ref())) {
+            let variance = sigma[c] * sigma[c];
+            return Some(Mean { value: *value, variance, given: true, samples: 1, scatter: 0.0, free: 0 });
+        }
+        if points.len() >= FEWEST {
+            let (slope, level, spread) = resistant(&points);
+            let scale = if spread > 0.0 { spread } else { self.sigmas[c] };
+            points.retain(|&(dt, x, line)| {
+                let off = x - level - slope * dt;
+                let sigmas = off / scale;
+                if sigmas.abs() > SPIKE {
+                    spikes.push(Spike { line, t: t + dt, channel: c, off, sigmas });
+                }
+                sigmas.abs() <= SPIKE
+            });
+        }
+        let samples = points.len();
+        if samples == 0 {
+            return None;
+        }
+        let n = samples as f64;
+        let mean = |of: &dyn Fn(&(f64, f64, u64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+        let (dt, x) = (mean(&|p| p.0), mean(&|p| p.1));
+        let along: f64 = points.iter().map(|p| (p.0 - dt).powi(2)).sum();
+        let slope = match samples {
+            1 => 0.0,
+            _ => points.iter().map(|p| (p.0 - dt) * (p.1 - x)).sum::<f64>() / along,
+        };
+        let scatter = points.iter().map(|p| (p.1 - x - slope * (p.0 - dt)).powi(2)).sum();
+        let variance = 1.0 / n + if samples > 1 { dt * dt / along } else { 0.0 };
+        let value = x - slope * dt;
+        Some(Mean { value, variance, given: false, samples, scatter, free: samples.saturating_sub(2) })
+    }
+}
+
+/// The median of some numbers.
+fn median(mut of: Vec<f64>) -> f64 {
+    let middle = of.len() / 2;
+    *of.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A line that a part of the samples cannot move: slope (the median of those from each sample of the first half to its partner in the second; Theil 1950), level
+/// at 0, and the standard deviation about it by the median distance.
+fn resistant(points: &[(f64, f64, u64)]) -> (f64, f64, f64) {
+    let half = points.len() / 2;
+    let slope = median(
+        points
+            .iter()
+            .zip(&points[half..])
+            .map(|(left, right)| (right.1 - left.1) / (right.0 - left.0))
+            .collect(),
+    );
+    let level = median(points.iter().map(|p| p.1 - slope * p.0).collect());
+    let spread = median(points.iter().map(|p| (p.1 - level - slope * p.0).abs()).collect());
+    (slope, level, 1.4826 * spread)
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_evidence::simulation::Noise;
+
+    use super::*;
+
+    fn sample(line: u64, t: f64, z: f64) -> Sample {
+        Sample { line, t, z: vec![Some(z)], sigma: None }
+    }
+
+    fn binned(samples: impl Iterator<Item = Sample>) -> (Vec<Bin>, Vec<Spike>) {
+        let (mut binner, mut spikes) = (Binner::new(10.0, vec![1e-3]), Vec::new());
+        let mut bins: Vec<Bin> = samples.filter_map(|s| binner.push(s, &mut spikes)).collect();
+        bins.extend(binner.end(&mut spikes));
+        (bins, spikes)
+    }
+
+    /// Samples every 10 s are bins of their own; a line of more is its value at the middle, with the weight of all of them.
+    #[test]
+    fn alone_and_together() {
+        let (alone, _) = binned((0..3).map(|i| sample(i + 2, 10.0 * i as f64, i as f64)));
+        assert_eq!(alone.len(), 3);
+        assert_eq!((alone[1].t, alone[1].lines), (10.0, (3, 3)));
+        let one = alone[1].channels[0].expect("measured");
+        assert_eq!((one.value, one.variance, one.free), (1.0, 1.0, 0));
+        let (all, spikes) = binned((0..100).map(|i| sample(i, i as f64 / 10.0, 3.0 + 0.7 * i as f64)));
+        let mean = all[0].channels[0].expect("measured");
+        assert!((all[0].t - 4.95).abs() < 1e-12 && (mean.value - 3.0 - 0.7 * 49.5).abs() < 1e-10);
+        assert!((mean.variance - 0.01).abs() < 1e-12 && mean.scatter < 1e-18 && mean.free == 98);
+        assert!(spikes.is_empty() && all.len() == 1);
+    }
+
+    /// Two spikes in a noisy line are found at their lines and change its value by nothing that shows; the scatter is the noise.
+    #[test]
+    fn spikes_are_left_out() {
+        let mut noise = Noise::new(3, 0);
+        let clean: Vec<f64> = (0..400).map(|i| 0.01 * i as f64 + 1e-3 * noise.normal()).collect();
+        let of = |values: &[f64]| {
+            binned(values.iter().enumerate().map(|(i, z)| sample(i as u64, i as f64 / 40.0, *z)).take(400))
+        };
+        let mut spiked = clean.clone();
+        spiked[17] += 5.0;
+        spiked[390] -= 0.02;
+        let (right, none) = of(&clean);
+        let (bins, spikes) = of(&spiked);
+        assert!(none.is_empty(), "{none:?}");
+        assert_eq!(spikes.iter().map(|s| s.line).collect::<Vec<_>>(), [17, 390]);
+        assert!((spikes[1].off + 0.02).abs() < 5e-3 && spikes[1].sigmas < -12.0);
+        let (a, b) = (right[0].channels[0].expect("there"), bins[0].channels[0].expect("there"));
+        assert!((a.value - b.value).abs() < 2e-5, "{} {}", a.value, b.value);
+        let sigma = (b.scatter / b.free as f64).sqrt();
+        assert!((sigma / 1e-3 - 1.0).abs() < 0.1, "{sigma}");
+    }
+
+    /// What the record gives a sigma is a bin of its own; gaps are none.
+    #[test]
+    fn given_sigmas_and_gaps() {
+        let given =
+            |line: u64, z: Option<f64>| Sample { line, t: line as f64, z: vec![z], sigma: Some(vec![0.5]) };
+        let (bins, _) = binned([given(1, Some(2.0)), given(2, None), given(3, Some(4.0))].into_iter());
+        let of: Vec<_> = bins.iter().map(|b| b.channels[0].map(|m| (m.value, m.variance, m.given))).collect();
+        assert_eq!(of, [Some((2.0, 0.25, true)), None, Some((4.0, 0.25, true))]);
+    }
+}

@@ -1,0 +1,303 @@
+//! Least squares on a linearised run in square-root information form, from its end to its start: no covariance, no gain, no prior.
+//!
+//! Rows `A d_k = b` say what the measurements from step k on know of the state there. A step `d_k = Phi d_(k-1) + G xi`, `xi` unit normals, makes of them
+//! `[A G, A Phi] [xi, d_(k-1)] = b` beside `xi = 0`; a QR factorisation parts what is said of `xi` from what is left for `d_(k-1)` (Dyer, McReynolds 1969,
+//! doi:10.1007/BF00929453; Bierman 1977, chapter X). At the start the triangle is the root of the information on the start, its last entry what no start explains;
+//! going forward again, the rows of `xi` give every state of the run with its covariance.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_ekf::{EkfError, Stage};
+
+/// A run linearised along one trajectory: of every step Phi, Q and rows ([`Stage`]s of one step), a root of Q, and what the trajectory leaves of the measurements.
+#[derive(Debug, Clone, Default)]
+pub struct Linearised {
+    /// The steps.
+    pub stages: Vec<Stage>,
+    /// Of every step `G` (n x q) with `Q = G G^T`.
+    pub roots: Vec<DMatrix<f64>>,
+    /// Measurement minus output, in the order of the rows.
+    pub residuals: Vec<f64>,
+}
+
+impl Linearised {
+    /// The number of states.
+    pub fn states(&self) -> usize {
+        self.stages.first().map_or(0, |s| s.transition.states())
+    }
+
+    /// The same without the measurements for which `keep` is false.
+    #[must_use]
+    pub fn without(&self, keep: &[bool]) -> Self {
+        let mut out = self.clone();
+        let mut all = keep.iter().copied();
+        for stage in &mut out.stages {
+            stage.outputs.retain(|_| all.next().unwrap_or(true));
+        }
+        let mut all = keep.iter().copied();
+        out.residuals.retain(|_| all.next().unwrap_or(true));
+        out
+    }
+}
+
+/// What is said of the noise of a step once everything after it is known: `own xi + before d_(k-1) = right`.
+#[derive(Debug, Clone)]
+struct OfNoise {
+    own: DMatrix<f64>,
+    before: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+/// What a run says of its start.
+#[derive(Debug, Clone)]
+pub struct Information {
+    /// The root `S` (n x n) of the information on the start.
+    pub root: DMatrix<f64>,
+    /// `S d = right` is the most probable start, as a correction of that of the trajectory.
+    pub right: DVector<f64>,
+    /// The sum of squares that is left there.
+    pub left: f64,
+    noise: Vec<OfNoise>,
+}
+
+/// A state of a run from all its measurements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// The correction of the trajectory's.
+    pub correction: DVector<f64>,
+    /// A root (n x any) of the covariance of its error, which is this times its transpose.
+    pub root: DMatrix<f64>,
+}
+
+impl State {
+    /// The standard deviation of a component.
+    pub fn sigma(&self, i: usize) -> f64 {
+        self.root.row(i).norm()
+    }
+}
+
+/// The upper triangle of a QR factorisation, at least `rows` of it.
+fn triangle(of: DMatrix<f64>, rows: usize) -> DMatrix<f64> {
+    let r = of.qr().r();
+    let columns = r.ncols();
+    let found = r.nrows();
+    if found < rows { r.resize(rows, columns, 0.0) } else { r }
+}
+
+impl Information {
+    /// Of a run.
+    ///
+    /// # Errors
+    /// [`EkfError::NotFinite`].
+    pub fn of(run: &Linearised) -> Result<Self, EkfError> {
+        let n = run.states();
+        let mut rows: DMatrix<f64> = DMatrix::zeros(n + 1, n + 1);
+        let mut noise = Vec::with_capacity(run.stages.len());
+        let mut next = run.residuals.len();
+        for (stage, g) in run.stages.iter().zip(&run.roots).rev() {
+            let (m, q) = (stage.outputs.len(), g.ncols());
+            next -= m;
+            // what this step measured
+            let mut with = rows.clone().resize(n + 1 + m, n + 1, 0.0);
+            for (i, output) in stage.outputs.iter().enumerate() {
+                let weight = 1.0 / output.r.sqrt();
+                output.h.iter().for_each(|&(j, c)| with[(n + 1 + i, j)] += weight * c);
+                with[(n + 1 + i, n)] = weight * run.residuals[next + i];
+            }
+            // carried to the step before, its noise first
+            let a = with.columns(0, n);
+            let mut all = DMatrix::zeros(q + with.nrows(), q + n + 1);
+            all.view_mut((0, 0), (q, q)).fill_with_identity();
+            all.view_mut((q, 0), (with.nrows(), q)).copy_from(&(a * g));
+            all.view_mut((q, q), (with.nrows(), n)).copy_from(&(a * stage.transition.matrix()));
+            all.view_mut((q, q + n), (with.nrows(), 1)).copy_from(&with.columns(n, 1));
+            if let Some(k) = all.iter().position(|x| !x.is_finite()) {
+                let (row, column) = (k % all.nrows(), k / all.nrows());
+                return Err(EkfError::NotFinite {
+                    what: "the rows of a step",
+                    value: all[(row, column)],
+                    row,
+                    column,
+                });
+            }
+            let r = triangle(all, q + n + 1);
+            noise.push(OfNoise {
+                own: r.view((0, 0), (q, q)).into_owned(),
+                before: r.view((0, q), (q, n)).into_owned(),
+                right: r.view((0, q + n), (q, 1)).column(0).into_owned(),
+            });
+            rows = r.view((q, q), (n + 1, n + 1)).into_owned();
+        }
+        noise.reverse();
+        Ok(Self {
+            root: rows.view((0, 0), (n, n)).into_owned(),
+            right: rows.view((0, n), (n, 1)).column(0).into_owned(),
+            left: rows[(n, n)].powi(2),
+            noise,
+        })
+    }
+
+    /// The sum of squares of a run that starts as the trajectory does: the noise of its steps is still free.
+    pub fn at_zero(&self) -> f64 {
+        self.left + self.right.norm_squared()
+    }
+
+    /// All states of the run, from its start on, when the start is known as `start` says; `run` is the one that this is of.
+    ///
+    /// # Errors
+    /// [`EkfError::Singular`].
+    pub fn states(&self, run: &Linearised, start: State) -> Result<Vec<State>, EkfError> {
+        let mut out = vec![start];
+        for ((stage, g), of) in run.stages.iter().zip(&run.roots).zip(&self.noise) {
+            let Some(State { correction: d, root: p }) = out.last() else { break };
+            let phi = stage.transition.matrix();
+            let solve = |b: &DMatrix<f64>| {
+                of.own.solve_upper_triangular(b).ok_or(EkfError::Singular { column: of.own.ncols() })
+            };
+            let next = if g.ncols() == 0 {
+                State { correction: &phi * d, root: &phi * p }
+            } else {
+                let right = &of.right - &of.before * d;
+                let xi = solve(&DMatrix::from_column_slice(right.len(), 1, right.as_slice()))?;
+                let through = &phi - g * solve(&of.before)?;
+                let own = g * solve(&DMatrix::identity(g.ncols(), g.ncols()))?;
+                // both parts of the error side by side, then as a triangle
+                let (n, m) = (p.nrows(), p.ncols());
+                let mut both = (&through * p).resize_horizontally(m + own.ncols(), 0.0);
+                both.columns_mut(m, own.ncols()).copy_from(&own);
+                let root = if both.ncols() > n { both.transpose().qr().r().transpose() } else { both };
+                State { correction: &phi * d + g * xi.column(0), root }
+            };
+            out.push(next);
+        }
+        Ok(out)
+    }
+}
+
+/// The least-squares solution of rows that are stacked one after the other.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The unknowns (shape n).
+    pub x: DVector<f64>,
+    /// The inverse root of the information (n x n): the covariance is this times its transpose.
+    pub inverse_root: DMatrix<f64>,
+    /// The root itself.
+    pub root: DMatrix<f64>,
+    /// The sum of squares that the rows leave.
+    pub left: f64,
+}
+
+/// Rows `A x = b` with unit errors, put one after the other.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    all: DMatrix<f64>,
+}
+
+impl Rows {
+    /// None yet, on n unknowns.
+    pub fn new(n: usize) -> Self {
+        Self { all: DMatrix::zeros(0, n + 1) }
+    }
+
+    /// Adds `a` (any x n) and `b`.
+    pub fn add(&mut self, a: &DMatrix<f64>, b: &DVector<f64>) {
+        let (rows, n) = (self.all.nrows(), self.all.ncols() - 1);
+        let mut all = self.all.clone().resize_vertically(rows + a.nrows(), 0.0);
+        all.view_mut((rows, 0), (a.nrows(), n)).copy_from(a);
+        all.view_mut((rows, n), (a.nrows(), 1)).copy_from(b);
+        self.all = if all.nrows() > 4 * (n + 1) { all.qr().r() } else { all };
+    }
+
+    /// Their solution.
+    ///
+    /// # Errors
+    /// [`EkfError::Singular`] when they do not determine all unknowns.
+    pub fn solve(&self) -> Result<Solution, EkfError> {
+        let n = self.all.ncols() - 1;
+        let r = triangle(self.all.clone(), n + 1);
+        let root = r.view((0, 0), (n, n)).into_owned();
+        let pivot = |j: usize| root[(j, j)].abs() - 1e-15 * root.column(j).norm();
+        let singular = (0..n).find(|&j| pivot(j).is_nan() || pivot(j) <= 0.0);
+        if let Some(column) = singular {
+            return Err(EkfError::Singular { column });
+        }
+        let inverse_root =
+            root.solve_upper_triangular(&DMatrix::identity(n, n)).ok_or(EkfError::Singular { column: n })?;
+        let right = r.view((0, n), (n, 1)).column(0).into_owned();
+        let x = &inverse_root * right;
+        Ok(Solution { x, inverse_root, root, left: r[(n, n)].powi(2) })
+    }
+}
+
+impl Solution {
+    /// The covariance (n x n).
+    pub fn covariance(&self) -> DMatrix<f64> {
+        &self.inverse_root * self.inverse_root.transpose()
+    }
+
+    /// The standard deviation of a functional of the unknowns.
+    pub fn sigma(&self, terms: &[(usize, f64)]) -> f64 {
+        let zero = nalgebra::RowDVector::zeros(self.inverse_root.ncols());
+        terms.iter().fold(zero, |sum, &(i, k)| sum + self.inverse_root.row(i) * k).norm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_ekf::{ProcessNoise, ScalarOutput, Transition};
+
+    use super::*;
+
+    /// A walk in two states with a constant, seen in part: against the normal equations of all states at once.
+    #[test]
+    fn all_states_at_once() {
+        let phi = DMatrix::from_row_slice(3, 3, &[1.0, 0.3, 0.5, -0.1, 0.9, 0.0, 0.0, 0.0, 1.0]);
+        let g = DMatrix::from_row_slice(3, 2, &[0.4, 0.0, 0.1, 0.2, 0.0, 0.0]);
+        let z = [0.7, 1.9, -0.4, 0.2, 2.2, 1.0, 0.3, -0.8];
+        let stage = |k: usize| Stage {
+            transition: Transition::new(&phi).expect("finite"),
+            noise: ProcessNoise::new(&(&g * g.transpose())).expect("Q"),
+            // no measurement at one step
+            outputs: if k == 3 { vec![] } else { vec![ScalarOutput { h: vec![(0, 1.0), (1, 0.5)], r: 0.3 }] },
+            steps: 1,
+        };
+        let residuals: Vec<f64> = (0..8).filter(|k| *k != 3).map(|k| z[k]).collect();
+        let run = Linearised { stages: (0..8).map(stage).collect(), roots: vec![g.clone(); 8], residuals };
+        // unknowns: the start (3), then xi of every step (2 each)
+        let n = 3 + 16;
+        let (mut information, mut right, mut squares) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
+        let mut map = DMatrix::zeros(3, n);
+        map.view_mut((0, 0), (3, 3)).fill_with_identity();
+        let mut maps = vec![map.clone()];
+        for k in 0..8 {
+            map = &phi * map;
+            map.view_mut((0, 3 + 2 * k), (3, 2)).copy_from(&g);
+            maps.push(map.clone());
+            for i in 0..2 {
+                information[(3 + 2 * k + i, 3 + 2 * k + i)] += 1.0;
+            }
+            if k != 3 {
+                let row = (map.row(0) + map.row(1) * 0.5) / 0.3f64.sqrt();
+                let value = z[k] / 0.3f64.sqrt();
+                information += row.transpose() * &row;
+                right += row.transpose() * value;
+                squares += value * value;
+            }
+        }
+        let covariance = information.try_inverse().expect("definite");
+        let x = &covariance * &right;
+        let found = Information::of(&run).expect("finite");
+        let mut rows = Rows::new(3);
+        rows.add(&found.root, &found.right);
+        let solution = rows.solve().expect("determined");
+        assert!((found.left - (squares - right.dot(&x))).abs() < 1e-10);
+        let start = State { correction: solution.x.clone(), root: solution.inverse_root.clone() };
+        let states = found.states(&run, start).expect("regular");
+        assert_eq!(states.len(), 9);
+        for (k, (state, map)) in states.iter().zip(&maps).enumerate() {
+            assert!((&state.correction - map * &x).amax() < 1e-10, "state {k}");
+            let found = &state.root * state.root.transpose();
+            let gap = found - map * &covariance * map.transpose();
+            assert!(gap.amax() < 1e-10, "covariance {k}");
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Calibration: what a scheme determines, estimated from the record of its run, with how far that can be trusted.
+//!
+//! A record ([`record`]) is taken together into bins ([`bins`]) and laid beside the timeline of its scheme ([`platform`]); the estimate is that of least
+//! squares without a prior ([`least_squares`]), of what the exact verdict calls determined; a filter is the second path to it.
+
+pub mod answer;
+pub mod bins;
+pub mod least_squares;
+pub mod platform;
+pub mod record;
+pub mod system;
+
+pub use answer::Calibration;
+pub use platform::{CalibrationError, Options, calibrate};
+pub use system::{SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system};

@@ -1,0 +1,661 @@
+//! Whether an estimate can be believed: what is left of every measurement, by position, component and time; the filter as a second path; what single positions and
+//! the prior are worth.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::degree::Status;
+use obsdeg_core::model::{AZIMUTH, Scheme};
+use obsdeg_ekf::consistency::{autocorrelation, chi_square_band, ljung_box};
+use obsdeg_ekf::linear::{filter_pass, smoothed_start};
+use obsdeg_ekf::{Covariance, EkfError, Form};
+use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
+use obsdeg_evidence::simulation::{
+    Conditions, Plan, latitude_of, shown_unit, si_per_shown, sigmas_without_prior,
+};
+
+use super::estimate::{Estimate, Problem, WEAK};
+use super::observe::{By, channel_name};
+use super::run::Key;
+use super::{CalibrationError, Options};
+use crate::answer::{
+    Assumed, Calibration, ChannelFit, CovarianceTable, Estimated, Finding, Fit, Moved, Outlier, PositionFit,
+    PositionsBy, RecordReport, Repeatability, Residual, SCHEMA, SecondPath,
+};
+use crate::least_squares::{Information, Linearised, Rows, Solution, State};
+
+/// How many times wider than the prior that of the filter is.
+const WIDE: f64 = 100.0;
+/// The probability with which a right record is in its bands.
+const STRICT: f64 = 0.999;
+/// Fewest residuals of which a correlation is told.
+const FEWEST: usize = 40;
+/// Lags of the correlation.
+const LAGS: usize = 20;
+/// The paths agree to this, in sigma.
+const AGREE: f64 = 1e-6;
+/// A pull ten times as weak leaves the sigma of what is determined.
+const DETERMINED: f64 = 1.05;
+/// A position that fits this many times worse than the others in the middle is named by itself.
+const APART: f64 = 2.0;
+/// The specific force may be off one g by this where nothing unknown explains it.
+const FORCE: f64 = 3e-4;
+/// Without a position sigma of what it alone determines grows by this at least.
+const LOST: f64 = 1e3;
+
+/// A measurement with what is left of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Left {
+    pub run: usize,
+    pub key: Key,
+    /// Measurement minus estimate.
+    pub residual: f64,
+    /// Its variance as it was given.
+    pub r: f64,
+    /// The part of that which the estimate leaves free: `r D`.
+    pub free: f64,
+    /// What all others leave of it, normalised.
+    pub normalised: f64,
+}
+
+impl Left {
+    /// Its square in units of sigma.
+    fn square(&self) -> f64 {
+        self.residual * self.residual / self.r
+    }
+}
+
+/// What is left of all measurements, and the second path.
+pub(crate) struct Diagnosed {
+    pub all: Vec<Left>,
+    pub second: SecondPath,
+    /// Of every run alone: the sum of squares that it leaves, by least squares with the wide prior.
+    alone: Vec<f64>,
+}
+
+impl Diagnosed {
+    /// Of an estimate.
+    ///
+    /// # Errors
+    /// [`EkfError`].
+    pub(crate) fn of(
+        problem: &Problem<'_>,
+        estimate: &Estimate,
+        prediction: &Prediction,
+    ) -> Result<Self, EkfError> {
+        let mut out = Self {
+            all: Vec::new(),
+            second: SecondPath { difference: 0.0, sigma_difference: 0.0 },
+            alone: Vec::new(),
+        };
+        for (r, (run, keys)) in estimate.at.runs.iter().enumerate() {
+            let index = &problem.unknowns.index[r];
+            let own = &problem.runs[r].plan;
+            // random biases have a prior that is theirs
+            let wide = |(s, &i): (usize, &usize)| {
+                problem.unknowns.prior[i] * if s < own.unknowns() { WIDE } else { 1.0 }
+            };
+            let prior: Vec<f64> = index.iter().enumerate().map(wide).collect();
+            let n = prior.len();
+            let p0 = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
+            let (mut delta, mut whitened) = (vec![0.0; n], Vec::with_capacity(run.residuals.len()));
+            let mut end: Option<(Vec<f64>, Vec<f64>)> = None;
+            let mut first = 0;
+            let mut measure = |_: usize, _: usize, z: &mut [f64]| {
+                z.copy_from_slice(&run.residuals[first..first + z.len()]);
+                first += z.len();
+            };
+            let covariance = Covariance::new("P0", &p0, Form::Ud)?;
+            let steps = run.stages.len();
+            let gains = filter_pass(&run.stages, covariance, &mut delta, &mut measure, |step, x, p, w| {
+                whitened.extend_from_slice(w);
+                if step + 1 == steps {
+                    end = Some((x.to_vec(), p.sigmas()));
+                }
+            })?;
+            let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
+            let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
+            for ((left, r_of), key) in smoothed.left_out.iter().zip(variances).zip(keys) {
+                out.all.push(Left {
+                    run: r,
+                    key: *key,
+                    residual: r_of * left.u,
+                    r: r_of,
+                    free: r_of * left.variance,
+                    normalised: left.normalised(),
+                });
+            }
+            let information = &estimate.at.information[r];
+            let mut rows = Rows::new(n);
+            rows.add(&information.root, &information.right);
+            let pull = DVector::from_iterator(n, prior.iter().map(|s| 1.0 / s));
+            rows.add(&DMatrix::from_diagonal(&pull), &DVector::zeros(n));
+            let batch = rows.solve()?;
+            out.alone.push(information.left + batch.left);
+            let start = State { correction: batch.x.clone(), root: batch.inverse_root.clone() };
+            let states = information.states(run, start)?;
+            if let (Some((x, sigmas)), Some(last)) = (end, states.last()) {
+                let determined = |s: usize| prediction.unknowns.get(s).is_some_and(|u| u.determined_at_end);
+                for (i, (x, sigma)) in x.iter().zip(&sigmas).enumerate().filter(|(s, _)| determined(*s)) {
+                    let own = last.sigma(i);
+                    out.second.difference = out.second.difference.max((x - last.correction[i]).abs() / sigma);
+                    out.second.sigma_difference = out.second.sigma_difference.max((own / sigma - 1.0).abs());
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// Per channel: what its sigma is to be multiplied by.
+    pub(crate) fn channel_factors(&self, channels: usize) -> Vec<f64> {
+        let of = |c| {
+            let (chi, free) = self.sums(|l| l.key.channel == c);
+            if free > 0.0 && chi > 0.0 { (chi / free).sqrt() } else { 1.0 }
+        };
+        (0..channels).map(of).collect()
+    }
+
+    /// Sum of squares and degrees of freedom of some measurements.
+    fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
+        let some = self.all.iter().filter(|l| of(l));
+        some.fold((0.0, 0.0), |(chi, free), l| (chi + l.square(), free + l.free))
+    }
+
+    /// Measurements further off than `gate`, in units of what is usual here where that is more than one.
+    pub(crate) fn beyond(&self, gate: f64) -> Vec<(usize, Key)> {
+        let mut sizes: Vec<f64> = self.all.iter().map(|l| l.normalised.abs()).collect();
+        if sizes.is_empty() {
+            return Vec::new();
+        }
+        let middle = sizes.len() / 2;
+        let usual = (*sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745).max(1.0);
+        let off = self.all.iter().filter(|l| l.normalised.abs() > gate * usual);
+        off.map(|l| (l.run, l.key)).collect()
+    }
+}
+
+/// Everything that an answer is made of.
+pub(crate) struct Parts<'a> {
+    pub scheme: &'a Scheme,
+    pub conditions: &'a Conditions,
+    pub options: &'a Options,
+    pub planned: &'a Plan,
+    pub prediction: &'a Prediction,
+    pub problem: &'a Problem<'a>,
+    pub estimate: &'a Estimate,
+    pub found: &'a Diagnosed,
+    pub too_many: Option<usize>,
+    pub known: Vec<String>,
+}
+
+/// A functional that is reported.
+struct Asked {
+    name: String,
+    unit: &'static str,
+    status: Status,
+    degree: Option<usize>,
+    /// Whether scheme and records determine it.
+    determined: bool,
+    /// On the unknowns, in SI.
+    terms: Vec<(usize, f64)>,
+    /// The same in local coordinates at the estimate.
+    local: Vec<(usize, f64)>,
+    /// What the scheme promised, in SI.
+    predicted: Option<f64>,
+}
+
+impl Parts<'_> {
+    /// The functionals: unknowns, then combinations, those with psi once per record.
+    fn asked(&self, weaker: &Solution) -> (Vec<Asked>, Vec<Asked>) {
+        let (names, units) = (self.planned.platform.names(), self.planned.platform.units());
+        let psi = self.planned.unknowns() - self.planned.platform.coefficients();
+        let runs = self.problem.runs.len();
+        let predicted = sigmas_without_prior(self.scheme, self.conditions, 1.0).ok();
+        let make =
+            |name: &str, verdict: (Status, Option<usize>, bool), terms: &[(usize, f64)], at_start: bool| {
+                let of_psi = terms.iter().any(|(i, _)| *i < psi);
+                let single = at_start && terms.len() == 1 && !of_psi;
+                let predicted = predicted.as_ref().filter(|_| single).map(|p| p[terms[0].0]);
+                let many = runs > 1 && of_psi;
+                (0..if many { runs } else { 1 })
+                    .map(|r| {
+                        let index = &self.problem.unknowns.index[r];
+                        let on =
+                            |c: &[(usize, f64)]| c.iter().map(|&(s, k)| (index[s], k)).collect::<Vec<_>>();
+                        let local = on(&self.estimate.at.x[r].functional(terms));
+                        let (narrow, wide) = (self.estimate.solution.sigma(&local), weaker.sigma(&local));
+                        Asked {
+                            name: if many { format!("{name} (record {})", r + 1) } else { name.into() },
+                            unit: units[terms[0].0],
+                            status: verdict.0,
+                            degree: verdict.1,
+                            determined: verdict.2 && wide <= DETERMINED * narrow,
+                            terms: on(terms),
+                            local,
+                            predicted,
+                        }
+                    })
+                    .collect::<Vec<_>>()
+            };
+        let unknowns = self
+            .prediction
+            .unknowns
+            .iter()
+            .enumerate()
+            .flat_map(|(c, u)| make(&names[c], (u.status, u.degree, u.determined), &[(c, 1.0)], true));
+        // what is made of determined unknowns alone says nothing new
+        let open = |c: &&PredictedCombination| {
+            c.requested || c.terms.iter().any(|&(i, _)| !self.prediction.unknowns[i].determined)
+        };
+        let combinations = self.prediction.combinations.iter().filter(open).flat_map(|c| {
+            let determined = c.status == Status::Observable || c.accuracy_order.is_some();
+            make(&c.expression, (c.status, c.degree, determined), &c.terms, false)
+        });
+        (unknowns.collect(), combinations.collect())
+    }
+
+    /// The estimate with the prior of the scheme on everything.
+    fn with_prior(&self) -> Result<Solution, EkfError> {
+        self.problem.step_with_prior(&self.estimate.at)
+    }
+
+    pub(crate) fn answer(self) -> Result<Calibration, CalibrationError> {
+        let weaker = self.problem.step(&self.estimate.at, 10.0 * WEAK)?;
+        let (unknowns, combinations) = self.asked(&weaker);
+        let determined: Vec<&Asked> = unknowns.iter().chain(&combinations).filter(|a| a.determined).collect();
+        if determined.is_empty() {
+            return Err(CalibrationError::Nothing);
+        }
+        let fit = self.fit(&unknowns, &combinations);
+        let with_prior = self.with_prior()?;
+        let values = self.problem.values(&self.estimate.at.x);
+        let solution = &self.estimate.solution;
+        let estimated = |a: &Asked| {
+            let scale = si_per_shown(a.unit);
+            let there = |x: f64| a.determined.then_some(x);
+            let sigma = solution.sigma(&a.local);
+            let moved: f64 = a.local.iter().map(|&(i, k)| k * with_prior.x[i]).sum();
+            Estimated {
+                name: a.name.clone(),
+                unit: shown_unit(a.unit).into(),
+                status: a.status,
+                degree: a.degree,
+                determined: a.determined,
+                estimate: there(a.terms.iter().map(|&(i, k)| k * values[i]).sum::<f64>() / scale),
+                sigma: there(sigma / scale),
+                sigma_rescaled: there(sigma * fit.factor.max(1.0) / scale),
+                predicted_sigma: a.predicted.filter(|_| a.determined).map(|p| p / scale),
+                prior_shift: there(moved / sigma),
+                prior_factor: there(with_prior.sigma(&a.local) / sigma),
+            }
+        };
+        let row = |a: &Asked| {
+            let zero = nalgebra::RowDVector::zeros(solution.inverse_root.ncols());
+            let scale = si_per_shown(a.unit);
+            a.local.iter().fold(zero, |sum, &(i, k)| sum + solution.inverse_root.row(i) * (k / scale))
+        };
+        // none that follows from the others
+        let single = |a: &Asked| a.terms.len() == 1;
+        let follows = |a: &Asked| {
+            a.terms.iter().all(|(i, _)| determined.iter().any(|d| single(d) && d.terms[0].0 == *i))
+        };
+        let free: Vec<&Asked> = determined.iter().copied().filter(|a| single(a) || !follows(a)).collect();
+        let of: Vec<_> = free.iter().map(|a| row(a)).collect();
+        let covariance = CovarianceTable {
+            names: free.iter().map(|a| a.name.clone()).collect(),
+            units: free.iter().map(|a| shown_unit(a.unit).into()).collect(),
+            estimates: free.iter().filter_map(|a| estimated(a).estimate).collect(),
+            covariance: of.iter().map(|a| of.iter().map(|b| a.dot(b)).collect()).collect(),
+        };
+        let positions = self.positions(&determined)?;
+        let channels = self.channels();
+        let records = self.records();
+        let repeatability = self.repeatability(&fit);
+        let outliers = self.outliers();
+        let mut out = Calibration {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            consistent: true,
+            findings: Vec::new(),
+            unknowns: unknowns.iter().map(estimated).collect(),
+            combinations: combinations.iter().map(estimated).collect(),
+            covariance,
+            fit,
+            positions,
+            channels,
+            outlier_count: outliers.len(),
+            outliers,
+            second_path: self.found.second.clone(),
+            repeatability,
+            records,
+            assumed: self.assumed(),
+            residuals: self.residuals(),
+        };
+        out.findings = self.findings(&out);
+        out.consistent = out.findings.is_empty();
+        Ok(out)
+    }
+
+    /// Chi-square of everything: degrees of freedom are measurements minus what they determine.
+    fn fit(&self, unknowns: &[Asked], combinations: &[Asked]) -> Fit {
+        let (_, free) = self.found.sums(|_| true);
+        let left: f64 =
+            self.estimate.at.cost - (&self.estimate.solution.root * &self.estimate.solution.x).norm_squared();
+        // what several records share counts once: every run alone leaves more free than all together
+        let alone = self.problem.runs.len() - 1;
+        let coefficients = |a: &&Asked| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
+        let shared = unknowns.iter().chain(combinations).filter(coefficients).count();
+        let degrees_of_freedom = free + (alone * shared) as f64;
+        let mean = left.max(0.0) / degrees_of_freedom.max(1.0);
+        Fit {
+            chi_square: left,
+            degrees_of_freedom,
+            band: chi_square_band(degrees_of_freedom.max(1.0), 1.0, STRICT)
+                .map_both(|x| x / degrees_of_freedom.max(1.0)),
+            factor: mean.sqrt(),
+            passes: self.estimate.passes,
+        }
+    }
+
+    /// The first unknown that all runs share.
+    fn shared(&self) -> usize {
+        self.problem.unknowns.n - self.planned.platform.coefficients()
+    }
+
+    fn positions(&self, determined: &[&Asked]) -> Result<Vec<PositionFit>, EkfError> {
+        let names = &self.scheme.positions;
+        let mut out = Vec::new();
+        for (r, run) in self.problem.runs.iter().enumerate() {
+            for (p, position) in names.iter().enumerate() {
+                let (chi, free) = self.found.sums(|l| l.run == r && l.key.position == p);
+                let measurements =
+                    self.found.all.iter().filter(|l| l.run == r && l.key.position == p).count();
+                let (start_s, end_s) = run.reading.stays.get(p).copied().unwrap_or((0.0, 0.0));
+                let (moves, loses) = self.without(r, p, determined)?;
+                out.push(PositionFit {
+                    record: run.reading.name.clone(),
+                    position: position.name.clone(),
+                    start_s,
+                    end_s,
+                    measurements,
+                    chi_square: chi / free.max(f64::MIN_POSITIVE),
+                    degrees_of_freedom: free,
+                    moves,
+                    loses,
+                });
+            }
+        }
+        Ok(out)
+    }
+
+    /// What the estimate is without a position of a run.
+    fn without(
+        &self,
+        r: usize,
+        p: usize,
+        determined: &[&Asked],
+    ) -> Result<(Option<Moved>, Vec<String>), EkfError> {
+        let (run, keys): &(Linearised, Vec<Key>) = &self.estimate.at.runs[r];
+        let keep: Vec<bool> = keys.iter().map(|k| k.position != p).collect();
+        let rest = Information::of(&run.without(&keep))?;
+        let solution = self.problem.step_with(&self.estimate.at, WEAK, Some((r, &rest)))?;
+        let (mut moves, mut loses): (Option<Moved>, _) = (None, Vec::new());
+        for a in determined {
+            let (with, without) = (self.estimate.solution.sigma(&a.local), solution.sigma(&a.local));
+            if without > LOST * with {
+                loses.push(a.name.clone());
+                continue;
+            }
+            let by: f64 = a.local.iter().map(|&(i, k)| k * solution.x[i]).sum();
+            let expected = (without * without - with * with).max(1e-12 * with * with).sqrt();
+            let sigmas = by / expected;
+            if moves.as_ref().is_none_or(|m| sigmas.abs() > m.sigmas.abs()) {
+                moves = Some(Moved { name: a.name.clone(), sigmas });
+            }
+        }
+        Ok((moves, loses))
+    }
+
+    fn channels(&self) -> Vec<ChannelFit> {
+        let of = |(c, &component): (usize, &usize)| {
+            let (chi, free) = self.found.sums(|l| l.key.channel == c);
+            let means = self.problem.runs.iter().flat_map(|run| run.measured());
+            let (scatter, scatter_free) = means
+                .filter(|(key, ..)| key.channel == c)
+                .fold((0.0, 0), |(s, f), (_, m, _)| (s + m.scatter, f + m.free));
+            let white = (0..self.problem.runs.len()).filter_map(|r| self.whiteness(r, c));
+            ChannelFit {
+                channel: channel_name(component),
+                unit: if component == AZIMUTH { "rad".into() } else { "g".into() },
+                sigma: self.problem.sigmas[c],
+                scatter: (scatter_free > 0).then(|| (scatter / scatter_free as f64).sqrt()),
+                chi_square: chi / free.max(f64::MIN_POSITIVE),
+                degrees_of_freedom: free,
+                whiteness_probability: white.reduce(f64::min),
+            }
+        };
+        self.planned.components.iter().enumerate().map(of).collect()
+    }
+
+    /// Probability that independent residuals are correlated as these are.
+    fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
+        let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
+        let series: Vec<f64> = own.map(|l| l.normalised).collect();
+        let lags = LAGS.min(series.len() / 4);
+        (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
+    }
+
+    fn records(&self) -> Vec<RecordReport> {
+        let of = |run: &super::run::Run| RecordReport {
+            name: run.reading.name.clone(),
+            samples: run.reading.samples,
+            unused: run.reading.unused,
+            bins: run.len(),
+            span_s: run.reading.span,
+            positions_by: match run.reading.by {
+                By::Label => PositionsBy::Labels,
+                By::Timeline => PositionsBy::Timeline,
+                By::Both => PositionsBy::Both,
+            },
+            ignored: run.reading.ignored.clone(),
+            force_g: run.reading.force,
+        };
+        self.problem.runs.iter().map(of).collect()
+    }
+
+    /// What joining the records adds to what each leaves alone.
+    fn repeatability(&self, fit: &Fit) -> Option<Repeatability> {
+        let runs = self.problem.runs.len();
+        let (_, free) = self.found.sums(|_| true);
+        let degrees_of_freedom = fit.degrees_of_freedom - free;
+        (runs > 1 && degrees_of_freedom > 0.0).then(|| {
+            let joined = (fit.chi_square - self.found.alone.iter().sum::<f64>()).max(0.0);
+            Repeatability {
+                chi_square: joined / degrees_of_freedom,
+                degrees_of_freedom,
+                band: chi_square_band(degrees_of_freedom, 1.0, STRICT).map_both(|x| x / degrees_of_freedom),
+            }
+        })
+    }
+
+    fn outliers(&self) -> Vec<Outlier> {
+        let mut out = Vec::new();
+        let channel = |c: usize| channel_name(self.planned.components[c]);
+        for run in self.problem.runs {
+            for s in &run.reading.spikes {
+                out.push(Outlier {
+                    record: run.reading.name.clone(),
+                    lines: (s.line, s.line),
+                    t_s: s.t,
+                    channel: channel(s.channel),
+                    sigmas: s.sigmas,
+                });
+            }
+            for (key, mean, bin) in run.measured().filter(|(k, ..)| !run.counts[k.bin][k.channel]) {
+                let sigma = self.problem.sigmas[key.channel];
+                let own = (mean.variance * if mean.given { 1.0 } else { sigma * sigma }).sqrt();
+                out.push(Outlier {
+                    record: run.reading.name.clone(),
+                    lines: bin.lines,
+                    t_s: bin.t,
+                    channel: channel(key.channel),
+                    sigmas: self.off(run, &key, mean.value) / own,
+                });
+            }
+        }
+        out
+    }
+
+    /// How far a measurement that was left out is from the estimate: from its neighbours of the same position and channel that count.
+    fn off(&self, run: &super::run::Run, key: &Key, value: f64) -> f64 {
+        let near = run.measured().filter(|(k, ..)| {
+            k.position == key.position && k.channel == key.channel && run.counts[k.bin][k.channel]
+        });
+        let mut near: Vec<(usize, f64)> = near.map(|(k, m, _)| (k.bin.abs_diff(key.bin), m.value)).collect();
+        near.sort_by_key(|(d, _)| *d);
+        near.truncate(2);
+        match near.len() {
+            0 => f64::NAN,
+            n => value - near.iter().map(|(_, v)| v).sum::<f64>() / n as f64,
+        }
+    }
+
+    fn assumed(&self) -> Assumed {
+        let c = self.conditions;
+        Assumed {
+            latitude_deg: latitude_of(self.scheme).map_or(0.0, |l| l.degrees()),
+            latitude_by_default: self.scheme.latitude.is_none(),
+            gravity_m_s2: self.options.gravity_m_s2,
+            bin_s: c.step_s,
+            accelerometer_noise_g: c.accelerometer_noise_g,
+            noise_estimated: self.options.estimate_noise,
+            drift_noise_deg_sqrt_h: c.drift_noise.density_deg_sqrt_h(c.drift_noise_step_s),
+            gate: self.options.gate,
+            known: self.known.clone(),
+            seed: self.options.seed,
+        }
+    }
+
+    fn residuals(&self) -> Vec<Residual> {
+        let runs = self.problem.runs;
+        let times: Vec<Vec<f64>> = runs
+            .iter()
+            .map(|run| run.bins.iter().flatten().map(|&(p, i)| run.reading.bins[p][i].t).collect())
+            .collect();
+        let of = |l: &Left| Residual {
+            record: l.run,
+            position: l.key.position,
+            channel: l.key.channel,
+            t_s: times[l.run][l.key.bin],
+            residual: l.residual,
+            sigma: l.r.sqrt(),
+            normalised: l.normalised,
+        };
+        self.found.all.iter().map(of).collect()
+    }
+
+    /// What speaks against all of it.
+    fn findings(&self, c: &Calibration) -> Vec<Finding> {
+        let mut out = Vec::new();
+        if !self.estimate.converged {
+            out.push(Finding::NotSettled);
+        }
+        if !self.planned.platform.observed().accelerometers {
+            for record in &c.records {
+                if let Some(length_g) = record.force_g.filter(|f| (f - 1.0).abs() > FORCE) {
+                    out.push(Finding::Force { record: record.name.clone(), length_g });
+                }
+            }
+        }
+        out.extend(self.fits(c));
+        for (r, record) in c.records.iter().enumerate() {
+            let tests = (c.records.len() * c.channels.len()) as f64;
+            for (k, channel) in c.channels.iter().enumerate() {
+                if let Some(probability) =
+                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < 1.0 - STRICT)
+                {
+                    let (record, channel) = (record.name.clone(), channel.channel.clone());
+                    out.push(Finding::Correlated { record, channel, probability });
+                }
+            }
+        }
+        out.extend(self.too_many.map(|count| Finding::Outliers { count, of: self.found.all.len() }));
+        if let Some(r) = c.repeatability.as_ref().filter(|r| r.chi_square > r.band.1) {
+            out.push(Finding::Repeatability { chi_square: r.chi_square });
+        }
+        if let Some(chi_square) = self.known_misfit() {
+            out.push(Finding::Known { chi_square });
+        }
+        let difference = c.second_path.difference.max(c.second_path.sigma_difference);
+        if difference.is_nan() || difference > AGREE {
+            out.push(Finding::SecondPath { difference });
+        }
+        out
+    }
+
+    /// Positions, or noise, or components.
+    fn fits(&self, c: &Calibration) -> Vec<Finding> {
+        let limits = |dof: f64, tests: usize| {
+            let strict = 1.0 - (1.0 - STRICT) / tests.max(1) as f64;
+            chi_square_band(dof.max(1e-3), 1.0, strict).map_both(|x| x / dof.max(1e-3))
+        };
+        let all: Vec<&PositionFit> = c.positions.iter().filter(|p| p.degrees_of_freedom > 0.5).collect();
+        let mut chi: Vec<f64> = all.iter().map(|p| p.chi_square).collect();
+        chi.sort_by(f64::total_cmp);
+        let usual = chi.get(chi.len().saturating_sub(1) / 2).copied().unwrap_or(1.0);
+        let mut apart: Vec<&&PositionFit> = all
+            .iter()
+            .filter(|p| p.chi_square > limits(p.degrees_of_freedom, all.len()).1)
+            .filter(|p| p.chi_square > APART * usual.min(c.fit.band.1.max(1.0)))
+            .collect();
+        apart.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
+        let named = apart.iter().map(|p| Finding::Position {
+            record: p.record.clone(),
+            position: p.position.clone(),
+            chi_square: p.chi_square,
+            factor: p.chi_square.sqrt(),
+        });
+        let mut out: Vec<Finding> = if usual > APART && apart.iter().all(|p| p.chi_square < APART * usual) {
+            Vec::new()
+        } else {
+            named.collect()
+        };
+        if !out.is_empty() {
+            return out;
+        }
+        let total = c.fit.factor * c.fit.factor;
+        if !(c.fit.band.0..=c.fit.band.1).contains(&total) {
+            out.push(Finding::Noise { chi_square: total, factor: c.fit.factor });
+            return out;
+        }
+        for channel in &c.channels {
+            let band = limits(channel.degrees_of_freedom, c.channels.len());
+            if !(band.0..=band.1).contains(&channel.chi_square) {
+                out.push(Finding::Channel {
+                    channel: channel.channel.clone(),
+                    chi_square: channel.chi_square,
+                    factor: channel.chi_square.sqrt(),
+                });
+            }
+        }
+        out
+    }
+
+    /// Chi-square of what was known before against the estimate, where it is beyond its band.
+    fn known_misfit(&self) -> Option<f64> {
+        let (rows, values) = self.problem.known.as_ref()?;
+        let dof = values.len() as f64;
+        let left = values - rows * self.problem.values(&self.estimate.at.x);
+        let chi = left.norm_squared() / dof;
+        (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
+    }
+}
+
+/// Both ends of a band.
+trait MapBoth {
+    fn map_both(self, f: impl Fn(f64) -> f64) -> Self;
+}
+
+impl MapBoth for (f64, f64) {
+    fn map_both(self, f: impl Fn(f64) -> f64) -> Self {
+        (f(self.0), f(self.1))
+    }
+}

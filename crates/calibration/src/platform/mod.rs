@@ -1,0 +1,305 @@
+//! A torquing scheme calibrated from the records of its runs.
+
+mod diagnose;
+mod estimate;
+mod observe;
+mod run;
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::{Scheme, SchemeError};
+use obsdeg_ekf::EkfError;
+use obsdeg_ekf::consistency::chi_square_quantile;
+use obsdeg_evidence::simulation::{
+    Conditions, Plan, PlatformState, RunStart, SimulationError, predict, si_per_shown,
+};
+
+use crate::answer::{Calibration, CovarianceTable};
+use crate::record::{Record, RecordError};
+use diagnose::Diagnosed;
+use estimate::{Problem, Unknowns};
+use run::Run;
+
+/// Why a scheme cannot be calibrated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibrationError {
+    /// The record.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A label of no position.
+    #[error("{record}: line {line}, column `position`: no position is called `{found}`; expected {expected}")]
+    UnknownPosition {
+        /// The record.
+        record: String,
+        /// The line.
+        line: u64,
+        /// The label.
+        found: String,
+        /// The names of the scheme.
+        expected: String,
+    },
+    /// Positions in another order.
+    #[error("{record}: line {line}, column `position`: found `{found}`, expected {expected}")]
+    Order {
+        /// The record.
+        record: String,
+        /// The line.
+        line: u64,
+        /// The label.
+        found: String,
+        /// What the scheme has there.
+        expected: String,
+    },
+    /// A position without samples.
+    #[error("{record}: the position {position} of the scheme has no samples: {hint}")]
+    NoSamples {
+        /// The record.
+        record: String,
+        /// The position.
+        position: String,
+        /// What may be the matter.
+        hint: String,
+    },
+    /// A force that points elsewhere.
+    #[error(
+        "{record}: line {line}: at {position} the specific force is {off_deg} deg from where the scheme has it; it is that of {like}"
+    )]
+    Attitude {
+        /// The record.
+        record: String,
+        /// The first line of the position.
+        line: u64,
+        /// The position.
+        position: String,
+        /// By how much.
+        off_deg: String,
+        /// Positions that it fits.
+        like: String,
+    },
+    /// A standard deviation that is none.
+    #[error(
+        "{record}: line {line}: no standard deviation of {channel}; expected one above zero beside every value"
+    )]
+    Sigma {
+        /// The record.
+        record: String,
+        /// The line.
+        line: u64,
+        /// The component.
+        channel: String,
+    },
+    /// A gap that is too short.
+    #[error(
+        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the scheme takes {slew_s:.3} s"
+    )]
+    Slew {
+        /// The record.
+        record: String,
+        /// Where it goes.
+        position: String,
+        /// The gap.
+        gap_s: f64,
+        /// The slew.
+        slew_s: f64,
+    },
+    /// Turning positions.
+    #[error(
+        "a record of a rotating segment cannot be calibrated yet; expected positions at rest, found {position}"
+    )]
+    Rotates {
+        /// The segment.
+        position: String,
+    },
+    /// Nothing to estimate.
+    #[error("nothing is determined by these records: no unknown and no combination")]
+    Nothing,
+    /// A calibration that is none of this platform.
+    #[error("the prior calibration says nothing of this scheme: it has {found}")]
+    Prior {
+        /// What it has.
+        found: String,
+    },
+    /// The scheme or its conditions.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
+impl From<EkfError> for CalibrationError {
+    fn from(e: EkfError) -> Self {
+        Self::Simulation(e.into())
+    }
+}
+
+impl From<SchemeError> for CalibrationError {
+    fn from(e: SchemeError) -> Self {
+        Self::Simulation(e.into())
+    }
+}
+
+/// How a record is taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// What one g is, in m/s^2.
+    pub gravity_m_s2: f64,
+    /// Whether the noise is estimated from the records.
+    pub estimate_noise: bool,
+    /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out.
+    pub gate: f64,
+    /// A calibration before.
+    pub prior: Option<CovarianceTable>,
+    /// Seed of the exact verdicts.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { gravity_m_s2: STANDARD_GRAVITY, estimate_noise: false, gate: 0.999, prior: None, seed: 1 }
+    }
+}
+
+/// The standard acceleration of gravity, in m/s^2.
+pub const STANDARD_GRAVITY: f64 = 9.80665;
+/// Rounds in which outliers are looked for, or the noise is estimated.
+const ROUNDS: usize = 6;
+/// More than this part of all measurements are no outliers.
+const MOST_OUTLIERS: f64 = 0.02;
+
+/// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and slews.
+///
+/// # Errors
+/// [`CalibrationError`].
+pub fn calibrate(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    records: Vec<Record>,
+    options: &Options,
+) -> Result<Calibration, CalibrationError> {
+    if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
+        return Err(CalibrationError::Rotates { position: p.name.clone() });
+    }
+    let own = run::conditions(conditions);
+    let planned = Plan::new(scheme, &own)?;
+    let mut sigmas: Vec<f64> = planned.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
+    let mut runs = Vec::with_capacity(records.len());
+    for record in records {
+        let reading =
+            observe::observe(record, &planned, options.gravity_m_s2, conditions.step_s, sigmas.clone())?;
+        runs.push(Run::new(reading, scheme, &planned, &own)?);
+    }
+    let prediction = predict(&planned, options.seed)?;
+    let start = RunStart::new(&planned, &own)?;
+    let (n, coefficients, biases) =
+        (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
+    let unknowns = Unknowns::new(
+        runs.len(),
+        [n - coefficients, coefficients, biases],
+        &start.sigma,
+        &start.estimate,
+        &prediction.null_space,
+    );
+    let known = options.prior.as_ref().map(|p| known(p, &planned, &prediction, &unknowns)).transpose()?;
+    let (known, known_names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
+    let mut x: Vec<PlatformState> =
+        runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
+    let (mut round, mut too_many) = (0, None);
+    loop {
+        round += 1;
+        let problem = Problem {
+            conditions: &own,
+            runs: &runs,
+            unknowns: &unknowns,
+            sigmas: sigmas.clone(),
+            known: known.clone(),
+        };
+        let estimate = problem.estimate(x, round == 1)?;
+        let found = Diagnosed::of(&problem, &estimate, &prediction)?;
+        let last = round == ROUNDS;
+        // noise first: a gate needs it
+        let rescaled = options.estimate_noise.then(|| found.channel_factors(sigmas.len()));
+        let settled = rescaled.as_ref().is_none_or(|f| f.iter().all(|f| (f - 1.0).abs() < 1e-3));
+        let off = found.beyond(gate(options.gate, found.all.len()));
+        let many = off.len() as f64 > MOST_OUTLIERS * found.all.len() as f64;
+        if many {
+            too_many = Some(off.len());
+        }
+        let leave_out = !off.is_empty() && !many;
+        if last || (settled && !leave_out) {
+            let parts = diagnose::Parts {
+                scheme,
+                conditions,
+                options,
+                planned: &planned,
+                prediction: &prediction,
+                problem: &problem,
+                estimate: &estimate,
+                found: &found,
+                too_many: too_many.filter(|_| many),
+                known: known_names,
+            };
+            return parts.answer();
+        }
+        let next = estimate.at.x.clone();
+        if let Some(factors) = rescaled {
+            sigmas.iter_mut().zip(factors).for_each(|(s, f)| *s *= f);
+        }
+        if leave_out {
+            for (run, key) in off {
+                runs[run].counts[key.bin][key.channel] = false;
+            }
+        }
+        x = next;
+    }
+}
+
+/// Beyond how many standard deviations a measurement of so many is left out.
+fn gate(probability: f64, of: usize) -> f64 {
+    if probability >= 1.0 {
+        return f64::INFINITY;
+    }
+    chi_square_quantile(1.0, 1.0 - (1.0 - probability) / of.max(1) as f64).sqrt()
+}
+
+/// Rows of what a calibration before says of the coefficients and their combinations, with unit errors, and their names.
+type Known = ((DMatrix<f64>, DVector<f64>), Vec<String>);
+
+fn known(
+    table: &CovarianceTable,
+    plan: &Plan,
+    prediction: &obsdeg_evidence::prediction::Prediction,
+    unknowns: &Unknowns,
+) -> Result<Known, CalibrationError> {
+    let (names, units) = (plan.platform.names(), plan.platform.units());
+    let psi = plan.unknowns() - plan.platform.coefficients();
+    let functional = |name: &String| -> Option<(Vec<(usize, f64)>, f64)> {
+        let single = names.iter().position(|n| n == name).map(|i| vec![(i, 1.0)]);
+        let of = |c: &obsdeg_evidence::prediction::PredictedCombination| c.expression == *name;
+        let terms =
+            single.or_else(|| prediction.combinations.iter().find(|c| of(c)).map(|c| c.terms.clone()))?;
+        // psi is that of another run
+        let scale = si_per_shown(units[terms[0].0]);
+        terms.iter().all(|(i, _)| *i >= psi).then_some((terms, scale))
+    };
+    let n = table.names.len();
+    let shapes = table.estimates.len() == n
+        && table.covariance.len() == n
+        && table.covariance.iter().all(|row| row.len() == n);
+    let found: Vec<_> = (0..n).filter_map(|k| Some((k, functional(&table.names[k])?))).collect();
+    let nothing = || CalibrationError::Prior { found: table.names.join(", ") };
+    if found.is_empty() || !shapes {
+        return Err(nothing());
+    }
+    let m = found.len();
+    let covariance = DMatrix::from_fn(m, m, |i, j| {
+        let ((a, (_, s)), (b, (_, t))) = (&found[i], &found[j]);
+        table.covariance[*a][*b] * s * t
+    });
+    let root = nalgebra::Cholesky::new(covariance).ok_or_else(nothing)?.l();
+    let mut rows = DMatrix::zeros(m, unknowns.n);
+    let mut values = DVector::zeros(m);
+    for (i, (k, (terms, scale))) in found.iter().enumerate() {
+        terms.iter().for_each(|&(s, c)| rows[(i, unknowns.index[0][s])] += c);
+        values[i] = table.estimates[*k] * scale;
+    }
+    let solve = |b: DMatrix<f64>| root.solve_lower_triangular(&b).ok_or_else(nothing);
+    let values = solve(DMatrix::from_column_slice(m, 1, values.as_slice()))?.column(0).into_owned();
+    Ok(((solve(rows)?, values), found.iter().map(|(k, _)| table.names[*k].clone()).collect()))
+}

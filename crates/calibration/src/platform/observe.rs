@@ -1,0 +1,405 @@
+//! A record of a platform: which columns it has, at which position every sample was taken, and bins of them in n.
+
+use obsdeg_core::model::slew::apply;
+use obsdeg_core::model::{AZIMUTH, Matrix3};
+use obsdeg_evidence::simulation::{Plan, SegmentKind};
+
+use super::CalibrationError;
+use crate::bins::{Bin, Binner, Sample, Spike};
+use crate::record::{Column, Record, Row, Wanted};
+
+/// Units of forces, and what they are of g where gravity is as it is (`None`: that of a metre per second squared).
+const FORCES: [(&str, Option<f64>); 4] =
+    [("g", Some(1.0)), ("mg", Some(1e-3)), ("ug", Some(1e-6)), ("m/s^2", None)];
+const ANGLES: [(&str, f64); 4] = [
+    ("rad", 1.0),
+    ("mrad", 1e-3),
+    ("deg", std::f64::consts::PI / 180.0),
+    ("arcsec", std::f64::consts::PI / 648000.0),
+];
+/// Units of time.
+pub(crate) const TIMES: [(&str, f64); 5] =
+    [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0), ("h", 3600.0)];
+/// The specific force of a position of the scheme is no further from the vertical than this, in deg.
+const TILT_DEG: f64 = 20.0;
+
+/// What the three columns of a record are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Observed {
+    /// Outputs of the accelerometers in platform axes.
+    Force,
+    /// Z in platform axes.
+    Platform,
+    /// Z in n.
+    Geographic,
+}
+
+/// How samples came to their positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum By {
+    /// By a column of labels.
+    Label,
+    /// By the timeline of the scheme.
+    Timeline,
+    /// By labels that agree with the timeline.
+    Both,
+}
+
+/// A record beside its scheme.
+#[derive(Debug, Clone)]
+pub(crate) struct Reading {
+    pub name: String,
+    pub by: By,
+    /// Bins of every position, times in s from the first sample (labels) or from the start of the scheme.
+    pub bins: Vec<Vec<Bin>>,
+    /// First and last sample of every position, in s alike.
+    pub stays: Vec<(f64, f64)>,
+    pub spikes: Vec<Spike>,
+    pub samples: usize,
+    /// Samples at no position.
+    pub unused: usize,
+    /// First and last time as they are in the record, in s.
+    pub span: (f64, f64),
+    /// Columns that nothing was made of.
+    pub ignored: Vec<String>,
+    /// The mean length of the specific force, in g, where the record has it.
+    pub force: Option<f64>,
+}
+
+/// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations of the three.
+struct Layout {
+    observed: Observed,
+    wanted: Vec<Wanted>,
+    azimuth: bool,
+    sigmas: bool,
+    label: Option<usize>,
+    ignored: Vec<String>,
+}
+
+impl Layout {
+    fn of(record: &Record, plan: &Plan, gravity: f64) -> Result<Self, CalibrationError> {
+        let forces = FORCES.map(|(u, g)| (u, g.unwrap_or(1.0 / gravity)));
+        let time = record.find("t").ok_or_else(|| record.missing("`t [s]`"))?;
+        let mut wanted = vec![record.wanted(time, &TIMES)?];
+        let families = [
+            (Observed::Force, ["fx", "fy", "fz"]),
+            (Observed::Platform, ["Zx", "Zy", "Zz"]),
+            (Observed::Geographic, ["Z1", "Z2", "Z3"]),
+        ];
+        let there = |names: &[&str; 3]| names.iter().any(|n| record.find(n).is_some());
+        let mut of = families.iter().filter(|(_, names)| there(names));
+        let expected = "`fx [g]`, `fy [g]`, `fz [g]` (outputs of the accelerometers in platform axes), or `Zx`, `Zy`, `Zz`, or `Z1`, `Z3`";
+        let &(observed, names) = of.next().ok_or_else(|| record.missing(expected))?;
+        if let Some((_, others)) = of.next() {
+            let also = format!("either {}, {}, {} or {}", names[0], names[1], names[2], others.join(", "));
+            return Err(record.missing(&also).into());
+        }
+        let needed = |i: usize| observed != Observed::Geographic || plan.components.contains(&(i + 1));
+        let mut own = Vec::new();
+        for (i, name) in names.iter().enumerate() {
+            match record.find(name) {
+                Some(column) => own.push((i, record.wanted(column, &forces)?)),
+                None if needed(i) => return Err(record.missing(&format!("`{name} [g]`")).into()),
+                // Z2 of a scheme without unknown accelerometers
+                None => own.push((i, wanted[0])),
+            }
+        }
+        wanted.extend(own.iter().map(|(_, w)| *w));
+        let azimuth = plan.components.contains(&AZIMUTH);
+        if azimuth {
+            let column =
+                record.find("Za").ok_or_else(|| record.missing("`Za [deg]` (the measured azimuth)"))?;
+            wanted.push(record.wanted(column, &ANGLES)?);
+        }
+        let mut sigmas = false;
+        let of_sigma: Vec<Option<usize>> = names.iter().map(|n| record.find(&format!("sigma_{n}"))).collect();
+        if of_sigma.iter().any(Option::is_some) {
+            sigmas = true;
+            for (i, (column, name)) in of_sigma.iter().zip(names).enumerate() {
+                match column {
+                    Some(column) => wanted.push(record.wanted(*column, &forces)?),
+                    None if needed(i) => return Err(record.missing(&format!("`sigma_{name} [g]`")).into()),
+                    None => wanted.push(wanted[0]),
+                }
+            }
+        }
+        let label = record.find("position");
+        let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
+        let ignored = record.columns().iter().enumerate().filter(|(i, _)| !used(*i));
+        let ignored = ignored.map(|(_, c): (usize, &Column)| c.text.clone()).collect();
+        Ok(Self { observed, wanted, azimuth, sigmas, label, ignored })
+    }
+
+    /// Components 1, 2, 3 of Z in n, and the azimuth, of a row taken where `C_c^n` is `c`.
+    fn in_n(&self, row: &Row<'_>, c: &Matrix3<f64>) -> [Option<f64>; 4] {
+        let n = row.numbers;
+        let azimuth = if self.azimuth { n[4] } else { None };
+        let turned = match (n[1], n[2], n[3]) {
+            (Some(x), Some(y), Some(z)) => Some(apply(c, &[x, y, z])),
+            _ => None,
+        };
+        match self.observed {
+            Observed::Geographic => [n[1], n[2], n[3], azimuth],
+            Observed::Platform => [turned.map(|z| z[0]), turned.map(|z| z[1]), turned.map(|z| z[2]), azimuth],
+            // Z^c = f^c + g^c
+            Observed::Force => {
+                [turned.map(|z| z[0]), turned.map(|z| z[1] - 1.0), turned.map(|z| z[2]), azimuth]
+            }
+        }
+    }
+
+    /// Their standard deviations where the record has them: those of platform axes turned, without their correlation.
+    fn sigmas_in_n(&self, row: &Row<'_>, c: &Matrix3<f64>) -> Option<[Option<f64>; 3]> {
+        let first = if self.azimuth { 5 } else { 4 };
+        let own =
+            self.sigmas.then(|| [row.numbers[first], row.numbers[first + 1], row.numbers[first + 2]])?;
+        if self.observed == Observed::Geographic {
+            return Some(own);
+        }
+        let squares: Option<Vec<f64>> = own.iter().map(|s| s.map(|s| s * s)).collect();
+        Some(std::array::from_fn(|i| {
+            let squares = squares.as_ref()?;
+            Some((0..3).map(|j| c[i][j] * c[i][j] * squares[j]).sum::<f64>().sqrt())
+        }))
+    }
+}
+
+/// The position of a time of the scheme, while Z is observed.
+fn at_time(plan: &Plan, t: f64) -> Option<usize> {
+    let within = |s: &&obsdeg_evidence::simulation::Segment| {
+        t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + 1e-9
+    };
+    // the end of one position is rather that than the start of the next
+    let found = plan.segments.iter().find(within)?;
+    (!matches!(found.kind, SegmentKind::Slew(_))).then_some(found.position)
+}
+
+/// What happens to a sample.
+struct Taking<'a> {
+    layout: &'a Layout,
+    plan: &'a Plan,
+    /// Components of Z, in the order of the channels.
+    binner: Binner,
+    out: Reading,
+    /// The position of the bin, and the time of the first sample.
+    now: Option<usize>,
+    begin: f64,
+    /// Whether every label is what the timeline of the scheme has there.
+    agrees: bool,
+    /// Per position: the sum of what is Z in n (1, 2, 3), its samples, and the line of the first.
+    sums: Vec<([f64; 3], usize, u64)>,
+    length: f64,
+}
+
+impl Taking<'_> {
+    fn names(&self) -> String {
+        let names: Vec<&str> =
+            self.plan.platform.scheme().positions.iter().map(|p| p.name.as_str()).collect();
+        names.join(", ")
+    }
+
+    /// The position of a row.
+    fn position(&self, row: &Row<'_>, t: f64) -> Result<Option<usize>, CalibrationError> {
+        let positions = &self.plan.platform.scheme().positions;
+        match self.out.by {
+            By::Timeline | By::Both => Ok(at_time(self.plan, t)),
+            By::Label if row.label.is_empty() => Ok(None),
+            By::Label => {
+                let found = positions.iter().position(|p| p.name == row.label);
+                let found = found.ok_or_else(|| CalibrationError::UnknownPosition {
+                    record: self.out.name.clone(),
+                    line: row.line,
+                    found: row.label.into(),
+                    expected: self.names(),
+                })?;
+                let last = self.out.stays.len();
+                let next = if self.now == Some(found) { last - 1 } else { last };
+                if found == next {
+                    return Ok(Some(found));
+                }
+                Err(CalibrationError::Order {
+                    record: self.out.name.clone(),
+                    line: row.line,
+                    found: row.label.into(),
+                    expected: positions.get(last).map_or_else(
+                        || format!("no position after {}, the last of the scheme", positions[last - 1].name),
+                        |p| format!("{} (the scheme's positions are {})", p.name, self.names()),
+                    ),
+                })
+            }
+        }
+    }
+
+    fn take(&mut self, row: &Row<'_>) -> Result<(), CalibrationError> {
+        let Some(time) = row.numbers[0] else { return Ok(()) };
+        if self.out.samples == 0 {
+            self.out.span.0 = time;
+        }
+        self.out.span.1 = time;
+        self.out.samples += 1;
+        let from = |begin: f64| time - begin;
+        let found = self.position(row, from(if self.out.by == By::Label { self.begin } else { 0.0 }))?;
+        if found != self.now {
+            self.end();
+        }
+        let Some(p) = found else {
+            self.out.unused += 1;
+            self.now = None;
+            return Ok(());
+        };
+        if self.out.by == By::Label && self.out.stays.is_empty() {
+            self.begin = time;
+        }
+        self.agrees &= at_time(self.plan, time) == Some(p);
+        let t = time - if self.out.by == By::Label { self.begin } else { 0.0 };
+        if self.now != Some(p) {
+            // the timeline may begin late, or leave positions out
+            while self.out.stays.len() <= p {
+                self.out.stays.push((t, t));
+            }
+        }
+        self.now = Some(p);
+        self.out.stays[p].1 = t;
+        let c = &self.plan.attitudes[p];
+        let in_n = self.layout.in_n(row, c);
+        if let [Some(x), Some(y), Some(z), _] = in_n {
+            let (sum, count, line) = &mut self.sums[p];
+            if *count == 0 {
+                *line = row.line;
+            }
+            *count += 1;
+            [x, y, z].iter().zip(sum).for_each(|(x, s)| *s += x);
+            self.length += (x * x + (y + 1.0) * (y + 1.0) + z * z).sqrt();
+        }
+        let z = self.plan.components.iter().map(|&k| if k == AZIMUTH { in_n[3] } else { in_n[k - 1] });
+        let z: Vec<Option<f64>> = z.collect();
+        let mut sigma = None;
+        if let Some(own) = self.layout.sigmas_in_n(row, c) {
+            let of = |&k: &usize| if k == AZIMUTH { None } else { own[k - 1] };
+            let all: Vec<f64> = self.plan.components.iter().map(|k| of(k).unwrap_or(f64::NAN)).collect();
+            // a value with a sigma that is none is a mistake; without a value nobody asks
+            if let Some(k) = (0..z.len()).find(|&k| z[k].is_some() && (all[k].is_nan() || all[k] <= 0.0)) {
+                return Err(CalibrationError::Sigma {
+                    record: self.out.name.clone(),
+                    line: row.line,
+                    channel: channel_name(self.plan.components[k]),
+                });
+            }
+            sigma = Some(all);
+        }
+        let bin = self.binner.push(Sample { line: row.line, t, z, sigma }, &mut self.out.spikes);
+        if let Some(bin) = bin {
+            self.out.bins[p].push(bin);
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) {
+        if let (Some(bin), Some(p)) = (self.binner.end(&mut self.out.spikes), self.now) {
+            self.out.bins[p].push(bin);
+        }
+    }
+
+    /// Refuses positions whose force is far from where the scheme has it.
+    fn check_attitudes(&self) -> Result<(), CalibrationError> {
+        let positions = &self.plan.platform.scheme().positions;
+        let tilt = |c: &Matrix3<f64>, force: &[f64; 3]| {
+            let f = apply(c, force);
+            let length = f.iter().map(|x| x * x).sum::<f64>().sqrt();
+            (f[1] / length).clamp(-1.0, 1.0).acos().to_degrees()
+        };
+        for (p, &(sum, count, line)) in self.sums.iter().enumerate().filter(|(_, s)| s.1 > 0) {
+            // in n, of the position that the scheme has; then in platform axes
+            let mean = [sum[0] / count as f64, sum[1] / count as f64 + 1.0, sum[2] / count as f64];
+            let c = &self.plan.attitudes[p];
+            let force: [f64; 3] = std::array::from_fn(|j| (0..3).map(|i| c[i][j] * mean[i]).sum());
+            let off = tilt(c, &force);
+            if off <= TILT_DEG {
+                continue;
+            }
+            let near = |q: &usize| tilt(&self.plan.attitudes[*q], &force) <= TILT_DEG;
+            let like: Vec<&str> =
+                (0..positions.len()).filter(near).map(|q| positions[q].name.as_str()).collect();
+            return Err(CalibrationError::Attitude {
+                record: self.out.name.clone(),
+                line,
+                position: positions[p].name.clone(),
+                off_deg: format!("{off:.1}"),
+                like: if like.is_empty() { "no position of the scheme".into() } else { like.join(" or ") },
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The name of a component of Z.
+pub(crate) fn channel_name(component: usize) -> String {
+    if component == AZIMUTH { "Za".into() } else { format!("Z{component}") }
+}
+
+/// Reads `record` beside the timeline of `plan`, into bins of at most `bin_s`; `sigmas` are about those of a sample, by channel.
+///
+/// # Errors
+/// [`CalibrationError`].
+pub(crate) fn observe(
+    record: Record,
+    plan: &Plan,
+    gravity: f64,
+    bin_s: f64,
+    sigmas: Vec<f64>,
+) -> Result<Reading, CalibrationError> {
+    let layout = Layout::of(&record, plan, gravity)?;
+    let positions = plan.platform.scheme().positions.len();
+    let by = if layout.label.is_some() { By::Label } else { By::Timeline };
+    let out = Reading {
+        name: record.name().into(),
+        by,
+        bins: vec![Vec::new(); positions],
+        stays: Vec::new(),
+        spikes: Vec::new(),
+        samples: 0,
+        unused: 0,
+        span: (0.0, 0.0),
+        ignored: layout.ignored.clone(),
+        force: None,
+    };
+    let sums = vec![([0.0; 3], 0, 0); positions];
+    let binner = Binner::new(bin_s, sigmas);
+    let mut taking =
+        Taking { layout: &layout, plan, binner, out, now: None, begin: 0.0, agrees: true, sums, length: 0.0 };
+    record.read(&layout.wanted, layout.label, false, |row| taking.take(&row))?;
+    taking.end();
+    let all = layout.observed != Observed::Geographic;
+    if all {
+        taking.check_attitudes()?;
+    }
+    let count: usize = taking.sums.iter().map(|s| s.1).sum();
+    let force = (layout.observed == Observed::Force && count > 0).then(|| taking.length / count as f64);
+    let (agrees, begin) = (taking.agrees, taking.begin);
+    let mut out = taking.out;
+    out.force = force;
+    if out.by == By::Label && agrees {
+        // which says when each position begins and ends, where samples only say what is between
+        out.by = By::Both;
+        out.bins.iter_mut().flatten().for_each(|b| b.t += begin);
+        out.spikes.iter_mut().for_each(|s| s.t += begin);
+        out.stays.iter_mut().for_each(|s| *s = (s.0 + begin, s.1 + begin));
+    }
+    if let Some(p) = out.bins.iter().position(|b| b.iter().all(|b| b.channels.iter().all(Option::is_none))) {
+        let scheme = plan.platform.scheme();
+        return Err(CalibrationError::NoSamples {
+            record: out.name,
+            position: scheme.positions[p].name.clone(),
+            hint: match by {
+                By::Label | By::Both => "its label does not occur".into(),
+                By::Timeline => format!(
+                    "the record is of {} to {} s, the scheme of 0 to {} s (a column `position` says what is where)",
+                    out.span.0,
+                    out.span.1,
+                    plan.duration_s()
+                ),
+            },
+        });
+    }
+    Ok(out)
+}

@@ -1,0 +1,188 @@
+//! The record of one run on its own timeline: the scheme with the times of the record, linearised along a trajectory.
+
+use nalgebra::DMatrix;
+use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::{Dwell, Scheme};
+use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage, Update};
+use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind};
+
+use super::CalibrationError;
+use super::observe::{By, Reading};
+use crate::bins::{Bin, Mean};
+use crate::least_squares::Linearised;
+
+/// No two bins are closer, in s.
+const CLOSEST: f64 = 1e-6;
+
+/// A run with its bins on its timeline.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    pub reading: Reading,
+    pub plan: Plan,
+    /// The bin at the end of each segment of the plan, by position.
+    pub bins: Vec<Option<(usize, usize)>>,
+    /// Per bin (in order) and channel: whether it counts.
+    pub counts: Vec<Vec<bool>>,
+}
+
+/// Which measurement a row of a linearised run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Key {
+    pub position: usize,
+    /// The bin of the run, in order.
+    pub bin: usize,
+    pub channel: usize,
+}
+
+/// The conditions of an estimate: random drift is a density, since the bins of a record are as long as they are.
+pub(crate) fn conditions(of: &Conditions) -> Conditions {
+    let density = of.drift_noise.density_deg_sqrt_h(of.drift_noise_step_s);
+    Conditions { drift_noise: DriftNoise::RandomWalk(density), ..of.clone() }
+}
+
+/// Parts of a position that begins at `begin`: the steps to its bins, and what is left of it.
+fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
+    let mut at = begin;
+    let mut out: Vec<(usize, f64)> = Vec::with_capacity(bins.len() + 1);
+    for bin in bins {
+        let dt = (bin.t - at).max(CLOSEST);
+        out.push((1, dt));
+        at += dt;
+    }
+    let rest = begin + length - at;
+    if rest > CLOSEST {
+        out.push((1, rest));
+    }
+    out
+}
+
+impl Run {
+    /// Lays a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as the record says.
+    ///
+    /// # Errors
+    /// [`CalibrationError`].
+    pub(crate) fn new(
+        reading: Reading,
+        scheme: &Scheme,
+        planned: &Plan,
+        conditions: &Conditions,
+    ) -> Result<Self, CalibrationError> {
+        let mut own = scheme.clone();
+        let mut begins = vec![0.0; own.positions.len()];
+        if reading.by == By::Label {
+            // the platform leaves a position after its last sample, and what of a gap is no slew is spent at the next
+            let mut left = 0.0;
+            for (p, position) in own.positions.iter_mut().enumerate() {
+                let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
+                let turned: f64 = planned.segments.iter().filter(slew).map(|s| s.dt * s.steps as f64).sum();
+                let (first, last) = reading.stays[p];
+                begins[p] = left + turned;
+                if begins[p] > first {
+                    return Err(CalibrationError::Slew {
+                        record: reading.name.clone(),
+                        position: position.name.clone(),
+                        gap_s: first - left,
+                        slew_s: turned,
+                    });
+                }
+                let dwell = (last - begins[p]).max(2.0 * CLOSEST * (1.0 + reading.bins[p].len() as f64));
+                position.dwell = Dwell::from_seconds(dwell);
+                left = begins[p] + dwell;
+            }
+        }
+        let plan = Plan::derived(&own, conditions)?;
+        for s in &plan.segments {
+            if !matches!(s.kind, SegmentKind::Slew(_)) {
+                begins[s.position] = s.start_s;
+            }
+        }
+        let of = |s: &Segment| parts(&reading.bins[s.position], begins[s.position], s.steps as f64 * s.dt);
+        let plan = plan.in_steps(conditions, of)?;
+        let mut seen = vec![0; own.positions.len()];
+        let mut bins = Vec::with_capacity(plan.segments.len());
+        for s in &plan.segments {
+            let next = seen[s.position];
+            let there = !matches!(s.kind, SegmentKind::Slew(_)) && next < reading.bins[s.position].len();
+            bins.push(there.then_some((s.position, next)));
+            seen[s.position] += usize::from(there);
+        }
+        let all = bins.iter().flatten().count();
+        let counts = vec![vec![true; plan.components.len()]; all];
+        Ok(Self { reading, plan, bins, counts })
+    }
+
+    /// The number of its bins.
+    pub(crate) fn len(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// What its bins say, with the time of each from its start, in order.
+    pub(crate) fn measured(&self) -> impl Iterator<Item = (Key, Mean, &Bin)> + '_ {
+        let of = self.bins.iter().flatten().enumerate();
+        of.flat_map(move |(bin, &(position, i))| {
+            let b = &self.reading.bins[position][i];
+            let means = b.channels.iter().enumerate();
+            means.filter_map(move |(channel, m)| Some((Key { position, bin, channel }, (*m)?, b)))
+        })
+    }
+
+    /// Linearised along the trajectory from `x0`, with all that counts of its first `most` bins; `sigmas` are those of a sample, by channel.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(crate) fn along(
+        &self,
+        conditions: &Conditions,
+        sigmas: &[f64],
+        x0: &PlatformState,
+        most: usize,
+    ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
+        let filter = Extended::new(&self.plan, conditions, Update::default())?;
+        let (plan, n) = (&self.plan, self.plan.states());
+        let (mut out, mut keys) = (Linearised::default(), Vec::new());
+        let (mut x, mut bin) = (x0.clone(), 0);
+        for (segment, s) in plan.segments.iter().enumerate() {
+            if bin >= most {
+                break;
+            }
+            let motion = filter.motion(segment);
+            let (transition, noise) = motion.advance(0.0, s.dt, &mut x)?;
+            let mut outputs = Vec::new();
+            if let Some((position, i)) = self.bins[segment] {
+                let (h, rows) = (motion.h(0.0, &x), Measurement::jacobian(&motion, 0.0, &x));
+                for (channel, mean) in self.reading.bins[position][i].channels.iter().enumerate() {
+                    let Some(mean) = mean.filter(|_| self.counts[bin][channel]) else { continue };
+                    let row = rows.row(channel);
+                    let h_of = row.iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect();
+                    let r = mean.variance * if mean.given { 1.0 } else { sigmas[channel] * sigmas[channel] };
+                    outputs.push(ScalarOutput { h: h_of, r });
+                    out.residuals.push(mean.value - h[channel]);
+                    keys.push(Key { position, bin, channel });
+                }
+                bin += 1;
+            }
+            out.roots.push(self.root(segment, n));
+            out.stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
+        }
+        if let Some(k) = out.residuals.iter().position(|x| !x.is_finite()) {
+            let value = out.residuals[k];
+            return Err(EkfError::NotFinite { what: "the residuals", value, row: k, column: 0 }.into());
+        }
+        Ok((out, keys))
+    }
+
+    /// The root of the noise of a segment on all states, without directions of none.
+    fn root(&self, segment: usize, n: usize) -> DMatrix<f64> {
+        let root = &self.plan.noise_roots[segment];
+        let moved: Vec<usize> =
+            self.plan.psi_columns(segment).iter().copied().chain(self.plan.unknowns()..n).collect();
+        let there: Vec<usize> = (0..root.ncols()).filter(|&j| root.column(j).amax() > 0.0).collect();
+        let mut out = DMatrix::zeros(n, there.len());
+        for (k, &j) in there.iter().enumerate() {
+            for (i, &row) in moved.iter().enumerate() {
+                out[(row, k)] = root[(i, j)];
+            }
+        }
+        out
+    }
+}

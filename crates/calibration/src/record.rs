@@ -1,0 +1,493 @@
+//! Records: columns of numbers with their units in the header, from CSV or Parquet, row by row; only one row is held.
+//!
+//! A header is `name [unit]`; a name without brackets has no unit. Lines that begin with `#` are comments. An empty cell is a value that is not there.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek};
+
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
+
+/// Where something of a record is wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The record.
+    pub record: String,
+    /// Its line from 1, the header included; of Parquet the row from 1.
+    pub line: u64,
+    /// The header of the column; empty for all of the row.
+    pub column: String,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: line {}", self.record, self.line)?;
+        if self.column.is_empty() { Ok(()) } else { write!(f, ", column `{}`", self.column) }
+    }
+}
+
+/// Why a record cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RecordError {
+    /// The file or pipe.
+    #[error("cannot read the record {record}: {reason}")]
+    Read {
+        /// The record.
+        record: String,
+        /// Why.
+        reason: String,
+    },
+    /// No header.
+    #[error("the record {record} is empty; expected a header such as `t [s],position,fx [g],fy [g],fz [g]`")]
+    Empty {
+        /// The record.
+        record: String,
+    },
+    /// A header that is none.
+    #[error("{place}: expected a name, or a name with its unit as in `fx [g]`, once")]
+    Header {
+        /// Where.
+        place: Place,
+    },
+    /// A column that is wanted.
+    #[error("{record}: no column {expected}; found {found}")]
+    Missing {
+        /// The record.
+        record: String,
+        /// What is wanted.
+        expected: String,
+        /// What there is.
+        found: String,
+    },
+    /// A unit of something else.
+    #[error("{place}: expected {expected}")]
+    Unit {
+        /// Where.
+        place: Place,
+        /// The units that would do.
+        expected: String,
+    },
+    /// Not a number.
+    #[error("{place}: expected a number, found `{found}`")]
+    Number {
+        /// Where.
+        place: Place,
+        /// What there is.
+        found: String,
+    },
+    /// A number that cannot be.
+    #[error("{place}: found {found}, expected {expected}")]
+    Value {
+        /// Where.
+        place: Place,
+        /// What there is.
+        found: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// A row of another length.
+    #[error("{place}: {found} cells; expected {expected}, as in the header")]
+    Cells {
+        /// Where.
+        place: Place,
+        /// Its cells.
+        found: usize,
+        /// Those of the header.
+        expected: usize,
+    },
+    /// Time that does not go on.
+    #[error(
+        "{place}: the time {found} s is not after that of the row before, {before} s; expected times that increase"
+    )]
+    Time {
+        /// Where.
+        place: Place,
+        /// The time.
+        found: String,
+        /// The one before.
+        before: String,
+    },
+    /// Nothing after the header.
+    #[error("{record}: no rows after the header")]
+    NoRows {
+        /// The record.
+        record: String,
+    },
+}
+
+/// A column of a header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// Its unit, if it says one.
+    pub unit: Option<String>,
+    /// As it is written.
+    pub text: String,
+}
+
+impl Column {
+    fn of(text: &str) -> Option<Self> {
+        let whole = text.trim();
+        let (name, unit) = match whole.split_once('[') {
+            Some((name, rest)) => (name.trim(), Some(rest.strip_suffix(']')?.trim().to_string())),
+            None => (whole, None),
+        };
+        let sound = !name.is_empty() && !name.contains(']');
+        sound.then(|| Self { name: name.into(), unit, text: whole.into() })
+    }
+}
+
+/// What rows come from.
+enum Rows {
+    Csv(Lines),
+    Parquet(SerializedFileReader<File>),
+}
+
+/// Lines of CSV with their numbers.
+struct Lines {
+    text: BufReader<Box<dyn Read>>,
+    line: u64,
+    cells: Vec<String>,
+    buffer: Vec<u8>,
+}
+
+/// Longest line, in bytes.
+const LONGEST: u64 = 1 << 20;
+
+impl Lines {
+    /// Reads the cells of the next line that is neither empty nor a comment; false at the end.
+    fn next(&mut self, record: &str) -> Result<bool, RecordError> {
+        let wrong = |reason: String| RecordError::Read { record: record.into(), reason };
+        loop {
+            self.buffer.clear();
+            let read = (&mut self.text).take(LONGEST).read_until(b'\n', &mut self.buffer);
+            let read = read.map_err(|e| wrong(e.to_string()))?;
+            if read == 0 {
+                return Ok(false);
+            }
+            self.line += 1;
+            if read as u64 == LONGEST {
+                return Err(wrong(format!("line {} is longer than {LONGEST} bytes", self.line)));
+            }
+            let text = std::str::from_utf8(&self.buffer)
+                .map_err(|_| wrong(format!("line {} is no UTF-8 text", self.line)))?
+                .trim_end_matches(['\n', '\r']);
+            if text.trim().is_empty() || text.starts_with('#') {
+                continue;
+            }
+            self.cells.clear();
+            if text.contains('"') {
+                let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
+                let cells = reader.records().next().transpose().map_err(|e| wrong(e.to_string()))?;
+                self.cells.extend(cells.iter().flatten().map(|c| c.trim().to_string()));
+            } else {
+                self.cells.extend(text.split(',').map(|c| c.trim().to_string()));
+            }
+            return Ok(true);
+        }
+    }
+}
+
+/// A record whose header was read.
+pub struct Record {
+    name: String,
+    columns: Vec<Column>,
+    rows: Rows,
+}
+
+/// A column that is wanted: its index, and what a number of it is times to be in the unit of the caller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Which.
+    pub column: usize,
+    /// In its own unit.
+    pub scale: f64,
+}
+
+/// One row: the wanted numbers (`None` where the cell is empty) and its label.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row<'a> {
+    /// Its line from 1.
+    pub line: u64,
+    /// The wanted numbers in their order.
+    pub numbers: &'a [Option<f64>],
+    /// The text of the label column.
+    pub label: &'a str,
+}
+
+impl Record {
+    /// A record from a file: Parquet if it begins so, else CSV.
+    ///
+    /// # Errors
+    /// [`RecordError`].
+    pub fn file(name: &str, mut file: File) -> Result<Self, RecordError> {
+        let wrong =
+            |e: &dyn std::fmt::Display| RecordError::Read { record: name.into(), reason: e.to_string() };
+        let mut magic = [0; 4];
+        let parquet = file.metadata().map_err(|e| wrong(&e))?.is_file() && {
+            let whole = file.read_exact(&mut magic).is_ok();
+            file.rewind().map_err(|e| wrong(&e))?;
+            whole && &magic == b"PAR1"
+        };
+        if !parquet {
+            return Self::csv(name, Box::new(file));
+        }
+        let reader = SerializedFileReader::new(file).map_err(|e| wrong(&e))?;
+        let fields = reader.metadata().file_metadata().schema().get_fields();
+        let headers: Vec<String> = fields.iter().map(|f| f.name().to_string()).collect();
+        Ok(Self { name: name.into(), columns: columns(name, headers, 0)?, rows: Rows::Parquet(reader) })
+    }
+
+    /// A record as CSV.
+    ///
+    /// # Errors
+    /// [`RecordError`].
+    pub fn csv(name: &str, text: Box<dyn Read>) -> Result<Self, RecordError> {
+        let wrong =
+            |e: &dyn std::fmt::Display| RecordError::Read { record: name.into(), reason: e.to_string() };
+        // a mark of the byte order is no part of a name
+        let mut text = BufReader::new(text);
+        if text.fill_buf().map_err(|e| wrong(&e))?.starts_with(&[0xef, 0xbb, 0xbf]) {
+            text.consume(3);
+        }
+        let mut lines = Lines { text, line: 0, cells: Vec::new(), buffer: Vec::new() };
+        if !lines.next(name)? {
+            return Err(RecordError::Empty { record: name.into() });
+        }
+        let columns = columns(name, lines.cells.clone(), lines.line)?;
+        Ok(Self { name: name.into(), columns, rows: Rows::Csv(lines) })
+    }
+
+    /// What it is called.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its columns.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The index of the column of this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|c| c.name == name)
+    }
+
+    /// What a number of a column is times to be in the first of `units`, which are given with what one of each is of the first.
+    ///
+    /// # Errors
+    /// [`RecordError::Unit`].
+    pub fn wanted(&self, column: usize, units: &[(&str, f64)]) -> Result<Wanted, RecordError> {
+        let own = &self.columns[column];
+        let found = own.unit.as_ref().and_then(|u| units.iter().find(|(name, _)| name == u));
+        found.map(|&(_, scale)| Wanted { column, scale }).ok_or_else(|| RecordError::Unit {
+            place: self.at(1, column),
+            expected: format!(
+                "a unit, {}",
+                units.iter().map(|(u, _)| format!("`{} [{u}]`", own.name)).collect::<Vec<_>>().join(" or ")
+            ),
+        })
+    }
+
+    /// A column that is not there.
+    pub fn missing(&self, expected: &str) -> RecordError {
+        let found: Vec<String> = self.columns.iter().map(|c| format!("`{}`", c.text)).collect();
+        RecordError::Missing { record: self.name.clone(), expected: expected.into(), found: found.join(", ") }
+    }
+
+    fn at(&self, line: u64, column: usize) -> Place {
+        place(&self.name, line, &self.columns[column].text)
+    }
+
+    /// Goes through all rows: of each the `wanted` numbers and the text of the `label` column. The first wanted is the time, which must be there and
+    /// increase; it may begin anew with another label where `anew` says so.
+    ///
+    /// # Errors
+    /// [`RecordError`], and what `each` refuses.
+    pub fn read<E: From<RecordError>>(
+        self,
+        wanted: &[Wanted],
+        label: Option<usize>,
+        anew: bool,
+        mut each: impl FnMut(Row<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Self { name, columns, rows } = self;
+        let mut before = f64::NEG_INFINITY;
+        let mut last = String::new();
+        let mut any = false;
+        let mut row = |line: u64, cell: &mut dyn FnMut(usize) -> Cell, label: &str| -> Result<(), E> {
+            let mut numbers = [None; MOST];
+            for (slot, w) in numbers.iter_mut().zip(wanted) {
+                let at = || place(&name, line, &columns[w.column].text);
+                *slot = match cell(w.column) {
+                    Cell::Number(x) if x.is_finite() => Some(x * w.scale),
+                    Cell::Number(x) => {
+                        let expected = "a finite number (an empty cell is a value that is not there)";
+                        return Err(RecordError::Value { place: at(), found: x.to_string(), expected }.into());
+                    }
+                    Cell::Nothing => None,
+                    Cell::Text(found) => return Err(RecordError::Number { place: at(), found }.into()),
+                };
+            }
+            let at = || place(&name, line, &columns[wanted[0].column].text);
+            let Some(t) = numbers[0] else {
+                return Err(RecordError::Number { place: at(), found: String::new() }.into());
+            };
+            if anew && label != last {
+                before = f64::NEG_INFINITY;
+                last = label.into();
+            }
+            if t <= before {
+                let (found, before) = (t.to_string(), before.to_string());
+                return Err(RecordError::Time { place: at(), found, before }.into());
+            }
+            (before, any) = (t, true);
+            each(Row { line, numbers: &numbers[..wanted.len()], label })
+        };
+        match rows {
+            Rows::Csv(mut lines) => {
+                while lines.next(&name)? {
+                    let (line, cells) = (lines.line, &lines.cells);
+                    if cells.len() != columns.len() {
+                        let (found, expected) = (cells.len(), columns.len());
+                        return Err(
+                            RecordError::Cells { place: place(&name, line, ""), found, expected }.into()
+                        );
+                    }
+                    let mut cell = |i: usize| match cells[i].as_str() {
+                        "" => Cell::Nothing,
+                        text => text.parse().map_or_else(|_| Cell::Text(text.into()), Cell::Number),
+                    };
+                    row(line, &mut cell, label.map_or("", |i| &cells[i]))?;
+                }
+            }
+            Rows::Parquet(reader) => {
+                let wrong = |e: parquet::errors::ParquetError| RecordError::Read {
+                    record: name.clone(),
+                    reason: e.to_string(),
+                };
+                for (i, read) in reader.get_row_iter(None).map_err(wrong)?.enumerate() {
+                    let read = read.map_err(wrong)?;
+                    let fields: Vec<&Field> = read.get_column_iter().map(|(_, f)| f).collect();
+                    let label = label.map_or_else(String::new, |i| text_of(fields[i]));
+                    row(i as u64 + 1, &mut |i| Cell::of(fields[i]), &label)?;
+                }
+            }
+        }
+        if any { Ok(()) } else { Err(RecordError::NoRows { record: name }.into()) }
+    }
+}
+
+/// Most numbers that are wanted of a row.
+pub const MOST: usize = 64;
+
+/// What a cell holds.
+enum Cell {
+    Number(f64),
+    Nothing,
+    Text(String),
+}
+
+impl Cell {
+    fn of(field: &Field) -> Self {
+        match field {
+            Field::Double(x) => Self::Number(*x),
+            Field::Float(x) => Self::Number(f64::from(*x)),
+            Field::Int(x) => Self::Number(f64::from(*x)),
+            Field::Short(x) => Self::Number(f64::from(*x)),
+            Field::UInt(x) => Self::Number(f64::from(*x)),
+            Field::UShort(x) => Self::Number(f64::from(*x)),
+            Field::Long(x) => Self::Number(*x as f64),
+            Field::ULong(x) => Self::Number(*x as f64),
+            Field::Null => Self::Nothing,
+            other => Self::Text(other.to_string()),
+        }
+    }
+}
+
+/// A label of Parquet.
+fn text_of(field: &Field) -> String {
+    match field {
+        Field::Null => String::new(),
+        Field::Str(s) => s.trim().into(),
+        other => other.to_string(),
+    }
+}
+
+fn place(record: &str, line: u64, column: &str) -> Place {
+    Place { record: record.into(), line, column: column.into() }
+}
+
+/// The columns of headers, each once.
+fn columns(record: &str, headers: Vec<String>, line: u64) -> Result<Vec<Column>, RecordError> {
+    let mut out: Vec<Column> = Vec::new();
+    for text in headers {
+        let found = Column::of(&text).filter(|c| out.iter().all(|o| o.name != c.name));
+        out.push(found.ok_or_else(|| RecordError::Header { place: place(record, line, text.trim()) })?);
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(text: &str) -> Result<Vec<(u64, Vec<Option<f64>>, String)>, RecordError> {
+        let record = Record::csv("r.csv", Box::new(std::io::Cursor::new(text.to_string())))?;
+        let t = record.wanted(
+            record.find("t").ok_or_else(|| record.missing("`t [s]`"))?,
+            &[("s", 1.0), ("ms", 1e-3)],
+        )?;
+        let f = record.wanted(record.find("f").ok_or_else(|| record.missing("`f [g]`"))?, &[("g", 1.0)])?;
+        let (label, mut out) = (record.find("position"), Vec::new());
+        record.read(&[t, f], label, false, |r| {
+            out.push((r.line, r.numbers.to_vec(), r.label.to_string()));
+            Ok::<(), RecordError>(())
+        })?;
+        Ok(out)
+    }
+
+    #[test]
+    fn rows_with_units_gaps_and_comments() {
+        let rows = all("\u{feff}# made by hand\nt [ms], f [g] ,position\n500,1.5,p1\n# a gap\n1500,,\n2500.5,-1e-3,p 2\n").expect("rows");
+        assert_eq!(rows[0], (3, vec![Some(0.5), Some(1.5)], "p1".to_string()));
+        assert_eq!(rows[1], (5, vec![Some(1.5), None], String::new()));
+        assert_eq!(rows[2], (6, vec![Some(2.5005), Some(-1e-3)], "p 2".to_string()));
+    }
+
+    #[test]
+    fn what_is_wrong_has_its_place() {
+        for (text, message) in [
+            (
+                "",
+                "the record r.csv is empty; expected a header such as `t [s],position,fx [g],fy [g],fz [g]`",
+            ),
+            ("t [s],f [g]\n", "r.csv: no rows after the header"),
+            ("t [s],g [g]\n0,1\n", "r.csv: no column `f [g]`; found `t [s]`, `g [g]`"),
+            ("t [s],f\n0,1\n", "r.csv: line 1, column `f`: expected a unit, `f [g]`"),
+            ("t [h],f [g]\n0,1\n", "r.csv: line 1, column `t [h]`: expected a unit, `t [s]` or `t [ms]`"),
+            (
+                "t [s],f [g],f [g]\n0,1,1\n",
+                "r.csv: line 1, column `f [g]`: expected a name, or a name with its unit as in `fx [g]`, once",
+            ),
+            (
+                "t [s],f [g\n0,1\n",
+                "r.csv: line 1, column `f [g`: expected a name, or a name with its unit as in `fx [g]`, once",
+            ),
+            ("t [s],f [g]\n0,1\n1,abc\n", "r.csv: line 3, column `f [g]`: expected a number, found `abc`"),
+            (
+                "t [s],f [g]\n0,NaN\n",
+                "r.csv: line 2, column `f [g]`: found NaN, expected a finite number (an empty cell is a value that is not there)",
+            ),
+            ("t [s],f [g]\n,1\n", "r.csv: line 2, column `t [s]`: expected a number, found ``"),
+            ("t [s],f [g]\n0,1\n0.5\n", "r.csv: line 3: 1 cells; expected 2, as in the header"),
+            (
+                "t [s],f [g]\n0,1\n0,1\n",
+                "r.csv: line 3, column `t [s]`: the time 0 s is not after that of the row before, 0 s; expected times that increase",
+            ),
+        ] {
+            assert_eq!(all(text).expect_err(text).to_string(), message);
+        }
+    }
+}

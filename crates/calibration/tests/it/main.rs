@@ -1,0 +1,6 @@
+//! Calibrations of records that an independent simulator wrote.
+
+#![allow(clippy::print_stdout, reason = "what a sweep found")]
+
+mod round_trip;
+mod simulator;

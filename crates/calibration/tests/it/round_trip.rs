@@ -1,0 +1,325 @@
+//! From a bench to a record to an estimate: is it what the bench had, and what its sigmas say?
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_calibration::answer::Finding;
+use obsdeg_calibration::record::Record;
+use obsdeg_calibration::{Calibration, CalibrationError, Options, calibrate};
+use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::{Carry, Scheme, parse_attitude};
+use obsdeg_ekf::consistency::chi_square_band;
+use obsdeg_evidence::simulation::Conditions;
+
+use crate::simulator::{Bench, csv};
+
+/// The scheme that a bench runs.
+pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
+    let angles = bench
+        .positions
+        .iter()
+        .map(|(_, a, _)| parse_attitude(&format!("{},{},{}", a[0], a[1], a[2])).expect("an attitude"));
+    let mut scheme = Scheme::of_angles(angles);
+    scheme.carry = Carry::Inertial;
+    scheme.latitude = Some(bench.latitude_deg.to_string().parse().expect("a latitude"));
+    scheme.unknowns = terms.parse().expect("terms");
+    for (p, (name, _, dwell)) in scheme.positions.iter_mut().zip(&bench.positions) {
+        p.name = (*name).into();
+        p.dwell = Some(dwell.to_string().parse().expect("a dwell"));
+    }
+    scheme
+}
+
+pub(crate) fn conditions(bench: &Bench) -> Conditions {
+    Conditions {
+        drift_noise: DriftNoise::RandomWalk(bench.walk_deg_sqrt_h),
+        accelerometer_noise_g: bench.noise_g,
+        slew_rate_deg_s: bench.slew_deg_s,
+        ..Conditions::default()
+    }
+}
+
+pub(crate) fn of_csv(bench: &Bench, terms: &str, text: String) -> Result<Calibration, CalibrationError> {
+    let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text)))?;
+    calibrate(&scheme(bench, terms), &conditions(bench), vec![record], &Options::default())
+}
+
+pub(crate) fn six() -> Bench {
+    let attitudes = [
+        [10.0, 25.0, 40.0],
+        [130.0, -50.0, 70.0],
+        [-95.0, 33.0, -160.0],
+        [60.0, 80.0, 15.0],
+        [-20.0, -70.0, 110.0],
+        [170.0, 15.0, -75.0],
+    ];
+    let names = ["p1", "p2", "p3", "p4", "p5", "p6"];
+    let positions = names.into_iter().zip(attitudes).map(|(n, a)| (n, a, 1000.0)).collect();
+    Bench { positions, ..Bench::default() }
+}
+
+/// Name, error over sigma of every coefficient.
+fn errors(bench: &Bench, c: &Calibration) -> Vec<(String, f64)> {
+    let of = |name: &str| -> Option<f64> {
+        let axis = "XYZ".find(name.chars().last()?)?;
+        Some(match name.split_at(3).0 {
+            "D_F" => bench.drift[0][axis],
+            "D_I" => bench.drift[1][axis],
+            "D_O" => bench.drift[2][axis],
+            "D_S" => bench.drift[3][axis],
+            "K0_" => bench.accelerometers[0][axis] * 1e6,
+            "K1_" => bench.accelerometers[1][axis] * 1e6,
+            "K2_" => bench.accelerometers[2][axis] * 1e6,
+            _ => return None,
+        })
+    };
+    let known = c.unknowns.iter().filter(|u| u.determined).filter_map(|u| Some((u, of(&u.name)?)));
+    known.map(|(u, t)| (u.name.clone(), (u.estimate.expect("there") - t) / u.sigma.expect("there"))).collect()
+}
+
+/// NEES of the coefficients, and their number.
+fn normalised(bench: &Bench, c: &Calibration) -> (f64, usize) {
+    let errors = errors(bench, c);
+    let at: Vec<usize> =
+        errors.iter().map(|(n, _)| c.covariance.names.iter().position(|m| m == n).expect("there")).collect();
+    let p = DMatrix::from_fn(at.len(), at.len(), |i, j| c.covariance.covariance[at[i]][at[j]]);
+    let e = errors.iter().zip(&at).map(|((_, e), &i)| e * c.covariance.covariance[i][i].sqrt());
+    let e = DVector::from_iterator(at.len(), e);
+    let solved = p.cholesky().expect("definite").solve(&e);
+    (e.dot(&solved), at.len())
+}
+
+/// What every right record must show.
+fn is_right(c: &Calibration) {
+    // with wide priors on what is not determined sigmas lose some digits
+    assert!(c.second_path.difference < 1e-9 && c.second_path.sigma_difference < 1e-8, "{:?}", c.second_path);
+    assert!(c.consistent, "{:?}", c.findings);
+}
+
+/// Benches as real ones are: turns take time, outputs are quantised, samples are lost, gyros drift at random.
+fn real(seed: u64) -> Bench {
+    Bench {
+        seed,
+        slew_deg_s: Some(1.0),
+        quantum_g: 1e-6,
+        walk_deg_sqrt_h: 1e-4,
+        dropped: 20,
+        step_s: 5.0,
+        ..six()
+    }
+}
+
+/// The mean NEES of so many records lies where it does with a probability of 99.9 %.
+fn round_trips(records: u64, bench: impl Fn(u64) -> Bench, terms: &str) {
+    let (mut sum, mut count, mut inconsistent) = (0.0, 0, 0);
+    for seed in 0..records {
+        let bench = bench(seed);
+        let c = of_csv(&bench, terms, csv(&bench.record())).expect("calibrated");
+        assert!(
+            c.second_path.difference < 1e-9 && c.second_path.sigma_difference < 1e-9,
+            "{:?}",
+            c.second_path
+        );
+        let (nees, n) = normalised(&bench, &c);
+        (sum, count) = (sum + nees, n);
+        inconsistent += u64::from(!c.consistent);
+    }
+    let (low, high) = chi_square_band(count as f64, records as f64, 0.999);
+    let mean = sum / records as f64;
+    println!(
+        "{terms}: ANEES {mean:.2} of {count}, band {low:.2} to {high:.2}; {inconsistent} of {records} doubted"
+    );
+    assert!((low..=high).contains(&mean), "{mean} of {count}: {low} to {high}");
+    // each of some twelve tests fails once in a thousand; that of correlations a little more often
+    assert!(inconsistent <= 2 + records / 20, "{inconsistent} of {records}");
+}
+
+#[test]
+fn estimates_are_what_their_sigmas_say() {
+    round_trips(6, |seed| Bench { seed, ..six() }, "F,I,O,S");
+    round_trips(6, real, "F,I,O,S");
+}
+
+/// With biases, scale factors and squares of the accelerometers.
+#[test]
+fn accelerometers_too() {
+    let bench = |seed| Bench {
+        accelerometers: [[3e-4, -2e-4, 1e-4], [5e-4, -3e-4, 2e-4], [2e-5, 1e-5, -3e-5]],
+        positions: twelve(),
+        ..real(seed)
+    };
+    round_trips(3, bench, "F,I,O,S,K0,K1,K2");
+}
+
+/// 200 records of each kind: `cargo test -p obsdeg-calibration --release -- --ignored --nocapture many`.
+#[test]
+#[ignore = "minutes"]
+fn many_records() {
+    round_trips(200, |seed| Bench { seed, ..six() }, "F,I,O,S");
+    round_trips(200, real, "F,I,O,S");
+    let paper = |seed| Bench { seed, ..Bench::default() };
+    round_trips(200, paper, "F,I,O,S");
+}
+
+fn twelve() -> Vec<(&'static str, [f64; 3], f64)> {
+    let more = [
+        [0.0, 0.0, 0.0],
+        [80.0, 10.0, -30.0],
+        [160.0, -20.0, 60.0],
+        [-110.0, 5.0, 140.0],
+        [35.0, -75.0, -20.0],
+        [-50.0, 60.0, 100.0],
+    ];
+    let names = ["q1", "q2", "q3", "q4", "q5", "q6"];
+    let more = names.into_iter().zip(more).map(|(n, a)| (n, a, 1000.0));
+    six().positions.into_iter().chain(more).collect()
+}
+
+/// Two positions, nothing told of D_FZ and psi_y but together: no numbers of their own, one of the combination that is what the bench had.
+#[test]
+fn what_is_not_told_apart_has_no_estimate() {
+    let bench = Bench { seed: 4, drift: [[1.1, 1.2, 1.3], [0.5; 3], [0.5; 3], [0.5; 3]], ..Bench::default() };
+    let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
+    is_right(&c);
+    for name in ["psi_y", "D_SZ", "D_IX", "D_OZ"] {
+        let u = c.unknowns.iter().find(|u| u.name == name).expect("an unknown");
+        assert_eq!((u.determined, u.estimate, u.sigma), (false, None, None), "{name}");
+        assert!(!c.covariance.names.contains(&u.name));
+    }
+    let of = |name: &str| c.combinations.iter().find(|u| u.name.contains(name)).expect("a combination");
+    let both = of("psi_y");
+    let (estimate, sigma) = (both.estimate.expect("there"), both.sigma.expect("there"));
+    // under inertial carry: D_SZ + a*psi_y
+    assert!(both.name.contains("D_SZ"), "{}", both.name);
+    // D_SZ 0.5 and wN psi_y 0.023 deg/h: what nothing determines is held within ten times its prior, and bends into the combination
+    assert!((estimate - 0.523).abs() < 3.0 * sigma && sigma < 0.5, "{both:?}");
+    // with other priors it is the same but for that, which sigma holds
+    let mut other = conditions(&bench);
+    other.priors.iter_mut().for_each(|p| p.value *= 0.5);
+    let record =
+        Record::csv("run.csv", Box::new(std::io::Cursor::new(csv(&bench.record())))).expect("a record");
+    let again =
+        calibrate(&scheme(&bench, "F,I,O,S"), &other, vec![record], &Options::default()).expect("calibrated");
+    for (a, b) in
+        c.unknowns.iter().chain(&c.combinations).zip(again.unknowns.iter().chain(&again.combinations))
+    {
+        if let (Some(x), Some(y), Some(s)) = (a.estimate, b.estimate, a.sigma) {
+            assert!((x - y).abs() < s, "{}: {x} {y} +- {s}", a.name);
+        }
+    }
+}
+
+/// What is wrong with a record, or with what is believed of it, is found and named.
+#[test]
+fn faults_are_named() {
+    let bench = Bench { seed: 9, ..real(9) };
+    let samples = bench.record();
+    let right = of_csv(&bench, "F,I,O,S", csv(&samples)).expect("calibrated");
+    is_right(&right);
+
+    // spikes, in samples that are a measurement of two
+    let mut spiked = samples.clone();
+    for (k, by) in [(100, 3e-4), (700, -2e-3)] {
+        spiked[k].f[0] += by;
+    }
+    let c = of_csv(&bench, "F,I,O,S", csv(&spiked)).expect("calibrated");
+    assert!(c.consistent, "{:?}", c.findings);
+    for k in [100, 700] {
+        let line = k as u64 + 2;
+        assert!(
+            c.outliers.iter().any(|o| (o.lines.0..=o.lines.1).contains(&line)),
+            "{line}: {:?}",
+            c.outliers
+        );
+    }
+    assert!(c.outliers.iter().all(|o| [102, 702].iter().any(|l| (o.lines.0..=o.lines.1).contains(l))));
+    for (a, b) in right.unknowns.iter().zip(&c.unknowns) {
+        assert!(
+            (a.estimate.expect("there") - b.estimate.expect("there")).abs() < a.sigma.expect("there"),
+            "{}",
+            a.name
+        );
+    }
+
+    // two positions exchanged: of different gravity they cannot be what the scheme says
+    let mut other = bench.clone();
+    (other.positions[1].1, other.positions[3].1) = (bench.positions[3].1, bench.positions[1].1);
+    let e = of_csv(&other, "F,I,O,S", csv(&samples)).expect_err("another scheme").to_string();
+    assert!(
+        e.starts_with("run.csv: line ")
+            && e.contains("at p2 the specific force is")
+            && e.ends_with("it is that of p4"),
+        "{e}"
+    );
+
+    // a position whose azimuth is not that of the scheme, which gravity does not show
+    let mut other = bench.clone();
+    other.positions[3].1 = [0.0, 0.0, 0.0];
+    let mut turned = bench.clone();
+    turned.positions[3].1 = [0.0, 3.0, 0.0];
+    let c = of_csv(&other, "F,I,O,S", csv(&turned.record())).expect("calibrated");
+    assert!(!c.consistent);
+
+    // scale
+    let c = of_csv(&bench, "F,I,O,S", csv(&Bench { scale: 1.001, ..bench.clone() }.record()))
+        .expect("calibrated");
+    let Some(Finding::Force { length_g, .. }) = c.findings.first() else { panic!("{:?}", c.findings) };
+    assert!((length_g - 1.001).abs() < 1e-4, "{length_g}");
+
+    // noise that is three times what was said, alike everywhere
+    let c = of_csv(
+        &Bench { noise_g: 1e-5, ..bench.clone() },
+        "F,I,O,S",
+        csv(&Bench { noise_g: 3e-5, ..bench.clone() }.record()),
+    );
+    let c = c.expect("calibrated");
+    let [Finding::Noise { factor, .. }] = c.findings[..] else { panic!("{:?}", c.findings) };
+    assert!((factor / 3.0 - 1.0).abs() < 0.1, "{factor}");
+    let u = &c.unknowns[3];
+    assert!((u.sigma_rescaled.expect("there") / u.sigma.expect("there") - factor).abs() < 1e-9);
+
+    // a position that is missing
+    let fewer: Vec<_> = samples.iter().filter(|s| s.label != "p3").cloned().collect();
+    let e = of_csv(&bench, "F,I,O,S", csv(&fewer)).expect_err("no p3").to_string();
+    assert!(e.contains("found `p4`, expected p3"), "{e}");
+    let fewer: Vec<_> = samples.iter().filter(|s| s.label != "p6").cloned().collect();
+    let e = of_csv(&bench, "F,I,O,S", csv(&fewer)).expect_err("no p6").to_string();
+    assert_eq!(e, "run.csv: the position p6 of the scheme has no samples: its label does not occur");
+    let e = of_csv(&bench, "F,I,O,S", csv(&samples).replace(",p5,", ",P5,")).expect_err("no P5").to_string();
+    assert!(
+        e.contains("column `position`: no position is called `P5`; expected p1, p2, p3, p4, p5, p6"),
+        "{e}"
+    );
+}
+
+/// The record of examples/bench-day.
+fn bench_day() -> Bench {
+    let mut positions = six().positions;
+    positions.iter_mut().for_each(|p| p.2 = 600.0);
+    Bench {
+        latitude_deg: 48.2,
+        slew_deg_s: Some(2.0),
+        psi: [0.04, -0.07, 0.05].map(f64::to_radians),
+        drift: [[1.3, -0.8, 2.1], [0.9, 1.6, -0.4], [-0.3, 0.6, 0.2], [0.7, -1.1, 0.5]],
+        quantum_g: 1e-7,
+        walk_deg_sqrt_h: 1e-4,
+        step_s: 4.0,
+        dropped: 50,
+        positions,
+        seed: 18,
+        ..Bench::default()
+    }
+}
+
+/// It is what the simulator writes, and the estimate is what the bench had.
+#[test]
+fn the_record_of_the_example() {
+    let bench = bench_day();
+    let text = csv(&bench.record());
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/bench-day/record.csv");
+    if std::env::var_os("WRITE_RECORD").is_some() {
+        std::fs::write(path, &text).expect("written");
+    }
+    assert_eq!(std::fs::read_to_string(path).expect("the record"), text);
+    let c = of_csv(&bench, "F,I,O,S", text).expect("calibrated");
+    is_right(&c);
+    assert!(errors(&bench, &c).iter().all(|(_, e)| e.abs() < 3.5), "{:?}", errors(&bench, &c));
+}

@@ -1,0 +1,247 @@
+//! `obsdeg calibrate`: what a scheme determines, from the record of its run.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Arg, Args};
+use obsdeg_calibration::answer::CovarianceTable;
+use obsdeg_calibration::platform::STANDARD_GRAVITY;
+use obsdeg_calibration::record::Record;
+use obsdeg_calibration::{Options, SystemCalibrationError, SystemOptions, calibrate, calibrate_system};
+use obsdeg_core::model::Scheme;
+use obsdeg_core::model::ranges;
+use obsdeg_core::model::settings::{DriftNoise, Settings};
+use obsdeg_evidence::simulation::Conditions;
+use obsdeg_report::{
+    File, ReportError, calibration_figures, residuals_csv, system_calibration_figures, system_residuals_csv,
+};
+
+use crate::arguments::Assumptions;
+use crate::conditions::{GyroNoiseArguments, within};
+use crate::failure::Failure;
+use crate::input::{Source, open};
+use crate::interrupt;
+use crate::output::{Output, to_a_folder};
+use crate::progress::Spinner;
+
+const AFTER_HELP: &str = "\
+Examples:
+  obsdeg calibrate scheme.toml monday.csv
+  obsdeg calibrate scheme.toml monday.csv tuesday.parquet --noise 2e-5 -o calibration
+  obsdeg calibrate scheme.toml wednesday.csv --prior calibration/calibration.json
+  gzip -dc record.csv.gz | obsdeg calibrate scheme.toml -
+  obsdeg calibrate --model examples/influenza/model.toml examples/influenza/data.csv --profile beta
+
+A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well),
+`Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the
+scheme (empty while the platform turns); without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a mean with a sigma of
+its own. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv (with the whole
+covariance), residuals.csv and figures.
+Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, 2 bad input, 3 internal error, 130 interrupted.";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
+pub(crate) struct Arguments {
+    /// The scheme file (TOML), then one or more records of its runs (CSV or Parquet; - is CSV on stdin); with --model the record alone
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+
+    /// Any other system: a model file; columns of the record are `t`, its outputs, known inputs, `sigma_NAME` of either, `experiment`
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+
+    /// With --model: starts of the iteration, that of the file and others about it
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    starts: u32,
+
+    /// With --model: the profile of an unknown, what the data say of it when all others follow; may be given several times
+    #[arg(long, value_name = "NAME")]
+    profile: Vec<String>,
+
+    #[command(flatten)]
+    assumptions: Assumptions,
+
+    /// White noise of Z per sample and axis, in g (default: that of the scheme, or 1e-5; 1e-15 to 1000 g)
+    #[arg(long, value_name = "G", value_parser = within(ranges::NOISE_G))]
+    noise: Option<f64>,
+
+    /// Noise of a measured azimuth per sample, in deg (default: that of the scheme, or 0.001; 1e-12 to 1000 deg)
+    #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
+    azimuth_noise: Option<f64>,
+
+    /// Estimate the noise of every component of Z from what the estimate leaves of it
+    #[arg(long)]
+    estimate_noise: bool,
+
+    /// Samples within so many s are taken together as one measurement (default: the step of the scheme, or 10 s)
+    #[arg(long, value_name = "S", value_parser = within(ranges::STEP_S))]
+    step: Option<f64>,
+
+    /// Rate of the turns between positions in deg/s (default: that of the scheme, or at once)
+    #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
+    slew_rate: Option<f64>,
+
+    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
+    /// (default: that of the scheme, or 0.01 deg/h)
+    #[arg(long, value_name = "NOISE")]
+    drift_noise: Option<DriftNoise>,
+
+    #[command(flatten)]
+    gyro_noise: GyroNoiseArguments,
+
+    /// What one g is, in m/s^2 (9 to 10.5)
+    #[arg(long, value_name = "M_S2", default_value_t = STANDARD_GRAVITY, value_parser = gravity)]
+    gravity: f64,
+
+    /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out (0.5 to 1)
+    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = probability)]
+    gate: f64,
+
+    /// A calibration of the same platform before: the JSON that -o writes
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+
+    /// Seed of the exact verdicts
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    #[command(flatten)]
+    output: Output,
+}
+
+/// What shared options say here.
+fn words(arg: Arg) -> Arg {
+    match arg.get_id().as_str() {
+        "output" => arg.help("Write calibration, coefficients, residuals and figures to a folder"),
+        "carry" => arg.help(
+            "What is carried between positions: platform, inertial or reset (default: that of the scheme)",
+        ),
+        "latitude" => arg.help("Latitude in degrees (default: that of the scheme, or 28.2)"),
+        _ => arg,
+    }
+}
+
+fn gravity(text: &str) -> Result<f64, String> {
+    number_within(text, 9.0, 10.5)
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    number_within(text, 0.5, 1.0)
+}
+
+fn number_within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|x: &f64| (low..=high).contains(x));
+    number.ok_or_else(|| format!("expected a number from {low} to {high}"))
+}
+
+pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
+    interrupt::ends()?;
+    a.output.target.check_folder()?;
+    if let Some(model) = &a.model {
+        return run_model(a, model);
+    }
+    let Some((file, records)) = a.files.split_first() else { return Ok(()) };
+    if records.is_empty() {
+        return Err(Failure::input(
+            "no record; expected a scheme file and a record of its run (or --model)".into(),
+        ));
+    }
+    let source = Source::read(file, "scheme")?;
+    let mut scheme = source.scheme()?;
+    a.assumptions.apply(&mut scheme);
+    let records = records.iter().map(|path| record(path)).collect::<Result<Vec<_>, _>>()?;
+    let options = Options {
+        gravity_m_s2: a.gravity,
+        estimate_noise: a.estimate_noise,
+        gate: a.gate,
+        prior: a.prior.as_deref().map(prior).transpose()?,
+        seed: a.seed,
+    };
+    let spinner = Spinner::start("calibrating", a.output.target.quiet);
+    let calibration = calibrate(&scheme, &a.conditions(&scheme), records, &options)?;
+    drop(spinner);
+    a.output.write_folder(&calibration, "calibration.json", || {
+        let coefficients = obsdeg_report::written(
+            &calibration,
+            obsdeg_report::Format::Csv,
+            obsdeg_report::Layout::default(),
+        )?;
+        let mut files = vec![
+            File { name: "coefficients.csv".into(), bytes: coefficients.into_bytes() },
+            File { name: "residuals.csv".into(), bytes: residuals_csv(&calibration)?.into_bytes() },
+        ];
+        files.extend(calibration_figures(&calibration)?);
+        Ok::<_, ReportError>(files)
+    })?;
+    if calibration.consistent { Ok(()) } else { Err(Failure::check()) }
+}
+
+/// A model and its data.
+fn run_model(a: &Arguments, path: &Path) -> Result<(), Failure> {
+    let file = Source::read(path, "model")?.model()?;
+    let [data] = &a.files[..] else {
+        return Err(Failure::input(format!("found {} records; expected one with --model", a.files.len())));
+    };
+    let record = record(data)?;
+    let options = SystemOptions { starts: a.starts as usize, profiles: a.profile.clone(), seed: a.seed };
+    let spinner = Spinner::start("calibrating", a.output.target.quiet);
+    let found = calibrate_system(&file.model, record, &options).map_err(|e| match e {
+        SystemCalibrationError::Model(e) => file.wrong(&e),
+        e => Failure::input(e.to_string()),
+    })?;
+    drop(spinner);
+    a.output.write_folder(&found, "calibration.json", || {
+        let text =
+            obsdeg_report::written(&found, obsdeg_report::Format::Csv, obsdeg_report::Layout::default())?;
+        let mut files = vec![
+            File { name: "coefficients.csv".into(), bytes: text.into_bytes() },
+            File { name: "residuals.csv".into(), bytes: system_residuals_csv(&found)?.into_bytes() },
+        ];
+        files.extend(system_calibration_figures(&found)?);
+        Ok::<_, ReportError>(files)
+    })?;
+    if found.consistent == Some(false) { Err(Failure::check()) } else { Ok(()) }
+}
+
+impl Arguments {
+    fn conditions(&self, scheme: &Scheme) -> Conditions {
+        let mut out = Conditions::of(scheme);
+        out.apply(&Settings {
+            step_s: self.step,
+            accelerometer_noise_g: self.noise,
+            azimuth_noise_deg: self.azimuth_noise,
+            slew_rate_deg_s: self.slew_rate,
+            drift_noise: self.drift_noise,
+            ..self.gyro_noise.settings()
+        });
+        out
+    }
+}
+
+/// A record that is a file, or CSV on stdin.
+fn record(path: &Path) -> Result<Record, Failure> {
+    let wrong = |e: &dyn std::fmt::Display| Failure::input(e.to_string());
+    if path == Path::new("-") {
+        return Record::csv("stdin", Box::new(std::io::stdin())).map_err(|e| wrong(&e));
+    }
+    let name = path.display().to_string();
+    let file = open(path).map_err(|e| Failure::input(format!("cannot read the record {name}: {e}")))?;
+    Record::file(&name, file).map_err(|e| wrong(&e))
+}
+
+/// Estimates and covariance of a calibration.
+fn prior(path: &Path) -> Result<CovarianceTable, Failure> {
+    let source = Source::read(path, "calibration")?;
+    let wrong = |reason: String| {
+        Failure::input(format!(
+            "{}: {reason}; expected the calibration.json of `obsdeg calibrate -o`",
+            path.display()
+        ))
+    };
+    let value: serde_json::Value = serde_json::from_str(source.text()).map_err(|e| wrong(e.to_string()))?;
+    let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
+    if !schema.starts_with("obsdeg.calibration/") {
+        return Err(wrong("no calibration".into()));
+    }
+    let table = value.get("covariance").cloned().unwrap_or_default();
+    serde_json::from_value(table).map_err(|e| wrong(e.to_string()))
+}

@@ -1,0 +1,406 @@
+//! A calibration from recorded data.
+
+use obsdeg_calibration::Calibration;
+use obsdeg_calibration::answer::{
+    CovarianceTable, Estimated, Finding, PositionFit, PositionsBy, RecordReport,
+};
+
+use crate::document::{Block, Document, left, number, optional, right};
+use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
+use crate::figures::{File, line, picture};
+use crate::{Answer, ReportError, words};
+
+/// How many outliers are listed.
+const LISTED: usize = 20;
+
+/// A factor of sigma in words.
+fn sigmas(factor: f64) -> String {
+    if factor >= 1.0 {
+        format!("sigmas are {factor:.2} times too small")
+    } else {
+        format!("sigmas are {:.2} times too large", 1.0 / factor)
+    }
+}
+
+/// ` of FILE`, where there are several records.
+fn of(record: &str, records: &[RecordReport]) -> String {
+    if records.len() > 1 { format!(" of {record}") } else { String::new() }
+}
+
+fn finding(f: &Finding, records: &[RecordReport]) -> String {
+    match f {
+        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up".into(),
+        Finding::Force { record, length_g } => format!(
+            "the specific force{} is {length_g:.6} g long on average: a scale error of {}, or another gravity, which no unknown of the scheme explains (K1 would)",
+            of(record, records),
+            number(length_g - 1.0)
+        ),
+        Finding::Position { record, position, chi_square, factor } => format!(
+            "the model does not explain position {position}{} (chi-square {} per degree of freedom): {} there",
+            of(record, records),
+            number(*chi_square),
+            sigmas(*factor)
+        ),
+        Finding::Noise { chi_square, factor } => format!(
+            "chi-square is {} per degree of freedom, alike at all positions: {}",
+            number(*chi_square),
+            sigmas(*factor)
+        ),
+        Finding::Channel { channel, chi_square, factor } => {
+            format!(
+                "{channel} has a chi-square of {} per degree of freedom: its {}",
+                number(*chi_square),
+                sigmas(*factor)
+            )
+        }
+        Finding::Correlated { record, channel, probability } => format!(
+            "the residuals of {channel}{} are not independent of each other (probability {}): sigmas are too small by what that hides",
+            of(record, records),
+            number(*probability)
+        ),
+        Finding::Outliers { count, of } => {
+            format!(
+                "{count} of {of} measurements are far off, too many to be outliers: none of them was left out"
+            )
+        }
+        Finding::Repeatability { chi_square } => format!(
+            "the records do not agree on the coefficients (chi-square {} per degree of freedom): they changed between the runs, or sigmas are too small",
+            number(*chi_square)
+        ),
+        Finding::SecondPath { difference } => format!(
+            "filter and least squares differ by {} sigma: these numbers are not resolved in double precision",
+            number(*difference)
+        ),
+        Finding::Known { chi_square } => format!(
+            "the calibration before does not agree with these records (chi-square {} per degree of freedom)",
+            number(*chi_square)
+        ),
+    }
+}
+
+/// Why there is no estimate, or what is to be said of it.
+fn verdict(e: &Estimated) -> String {
+    match (e.determined, e.degree) {
+        (true, Some(_)) => "estimated".into(),
+        (true, None) => "estimated; not by derivatives alone".into(),
+        (false, Some(_)) => "observable by the scheme, not determined by these records".into(),
+        (false, None) => e.status.to_string(),
+    }
+}
+
+fn row(e: &Estimated) -> Vec<String> {
+    let influence =
+        e.prior_shift.zip(e.prior_factor).filter(|(s, f)| s.abs() >= 0.005 || (f - 1.0).abs() >= 0.005);
+    vec![
+        e.name.clone(),
+        e.unit.clone(),
+        words::degree(e.degree),
+        optional(e.estimate),
+        optional(e.sigma),
+        optional(e.sigma_rescaled),
+        optional(e.predicted_sigma),
+        match (influence, e.determined) {
+            (Some((shift, factor)), _) => format!("{shift:+.2}, x{factor:.2}"),
+            (None, true) => "none".into(),
+            (None, false) => "-".into(),
+        },
+        verdict(e),
+    ]
+}
+
+fn position(p: &PositionFit, record: Option<usize>) -> Vec<String> {
+    vec![
+        format!("{}{}", p.position, record.map_or_else(String::new, |r| format!(" (record {})", r + 1))),
+        number(p.start_s),
+        number(p.end_s),
+        p.measurements.to_string(),
+        number(p.chi_square),
+        p.moves.as_ref().map_or_else(|| "-".into(), |m| format!("{} by {:+.1}", m.name, m.sigmas)),
+        if p.loses.is_empty() { "-".into() } else { p.loses.join(", ") },
+    ]
+}
+
+/// What was read, a sentence for each record.
+fn records(c: &Calibration) -> Vec<String> {
+    let of = |r: &RecordReport| {
+        let mut out = format!(
+            "{}: {} samples from {} to {} s, taken together in {} bins; positions by {}",
+            r.name,
+            r.samples,
+            r.span_s.0,
+            r.span_s.1,
+            r.bins,
+            match r.positions_by {
+                PositionsBy::Labels => {
+                    "the column `position`: one ends with its last sample, the next begins when the slew is over"
+                }
+                PositionsBy::Timeline => "the timeline of the scheme",
+                PositionsBy::Both =>
+                    "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end",
+            }
+        );
+        if r.unused > 0 {
+            out += &format!("; {} samples at no position were not used", r.unused);
+        }
+        if let Some(f) = r.force_g {
+            out += &format!("; the specific force is {f:.6} g long on average");
+        }
+        if !r.ignored.is_empty() {
+            out += &format!("; nothing was made of the columns {}", r.ignored.join(", "));
+        }
+        out
+    };
+    c.records.iter().map(of).collect()
+}
+
+fn assumed(c: &Calibration) -> Vec<String> {
+    let a = &c.assumed;
+    let mut out = vec![
+        format!(
+            "latitude {} deg{}",
+            a.latitude_deg,
+            if a.latitude_by_default { " (chosen here: the scheme names none)" } else { "" }
+        ),
+        match a.noise_estimated {
+            true => format!(
+                "noise of a sample estimated from what is left of it (first taken as {:e} g)",
+                a.accelerometer_noise_g
+            ),
+            false => format!(
+                "noise of a sample {:e} g, white, per axis; sigmas given in a record are taken as they are",
+                a.accelerometer_noise_g
+            ),
+        },
+        format!("white drift {} deg/sqrt(h)", number(a.drift_noise_deg_sqrt_h)),
+        format!("samples within {} s are one measurement: the value of a line at their middle", a.bin_s),
+        format!("one g is {} m/s^2", a.gravity_m_s2),
+        "what nothing determines is held within ten times the prior of the scheme: attitudes far from the computed ones bend a little of that into combinations (column prior)".into(),
+        format!("psi is that of the start of a record; full attitudes; seed {}", a.seed),
+    ];
+    if !a.known.is_empty() {
+        out.push(format!("known from a calibration before: {}", a.known.join(", ")));
+    }
+    out
+}
+
+/// A difference that is rounding alone has no digits.
+fn rounding(x: f64) -> String {
+    if x < 1e-9 { "1e-9".into() } else { number(x) }
+}
+
+fn fit(c: &Calibration) -> Vec<String> {
+    let f = &c.fit;
+    let per = f.factor * f.factor;
+    let mut out = vec![
+        format!(
+            "chi-square {} on {:.1} degrees of freedom: {:.4} each (band of 99.9 % {:.4} to {:.4}); rescaled sigmas are times {:.3}, where that is above one",
+            number(f.chi_square),
+            f.degrees_of_freedom,
+            per,
+            f.band.0,
+            f.band.1,
+            f.factor.max(1.0)
+        ),
+        format!("{} linearisations along the whole run", f.passes),
+        format!(
+            "second path, a filter with the same wide prior: at the end of a record within {} sigma, its sigmas within {} of themselves",
+            rounding(c.second_path.difference),
+            rounding(c.second_path.sigma_difference)
+        ),
+    ];
+    if let Some(r) = &c.repeatability {
+        out.push(format!(
+            "run to run: chi-square {} per degree of freedom on {:.0} (band of 99.9 % {:.3} to {:.3})",
+            number(r.chi_square),
+            r.degrees_of_freedom,
+            r.band.0,
+            r.band.1
+        ));
+    }
+    out
+}
+
+impl Answer for Calibration {
+    fn document(&self) -> Document {
+        let mut lead = vec![match self.consistent {
+            true => "consistent: the model and its sigmas explain the record".to_string(),
+            false => "NOT consistent: sigmas are not to be relied upon as they are".into(),
+        }];
+        lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));
+        let columns = [
+            left("unknown"),
+            left("unit"),
+            right("degree"),
+            right("estimate"),
+            right("sigma"),
+            right("rescaled"),
+            right("predicted"),
+            right("prior"),
+            left("verdict"),
+        ];
+        let mut blocks = vec![Block::table(
+            "Estimates (degree: exact verdict; predicted: sigma of the scheme as planned; prior: what that of the scheme would do, in sigma and to sigma)",
+            columns,
+            self.unknowns.iter().map(row),
+        )];
+        if !self.combinations.is_empty() {
+            let rows = self.combinations.iter().map(row);
+            blocks.push(Block::table(
+                "Combinations of what is not told apart, and those asked for",
+                columns,
+                rows,
+            ));
+        }
+        blocks.push(Block::list("Fit", fit(self)));
+        let each = self.positions.len() / self.records.len().max(1);
+        let columns = [
+            left("position"),
+            right("from [s]"),
+            right("to [s]"),
+            right("measured"),
+            right("chi-square"),
+            left("without it moves most [sigma]"),
+            left("without it not determined"),
+        ];
+        blocks.push(Block::table(
+            "Positions (chi-square per degree of freedom)",
+            columns,
+            self.positions
+                .iter()
+                .enumerate()
+                .map(|(i, p)| position(p, (self.records.len() > 1).then(|| i / each))),
+        ));
+        let columns = [
+            left("component"),
+            left("unit"),
+            right("sigma"),
+            right("scatter"),
+            right("chi-square"),
+            right("whiteness"),
+        ];
+        let rows = self.channels.iter().map(|c| {
+            vec![
+                c.channel.clone(),
+                c.unit.clone(),
+                number(c.sigma),
+                optional(c.scatter),
+                number(c.chi_square),
+                optional(c.whiteness_probability),
+            ]
+        });
+        blocks.push(Block::table(
+            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: probability of correlations like these)",
+            columns,
+            rows,
+        ));
+        if !self.outliers.is_empty() {
+            let columns =
+                [left("record"), left("lines"), right("t [s]"), left("component"), right("off by [sigma]")];
+            let lines =
+                |(from, to): (u64, u64)| if from == to { from.to_string() } else { format!("{from}-{to}") };
+            let rows = self.outliers.iter().take(LISTED).map(|o| {
+                vec![
+                    o.record.clone(),
+                    lines(o.lines),
+                    number(o.t_s),
+                    o.channel.clone(),
+                    format!("{:+.1}", o.sigmas),
+                ]
+            });
+            let heading = match self.outlier_count {
+                n if n > LISTED => format!("Left out as outliers: {n}, of which the first {LISTED}"),
+                n => format!("Left out as outliers: {n}"),
+            };
+            blocks.push(Block::table(heading, columns, rows));
+        }
+        blocks.push(Block::list("Read", records(self)));
+        blocks.push(Block::list("Assumed", assumed(self)));
+        let count = self.records.len();
+        Document {
+            title: format!("Calibration from {count} record{}", if count == 1 { "" } else { "s" }),
+            lead,
+            blocks,
+        }
+    }
+
+    /// Everything that has an estimate, with the covariance of all.
+    fn records(&self) -> Option<Vec<Vec<String>>> {
+        Some(covariance_rows(&self.covariance))
+    }
+}
+
+/// Estimates and sigmas with the covariance of all.
+pub(crate) fn covariance_rows(t: &CovarianceTable) -> Vec<Vec<String>> {
+    let head = ["name", "unit", "estimate", "sigma"].map(String::from).into_iter();
+    let head = head.chain(t.names.iter().map(|n| format!("covariance with {n}"))).collect();
+    let row = |i: usize| {
+        let own = [t.estimates[i], t.covariance[i][i].sqrt()].map(|x| x.to_string());
+        let texts = [t.names[i].clone(), t.units[i].clone()].into_iter().chain(own);
+        texts.chain(t.covariance[i].iter().map(f64::to_string)).collect()
+    };
+    std::iter::once(head).chain((0..t.names.len()).map(row)).collect()
+}
+
+/// Every measurement and what is left of it, as CSV.
+///
+/// # Errors
+/// [`ReportError::Csv`].
+pub fn residuals_csv(c: &Calibration) -> Result<String, ReportError> {
+    let head = ["record", "position", "component", "t [s]", "residual", "sigma", "left out, in sigma"]
+        .map(String::from);
+    let rows = c.residuals.iter().map(|r| {
+        let position = &c.positions[r.record * (c.positions.len() / c.records.len()) + r.position].position;
+        vec![
+            c.records[r.record].name.clone(),
+            position.clone(),
+            c.channels[r.channel].channel.clone(),
+            r.t_s.to_string(),
+            r.residual.to_string(),
+            r.sigma.to_string(),
+            r.normalised.to_string(),
+        ]
+    });
+    crate::csv_text::write(std::iter::once(head.to_vec()).chain(rows))
+}
+
+/// The figures of a calibration: what is left of the measurements over time, by component and record, with three sigma.
+///
+/// # Errors
+/// [`FigureError`].
+pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
+    let mut files = Vec::new();
+    for (k, record) in c.records.iter().enumerate() {
+        let figures: Vec<_> = (0..c.channels.len()).map(|channel| residual_figure(c, k, channel)).collect();
+        let name = if c.records.len() > 1 { format!("residuals-{}", k + 1) } else { "residuals".into() };
+        let title = format!("What the estimate leaves of {}", record.name);
+        files.extend(picture(&name, grid(&figures, figures.len().min(2), &title))?);
+    }
+    Ok(files)
+}
+
+/// What is left of a component.
+fn residual_figure(c: &Calibration, record: usize, channel: usize) -> crate::figure::Figure {
+    let some: Vec<_> = c.residuals.iter().filter(|r| r.record == record && r.channel == channel).collect();
+    let points: Vec<(f64, f64)> = some.iter().map(|r| (r.t_s, r.residual)).collect();
+    let band = |r: &&obsdeg_calibration::answer::Residual| (r.t_s, -3.0 * r.sigma, 3.0 * r.sigma);
+    let count = c.positions.len() / c.records.len();
+    let own = &c.positions[record * count..(record + 1) * count];
+    let (first, last) = (points.first().map_or(0.0, |p| p.0), points.last().map_or(1.0, |p| p.0));
+    let largest = some.iter().map(|r| r.residual.abs().max(3.0 * r.sigma)).fold(0.0, f64::max);
+    let half = if largest > 0.0 { 1.15 * largest } else { 1.0 };
+    let name = &c.channels[channel];
+    crate::figure::Figure {
+        title: format!("{}: measurement minus estimate", name.channel),
+        x_label: "t [s]".into(),
+        y_label: format!("residual [{}]", name.unit),
+        bands: vec![Band { color: SKY, points: some.iter().map(band).collect() }],
+        lines: vec![
+            line("zero", BLACK, Stroke::Dotted, vec![(first, 0.0), (last, 0.0)]),
+            line("residual, band of +-3 sigma", BLUE, Stroke::Solid, points),
+        ],
+        marks: own.iter().skip(1).map(|p| p.start_s).collect(),
+        x_range: Some((first.min(0.0), last)),
+        y_range: Some((-half, half)),
+        ..crate::figure::Figure::default()
+    }
+}

@@ -1,0 +1,212 @@
+//! A calibration of any system.
+
+use obsdeg_calibration::system::{SystemCalibration, SystemEstimated, SystemFinding};
+
+use crate::document::{Block, Document, left, number, optional, right};
+use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
+use crate::figures::{File, line, picture};
+use crate::{Answer, ReportError, words};
+
+/// How many of many are listed.
+const LISTED: usize = 20;
+
+fn finding(f: &SystemFinding) -> String {
+    match f {
+        SystemFinding::NotSettled => {
+            "no start settled: the estimates are where the iteration was given up".into()
+        }
+        SystemFinding::Noise { chi_square, factor } if *factor >= 1.0 => {
+            format!(
+                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small",
+                number(*chi_square)
+            )
+        }
+        SystemFinding::Noise { chi_square, factor } => format!(
+            "chi-square is {} per degree of freedom: sigmas are {:.2} times too large",
+            number(*chi_square),
+            1.0 / factor
+        ),
+        SystemFinding::Correlated { output, probability } => format!(
+            "the residuals of {output} are not independent of each other (probability {}): the model leaves something out, or sigmas are too small",
+            number(*probability)
+        ),
+        SystemFinding::Outlier { output, line, sigmas } => {
+            format!(
+                "{output} at line {line} is {sigmas:+.1} sigma from what all others say (it was not left out)"
+            )
+        }
+    }
+}
+
+fn row(e: &SystemEstimated) -> Vec<String> {
+    let verdict = match (e.determined, e.status, e.degree) {
+        (true, ..) => "estimated".into(),
+        (false, _, Some(_)) => "observable by the model, not determined by these data".into(),
+        (false, Some(status), None) => status.to_string(),
+        (false, None, None) => "-".into(),
+    };
+    vec![
+        e.name.clone(),
+        e.unit.clone(),
+        words::degree(e.degree),
+        optional(e.estimate),
+        optional(e.sigma),
+        optional(e.sigma_rescaled),
+        verdict,
+    ]
+}
+
+impl Answer for SystemCalibration {
+    fn document(&self) -> Document {
+        let mut lead = vec![match (self.consistent, self.findings.is_empty()) {
+            (Some(true), _) => "consistent: the model and its noise explain the data".to_string(),
+            (Some(false), _) => "NOT consistent: sigmas are not to be relied upon as they are".into(),
+            (None, _) => {
+                "no noise was given: it is estimated from what is left, so chi-square says nothing of the model".into()
+            }
+        }];
+        lead.extend(self.findings.iter().take(LISTED).map(finding));
+        if self.findings.len() > LISTED {
+            lead.push(format!("and {} findings more", self.findings.len() - LISTED));
+        }
+        let columns = [
+            left("unknown"),
+            left("unit"),
+            right("degree"),
+            right("estimate"),
+            right("sigma"),
+            right("rescaled"),
+            left("verdict"),
+        ];
+        let mut blocks = vec![Block::table(
+            "Estimates (degree: exact verdict; states: at the start)",
+            columns,
+            self.unknowns.iter().map(row),
+        )];
+        if !self.combinations.is_empty() {
+            blocks.push(Block::table(
+                "Combinations that were asked for",
+                columns,
+                self.combinations.iter().map(row),
+            ));
+        }
+        let per = self.factor * self.factor;
+        let mut fit = vec![format!(
+            "chi-square {} on {} degrees of freedom: {per:.4} each (band of 99.9 % {:.4} to {:.4})",
+            number(self.chi_square),
+            self.degrees_of_freedom,
+            self.band.0,
+            self.band.1
+        )];
+        fit.push(match self.starts {
+            (of, led) if self.others.is_empty() => {
+                format!(
+                    "{led} of {of} starts led to this solution; no other that fits nearly as well was found"
+                )
+            }
+            (of, led) => {
+                format!("{led} of {of} starts led to this solution; OTHERS fit nearly as well, see below")
+            }
+        });
+        blocks.push(Block::list("Fit", fit));
+        let columns = [
+            left("output"),
+            right("measured"),
+            right("sigma"),
+            left("from"),
+            right("chi-square"),
+            right("rms left"),
+            right("whiteness"),
+        ];
+        let rows = self.outputs.iter().map(|o| {
+            vec![
+                o.output.clone(),
+                o.measurements.to_string(),
+                o.sigma.map_or_else(|| "by row".into(), number),
+                if o.estimated { "what is left" } else { "given" }.into(),
+                number(o.chi_square),
+                number(o.rms),
+                optional(o.whiteness_probability),
+            ]
+        });
+        blocks.push(Block::table("Outputs", columns, rows));
+        if !self.others.is_empty() {
+            let names: Vec<&str> = self.unknowns.iter().map(|u| u.name.as_str()).collect();
+            let of = |o: &obsdeg_calibration::system::OtherSolution| {
+                let values: Vec<String> =
+                    names.iter().zip(&o.values).map(|(n, v)| format!("{n} = {}", number(*v))).collect();
+                format!("chi-square {} from {} starts: {}", number(o.chi_square), o.starts, values.join(", "))
+            };
+            blocks.push(Block::list("Other solutions", self.others.iter().map(of).collect()));
+        }
+        for p in &self.profiles {
+            let flat = if p.flat { ": FLAT, the data say nothing of it" } else { "" };
+            blocks.push(Block::table(
+                format!("Profile of {}{flat}", p.name),
+                [right("value"), right("chi-square more")],
+                p.points.iter().map(|(x, c)| vec![number(*x), number(*c)]),
+            ));
+        }
+        let mut read = vec![format!(
+            "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} times the usual steps of integration; seed {}",
+            self.rows, self.substeps, self.seed
+        )];
+        if !self.ignored.is_empty() {
+            read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
+        }
+        blocks.push(Block::list("Read", read));
+        Document { title: format!("Calibration: {}", self.name), lead, blocks }
+    }
+
+    fn records(&self) -> Option<Vec<Vec<String>>> {
+        Some(crate::calibration::covariance_rows(&self.covariance))
+    }
+}
+
+/// Every measurement and what is left of it, as CSV.
+///
+/// # Errors
+/// [`ReportError::Csv`].
+pub fn system_residuals_csv(c: &SystemCalibration) -> Result<String, ReportError> {
+    let head = ["experiment", "output", "line", "t", "measured", "residual", "sigma", "left out, in sigma"];
+    let rows = c.residuals.iter().map(|r| {
+        let numbers = [r.t, r.measured, r.residual, r.sigma, r.normalised].map(|x| x.to_string());
+        let first = [(r.experiment + 1).to_string(), c.outputs[r.output].output.clone(), r.line.to_string()];
+        first.into_iter().chain(numbers).collect()
+    });
+    crate::csv_text::write(std::iter::once(head.map(String::from).to_vec()).chain(rows))
+}
+
+/// What is left of every output over time, with three sigma.
+///
+/// # Errors
+/// [`FigureError`].
+pub fn system_calibration_figures(c: &SystemCalibration) -> Result<Vec<File>, FigureError> {
+    let figure = |(k, o): (usize, &obsdeg_calibration::system::OutputFit)| {
+        let mut some: Vec<_> = c.residuals.iter().filter(|r| r.output == k).collect();
+        some.sort_by(|a, b| a.t.total_cmp(&b.t));
+        let points: Vec<(f64, f64)> = some.iter().map(|r| (r.t, r.residual)).collect();
+        let (first, last) = (points.first().map_or(0.0, |p| p.0), points.last().map_or(1.0, |p| p.0));
+        let largest = some.iter().map(|r| r.residual.abs().max(3.0 * r.sigma)).fold(0.0, f64::max);
+        let half = if largest > 0.0 { 1.15 * largest } else { 1.0 };
+        crate::figure::Figure {
+            title: format!("{}: measurement minus estimate", o.output),
+            x_label: "t".into(),
+            y_label: "residual".into(),
+            bands: vec![Band {
+                color: SKY,
+                points: some.iter().map(|r| (r.t, -3.0 * r.sigma, 3.0 * r.sigma)).collect(),
+            }],
+            lines: vec![
+                line("zero", BLACK, Stroke::Dotted, vec![(first, 0.0), (last, 0.0)]),
+                line("residual, band of +-3 sigma", BLUE, Stroke::Solid, points),
+            ],
+            x_range: Some((first, last)),
+            y_range: Some((-half, half)),
+            ..crate::figure::Figure::default()
+        }
+    };
+    let figures: Vec<_> = c.outputs.iter().enumerate().map(figure).collect();
+    let title = format!("What the estimate leaves of {}", c.name);
+    Ok(picture("residuals", grid(&figures, figures.len().min(2), &title))?.into())
+}

@@ -1,0 +1,301 @@
+//! `obsdeg calibrate`, end to end.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::process::Stdio;
+use std::sync::Arc;
+
+use parquet::basic::{Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+use serde_json::Value;
+
+use crate::program::{json, obsdeg, run, stderr, stdout};
+
+const SCHEME: &str = "examples/bench-day/scheme.toml";
+const RECORD: &str = "examples/bench-day/record.csv";
+
+#[test]
+fn a_day_at_the_bench() {
+    let output = run(&["calibrate", SCHEME, RECORD]);
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
+    insta::assert_snapshot!("calibrate_bench_day", stdout(&output));
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path().join("day").display().to_string();
+    assert!(run(&["calibrate", SCHEME, RECORD, "-o", &at, "-q"]).status.success());
+    let mut names: Vec<String> = fs::read_dir(&at)
+        .expect("written")
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        ["calibration.json", "coefficients.csv", "residuals.csv", "residuals.png", "residuals.svg"]
+    );
+    let found = json(&["calibrate", SCHEME, RECORD, "--format", "json"]);
+    let text = fs::read_to_string(format!("{at}/calibration.json")).expect("written");
+    assert_eq!(serde_json::from_str::<Value>(&text).expect("JSON"), found);
+    let covariance = &found["covariance"];
+    let n = covariance["names"].as_array().expect("names").len();
+    assert_eq!((n, covariance["covariance"].as_array().expect("rows").len()), (15, 15));
+    let csv = fs::read_to_string(format!("{at}/coefficients.csv")).expect("written");
+    assert_eq!(csv.lines().count(), 16);
+    assert!(csv.starts_with("name,unit,estimate,sigma,covariance with psi_x,"), "{csv}");
+    let residuals = fs::read_to_string(format!("{at}/residuals.csv")).expect("written");
+    assert_eq!(residuals.lines().count(), 601);
+    // a second run with what the first says before: sigmas are smaller by about the root of two
+    let again = json(&[
+        "calibrate",
+        SCHEME,
+        RECORD,
+        "--format",
+        "json",
+        "--prior",
+        &format!("{at}/calibration.json"),
+    ]);
+    for (k, u) in again["unknowns"].as_array().expect("unknowns").iter().enumerate().skip(3) {
+        let sigma = |u: &Value| u["sigma"].as_f64().expect("a number");
+        let factor = sigma(&found["unknowns"][k]) / sigma(u);
+        assert!((1.41..1.42).contains(&factor), "{u}: {factor}");
+        let moved = u["estimate"].as_f64().expect("a number")
+            - found["unknowns"][k]["estimate"].as_f64().expect("a number");
+        assert!(moved.abs() < 1e-3 * sigma(u), "{u}");
+    }
+}
+
+/// The same record as Parquet, on stdin, and twice.
+#[test]
+fn the_same_from_everywhere() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("record.parquet");
+    let text = fs::read_to_string(crate_root(RECORD)).expect("the record");
+    fs::write(&path, parquet(&text)).expect("written");
+    // numbers of CSV and of Parquet are the same, so are bytes of an answer
+    let estimates = |v: &Value| -> Vec<f64> {
+        let all = v["covariance"]["estimates"].as_array().expect("estimates");
+        all.iter().map(|x| x.as_f64().expect("a number")).collect()
+    };
+    let csv = json(&["calibrate", SCHEME, RECORD, "--format", "json"]);
+    let name = path.display().to_string();
+    let columns = json(&["calibrate", SCHEME, &name, "--format", "json"]);
+    assert_eq!(estimates(&csv), estimates(&columns));
+    let mut piped = obsdeg(&["calibrate", SCHEME, "-", "--format", "json"]);
+    let mut child = piped.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+    child.stdin.take().expect("a pipe").write_all(text.as_bytes()).expect("written");
+    let piped: Value =
+        serde_json::from_slice(&child.wait_with_output().expect("it ends").stdout).expect("JSON");
+    assert_eq!(estimates(&csv), estimates(&piped));
+    // twice the same record: coefficients as before, with sigmas smaller by the root of two, and a psi for each
+    // (what fits badly by chance fits as badly twice: there is a check that fails)
+    let twice = run(&["calibrate", SCHEME, RECORD, &name, "--format", "json"]);
+    let twice: Value = serde_json::from_slice(&twice.stdout).expect("JSON");
+    let find = |v: &Value, name: &str| -> [f64; 2] {
+        let all = v["unknowns"].as_array().expect("unknowns");
+        let u = all.iter().find(|u| u["name"] == name).unwrap_or_else(|| panic!("{name}"));
+        ["estimate", "sigma"].map(|k| u[k].as_f64().expect("a number"))
+    };
+    for name in ["D_FX", "D_IY", "D_SZ"] {
+        let ([a, s], [b, t]) = (find(&csv, name), find(&twice, name));
+        assert!((a - b).abs() < 1e-3 * s && (s / t - 2f64.sqrt()).abs() < 1e-3, "{name}: {a} {s} {b} {t}");
+    }
+    let ([_, s], [_, t]) = (find(&twice, "psi_y (record 1)"), find(&twice, "psi_y (record 2)"));
+    assert!((s / t - 1.0).abs() < 1e-9);
+    assert!(twice["repeatability"]["chi_square"].as_f64().expect("a number") < 1e-6);
+    // a truncated file
+    let bytes = fs::read(&path).expect("readable");
+    fs::write(&path, &bytes[..bytes.len() / 2]).expect("written");
+    let output = run(&["calibrate", SCHEME, &name]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).starts_with(&format!("error: cannot read the record {name}: ")),
+        "{}",
+        stderr(&output)
+    );
+}
+
+/// The unknown or combination of this name: estimate and sigma as the fit has it.
+fn found(v: &Value, name: &str) -> [f64; 2] {
+    let all =
+        v["unknowns"].as_array().expect("unknowns").iter().chain(v["combinations"].as_array().expect("some"));
+    let u = all.into_iter().find(|u| u["name"] == name).unwrap_or_else(|| panic!("{name}"));
+    ["estimate", "sigma_rescaled"].map(|k| u[k].as_f64().unwrap_or(f64::NAN))
+}
+
+fn model(name: &str, more: &[&str]) -> Value {
+    let [model, data] = ["model.toml", "data.csv"].map(|file| format!("examples/{name}/{file}"));
+    let output = run(&[&["calibrate", "--model", &model, &data, "--format", "json"], more].concat());
+    assert!(output.status.code().is_some_and(|c| c < 2), "{}", stderr(&output));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// Small series of the literature, with what was published of them.
+#[test]
+fn series_of_the_literature() {
+    // J. D. Murray, Mathematical Biology (1989), 19.1: r = 2.18e-3 / d, rho = 202, a = 0.44 / d
+    let flu = model("influenza", &[]);
+    let ([beta, s], [gamma, t]) = (found(&flu, "beta"), found(&flu, "gamma"));
+    assert!((beta / 2.18e-3 - 1.0).abs() < 0.03 && s < 1e-4, "{beta} +- {s}");
+    assert!((gamma / 0.44 - 1.0).abs() < 0.03 && t < 0.02, "{gamma} +- {t}");
+    // R, ?SSfol: lKe -2.9196 +- 0.1709, lKa 0.5752 +- 0.1728, lCl -3.9159 +- 0.1273; 0.732 on 8 degrees of freedom
+    let theo = model("theophylline", &[]);
+    let of = |name| found(&theo, name)[0];
+    let [ke, ka, v] = ["ke", "ka", "V"].map(of);
+    let logarithms = [ke.ln() + 2.9196, ka.ln() - 0.5752, (v * ke).ln() + 3.9159];
+    assert!(logarithms.iter().all(|x| x.abs() < 2e-4), "{logarithms:?}");
+    assert!(
+        (found(&theo, "ke")[1] / ke - 0.1709).abs() < 5e-4
+            && (found(&theo, "ka")[1] / ka - 0.1728).abs() < 5e-4
+    );
+    assert_eq!(theo["degrees_of_freedom"], 8);
+    // absorption and elimination may change places
+    let others = theo["others"].as_array().expect("others");
+    let other = |k: usize| others[0]["values"][k].as_f64().expect("a number");
+    assert!(
+        others.len() == 1 && (other(0) / ke - 1.0).abs() < 1e-3 && (other(1) / ka - 1.0).abs() < 1e-3,
+        "{others:?}"
+    );
+    let sigma = theo["outputs"][0]["sigma"].as_f64().expect("a number");
+    assert!((sigma - 0.732).abs() < 1e-3, "{sigma}");
+    // B. Carpenter, Predator-prey population dynamics (2018), with priors: 0.55, 0.028, 0.80, 0.024, 34.0, 5.9; sigma 0.25
+    let hares = model("hudson-bay", &[]);
+    for (name, published, within) in [
+        ("a", 0.55, 0.07),
+        ("b", 0.028, 0.005),
+        ("c", 0.80, 0.1),
+        ("d", 0.024, 0.004),
+        ("H", 34.0, 3.0),
+        ("L", 5.9, 0.6),
+    ] {
+        let [x, s] = found(&hares, name);
+        assert!((x - published).abs() < within && s < 2.0 * within, "{name}: {x} +- {s}");
+    }
+}
+
+/// Prey alone are counted: the predators' number and what each eats are told only as a product, and the profile of either is flat.
+#[test]
+fn a_profile_is_flat_where_the_verdict_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run_at = folder.path().join("run").display().to_string();
+    let file = "examples/lotka-volterra/model.toml";
+    assert!(run(&["simulate", "--model", file, "-o", &run_at, "-q"]).status.success());
+    // the prey by the equations themselves, with steps a thousandth as long as a unit of time
+    let (mut x, mut text) = ([10.0, 5.0], String::from("t [a],y\n"));
+    let rate = |x: &[f64; 2]| [1.1 * x[0] - 0.4 * x[0] * x[1], -0.4 * x[1] + 0.1 * x[0] * x[1]];
+    for k in 0..=4000 {
+        if k % 100 == 0 {
+            // errors of a tenth that have no mean
+            let noise = 0.1 * ((k as f64 * 0.7133).sin() + (k as f64 * 1.319).cos());
+            text += &format!("{},{}\n", k as f64 * 5e-3, x[0] + noise);
+        }
+        let middle = [0, 1].map(|i| x[i] + 2.5e-3 * rate(&x)[i]);
+        let next = [0, 1].map(|i| x[i] + 5e-3 * rate(&middle)[i]);
+        x = next;
+    }
+    let data = folder.path().join("prey.csv").display().to_string();
+    fs::write(&data, text).expect("written");
+    let output =
+        run(&["calibrate", "--model", file, &data, "--profile", "x2", "--profile", "a", "--format", "json"]);
+    let v: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for name in ["x2", "b"] {
+        let u = v["unknowns"].as_array().expect("unknowns").iter().find(|u| u["name"] == name).expect("one");
+        assert!(u["determined"] == false && u["estimate"].is_null() && u["status"] == "inseparable", "{u}");
+    }
+    let [product, sigma] = found(&v, "b*x2");
+    assert!((product - 2.0).abs() < 4.0 * sigma && sigma < 0.1, "{product} +- {sigma}");
+    for (name, truth) in [("x1", 10.0), ("a", 1.1), ("c", 0.4), ("d", 0.1)] {
+        let [x, s] = found(&v, name);
+        assert!((x - truth).abs() < 4.0 * s && s < 0.1 * truth, "{name}: {x} +- {s}");
+    }
+    assert_eq!(
+        (&v["profiles"][0]["flat"], &v["profiles"][1]["flat"]),
+        (&Value::Bool(true), &Value::Bool(false))
+    );
+    let ends = v["profiles"][1]["points"].as_array().expect("points");
+    let rise = ends[0][1].as_f64().expect("a number");
+    assert!((4.0..16.0).contains(&rise), "three sigma are nine: {rise}");
+}
+
+fn crate_root(path: &str) -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// A record in CSV as Parquet: numbers and labels.
+fn parquet(text: &str) -> Vec<u8> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let headers: Vec<String> = reader.headers().expect("a header").iter().map(String::from).collect();
+    let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.expect("a row")).collect();
+    let field = |name: &String| {
+        let kind = if name == "position" { Physical::BYTE_ARRAY } else { Physical::DOUBLE };
+        let logical = (name == "position").then_some(parquet::basic::LogicalType::String);
+        let builder = Type::primitive_type_builder(name, kind).with_repetition(Repetition::REQUIRED);
+        Arc::new(builder.with_logical_type(logical).build().expect("a field"))
+    };
+    let fields = headers.iter().map(field).collect();
+    let schema = Arc::new(Type::group_type_builder("record").with_fields(fields).build().expect("a schema"));
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::default()).expect("a writer");
+    let mut group = writer.next_row_group().expect("a group");
+    for (i, name) in headers.iter().enumerate() {
+        let mut column = group.next_column().expect("a column").expect("a column");
+        if name == "position" {
+            let texts: Vec<ByteArray> = rows.iter().map(|r| r[i].into()).collect();
+            column.typed::<ByteArrayType>().write_batch(&texts, None, None).expect("written");
+        } else {
+            let numbers: Vec<f64> = rows.iter().map(|r| r[i].parse().expect("a number")).collect();
+            column.typed::<DoubleType>().write_batch(&numbers, None, None).expect("written");
+        }
+        column.close().expect("closed");
+    }
+    group.close().expect("closed");
+    writer.into_inner().expect("closed")
+}
+
+/// A bad record is refused with its place, and nothing is written.
+#[test]
+fn bad_records_are_refused_with_their_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bad.csv");
+    let right = fs::read_to_string(crate_root(RECORD)).expect("the record");
+    let line = |n: usize| right.lines().nth(n - 1).expect("a line").to_string();
+    let third = line(3);
+    let cells: Vec<&str> = third.split(',').collect();
+    let with = |i: usize, cell: &str| {
+        let mut cells = cells.clone();
+        cells[i] = cell;
+        right.replace(&third, &cells.join(","))
+    };
+    for (text, message) in [
+        (right.replace("fz [g]", "gz [g]"), "bad.csv: no column `fz [g]`; found `t [s]`, `position`"),
+        (
+            right.replace("fz [g]", "fz [deg]"),
+            "bad.csv: line 1, column `fz [deg]`: expected a unit, `fz [g]` or",
+        ),
+        (with(2, "nan"), "bad.csv: line 3, column `fx [g]`: found NaN, expected a finite number"),
+        (with(2, "much"), "bad.csv: line 3, column `fx [g]`: expected a number, found `much`"),
+        (
+            with(0, "4"),
+            "bad.csv: line 3, column `t [s]`: the time 4 s is not after that of the row before, 4 s",
+        ),
+        (with(1, "p7"), "bad.csv: line 3, column `position`: no position is called `p7`; expected p1, p2"),
+        (with(1, "p2"), "bad.csv: line 4, column `position`: found `p1`, expected p3 (the scheme's"),
+        (right.replace(",p6,", ",,"), "bad.csv: the position p6 of the scheme has no samples"),
+    ] {
+        fs::write(&path, text).expect("written");
+        let out = folder.path().join("out").display().to_string();
+        let output = run(&["calibrate", SCHEME, &path.display().to_string(), "-o", &out]);
+        let found = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{message}: {found}");
+        assert!(found.contains(message), "{message}: {found}");
+        assert!(output.stdout.is_empty() && !folder.path().join("out").exists(), "{message}");
+    }
+    File::create(&path).expect("made");
+    assert_eq!(run(&["calibrate", SCHEME, &path.display().to_string()]).status.code(), Some(2));
+    // a record that the model does not explain is one that can be read
+    let output = run(&["calibrate", SCHEME, RECORD, "--noise", "3e-6"]);
+    assert_eq!(output.status.code(), Some(1));
+    let text = stdout(&output);
+    assert!(
+        text.contains("NOT consistent") && text.contains("alike at all positions: sigmas are 3."),
+        "{text}"
+    );
+}
