@@ -254,7 +254,8 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     let Some(every) = &c.everywhere else { return out };
     out.push(format!(
         "of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}: {first} is within {} of that (attitudes \
-         that add most are sought on a net; between its points what they add is bounded as a trigonometric polynomial)",
+         that add most are sought on a net; between its points what they add is bounded as a trigonometric polynomial, and a part of \
+         1e-8 is assumed for rounding)",
         s.positions,
         number(every.best_possible),
         if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
@@ -404,7 +405,7 @@ fn shortened(names: &[String]) -> String {
 /// What no scheme is below, by total time.
 pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
     Line {
-        label: "no scheme of the candidates is below".into(),
+        label: "no scheme of the candidates in equal dwells is below".into(),
         color: BLACK,
         stroke: Stroke::Dashed,
         points: bound.iter().map(|p| (p[0], p[1])).collect(),

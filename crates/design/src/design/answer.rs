@@ -135,7 +135,7 @@ pub struct Certificate {
 
 /// How good the best scheme of any attitudes can be, whatever the candidates and the gimbals are; requirements on psi left out. Attitudes are
 /// taken up where they add most; between the points of a net of 3 degrees what they add is bounded as a trigonometric polynomial, so that
-/// the bound holds for all.
+/// the bound holds for all, if rounding is less than 1e-8 of it (assumed).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EverywhereReport {
     /// No scheme of so many attitudes, equal dwells, has a smaller criterion.

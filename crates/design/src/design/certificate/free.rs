@@ -26,7 +26,7 @@ const ROUNDS: usize = 25;
 const GAIN: f64 = 1e-5;
 /// Weights below are no support.
 const SUPPORT: f64 = 1e-3;
-/// The information of a position is evaluated in two ways that differ by rounding.
+/// The information of a position is evaluated in two ways that differ by rounding: assumed, not derived.
 const ROUNDING: f64 = 1e-8;
 
 /// What weights on all attitudes reach, and what nothing is below.
