@@ -103,5 +103,11 @@ fn whole_platforms_drawn_at_random_agree() {
 fn many_schemes_drawn_at_random_agree() {
     sweep(0..500, 100, |seed| drawn(seed, false));
     sweep(1000..1100, 10, |seed| drawn(seed, true));
+}
+
+/// Minutes: `cargo test --test it -- --ignored many_whole_platforms --nocapture`.
+#[test]
+#[ignore = "minutes"]
+fn many_whole_platforms_drawn_at_random_agree() {
     sweep(2000..2200, 20, drawn_whole);
 }
