@@ -491,11 +491,9 @@ impl Information {
                 |row: &Vector| (0..3).map(|_| d.int(0)).chain(row.iter().cloned()).collect::<Vector>();
             // in turns at once torquers add to psi^n, not to the psi that is carried
             let torqued: [Vector; 3] = std::array::from_fn(|r| behind(&model.torqued[i][r]));
+            let carried = |r: usize, k: usize| d.dot((0..3).map(|j| (&to_n[r][j], &psi[j][k])));
             let rows: [Vector; LOCAL] = std::array::from_fn(|r| match r {
-                0..3 => {
-                    let carried = |k: usize| d.dot((0..3).map(|j| (&to_n[r][j], &psi[j][k])));
-                    (0..columns.len()).map(|k| d.add(&carried(k), &torqued[r][k])).collect()
-                }
+                0..3 => (0..columns.len()).map(|k| d.add(&carried(r, k), &torqued[r][k])).collect(),
                 3..6 => behind(&drift[r - 3]),
                 _ => behind(&model.errors[i][r - 6]),
             });
@@ -505,8 +503,17 @@ impl Information {
             if between == Between::Dwell && !reset {
                 let moved = model.moved(&dwell);
                 let after: [Vector; 3] = std::array::from_fn(|r| {
-                    let moved = |k: usize| d.dot((0..6).map(|j| (&moved[r][j], &local.rows[j][k])));
-                    (0..local.columns.len()).map(|k| d.sub(&moved(k), &torqued[r][k])).collect()
+                    // what the dwell makes of torqued psi^n, less that itself: no digits of it are left where nothing moves it
+                    let change = |j: usize| d.sub(&moved[r][j], &d.int(i64::from(r == j)));
+                    let change: [Real; 3] = std::array::from_fn(change);
+                    let after = |k: usize| {
+                        let own: Vector = (0..3).map(|j| carried(j, k)).collect();
+                        let own = own.iter().chain((3..6).map(|j| &local.rows[j][k]));
+                        d.dot(
+                            moved[r].iter().zip(own).chain(change.iter().zip((0..3).map(|j| &torqued[j][k]))),
+                        )
+                    };
+                    (0..local.columns.len()).map(after).collect()
                 });
                 psi = std::array::from_fn(|j| {
                     (0..local.columns.len())
