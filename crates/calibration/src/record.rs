@@ -433,7 +433,10 @@ fn columns(record: &str, headers: Vec<String>, line: u64) -> Result<Vec<Column>,
 mod tests {
     use super::*;
 
-    fn all(text: &str) -> Result<Vec<(u64, Vec<Option<f64>>, String)>, RecordError> {
+    /// Line, numbers, label.
+    type Read = (u64, Vec<Option<f64>>, String);
+
+    fn all(text: &str) -> Result<Vec<Read>, RecordError> {
         let record = Record::csv("r.csv", Box::new(std::io::Cursor::new(text.to_string())))?;
         let t = record.wanted(
             record.find("t").ok_or_else(|| record.missing("`t [s]`"))?,
