@@ -445,6 +445,14 @@ impl SchemeError {
     }
 }
 
+impl Position {
+    /// Is reached the shortest way, with the rate that it says: for a scheme in which it is reached from another attitude.
+    pub fn take_shortest_way(&mut self) {
+        let rate_deg_s = self.slew.as_ref().and_then(|s| s.rate_deg_s);
+        self.slew = rate_deg_s.map(|rate| SlewTo { rate_deg_s: Some(rate), ..SlewTo::default() });
+    }
+}
+
 impl Scheme {
     /// A scheme of the given attitudes, named p1, p2, ..., with the paper's defaults.
     pub fn of_angles(angles: impl IntoIterator<Item = Euler>) -> Self {
@@ -574,8 +582,8 @@ impl Scheme {
         rest.positions =
             self.positions.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, p)| p.clone()).collect();
         if let Some(next) = rest.positions.get_mut(index) {
-            let rate_deg_s = next.slew.as_ref().and_then(|s| s.rate_deg_s).filter(|_| index > 0);
-            next.slew = rate_deg_s.map(|rate| SlewTo { rate_deg_s: Some(rate), ..SlewTo::default() });
+            next.take_shortest_way();
+            next.slew.take_if(|_| index == 0);
         }
         rest
     }

@@ -343,7 +343,9 @@ fn sensitivity(
         others.push((format!("dwell x {factor}"), other, conditions.clone()));
     }
     let without = if slews { ", no slews" } else { "" };
-    for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
+    // torquer errors act on ways that a scheme of another carry need not state
+    let stated = |carry: &Carry| Scheme { carry: *carry, ..scheme.clone() }.paths().is_ok();
+    for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry && stated(c)) {
         // slews carry psi^n: without them another carry can be asked for
         let still = Conditions { slews: false, ..conditions.clone() };
         others.push((format!("{carry} carry{without}"), Scheme { carry, ..scheme.clone() }, still));

@@ -22,7 +22,7 @@ pub use ranking::kendall_tau_b;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::Truth;
-use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Scheme};
+use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Position, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::{Form, SquareRootInformation};
 
@@ -96,6 +96,7 @@ impl FilterChange {
         out.latitude = self.latitude.or(out.latitude);
         if let Some(i) = self.dropped.filter(|_| scheme.positions.len() > 1) {
             out.positions[i].angles = scheme.positions[if i == 0 { 1 } else { i - 1 }].angles.clone();
+            out.positions.iter_mut().skip(i).take(2).for_each(Position::take_shortest_way);
         }
         out
     }

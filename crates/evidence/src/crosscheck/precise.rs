@@ -100,6 +100,9 @@ impl Constants {
     }
 }
 
+/// Of the digits of a sum in turns, the part that is never lost: what is smaller is the rest of what cancels.
+const CANCELLED: f64 = 0.75;
+
 /// Local unknowns: psi^n, eps^n, and the error a^n of the accelerometers.
 const LOCAL: usize = 9;
 
@@ -344,6 +347,13 @@ impl Model {
                 from = to_n(&from, &on);
             }
             torqued[i] = sum;
+        }
+        // what rounding leaves of terms that cancel, as the sine of half a turn, is nothing
+        let largest = torqued.iter().flatten().flatten().filter_map(log2).fold(f64::MIN, f64::max);
+        for x in torqued.iter_mut().flatten().flatten() {
+            if log2(x).is_some_and(|size| size < largest - digits.bits as f64 * CANCELLED) {
+                *x = d.int(0);
+            }
         }
         let seconds = |i: usize| scheme.positions[i].dwell.unwrap_or(Dwell::PAPER).seconds();
         let ratios =
