@@ -598,41 +598,18 @@ fn wrong_use_has_a_reason() {
     assert!(degree("K1_X").is_none() && degree("K3_X").is_none());
 }
 
-/// Positions that turn while Z is observed, with torquer and accelerometer errors: what turning adds to the derivatives of Z changes no
-/// verdict.
+/// A rotating segment is judged with drifts alone: at a steady rate w a bias that turns with the platform, K0 cos(w t), is what a drift that
+/// turns with it integrates to, (D/w) cos(w t).
 #[test]
-fn rotating_segments_by_the_second_path() {
-    let all = ["F", "I", "O", "S", "II", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
-    let mut rng = SplitMix64::new(17);
-    for case in 0..18 {
-        let mut chosen: Vec<&str> = all.into_iter().filter(|_| rng.below(2) == 0).collect();
-        for (whole, triangle) in [("GM", "GM3"), ("M6", "M3")] {
-            if chosen.contains(&whole) {
-                chosen.retain(|t| *t != triangle);
-            }
-        }
-        if chosen.is_empty() {
-            continue;
-        }
-        let start = ["10,25,40", "0,0,0", "-70,15,130"][case % 3];
-        let mut scheme = turned_about(start, 1 + rng.below(3) as usize, &mut rng);
-        scheme.carry = Carry::ALL[case / 3 % 3];
-        if scheme.carry == Carry::Inertial {
-            scheme = walk(scheme.positions.len(), rng.next_u64());
-        }
-        scheme.unknowns = unknowns(&chosen.join(","));
-        let last = scheme.positions.len() - 1;
-        let mut turns = vec![rng.below(1 + last as u64) as usize];
-        turns.extend((case % 2 == 0).then_some(last));
-        for i in turns {
-            let axis = ["X_p", "Y_p", "Z_p", "N", "U", "E"][rng.below(6) as usize];
-            // a quarter turn leads on from where a whole one ends
-            let any = i == last || scheme.carry != Carry::Inertial;
-            let angle = if any { ["70", "-120", "360", "500"][rng.below(4) as usize] } else { "360" };
-            scheme.positions[i].rotation = Some(Rotation::new(axis, angle).expect("a rotation"));
-        }
-        both_paths_agree(&scheme);
+fn rotations_are_of_drifts() {
+    let mut scheme = Scheme { carry: Carry::Inertial, unknowns: unknowns("F,GM,M3"), ..at(&["NDW"]) };
+    scheme.positions[0].rotation = Some(Rotation::new("E", "360").expect("a rotation"));
+    let refused = Platform::new(scheme.clone()).expect_err("refused").to_string();
+    assert!(refused.contains("GM, M3") && refused.contains("drifts alone"), "{refused}");
+    for terms in ["F,K0", "F,GS"] {
+        assert!(Platform::new(Scheme { unknowns: unknowns(terms), ..scheme.clone() }).is_err());
     }
+    assert!(Platform::new(Scheme { unknowns: unknowns("F,I,II"), ..scheme }).is_ok());
 }
 
 /// Seven positions by quarter turns, proven; what no tour determines is said at once.

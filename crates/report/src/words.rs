@@ -202,11 +202,11 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         );
     }
     if a.positions.iter().any(|p| p.rotation.is_some()) {
-        let torqued = if has(Source::Rate) { ", at one more where the angle itself is torqued" } else { "" };
-        out.push(format!(
-            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m){torqued}; psi in n \
+        out.push(
+            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \
              goes on through it"
-        ));
+                .into(),
+        );
     }
     if let Some(s) = a.stations.iter().find(|s| s.turned_deg.is_some_and(|t| t != 0.0)) {
         let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());

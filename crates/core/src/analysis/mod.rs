@@ -298,13 +298,12 @@ fn notes(scheme: &Scheme) -> Vec<String> {
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
-        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: but where a position turns \
-         they act by the earth rate alone, as if nothing had been torqued in between; real slews need inertial carry and a path",
+        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act by the earth rate alone, \
+         as if nothing had been torqued in between; real slews need inertial carry and a path",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
-        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: but where a position turns they act by the earth \
-         rate alone",
+        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act by the earth rate alone",
     );
     out
 }

@@ -86,7 +86,7 @@ mod tests {
     use super::*;
     use crate::degree::ensemble::staircase;
     use crate::model::platform::RandomValues;
-    use crate::model::{Angle, Carry, Rotation, Scheme, Term, Unknowns};
+    use crate::model::{Angle, Carry, Rotation, Scheme, Source, Term, Unknowns};
     use obsdeg_exact::SplitMix64;
     use proptest::prelude::*;
 
@@ -113,7 +113,8 @@ mod tests {
                 measured_azimuth,
                 ..Scheme::of_angles(angles)
             };
-            if let Some(p) = turning.and_then(|i| scheme.positions.get_mut(i)) {
+            let drifts = scheme.unknowns.terms().iter().all(|t| t.source() == Source::Gravity);
+            if let Some(p) = turning.filter(|_| drifts).and_then(|i| scheme.positions.get_mut(i)) {
                 p.rotation = Rotation::new("X_p", "120").ok();
             }
             let values = RandomValues::draw(&scheme, &mut SplitMix64::new(5)).expect("a field");

@@ -211,9 +211,7 @@ impl Platform {
                 torqued.advance(self, point, i, station.continues);
             }
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
-            // Where the platform turns at the rate w, Z' holds w times the derivative by the angle of what torquers and
-            // accelerometers put into Z: it lies in the span of Z along the arc (`Scheme::stations`), as that of eps^n does in
-            // that of Z'. So degrees are those of the attitudes of the arc, and the rate is that of the earth.
+            // where the platform turns, no torquer error is unknown
             let drift = self.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
             let accelerometer =
                 if accelerometers { self.accelerometer_rows(ring, c) } else { Default::default() };

@@ -390,6 +390,20 @@ pub enum SchemeError {
         /// The limits.
         limits: String,
     },
+    /// While it turns steadily, drifts integrate to what errors of accelerometers and torquers look like: `(D/w) sin` beside `K0 sin`. The
+    /// rows of attitudes of the arc would tell them apart.
+    #[error(
+        "`{name}` turns, and {terms} are unknown: rotating segments are judged with drifts alone; expected positions, or terms out of F, I, O, S, II, OO, \
+         SS, IO, IS, OS"
+    )]
+    RotationTerms {
+        /// The segment.
+        name: String,
+        /// Its index.
+        index: usize,
+        /// The terms that are not drifts.
+        terms: String,
+    },
     /// A slew to the first position.
     #[error("`{name}` is the first position; expected no slew to it")]
     FirstSlew {
@@ -436,7 +450,9 @@ impl SchemeError {
             Self::Combinations { .. } => Some("combinations".into()),
             Self::Range(e) => Some(e.what.clone()),
             Self::DriftPositions { .. } | Self::Terms(_) => Some("terms".into()),
-            Self::Rotation { index, .. } => Some(format!("position.{index}.rotation")),
+            Self::Rotation { index, .. } | Self::RotationTerms { index, .. } => {
+                Some(format!("position.{index}.rotation"))
+            }
             Self::Gimbals { index, .. } => Some(format!("position.{index}")),
             Self::FirstSlew { .. } => Some("position.0.slew".into()),
             Self::Geometry(_) => Some("geometry".into()),
@@ -491,6 +507,11 @@ impl Scheme {
             let none = |r: &Rotation| r.angle.generic().is_some() || r.angle.nanodeg().abs() < MIN_ROTATION;
             if p.rotation.as_ref().is_some_and(none) {
                 return Err(SchemeError::Rotation { name, index });
+            }
+            let others = self.unknowns.terms().iter().filter(|t| t.source() != Source::Gravity);
+            let terms = others.map(|t| t.letters()).collect::<Vec<_>>().join(", ");
+            if p.rotation.is_some() && !terms.is_empty() {
+                return Err(SchemeError::RotationTerms { name, index, terms });
             }
             if index == 0 && p.slew.is_some() {
                 return Err(SchemeError::FirstSlew { name });

@@ -462,9 +462,9 @@ mod tests {
         scheme.unknowns = terms.parse().expect("terms");
         // torquer errors need turns that are exact
         scheme.path = (terms != GYROS).then_some(Path::Gimbals);
-        // gimbal by gimbal the way would not start where a rotation ends
-        let turning = if terms == GYROS { 1 } else { 2 };
-        scheme.positions[turning].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
+        if terms == GYROS {
+            scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
+        }
         let conditions = Conditions {
             truth: Truth::Exact,
             slew_rate_deg_s: slew,
