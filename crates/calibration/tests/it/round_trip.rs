@@ -5,7 +5,7 @@ use obsdeg_calibration::answer::Finding;
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, CalibrationError, Options, calibrate};
 use obsdeg_core::model::settings::DriftNoise;
-use obsdeg_core::model::{Carry, Scheme, parse_attitude};
+use obsdeg_core::model::{Carry, Path, Scheme, parse_attitude};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::Conditions;
 
@@ -21,6 +21,8 @@ pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
     scheme.carry = Carry::Inertial;
     scheme.latitude = Some(bench.latitude_deg.to_string().parse().expect("a latitude"));
     scheme.unknowns = terms.parse().expect("terms");
+    // torquers act on turns that are exact
+    scheme.path = (terms == "all").then_some(Path::OneAxis);
     for (p, (name, _, dwell)) in scheme.positions.iter_mut().zip(&bench.positions) {
         p.name = (*name).into();
         p.dwell = Some(dwell.to_string().parse().expect("a dwell"));
@@ -60,6 +62,15 @@ pub(crate) fn six() -> Bench {
 fn errors(bench: &Bench, c: &Calibration) -> Vec<(String, f64)> {
     let of = |name: &str| -> Option<f64> {
         let axis = "XYZ".find(name.chars().last()?)?;
+        const ARCSEC: f64 = 648000.0 / std::f64::consts::PI;
+        if let Some((kind @ ("GM" | "M" | "GS"), axes)) = name.split_once('_') {
+            let i = "XYZ".find(axes.chars().next()?)?;
+            return Some(match kind {
+                "GS" => bench.torquer[i][i] * 1e6,
+                "GM" => bench.torquer[i][axis] * ARCSEC,
+                _ => bench.mounting[i][axis] * ARCSEC,
+            });
+        }
         Some(match name.split_at(3).0 {
             "D_F" => bench.drift[0][axis],
             "D_I" => bench.drift[1][axis],
@@ -149,6 +160,35 @@ fn accelerometers_too() {
     round_trips(3, bench, "F,I,O,S,K0,K1,K2");
 }
 
+/// The seven quarter turns of examples/self-calibration, with errors of everything: 33 coefficients.
+fn whole(seed: u64) -> Bench {
+    let attitudes = [
+        [0.0, 0.0, 90.0],
+        [0.0, 0.0, 180.0],
+        [0.0, 0.0, -90.0],
+        [90.0, 0.0, -90.0],
+        [0.0, -90.0, 0.0],
+        [180.0, 0.0, 180.0],
+        [-90.0, 0.0, 180.0],
+    ];
+    let names = ["p1", "p2", "p3", "p4", "p5", "p6", "p7"];
+    Bench {
+        positions: names.into_iter().zip(attitudes).map(|(n, a)| (n, a, 1000.0)).collect(),
+        drift: [[1.3, -0.8, 2.1], [0.9, 1.6, -0.4], [-0.3, 0.6, 0.2], [0.7, -1.1, 0.5]],
+        accelerometers: [[3e-4, -2e-4, 1e-4], [5e-4, -3e-4, 2e-4], [2e-5, 1e-5, -3e-5]],
+        mounting: [[0.0; 3], [3e-4, 0.0, 0.0], [-2e-4, 5e-4, 0.0]],
+        torquer: [[2e-4, 1e-4, -3e-4], [4e-4, -5e-4, 2e-4], [-1e-4, 3e-4, 1e-4]],
+        step_s: 10.0,
+        ..real(seed)
+    }
+}
+
+/// Everything at once: drifts, torquers, accelerometers and mounting.
+#[test]
+fn the_whole_platform() {
+    round_trips(2, whole, "all");
+}
+
 /// 200 records of each kind: `cargo test -p obsdeg-calibration --release -- --ignored --nocapture many`.
 #[test]
 #[ignore = "minutes"]
@@ -157,6 +197,7 @@ fn many_records() {
     round_trips(200, real, "F,I,O,S");
     let paper = |seed| Bench { seed, ..Bench::default() };
     round_trips(200, paper, "F,I,O,S");
+    round_trips(200, whole, "all");
 }
 
 fn twelve() -> Vec<(&'static str, [f64; 3], f64)> {

@@ -24,6 +24,10 @@ pub(crate) struct Bench {
     pub(crate) drift: [Vector; 4],
     /// K0 (g), K1, K2 (1/g) of the accelerometers.
     pub(crate) accelerometers: [Vector; 3],
+    /// What the output of each accelerometer has of the force along each platform axis besides its own, in rad.
+    pub(crate) mounting: [Vector; 3],
+    /// What each gyro is torqued too fast by, as a part of the rate commanded about each platform axis: scale factors, and misalignments in rad.
+    pub(crate) torquer: [Vector; 3],
     /// White noise of a sample, in g.
     pub(crate) noise_g: f64,
     /// Steps of the output, in g; 0: none.
@@ -50,6 +54,8 @@ impl Default for Bench {
             psi: [0.1, 0.1, 0.1].map(f64::to_radians),
             drift: [[11.0, 12.0, 13.0], [5.0; 3], [5.0; 3], [5.0; 3]],
             accelerometers: [[0.0; 3]; 3],
+            mounting: [[0.0; 3]; 3],
+            torquer: [[0.0; 3]; 3],
             noise_g: 1e-5,
             quantum_g: 0.0,
             walk_deg_sqrt_h: 0.0,
@@ -221,8 +227,10 @@ impl Bench {
                 let command_earth = turned(&conjugate(&at_computed), earth);
                 let g = turned(&conjugate(&at), &[0.0, -1.0, 0.0]);
                 let (drift, still) = (self.drift(&g), turned(&conjugate(&at), earth));
+                let command: Vector = std::array::from_fn(|i| command_earth[i] + slew[i]);
                 let rate: Vector = std::array::from_fn(|i| {
-                    command_earth[i] + slew[i] + drift[i] + markov[i] + white[i] - still[i]
+                    let wrong: f64 = (0..3).map(|j| self.torquer[i][j] * command[j]).sum();
+                    command[i] + wrong + drift[i] + markov[i] + white[i] - still[i]
                 });
                 let part = if half { h / 2.0 } else { h };
                 middle = multiply(q, &of_vector(&rate.map(|x| x * part)));
@@ -248,7 +256,8 @@ impl Bench {
         let force = turned(&conjugate(q), &[0.0, 1.0, 0.0]);
         let [k0, k1, k2] = &self.accelerometers;
         let f: Vector = std::array::from_fn(|i| {
-            let seen = force[i] + k0[i] + k1[i] * force[i] + k2[i] * force[i] * force[i];
+            let across: f64 = (0..3).map(|j| self.mounting[i][j] * force[j]).sum();
+            let seen = force[i] + k0[i] + k1[i] * force[i] + k2[i] * force[i] * force[i] + across;
             let noisy = self.scale * (seen + self.noise_g * random.normal());
             if self.quantum_g > 0.0 { (noisy / self.quantum_g).round() * self.quantum_g } else { noisy }
         });
