@@ -598,6 +598,32 @@ fn wrong_use_has_a_reason() {
     assert!(degree("K1_X").is_none() && degree("K3_X").is_none());
 }
 
+/// Positions that turn while Z is observed, with drifts: what turning adds to the derivatives of Z changes no verdict.
+#[test]
+fn rotating_segments_by_the_second_path() {
+    let all = ["F", "I", "O", "S", "II", "OO", "SS"];
+    let mut rng = SplitMix64::new(17);
+    for case in 0..18 {
+        let chosen: Vec<&str> = all.into_iter().filter(|_| rng.below(2) == 0).collect();
+        if chosen.is_empty() {
+            continue;
+        }
+        let start = ["10,25,40", "0,0,0", "-70,15,130"][case % 3];
+        let mut scheme = turned_about(start, 1 + rng.below(3) as usize, &mut rng);
+        scheme.carry = Carry::ALL[case / 3 % 3];
+        scheme.unknowns = unknowns(&chosen.join(","));
+        let last = scheme.positions.len() - 1;
+        let mut turns = vec![rng.below(1 + last as u64) as usize];
+        turns.extend((case % 2 == 0).then_some(last));
+        for i in turns {
+            let axis = ["X_p", "Y_p", "Z_p", "N", "U", "E"][rng.below(6) as usize];
+            let angle = ["70", "-120", "360", "500"][rng.below(4) as usize];
+            scheme.positions[i].rotation = Some(Rotation::new(axis, angle).expect("a rotation"));
+        }
+        both_paths_agree(&scheme);
+    }
+}
+
 /// A rotating segment is judged with drifts alone: at a steady rate w a bias that turns with the platform, K0 cos(w t), is what a drift that
 /// turns with it integrates to, (D/w) cos(w t).
 #[test]

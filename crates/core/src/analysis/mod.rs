@@ -13,7 +13,9 @@ use crate::degree::ensemble::degrees;
 use crate::degree::findings::Findings;
 use crate::degree::status::{Difference, Verdict};
 use crate::findings::{CombinationFinding, Judged, SchemeFindings};
+use crate::model::attitude::Matrix3;
 use crate::model::attitude::c_n_from_euler;
+use crate::model::path::TurnAt;
 use crate::model::platform::{Platform, Point};
 use crate::model::ring::Float;
 use crate::model::slew::{Slew, Turn};
@@ -340,17 +342,10 @@ fn turns(platform: &Platform) -> Vec<Vec<Turn>> {
         return Vec::new();
     }
     let point = Point::in_floats(platform, 1.0, 1.0);
-    let stations = platform.scheme().stations();
-    let mut out = vec![Vec::new(); platform.scheme().positions.len()];
-    for (i, station) in stations.iter().enumerate().filter(|(_, s)| !s.continues) {
-        let Some(mut from) = i.checked_sub(1).map(|before| point.attitudes[before]) else { continue };
-        for turn in &point.turns[i] {
-            let slew = Slew::by(&from, &turn.axis.map(|x| x * turn.angle), 1.0);
-            out[station.index].push(slew.turn());
-            from = slew.at(slew.duration_s);
-        }
-    }
-    out
+    let turn = |(from, turn): (Matrix3<f64>, &TurnAt<f64>)| {
+        Slew::by(&from, &turn.axis.map(|x| x * turn.angle), 1.0).turn()
+    };
+    (0..point.turns.len()).map(|i| point.turns_to(i).into_iter().map(turn).collect()).collect()
 }
 
 /// What is found under the other carries, and why nothing is under one of them.

@@ -58,8 +58,7 @@ pub struct Point<R: Ring> {
     pub w_u: R::Element,
     /// `C_c^n` of every station of the scheme.
     pub attitudes: Vec<Matrix3<R::Element>>,
-    /// The turns on which torquer errors act: to a station that is the start of a position, from the end of the position before; to another
-    /// of a rotation, from its start. Empty where there are no such errors.
+    /// The turns that lead to every position, on which torquer errors act; empty where none does.
     pub turns: Vec<Vec<TurnAt<R::Element>>>,
 }
 
@@ -128,7 +127,7 @@ impl Platform {
             let found = self.paths[index].iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
             PathError::NotExact { name: self.scheme.positions[index].name.clone(), index, found }
         };
-        match values.turns(&self.scheme, &self.paths, &roots, &values.attitudes(&self.scheme, &roots)) {
+        match values.turns(&self.paths, &roots, &values.attitudes(&self.scheme, &roots)) {
             Ok(_) => Ok(()),
             Err(at) => Err(inexact(at.min(index)).into()),
         }
@@ -182,7 +181,8 @@ impl Platform {
         let mut psi_block = &point.attitudes[0];
         let mut composed;
         let mut handed_on: Option<Matrix3<R::Element>> = None;
-        let mut torqued = Torqued::default();
+        // what torquer errors have left in psi^n
+        let mut torqued: Option<Columns<R::Element>> = None;
         let (no_psi, nothing) = ([0; 3].map(|_| ring.zero()), vec![ring.zero(); self.terms.len()]);
         let row = |psi: &[R::Element; 3], rest: &[R::Element]| {
             let mut row = Vec::with_capacity(3 + rest.len());
@@ -207,16 +207,25 @@ impl Platform {
                     std::array::from_fn(|r| std::array::from_fn(|k| c[k][r].clone()));
                 handed_on = Some(product(ring, &back, psi_block));
             }
-            if !point.turns.is_empty() {
-                torqued.advance(self, point, i, station.continues);
+            for (from, turn) in point.turns_to(i) {
+                let left = times(
+                    ring,
+                    &product(ring, &from, &turn.integral(ring)),
+                    &self.torquer_columns(ring, &turn.axis),
+                );
+                torqued = Some(match torqued {
+                    None => left,
+                    Some(old) => std::array::from_fn(|r| {
+                        old[r].iter().zip(&left[r]).map(|(a, b)| ring.add(a, b)).collect()
+                    }),
+                });
             }
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
-            // where the platform turns, no torquer error is unknown
             let drift = self.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
             let accelerometer =
                 if accelerometers { self.accelerometer_rows(ring, c) } else { Default::default() };
             let rows = std::array::from_fn(|r| match r {
-                0..3 => row(&psi_block[r], torqued.psi.as_ref().map_or(&nothing, |left| &left[r])),
+                0..3 => row(&psi_block[r], torqued.as_ref().map_or(&nothing, |left| &left[r])),
                 3..PSI_EPS => row(&no_psi, &drift[r - 3]),
                 _ if !accelerometers => Box::default(),
                 _ => row(&no_psi, &accelerometer[r - PSI_EPS]),
@@ -228,85 +237,22 @@ impl Platform {
     }
 }
 
+impl<R: Ring> Point<R> {
+    /// The turns to a position, each with the attitude from which it goes.
+    pub fn turns_to(&self, i: usize) -> Vec<(Matrix3<R::Element>, &TurnAt<R::Element>)> {
+        let (Some(turns), Some(before)) = (self.turns.get(i), i.checked_sub(1)) else { return Vec::new() };
+        let mut from = self.attitudes[before].clone();
+        let mut out = Vec::with_capacity(turns.len());
+        for turn in turns {
+            let next = product(&self.ring, &from, &turn.rotation(&self.ring));
+            out.push((std::mem::replace(&mut from, next), turn));
+        }
+        out
+    }
+}
+
 /// A vector with one column per coefficient, in n.
 type Columns<E> = [Vec<E>; 3];
-
-/// What torquer errors have made of `psi^n` so far.
-struct Torqued<E> {
-    psi: Option<Columns<E>>,
-    /// The same at the start of the segment, and the attitude there.
-    start: Option<(Option<Columns<E>>, Matrix3<E>)>,
-    /// The attitude of the station before.
-    before: Option<Matrix3<E>>,
-}
-
-impl<E> Default for Torqued<E> {
-    fn default() -> Self {
-        Self { psi: None, start: None, before: None }
-    }
-}
-
-impl<E: Clone> Torqued<E> {
-    /// Goes on to station `i`.
-    fn advance<R: Ring<Element = E>>(
-        &mut self,
-        platform: &Platform,
-        point: &Point<R>,
-        i: usize,
-        continues: bool,
-    ) {
-        let ring = &point.ring;
-        let c = &point.attitudes[i];
-        if continues {
-            if let Some((psi, start)) = &self.start {
-                self.psi.clone_from(psi);
-                let mut attitude = start.clone();
-                self.turn(platform, ring, &mut attitude, &point.turns[i]);
-            }
-        } else {
-            match (platform.scheme.carry, &self.before) {
-                (_, None) | (Carry::Reset, _) => self.psi = None,
-                (Carry::Inertial, Some(before)) => {
-                    let mut attitude = before.clone();
-                    self.turn(platform, ring, &mut attitude, &point.turns[i]);
-                }
-                // psi^c goes on
-                (Carry::Platform, Some(before)) => {
-                    let back: Matrix3<E> =
-                        std::array::from_fn(|r| std::array::from_fn(|k| before[k][r].clone()));
-                    let over = product(ring, c, &back);
-                    self.psi = self.psi.as_ref().map(|psi| times(ring, &over, psi));
-                }
-            }
-            self.start = Some((self.psi.clone(), c.clone()));
-        }
-        self.before = Some(c.clone());
-    }
-
-    /// Adds `C J E(u)` of every turn.
-    fn turn<R: Ring<Element = E>>(
-        &mut self,
-        platform: &Platform,
-        ring: &R,
-        attitude: &mut Matrix3<E>,
-        turns: &[TurnAt<E>],
-    ) {
-        for turn in turns {
-            let left = times(
-                ring,
-                &product(ring, attitude, &turn.integral(ring)),
-                &platform.torquer_columns(ring, &turn.axis),
-            );
-            self.psi = Some(match &self.psi {
-                None => left,
-                Some(old) => std::array::from_fn(|r| {
-                    old[r].iter().zip(&left[r]).map(|(a, b)| ring.add(a, b)).collect()
-                }),
-            });
-            *attitude = product(ring, attitude, &turn.rotation(ring));
-        }
-    }
-}
 
 /// `m v`.
 fn times<R: Ring>(ring: &R, m: &Matrix3<R::Element>, v: &Columns<R::Element>) -> Columns<R::Element> {
@@ -458,7 +404,7 @@ pub struct RandomValues {
     rates: (u64, u64),
     /// `exp(i angle)` of every generic angle.
     generic: Vec<(String, u64)>,
-    /// The image of pi, where torquer errors are unknown.
+    /// The image of pi, where torquer errors act in turns.
     pi: Option<u64>,
 }
 
@@ -479,7 +425,7 @@ impl RandomValues {
         let mut nonzero = || 1 + rng.below(p - 1);
         let rates = (nonzero(), nonzero());
         let generic = scheme.generic_names().into_iter().map(|n| (n, nonzero())).collect();
-        let pi = scheme.unknowns.have(Source::Rate).then(nonzero);
+        let pi = scheme.torquers_act().then(nonzero);
         Ok(Self { roots, rates, generic, pi })
     }
 
@@ -540,13 +486,12 @@ impl RandomValues {
         scheme.stations().iter().map(|station| station.attitude(&roots.field, cos_sin)).collect()
     }
 
-    /// The turns to every station ([`Point::turns`]).
+    /// The turns to every position ([`Point::turns`]).
     ///
     /// # Errors
     /// The index of the first position whose way has no image, or does not lead there.
     fn turns(
         &self,
-        scheme: &Scheme,
         paths: &[Vec<PathStep>],
         roots: &RootField,
         attitudes: &[Matrix3<u64>],
@@ -557,7 +502,7 @@ impl RandomValues {
         let at = |step: &PathStep, from: &Matrix3<u64>, to: Option<&Matrix3<u64>>| {
             step.at_field(roots, from, to, pi, cos_sin)
         };
-        turns_of(&f, scheme, paths, attitudes, at, |reached, to| reached == to)
+        turns_of(&f, paths, attitudes, at, |reached, to| reached == to)
     }
 
     /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
@@ -574,47 +519,36 @@ impl RandomValues {
         };
         let attitudes = self.attitudes(scheme, &roots);
         let paths = scheme.paths().unwrap_or_default();
-        let turns = self.turns(scheme, &paths, &roots, &attitudes);
+        let turns = self.turns(&paths, &roots, &attitudes);
         let turns = turns.expect("the ways of a platform have images in the fields of its angles");
         Sample { roots, point: Point { ring: f, w_n, w_u, attitudes, turns } }
     }
 }
 
-/// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an attitude, and ends at another where
-/// it is the only one; `arrives` says whether a way ends where it should.
+/// The turns to every position ([`Point::turns`]) in a ring, where rotating segments have none: `at` gives one of a way that starts at an
+/// attitude, and ends at another where it is the only one; `arrives` says whether a way ends where it should.
 ///
 /// # Errors
-/// The index of the first position whose way `at` does not know, or does not lead there.
+/// The index of the first position whose way `at` does not know, or that does not lead there.
 fn turns_of<R: Ring>(
     ring: &R,
-    scheme: &Scheme,
     paths: &[Vec<PathStep>],
     attitudes: &[Matrix3<R::Element>],
     at: impl Fn(&PathStep, &Matrix3<R::Element>, Option<&Matrix3<R::Element>>) -> Option<TurnAt<R::Element>>,
     arrives: impl Fn(&Matrix3<R::Element>, &Matrix3<R::Element>) -> bool,
 ) -> Result<Vec<Vec<TurnAt<R::Element>>>, usize> {
-    let mut out = Vec::with_capacity(attitudes.len());
-    let mut start = 0;
-    for (i, station) in scheme.stations().iter().enumerate() {
-        let mut turns = Vec::new();
-        if station.continues {
-            let turned = station.turned.as_ref().ok_or(station.index)?;
-            let step = PathStep::Named { axis: turned.axis, angle: turned.angle.clone() };
-            turns.push(at(&step, &attitudes[start], None).ok_or(station.index)?);
-        } else {
-            start = i;
-            let path = paths.get(station.index).map_or(&[][..], Vec::as_slice);
-            let mut attitude = attitudes[i.saturating_sub(1)].clone();
-            let only = (path.len() == 1).then_some(&attitudes[i]);
-            for step in path {
-                let turn = at(step, &attitude, only).ok_or(station.index)?;
-                attitude = product(ring, &attitude, &turn.rotation(ring));
-                turns.push(turn);
-            }
-            // no path is given where torquer errors do not act on slews
-            if !paths.is_empty() && i > 0 && !arrives(&attitude, &attitudes[i]) {
-                return Err(station.index);
-            }
+    let mut out = Vec::with_capacity(paths.len());
+    for (i, path) in paths.iter().enumerate() {
+        let mut attitude = attitudes[i.saturating_sub(1)].clone();
+        let only = (path.len() == 1).then_some(&attitudes[i]);
+        let mut turns = Vec::with_capacity(path.len());
+        for step in path {
+            let turn = at(step, &attitude, only).ok_or(i)?;
+            attitude = product(ring, &attitude, &turn.rotation(ring));
+            turns.push(turn);
+        }
+        if i > 0 && !arrives(&attitude, &attitudes[i]) {
+            return Err(i);
         }
         out.push(turns);
     }
@@ -624,16 +558,12 @@ fn turns_of<R: Ring>(
 impl Point<Float> {
     /// The platform in floating point at these rates of the earth.
     pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64) -> Self {
-        let scheme = platform.scheme();
+        let stations = platform.scheme().stations();
         let cos_sin = |angle: &Angle| angle.turn().cos_sin_f64();
-        let attitudes: Vec<_> = scheme.stations().iter().map(|s| s.attitude(&Float, cos_sin)).collect();
-        let mut turns = Vec::new();
-        if scheme.unknowns.have(Source::Rate) {
-            // where they lead was found when the platform was made
-            let at = |step: &PathStep, from: &Matrix3<f64>, _: Option<&Matrix3<f64>>| Some(step.at_f64(from));
-            turns =
-                turns_of(&Float, scheme, &platform.paths, &attitudes, at, |_, _| true).unwrap_or_default();
-        }
+        let attitudes: Vec<_> = stations.iter().map(|s| s.attitude(&Float, cos_sin)).collect();
+        // where they lead was found when the platform was made
+        let at = |step: &PathStep, from: &Matrix3<f64>, _: Option<&Matrix3<f64>>| Some(step.at_f64(from));
+        let turns = turns_of(&Float, &platform.paths, &attitudes, at, |_, _| true).unwrap_or_default();
         Self { ring: Float, w_n, w_u, attitudes, turns }
     }
 }

@@ -15,7 +15,7 @@ use super::gimbals::Gimbals;
 use super::path::{self, Path, PathError, PathStep, StepError};
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
-use super::terms::{Source, Unknowns};
+use super::terms::{Source, Term, Unknowns};
 use crate::model::ranges::{self, RangeError};
 use crate::model::settings;
 use crate::model::settings::Settings;
@@ -423,10 +423,20 @@ pub enum SchemeError {
 
 /// A turn in 1e-9 degrees.
 const FULL_TURN: i64 = 360_000_000_000;
-/// Stations of a rotation lie at multiples of a part of it (of a turn, if it is more): of this one for up to seven of them.
+/// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of them.
 const STATION_STEPS: i64 = 8;
-/// For more, of a part that makes so many more different ones along a whole turn than are needed.
-const SPARE_STEPS: i64 = 3;
+/// So many are different along a whole turn, which is enough for two g factors; with more the verdicts would say too little.
+const _: () = {
+    let mut term = 0;
+    while term < Term::ALL.len() {
+        assert!(
+            !matches!(Term::ALL[term].source(), Source::Gravity)
+                || 2 * (1 + Term::ALL[term].order() as i64) < STATION_STEPS,
+            "more steps for a drift of more g factors"
+        );
+        term += 1;
+    }
+};
 
 /// Most positions that a scheme may have.
 pub(crate) const MAX_POSITIONS: usize = 1000;
@@ -615,13 +625,10 @@ impl Scheme {
     }
 
     /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric polynomials of its
-    /// angle, of degree m = 1 + the largest number of factors (one for `C_c^n`, one for each component of g^c, f or the torqued rate), and
-    /// with torquer errors the angle itself: any 2m+1 different angles of the arc span what all of it spans, and one more does with
-    /// the angle. The end is added, where psi is handed on.
+    /// angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for each component of g^c): any
+    /// 2m+1 different angles of the arc span what all of it spans. The end is added, where psi is handed on.
     pub fn stations(&self) -> Vec<Station<'_>> {
-        let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0) as i64;
-        let last = 2 * degree + i64::from(self.unknowns.have(Source::Rate));
-        let steps = if last < STATION_STEPS - 1 { STATION_STEPS } else { last + SPARE_STEPS };
+        let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0);
         let mut out = Vec::with_capacity(self.positions.len());
         for (index, position) in self.positions.iter().enumerate() {
             let Some(r) = &position.rotation else {
@@ -629,8 +636,8 @@ impl Scheme {
                 continue;
             };
             let whole = r.angle.nanodeg();
-            let step = whole.clamp(-FULL_TURN, FULL_TURN) / steps;
-            let angles = (0..=last).map(|k| k * step).chain([whole]);
+            let step = whole.clamp(-FULL_TURN, FULL_TURN) / STATION_STEPS;
+            let angles = (0..=2 * degree as i64).map(|k| k * step).chain([whole]);
             out.extend(angles.map(|angle| Station {
                 position,
                 index,

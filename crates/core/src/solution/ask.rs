@@ -96,7 +96,7 @@ impl Solver<'_> {
                 };
                 let local = block.rows[..observed.locals()].iter().map(|row| entry(row));
                 let moving: Vec<String> = match *station {
-                    (position, Some(axis)) => drift_derivative(self.platform, &self.text_point, c, axis)
+                    (position, Some(axis)) => drift_derivative(self.platform, &Text, c, axis)
                         .iter()
                         .map(|row| {
                             let names: Vec<String> = (0..row.len()).map(|k| unknown(first_d + k)).collect();

@@ -29,9 +29,6 @@ pub(crate) enum FormulasError {
     /// Torquer errors have no symbols.
     #[error("no formulas of Z: those with torquer errors (GS, GM, GM3) are not written out")]
     Torquers,
-    /// What turning adds to Z' of accelerometers is not among them.
-    #[error("no formulas of Z: those with accelerometer errors of a platform that turns are not written out")]
-    Turning,
     /// Nobody derives them.
     #[error("formulas of Z need the symbolic engine")]
     NoEngine,
@@ -50,9 +47,6 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
         return Err(FormulasError::Torquers);
     }
     let observed = platform.observed();
-    if observed.accelerometers && platform.scheme().rotates() {
-        return Err(FormulasError::Turning);
-    }
     let locals = observed.locals();
     let zeros = solver.tables.zeros;
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
@@ -76,7 +70,7 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     let attitudes = text_point.attitudes.iter().zip(platform.scheme().stations());
     let slopes: Vec<Option<[Vec<String>; 3]>> = attitudes
         .map(|(c, station)| {
-            let rows = drift_derivative(platform, &text_point, c, station.turned?.axis);
+            let rows = drift_derivative(platform, &Text, c, station.turned?.axis);
             Some(rows.map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()))
         })
         .collect();

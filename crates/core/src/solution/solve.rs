@@ -12,7 +12,6 @@ use super::substitution::{Substitution, binomial};
 use super::support::short_support;
 use super::turning::attitude_derivative;
 use crate::degree::coefficient::{Coefficient, Form, Number, READABLE, Rates, power, readable};
-use crate::model::Source;
 use crate::model::platform::{AZIMUTH, Point};
 use crate::model::ring::Ring;
 
@@ -78,9 +77,6 @@ pub(crate) enum Unsolved {
     /// What a rotation adds could not be taken off.
     #[error("the motion of the platform is not in the span of its stations")]
     Motion,
-    /// The motion enters Z' where the accelerometers or torquers have errors.
-    #[error("what turning adds to Z' where accelerometers or torquers have errors is not taken off")]
-    Turning,
     /// A broken promise: the engine solves another system.
     #[error("its coefficients do not solve the system in the prime fields: please report this scheme")]
     Disagreement,
@@ -186,20 +182,12 @@ impl Solver<'_> {
         let targets: Vec<Vec<u64>> = functional.images.iter().map(scatter).collect();
         let first = self.tables.first();
         let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-        let mut allowed = self.tables.rows_up_to(degree);
-        let all = allowed.len();
-        let unknowns = &self.platform.scheme().unknowns;
-        if unknowns.have(Source::Rate) || unknowns.have(Source::Force) {
-            // what turning adds to Z' of these is in no row
-            let turning = |row: usize| self.stations[self.tables.station(row)].1.is_some();
-            allowed.retain(|&row| self.tables.order(row) == 0 || !turning(row));
-        }
-        let unspanned = if allowed.len() < all { Unsolved::Turning } else { Unsolved::NotSpanned };
+        let allowed = self.tables.rows_up_to(degree);
         // what is a row is solved by it
         let support = match allowed.iter().find(|&&j| first.rows[j] == targets[0]) {
             Some(&j) => vec![j],
             None => short_support(first.sample.roots.field, &first.rows, &allowed, &targets[0], cost)
-                .ok_or(unspanned)?,
+                .ok_or(Unsolved::NotSpanned)?,
         };
         let columns = self.platform.names().len();
         let solve = |problem: &Problem| -> Option<Vec<(Rates, Vec<u64>)>> {

@@ -70,7 +70,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
             }
             let Some(turned) = &station.turned else { continue };
             let c = &self.point.attitudes[term.station];
-            let slopes = drift_derivative(self.platform, self.point, c, turned.axis);
+            let slopes = drift_derivative(self.platform, ring, c, turned.axis);
             let first = out.len() - self.platform.coefficients();
             for (k, slot) in out[first..].iter_mut().enumerate() {
                 let entry = ring.dot((0..3).map(|i| (&row[LOCAL + i], &slopes[i][k])));

@@ -165,6 +165,20 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
     }
 
+    /// What a node is made of; of a state that moves its rate, of a function its argument.
+    fn operands(&self, i: usize, moving: bool) -> impl Iterator<Item = usize> {
+        let both = match self.dag.ops[i] {
+            Op::Number { .. } | Op::Pi => [None; 2],
+            Op::Slot(s) => match self.signals[s] {
+                Signal::State { rate } if moving => [Some(rate), None],
+                _ => [None; 2],
+            },
+            Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => [Some(a), Some(b)],
+            Op::Primitive { of, .. } => [Some(of), None],
+        };
+        both.into_iter().flatten()
+    }
+
     /// Marks what takes part. The derivative of a function of known constants is nowhere used: at the ends of its range it
     /// need not exist.
     fn need(&mut self, roots: &[usize], moving: bool) {
@@ -173,44 +187,17 @@ impl<'a, S: Values> Taylor<'a, S> {
             if std::mem::replace(&mut self.needed[i], true) {
                 continue;
             }
-            match self.dag.ops[i] {
-                Op::Number { .. } | Op::Pi => {}
-                Op::Slot(s) => {
-                    if let Signal::State { rate } = self.signals[s]
-                        && moving
-                    {
-                        left.push(rate);
-                    }
-                }
-                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
-                    left.extend([a, b]);
-                }
-                Op::Primitive { of, weight, .. } => {
-                    left.push(of);
-                    if !(self.constant[of] && self.known[of]) {
-                        left.push(weight);
-                    }
-                }
+            left.extend(self.operands(i, moving));
+            if let Op::Primitive { of, weight, .. } = self.dag.ops[i]
+                && !(self.constant[of] && self.known[of])
+            {
+                left.push(weight);
             }
         }
         left.extend(roots);
         while let Some(i) = left.pop() {
-            if std::mem::replace(&mut self.differentiated[i], true) {
-                continue;
-            }
-            match self.dag.ops[i] {
-                Op::Number { .. } | Op::Pi => {}
-                Op::Slot(s) => {
-                    if let Signal::State { rate } = self.signals[s]
-                        && moving
-                    {
-                        left.push(rate);
-                    }
-                }
-                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => {
-                    left.extend([a, b]);
-                }
-                Op::Primitive { of, .. } => left.push(of),
+            if !std::mem::replace(&mut self.differentiated[i], true) {
+                left.extend(self.operands(i, moving));
             }
         }
         for i in (0..self.dag.ops.len()).filter(|&i| self.differentiated[i]) {

@@ -406,6 +406,13 @@ impl<'a> Task<'a> {
         Ok(())
     }
 
+    /// The attitudes of a sequence, and the way through them where they are the candidates.
+    fn placed(&self, of: &Scored) -> (Vec<Euler>, Vec<Stop>) {
+        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
+        let path = of.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s });
+        (of.sequence.iter().map(attitude).collect(), path.collect())
+    }
+
     /// The best sequence with the total time divided among its positions, if that makes it better.
     pub(super) fn divided(
         &self,
@@ -413,10 +420,7 @@ impl<'a> Task<'a> {
         best: &Scored,
         going: &dyn Fn() -> bool,
     ) -> Result<Option<Found>, DesignError> {
-        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
-        let attitudes: Vec<Euler> = best.sequence.iter().map(attitude).collect();
-        let path: Vec<Stop> =
-            best.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s }).collect();
+        let (attitudes, path) = self.placed(best);
         let along = evaluator.along(&attitudes.iter().map(c_n_f64).collect::<Vec<_>>());
         let allowed = |there: &Evaluator| going() && self.constraints.keep(there, &path);
         let divided = divide::divide(&along, &path, &self.criterion, &allowed)?;
@@ -435,10 +439,7 @@ impl<'a> Task<'a> {
         best: &Scored,
         going: &dyn Fn() -> bool,
     ) -> Result<Option<Found>, DesignError> {
-        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
-        let start: Vec<Euler> = best.sequence.iter().map(attitude).collect();
-        let path: Vec<Stop> =
-            best.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s }).collect();
+        let (start, path) = self.placed(best);
         let c = &self.constraints;
         let allowed = |there: &Evaluator| going() && c.keep(there, &path);
         let refined = refine::refine(evaluator, &start, &path, &self.criterion, &self.base.gimbals, &allowed);

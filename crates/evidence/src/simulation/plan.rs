@@ -405,9 +405,9 @@ fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
     let (c, s) =
         scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
     let mut point = Point::in_floats(platform, W_IE * c, W_IE * s);
-    // turns that take time, and those of rotating segments, are integrated
-    for (station, turns) in scheme.stations().iter().zip(&mut point.turns) {
-        if station.continues || conditions.slew_rate(station.position).is_some() {
+    // turns that take time are integrated
+    for (position, turns) in scheme.positions.iter().zip(&mut point.turns) {
+        if conditions.slew_rate(position).is_some() {
             turns.clear();
         }
     }

@@ -1,19 +1,26 @@
 //! Any system calibrated from data: Gauss and Newton with the Jacobians of the model's own graph, from several starts.
 
+mod answer;
+mod data;
+
 use nalgebra::{DMatrix, DVector, RowDVector};
 use obsdeg_core::degree::Status;
-use obsdeg_core::system::{Compiled, KnownInput, ModelError, StateStart, SystemModel, judge_compiled};
+use obsdeg_core::system::{Compiled, ModelError, StateStart, SystemModel, judge_compiled};
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_band, chi_square_quantile, ljung_box};
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Measurement};
 use obsdeg_evidence::simulation::Noise;
 use obsdeg_evidence::system::{FilterState, Numeric};
-use schemars::JsonSchema;
-use serde::Serialize;
+
+pub use answer::{
+    OtherSolution, OutputFit, Profile, SystemCalibration, SystemCalibrationError, SystemEstimated,
+    SystemFinding, SystemResidual,
+};
 
 use crate::answer::CovarianceTable;
 use crate::least_squares::{Rows, Solution};
-use crate::record::{MOST, Record, RecordError, Row, Wanted};
+use crate::record::Record;
+use data::{Data, Read, read};
 
 /// Name and version of the JSON layout.
 const SCHEMA: &str = "obsdeg.system-calibration/1";
@@ -40,232 +47,6 @@ const SPREAD: f64 = 1.5;
 /// Fewest residuals of which a correlation is told.
 const FEWEST: usize = 40;
 
-/// A calibration of a system.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct SystemCalibration {
-    /// `obsdeg.system-calibration/1`.
-    pub schema: String,
-    /// Version of the program.
-    pub version: String,
-    /// The system.
-    pub name: String,
-    /// Whether model and noise explain the data; null where the noise was estimated from what is left, which then decides nothing.
-    pub consistent: Option<bool>,
-    /// What speaks against it.
-    pub findings: Vec<SystemFinding>,
-    /// States at the start of every experiment, parameters, and what is unknown of inputs.
-    pub unknowns: Vec<SystemEstimated>,
-    /// The combinations that the model asks for.
-    pub combinations: Vec<SystemEstimated>,
-    /// Of all unknowns that are determined.
-    pub covariance: CovarianceTable,
-    /// The sum of squares of all residuals, in sigma.
-    pub chi_square: f64,
-    /// Measurements minus what they determine.
-    pub degrees_of_freedom: usize,
-    /// Where chi-square per degree of freedom lies with a probability of 99.9 %.
-    pub band: (f64, f64),
-    /// The root of chi-square per degree of freedom.
-    pub factor: f64,
-    /// By output.
-    pub outputs: Vec<OutputFit>,
-    /// Other solutions that fit nearly as well, the best first: the values of the unknowns.
-    pub others: Vec<OtherSolution>,
-    /// Starts that were tried, and how many led to the solution.
-    pub starts: (usize, usize),
-    /// Profiles that were asked for.
-    pub profiles: Vec<Profile>,
-    /// Rows of the record.
-    pub rows: usize,
-    /// Columns that nothing was made of.
-    pub ignored: Vec<String>,
-    /// Steps of integration between two rows, at most.
-    pub substeps: usize,
-    /// Seed of starts and verdicts.
-    pub seed: u64,
-    /// Every measurement and what is left of it.
-    #[serde(skip)]
-    #[schemars(skip)]
-    pub residuals: Vec<SystemResidual>,
-}
-
-/// What speaks against model or noise.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case", tag = "kind")]
-pub enum SystemFinding {
-    /// No start settled.
-    NotSettled,
-    /// Chi-square is outside its band.
-    Noise {
-        /// Per degree of freedom.
-        chi_square: f64,
-        /// What sigmas are to be multiplied by.
-        factor: f64,
-    },
-    /// The residuals of an output are not independent of each other.
-    Correlated {
-        /// The output.
-        output: String,
-        /// Probability that independent ones are correlated so.
-        probability: f64,
-    },
-    /// A measurement is far off.
-    Outlier {
-        /// The output.
-        output: String,
-        /// Its line in the record.
-        line: u64,
-        /// By how much the others leave it off, in sigma as the fit has it.
-        sigmas: f64,
-    },
-}
-
-/// An unknown or a combination.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct SystemEstimated {
-    /// Its name.
-    pub name: String,
-    /// Its unit, as the file says.
-    pub unit: String,
-    /// The exact verdict; null for what is known.
-    pub status: Option<Status>,
-    /// The degree.
-    pub degree: Option<usize>,
-    /// Whether model and data determine it.
-    pub determined: bool,
-    /// The estimate.
-    pub estimate: Option<f64>,
-    /// Its standard deviation by the noise.
-    pub sigma: Option<f64>,
-    /// The same times the root of chi-square per degree of freedom, where that is above one.
-    pub sigma_rescaled: Option<f64>,
-}
-
-/// How well an output fits.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct OutputFit {
-    /// The output.
-    pub output: String,
-    /// Its measurements.
-    pub measurements: usize,
-    /// The noise of a measurement; null where every row has its own.
-    pub sigma: Option<f64>,
-    /// Whether it was estimated from what is left.
-    pub estimated: bool,
-    /// Chi-square per degree of freedom.
-    pub chi_square: f64,
-    /// Root of the mean square of what is left, in the unit of the output.
-    pub rms: f64,
-    /// Probability that independent residuals are correlated as these are; null for few.
-    pub whiteness_probability: Option<f64>,
-}
-
-/// Another solution.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct OtherSolution {
-    /// Its sum of squares.
-    pub chi_square: f64,
-    /// How many starts led there.
-    pub starts: usize,
-    /// Values of the unknowns, in their order.
-    pub values: Vec<f64>,
-}
-
-/// What the data say of one unknown when all others follow.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Profile {
-    /// The unknown.
-    pub name: String,
-    /// Its values, and by how much the sum of squares is larger there than at the solution.
-    pub points: Vec<(f64, f64)>,
-    /// Whether it is flat: no value changes the sum of squares by more than a hundredth of one.
-    pub flat: bool,
-}
-
-/// A measurement and what is left of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SystemResidual {
-    /// The output, from 0.
-    pub output: usize,
-    /// The experiment, from 0.
-    pub experiment: usize,
-    /// The line.
-    pub line: u64,
-    /// The time.
-    pub t: f64,
-    /// What was measured.
-    pub measured: f64,
-    /// Measurement minus estimate.
-    pub residual: f64,
-    /// Its sigma.
-    pub sigma: f64,
-    /// What the others leave of it, in sigma.
-    pub normalised: f64,
-}
-
-/// Why a system cannot be calibrated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SystemCalibrationError {
-    /// The model.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The record.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    /// Constraints or segments.
-    #[error("a model with {what} cannot be calibrated yet; expected one without")]
-    NotYet {
-        /// What it has.
-        what: &'static str,
-    },
-    /// Too many columns.
-    #[error("{found} columns are needed; expected at most {MOST}")]
-    TooMany {
-        /// How many.
-        found: usize,
-    },
-    /// Rows that the model cannot have.
-    #[error("{record}: line {line}, column `{column}`: found {found}, expected {expected}")]
-    Value {
-        /// The record.
-        record: String,
-        /// The line.
-        line: u64,
-        /// The column.
-        column: String,
-        /// What there is.
-        found: String,
-        /// What would do.
-        expected: String,
-    },
-    /// Less data than unknowns.
-    #[error("{found} measurements of {unknowns} unknowns that the model determines; expected more")]
-    TooFew {
-        /// Measurements.
-        found: usize,
-        /// Unknowns.
-        unknowns: usize,
-    },
-    /// Nowhere a number.
-    #[error(
-        "from none of {starts} starts does the model give numbers at all rows: {reason}; expected values under [simulation.values] near the solution"
-    )]
-    Nowhere {
-        /// How many were tried.
-        starts: usize,
-        /// What the first said.
-        reason: EkfError,
-    },
-    /// A profile of nothing.
-    #[error("no unknown is called `{found}`; expected one of {expected}")]
-    NoUnknown {
-        /// The name.
-        found: String,
-        /// Those that there are.
-        expected: String,
-    },
-}
-
 /// What is wanted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemOptions {
@@ -276,140 +57,6 @@ pub struct SystemOptions {
     /// Seed.
     pub seed: u64,
 }
-
-/// A row of the record.
-#[derive(Debug, Clone)]
-struct Data {
-    line: u64,
-    experiment: usize,
-    t: f64,
-    /// Values of inputs, and their standard deviations.
-    inputs: Vec<(f64, f64)>,
-    /// By output.
-    outputs: Vec<Option<f64>>,
-    /// By output, where the record says so.
-    sigmas: Vec<Option<f64>>,
-}
-
-/// The data of a model.
-struct Read {
-    rows: Vec<Data>,
-    /// Known inputs that are columns.
-    inputs: Vec<usize>,
-    ignored: Vec<String>,
-}
-
-/// Which wanted numbers of a row are what.
-struct Columns {
-    wanted: Vec<Wanted>,
-    inputs: Vec<(usize, Option<usize>)>,
-    outputs: Vec<(usize, Option<usize>)>,
-    label: Option<usize>,
-    ignored: Vec<String>,
-}
-
-impl Columns {
-    fn of(record: &Record, model: &SystemModel) -> Result<Self, SystemCalibrationError> {
-        let time = record.find("t").ok_or_else(|| record.missing("`t` (the time of the model)"))?;
-        // units of a model are its own
-        let mut wanted = vec![Wanted { column: time, scale: 1.0 }];
-        let mut want = |column: usize| {
-            wanted.push(Wanted { column, scale: 1.0 });
-            wanted.len() - 1
-        };
-        let mut inputs = Vec::new();
-        let mut given = Vec::new();
-        for (k, (named, kind)) in model.known_inputs.iter().enumerate() {
-            match (record.find(&named.name), kind) {
-                (None, KnownInput::Function(_)) => {}
-                (None, _) if model.simulation.inputs.contains_key(&named.name) => {}
-                (None, _) => return Err(record.missing(&format!("`{}` (a known input)", named.name)).into()),
-                (Some(_), KnownInput::Function(_)) => {
-                    let what = format!("the known input {}", named.name);
-                    let message =
-                        "a function of time in the model and a column of the record; expected one of them";
-                    return Err(ModelError { what, message: message.into(), span: None }.into());
-                }
-                (Some(column), _) => {
-                    given.push(k);
-                    inputs.push((want(column), record.find(&format!("sigma_{}", named.name)).map(&mut want)));
-                }
-            }
-        }
-        let mut outputs = Vec::new();
-        for (named, _) in &model.outputs {
-            let column = record.find(&named.name);
-            let column = column.ok_or_else(|| record.missing(&format!("`{}` (an output)", named.name)))?;
-            outputs.push((want(column), record.find(&format!("sigma_{}", named.name)).map(&mut want)));
-        }
-        let label = record.find("experiment");
-        if label.is_none() && model.experiments > 1 {
-            return Err(record.missing("`experiment` (1, 2, ...)").into());
-        }
-        let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
-        let columns = record.columns().iter().enumerate();
-        let ignored = columns.filter(|(i, _)| !used(*i)).map(|(_, c)| c.text.clone()).collect();
-        if wanted.len() > MOST {
-            return Err(SystemCalibrationError::TooMany { found: wanted.len() });
-        }
-        Ok(Self { wanted, inputs, outputs, label, ignored })
-    }
-}
-
-fn read(record: Record, model: &SystemModel) -> Result<Read, SystemCalibrationError> {
-    let columns = Columns::of(&record, model)?;
-    let inputs: Vec<usize> = (0..model.known_inputs.len())
-        .filter(|&k| record.find(&model.known_inputs[k].0.name).is_some())
-        .collect();
-    let (name, experiments) = (record.name().to_string(), model.experiments.max(1));
-    let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
-    let mut rows: Vec<Data> = Vec::new();
-    let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
-        let refuse = |column: &str, found: String, expected: &str| SystemCalibrationError::Value {
-            record: name.clone(),
-            line: row.line,
-            column: column.into(),
-            found,
-            expected: expected.into(),
-        };
-        let experiment = match columns.label {
-            None => 0,
-            Some(_) => {
-                let number = row.label.parse::<usize>().ok().filter(|e| (1..=experiments).contains(e));
-                let expected = format!("a number from 1 to {experiments}");
-                number.ok_or_else(|| refuse("experiment", format!("`{}`", row.label), &expected))? - 1
-            }
-        };
-        let t = row.numbers[0].unwrap_or(f64::NAN);
-        if t < 0.0 {
-            return Err(refuse(&texts[0], t.to_string(), "a time from 0, the start of the model, on"));
-        }
-        let value = |i: usize| row.numbers[i];
-        let sigma = |i: Option<usize>| -> Result<Option<f64>, SystemCalibrationError> {
-            match i.and_then(|i| Some((i, value(i)?))) {
-                Some((i, s)) if s <= 0.0 => {
-                    Err(refuse(&texts[i], s.to_string(), "a standard deviation above zero"))
-                }
-                found => Ok(found.map(|(_, s)| s)),
-            }
-        };
-        let mut of_inputs = Vec::new();
-        for &(i, s) in &columns.inputs {
-            let x =
-                value(i).ok_or_else(|| refuse(&texts[i], "nothing".into(), "the value of a known input"))?;
-            of_inputs.push((x, sigma(s)?.unwrap_or(0.0)));
-        }
-        let outputs = columns.outputs.iter().map(|&(i, _)| value(i)).collect();
-        let sigmas = columns.outputs.iter().map(|&(_, s)| sigma(s)).collect::<Result<_, _>>()?;
-        rows.push(Data { line: row.line, experiment, t, inputs: of_inputs, outputs, sigmas });
-        Ok(())
-    };
-    record.read(&columns.wanted, columns.label, true, take)?;
-    // each experiment in one piece
-    rows.sort_by_key(|r| r.experiment);
-    Ok(Read { rows, inputs, ignored: columns.ignored })
-}
-
 /// A model with its data.
 struct Problem<'a> {
     numeric: Numeric<'a>,

@@ -1,0 +1,236 @@
+//! What a calibration of a system says, and why there is none.
+
+use obsdeg_core::degree::Status;
+use obsdeg_core::system::ModelError;
+use obsdeg_ekf::EkfError;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::answer::CovarianceTable;
+use crate::record::{MOST, RecordError};
+
+/// A calibration of a system.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemCalibration {
+    /// `obsdeg.system-calibration/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The system.
+    pub name: String,
+    /// Whether model and noise explain the data; null where the noise was estimated from what is left, which then decides nothing.
+    pub consistent: Option<bool>,
+    /// What speaks against it.
+    pub findings: Vec<SystemFinding>,
+    /// States at the start of every experiment, parameters, and what is unknown of inputs.
+    pub unknowns: Vec<SystemEstimated>,
+    /// The combinations that the model asks for.
+    pub combinations: Vec<SystemEstimated>,
+    /// Of all unknowns that are determined.
+    pub covariance: CovarianceTable,
+    /// The sum of squares of all residuals, in sigma.
+    pub chi_square: f64,
+    /// Measurements minus what they determine.
+    pub degrees_of_freedom: usize,
+    /// Where chi-square per degree of freedom lies with a probability of 99.9 %.
+    pub band: (f64, f64),
+    /// The root of chi-square per degree of freedom.
+    pub factor: f64,
+    /// By output.
+    pub outputs: Vec<OutputFit>,
+    /// Other solutions that fit nearly as well, the best first: the values of the unknowns.
+    pub others: Vec<OtherSolution>,
+    /// Starts that were tried, and how many led to the solution.
+    pub starts: (usize, usize),
+    /// Profiles that were asked for.
+    pub profiles: Vec<Profile>,
+    /// Rows of the record.
+    pub rows: usize,
+    /// Columns that nothing was made of.
+    pub ignored: Vec<String>,
+    /// Steps of integration between two rows, at most.
+    pub substeps: usize,
+    /// Seed of starts and verdicts.
+    pub seed: u64,
+    /// Every measurement and what is left of it.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub residuals: Vec<SystemResidual>,
+}
+
+/// What speaks against model or noise.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum SystemFinding {
+    /// No start settled.
+    NotSettled,
+    /// Chi-square is outside its band.
+    Noise {
+        /// Per degree of freedom.
+        chi_square: f64,
+        /// What sigmas are to be multiplied by.
+        factor: f64,
+    },
+    /// The residuals of an output are not independent of each other.
+    Correlated {
+        /// The output.
+        output: String,
+        /// Probability that independent ones are correlated so.
+        probability: f64,
+    },
+    /// A measurement is far off.
+    Outlier {
+        /// The output.
+        output: String,
+        /// Its line in the record.
+        line: u64,
+        /// By how much the others leave it off, in sigma as the fit has it.
+        sigmas: f64,
+    },
+}
+
+/// An unknown or a combination.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SystemEstimated {
+    /// Its name.
+    pub name: String,
+    /// Its unit, as the file says.
+    pub unit: String,
+    /// The exact verdict; null for what is known.
+    pub status: Option<Status>,
+    /// The degree.
+    pub degree: Option<usize>,
+    /// Whether model and data determine it.
+    pub determined: bool,
+    /// The estimate.
+    pub estimate: Option<f64>,
+    /// Its standard deviation by the noise.
+    pub sigma: Option<f64>,
+    /// The same times the root of chi-square per degree of freedom, where that is above one.
+    pub sigma_rescaled: Option<f64>,
+}
+
+/// How well an output fits.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct OutputFit {
+    /// The output.
+    pub output: String,
+    /// Its measurements.
+    pub measurements: usize,
+    /// The noise of a measurement; null where every row has its own.
+    pub sigma: Option<f64>,
+    /// Whether it was estimated from what is left.
+    pub estimated: bool,
+    /// Chi-square per degree of freedom.
+    pub chi_square: f64,
+    /// Root of the mean square of what is left, in the unit of the output.
+    pub rms: f64,
+    /// Probability that independent residuals are correlated as these are; null for few.
+    pub whiteness_probability: Option<f64>,
+}
+
+/// Another solution.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct OtherSolution {
+    /// Its sum of squares.
+    pub chi_square: f64,
+    /// How many starts led there.
+    pub starts: usize,
+    /// Values of the unknowns, in their order.
+    pub values: Vec<f64>,
+}
+
+/// What the data say of one unknown when all others follow.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Profile {
+    /// The unknown.
+    pub name: String,
+    /// Its values, and by how much the sum of squares is larger there than at the solution.
+    pub points: Vec<(f64, f64)>,
+    /// Whether it is flat: no value changes the sum of squares by more than a hundredth of one.
+    pub flat: bool,
+}
+
+/// A measurement and what is left of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SystemResidual {
+    /// The output, from 0.
+    pub output: usize,
+    /// The experiment, from 0.
+    pub experiment: usize,
+    /// The line.
+    pub line: u64,
+    /// The time.
+    pub t: f64,
+    /// What was measured.
+    pub measured: f64,
+    /// Measurement minus estimate.
+    pub residual: f64,
+    /// Its sigma.
+    pub sigma: f64,
+    /// What the others leave of it, in sigma.
+    pub normalised: f64,
+}
+
+/// Why a system cannot be calibrated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SystemCalibrationError {
+    /// The model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The record.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// Constraints or segments.
+    #[error("a model with {what} cannot be calibrated yet; expected one without")]
+    NotYet {
+        /// What it has.
+        what: &'static str,
+    },
+    /// Too many columns.
+    #[error("{found} columns are needed; expected at most {MOST}")]
+    TooMany {
+        /// How many.
+        found: usize,
+    },
+    /// Rows that the model cannot have.
+    #[error("{record}: line {line}, column `{column}`: found {found}, expected {expected}")]
+    Value {
+        /// The record.
+        record: String,
+        /// The line.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What there is.
+        found: String,
+        /// What would do.
+        expected: String,
+    },
+    /// Less data than unknowns.
+    #[error("{found} measurements of {unknowns} unknowns that the model determines; expected more")]
+    TooFew {
+        /// Measurements.
+        found: usize,
+        /// Unknowns.
+        unknowns: usize,
+    },
+    /// Nowhere a number.
+    #[error(
+        "from none of {starts} starts does the model give numbers at all rows: {reason}; expected values under [simulation.values] near the solution"
+    )]
+    Nowhere {
+        /// How many were tried.
+        starts: usize,
+        /// What the first said.
+        reason: EkfError,
+    },
+    /// A profile of nothing.
+    #[error("no unknown is called `{found}`; expected one of {expected}")]
+    NoUnknown {
+        /// The name.
+        found: String,
+        /// Those that there are.
+        expected: String,
+    },
+}
