@@ -20,7 +20,9 @@ pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clo
 }
 
 /// Reads `NAME=X` with a number of a range.
-fn assigned(range: Range) -> impl Fn(&str) -> Result<Assignment, String> + Clone + Send + Sync + 'static {
+pub(crate) fn assigned(
+    range: Range,
+) -> impl Fn(&str) -> Result<Assignment, String> + Clone + Send + Sync + 'static {
     move |text| {
         let a: Assignment = text.parse().map_err(|e: AssignmentError| e.to_string())?;
         if range.admits(a.value) { Ok(a) } else { Err(format!("expected {range}")) }
@@ -140,7 +142,7 @@ pub(crate) struct ConditionArguments {
 }
 
 /// Refuses an assignment that concerns an unknown of none of the schemes: nothing would hear of it.
-fn concern_some<'a>(
+pub(crate) fn concern_some<'a>(
     option: &str,
     given: &[Assignment],
     schemes: impl Iterator<Item = &'a Scheme> + Clone,

@@ -4,18 +4,19 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
-use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
+use obsdeg_core::model::ranges::{PRIOR, SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
+use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Scheme, parse_decimal};
 use obsdeg_design::design::{
     Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions,
     design, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
-use obsdeg_evidence::simulation::Conditions;
+use obsdeg_evidence::simulation::{Conditions, general_first};
 use obsdeg_report::{File, design_figures, visible};
 
 use crate::arguments::{Assumptions, TermArguments, one_of};
-use crate::conditions::{MeasurementArguments, within};
+use crate::conditions::{MeasurementArguments, assigned, concern_some, within};
 use crate::failure::Failure;
 use crate::input::Source;
 use crate::interrupt;
@@ -132,6 +133,11 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     measurement: MeasurementArguments,
 
+    /// What is known of an unknown or family beforehand, as standard deviation in deg, deg/h, deg/h/g: D_F=0.1, psi=0.05. It counts in the
+    /// criterion, in sigmas and in the bound, not in what is observable; priors that a scheme file states count too (default: none; 1e-9 to 1e9)
+    #[arg(long, value_name = "NAME=X", help_heading = "Measurement", value_parser = assigned(PRIOR))]
+    prior: Vec<Assignment>,
+
     #[command(flatten)]
     output: Output,
 }
@@ -154,7 +160,7 @@ struct WantedArguments {
     criterion: CriterionName,
 
     /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
-    /// coefficients; by prediction: no prior, no drift noise, psi at the start (`simulate` the winner for the rest)
+    /// coefficients; by prediction: no prior but --prior, no drift noise, psi at the start (`simulate` the winner for the rest)
     #[arg(long)]
     meet: bool,
 
@@ -211,7 +217,9 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let any = std::array::from_fn(|_| obsdeg_core::model::Angle::from_degrees(0));
     let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
     a.measurement.concern(std::iter::once(&with_any))?;
+    concern_some("--prior", &a.prior, std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
+    conditions.priors.extend(general_first(a.prior.clone()));
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
     let round = parse_decimal(a.round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
     let round = round.ok_or_else(|| {
@@ -387,6 +395,8 @@ fn scheme_file(
     let what = if all { "all coefficients".into() } else { found.required.join(", ") };
     let search = found.search.as_ref();
     let unit = search.and_then(|s| s.unit.as_deref());
+    let prior = search.and_then(|s| s.prior.as_ref());
+    let prior = prior.map_or_else(|| "no prior".into(), |p| format!("prior {}", visible(p)));
     let reached = match (unit, best.worst_sigma_dph) {
         (Some("deg/h"), Some(sigma)) => format!("largest sigma of {what} {sigma:.3e} deg/h (per g)"),
         _ => {
@@ -396,7 +406,7 @@ fn scheme_file(
         }
     };
     Ok(format!(
-        "# {proven} of {} candidates: {reached} in {:.0} s, no prior, no drift noise, seed {}\n# {}\n{}",
+        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, no drift noise, seed {}\n# {}\n{}",
         found.candidates.len(),
         best.total_s,
         found.seed,

@@ -76,6 +76,8 @@ pub struct Margin {
 pub enum Basis {
     /// The information of all samples: no prior, no drift noise, psi at the start (under reset carry at the start of each position).
     Predicted,
+    /// The same with the priors that are stated.
+    PredictedWithPrior,
     /// The filter at the end of a run: with prior and drift noise, psi at the end.
     Run,
 }

@@ -251,7 +251,10 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         ),
     ];
     out.push(format!("weights: {}", weights(&c.weights)));
-    let Some(every) = &c.everywhere else { return out };
+    let Some(every) = &c.everywhere else {
+        out.push("of all attitudes: no bound was computed".into());
+        return out;
+    };
     out.push(format!(
         "of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}: {first} is within {} of that (attitudes \
          that add most are sought on a net; between its points what they add is bounded as a trigonometric polynomial, and a part of \
@@ -337,7 +340,10 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
             "noise of Z {:e} g per sample and axis{azimuth}; random drift: {}; prior: {}",
             c.accelerometer_noise_g,
             none(&s.drift_noise),
-            none(&s.prior)
+            s.prior.as_ref().map_or_else(
+                || "none".into(),
+                |p| format!("{p} (deg, deg/h, ... as stated; counted in sigmas and the bound, not in what is observable)")
+            )
         ),
         format!(
             "estimated together: psi and all coefficients of the terms {}; {}",
@@ -351,7 +357,13 @@ impl Answer for Design {
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         if let Some(s) = &self.search {
-            blocks.push(table(&format!("Best schemes ({})", words::PREDICTED), &self.found));
+            let sigmas = match s.prior {
+                Some(_) => {
+                    "sigma: information of all samples and the prior that is stated, no drift noise; psi at the start"
+                }
+                None => words::PREDICTED,
+            };
+            blocks.push(table(&format!("Best schemes ({sigmas})"), &self.found));
             let first = self.found.first().map(|f| requirements(&f.requirements));
             blocks.extend(first.map(|lines| Block::list("Requirements of the first", lines)));
             blocks.push(Block::list("How", how(self, s)));

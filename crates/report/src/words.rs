@@ -405,6 +405,9 @@ pub(crate) fn whose_margin(r: &Requirements) -> &'static str {
 pub(crate) fn basis(b: Basis) -> &'static str {
     match b {
         Basis::Predicted => "by prediction (no prior, no drift noise, psi at the start)",
+        Basis::PredictedWithPrior => {
+            "by prediction (the prior that is stated, no drift noise, psi at the start)"
+        }
         Basis::Run => "in the run (with prior and drift noise, psi at the end)",
     }
 }

@@ -1,6 +1,7 @@
 //! Bounds on the best of all schemes: against exhaustion with an information matrix written from the equations.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
+use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
 use obsdeg_design::design::{Candidates, Criterion, CriterionName, Design, DesignOptions, Evaluator, Limits};
 use obsdeg_evidence::simulation::Conditions;
@@ -66,6 +67,8 @@ struct Oracle {
     dwell: SMatrix<f64, 6, 6>,
     attitudes: Vec<Matrix3<f64>>,
     terms: String,
+    /// What is known beforehand of psi (platform axes, rad) and of every coefficient (deg/h): sigmas, infinite where nothing is.
+    prior: (f64, Vec<f64>),
     /// Of every candidate: the diagonal of the information where psi is known, the information where it is not; the
     /// covariance of psi where the coefficients are known, and how they move it.
     positions: Vec<Option<OfPosition>>,
@@ -82,7 +85,9 @@ impl Oracle {
         let mut l = DMatrix::zeros(6, 3 + m);
         l.view_mut((0, 0), (3, 3)).copy_from(c);
         l.view_mut((3, 3), (3, m)).copy_from(&drift(c, &self.terms));
-        l.transpose() * self.dwell * l
+        let mut out = l.transpose() * self.dwell * l;
+        (0..3).for_each(|k| out[(k, k)] += self.prior.0.powi(-2));
+        out
     }
 
     fn prepared(mut self) -> Self {
@@ -104,6 +109,10 @@ impl Oracle {
     fn covariance(&self, scheme: &[usize]) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let m = 3 * self.terms.len();
         let (mut information, mut whole) = (DMatrix::zeros(m, m), DVector::<f64>::zeros(m));
+        for (j, sigma) in self.prior.1.iter().enumerate() {
+            information[(j, j)] = sigma.powi(-2);
+            whole[j] = sigma.powi(-2);
+        }
         let mut of_psi = Vec::new();
         for &candidate in scheme {
             let (unreduced, reduced, own, by) = self.positions[candidate].as_ref()?;
@@ -224,7 +233,21 @@ fn no_scheme_of_tasks_is_below_the_bound(tasks: usize) {
                 .expect("terms"),
             ..Scheme::default()
         };
-        let conditions = Conditions { accelerometer_noise_g: noise, dwell_s: dwell, step_s: step, ..quiet() };
+        let mut conditions =
+            Conditions { accelerometer_noise_g: noise, dwell_s: dwell, step_s: step, ..quiet() };
+        // half of them with something known beforehand
+        let mut prior = (f64::INFINITY, vec![f64::INFINITY; m]);
+        let mut known = |name: String, sigma: f64| {
+            conditions.priors.push(Assignment { name, value: sigma });
+            sigma
+        };
+        if between(0.0, 1.0) < 0.25 {
+            prior.0 = known("psi".into(), 10f64.powf(between(-6.0, 0.0))).to_radians();
+        }
+        for (j, sigma) in prior.1.iter_mut().enumerate().filter(|_| task % 3 == 0) {
+            let name = format!("D_{}{}", &terms[j / 3..=j / 3], ["X", "Y", "Z"][j % 3]);
+            *sigma = known(name, 10f64.powf(between(-4.0, 3.0)));
+        }
         let euler = |d: &[f64; 3]| -> Euler { d.map(|x| Angle::from_nanodeg((x * 1e9) as i64)) };
         let attitudes: Vec<Euler> = degrees.iter().map(euler).collect();
         let evaluator = Evaluator::new(&base, &attitudes, &counting, &conditions).expect("an evaluator");
@@ -234,6 +257,7 @@ fn no_scheme_of_tasks_is_below_the_bound(tasks: usize) {
             dwell: of_a_dwell(latitude, dwell, step, noise),
             attitudes: degrees.iter().map(|d| attitude(*d)).collect(),
             terms: terms.into(),
+            prior,
             positions: Vec::new(),
         };
         let oracle = oracle.prepared();

@@ -6,6 +6,7 @@ mod command;
 mod divide;
 mod orders;
 mod parts;
+mod prior;
 mod search;
 mod sigmas;
 mod whole;

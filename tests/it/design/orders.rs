@@ -390,7 +390,12 @@ fn what_a_bound_leaves_out_is_not_missed() {
     let outcomes: Vec<(bool, u64)> = (0..400u64)
         .into_par_iter()
         .map(|seed| {
-            let t = task(seed);
+            let mut t = task(seed);
+            // a prior is in every prefix
+            let known =
+                [("D", 0.3), ("psi", 1e-3), ("psi_z", 1e-4)].map(|(name, value)| (name.to_string(), value));
+            let stated = known.into_iter().map(|(name, value)| Assignment { name, value });
+            t.conditions.priors.extend(stated.take(seed as usize % 4));
             let all = prepared(&t).0;
             let search = Search {
                 rows: &all.rows,

@@ -75,12 +75,13 @@ pub struct Minimum {
 pub struct SearchReport {
     /// The number of positions.
     pub positions: usize,
-    /// What every sigma rests on: the information of all samples on psi and all coefficients. Every position has the dwell, slews are about
-    /// the eigenaxis, Z is not used meanwhile.
+    /// What every sigma rests on: the information of all samples on psi and all coefficients, and the prior. Every position has the dwell, slews
+    /// are about the eigenaxis, Z is not used meanwhile.
     pub conditions: MeasurementReport,
     /// Random drift that sigmas allow for; null: none.
     pub drift_noise: Option<String>,
-    /// Knowledge beforehand that sigmas rest on; null: none.
+    /// Knowledge beforehand that sigmas and the bound count beside the samples: the priors that are stated; null: none. What is observable is
+    /// by the samples alone.
     pub prior: Option<String>,
     /// What makes a scheme better: worst, A, D, E or margin.
     pub criterion: String,
@@ -188,8 +189,8 @@ pub struct Found {
     pub total_s: f64,
     /// The criterion: a sigma in its unit, or for margin the largest sigma over its requirement, psi's too where it counts.
     pub value: f64,
-    /// The largest sigma of a required drift coefficient in deg/h (per g): information of all samples, no prior, no drift noise; null when none is
-    /// required.
+    /// The largest sigma of a required drift coefficient in deg/h (per g): information of all samples, prior if one is stated, no drift noise; null when
+    /// none is required.
     pub worst_sigma_dph: Option<f64>,
     /// The coefficient that has it.
     pub worst: Option<String>,

@@ -8,7 +8,9 @@ use obsdeg_core::model::{
     local_dynamics, local_output,
 };
 use obsdeg_ekf::integrate::van_loan;
-use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, latitude_of, si_per_shown, steps};
+use obsdeg_evidence::simulation::{
+    Conditions, PRIOR, Plan, SimulationError, is_rate, latitude_of, resolve, si_per_shown, steps,
+};
 
 use super::DesignError;
 use super::ways::{Stop, Way};
@@ -42,6 +44,15 @@ pub(super) struct Dwelling {
     phi: [[f64; PSI_EPS]; 3],
 }
 
+/// What is known beforehand: information, zero where nothing is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Prior {
+    /// On psi in platform axes at the start, under reset carry of every position, in 1/rad^2.
+    pub(super) psi: [f64; 3],
+    /// On the coefficients, in the order and the units of the evaluator (shape d).
+    pub(super) coefficients: Vec<f64>,
+}
+
 /// What every evaluation shares.
 #[derive(Debug, Clone)]
 pub struct Evaluator {
@@ -64,6 +75,7 @@ pub struct Evaluator {
     pub(super) candidates: Vec<Candidate>,
     /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
     pub(super) ways: Vec<Way>,
+    pub(super) prior: Prior,
     /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its coefficient.
     pub(super) dph: f64,
 }
@@ -82,8 +94,8 @@ pub struct State {
 }
 
 impl Evaluator {
-    /// The evaluator for positions of `dwell_s` each, without drift noise. `required` are the coefficients that count
-    /// (indices among the coefficients); the others are estimated with them.
+    /// The evaluator for positions of `dwell_s` each, without drift noise; of priors those count that are stated. `required` are the
+    /// coefficients that count (indices among the coefficients); the others are estimated with them.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -128,7 +140,9 @@ impl Evaluator {
         let order: Vec<usize> = (0..d).filter(|c| !counts(c)).chain((0..d).filter(|c| counts(c))).collect();
         let locals = platform.observed().locals();
         let units = platform.units()[platform.units().len() - d..].to_vec();
+        let prior = Prior::of(&platform, conditions, &order)?;
         let empty = Self {
+            prior,
             platform,
             conditions: conditions.clone(),
             nuisance: d - required.len(),
@@ -268,6 +282,7 @@ impl Evaluator {
                 }
             }
         }
+        self.prior.psi.iter().enumerate().for_each(|(k, p)| own[k][k] += p);
         eliminate(&mut own, n, 3);
         own[..n]
             .iter()
@@ -276,12 +291,14 @@ impl Evaluator {
             .collect()
     }
 
-    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi eliminated.
+    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi eliminated, whose prior is
+    /// the same about every axis.
     pub(super) fn information_of_effects(&self) -> [[f64; LOCAL - 3]; LOCAL - 3] {
         let mut all = [[0.0; MAX]; MAX];
         for (row, local) in all.iter_mut().zip(&self.dwells[0].local) {
             row[..LOCAL].copy_from_slice(local);
         }
+        self.prior.psi.iter().enumerate().for_each(|(k, p)| all[k][k] += p);
         eliminate(&mut all, LOCAL, 3);
         std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
     }
@@ -311,15 +328,28 @@ impl Evaluator {
         rows.map(|row| self.order.iter().zip(&self.scale).map(|(&c, scale)| row[c] * scale).collect())
     }
 
-    /// Nothing yet.
+    /// The same where nothing is known beforehand.
+    pub(super) fn without_prior(&self) -> Self {
+        let prior = Prior { psi: [0.0; 3], coefficients: vec![0.0; self.n - 3] };
+        let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
+        let mut out = Self { prior, ..self.clone() };
+        out.stand_at(&attitudes);
+        out.ways.clone_from(&self.ways);
+        out
+    }
+
+    /// Nothing but what is known beforehand.
     pub fn start(&self) -> State {
-        let unit = |r: usize| (0..self.n).map(|c| f64::from(u8::from(c == r))).collect();
-        State {
-            information: vec![0.0; self.n * self.n],
-            psi: std::array::from_fn(unit),
-            path: Vec::new(),
-            seconds: 0.0,
+        let n = self.n;
+        let unit = |r: usize| (0..n).map(|c| f64::from(u8::from(c == r))).collect();
+        let mut information = vec![0.0; n * n];
+        let mut known = |i: usize, p: f64| information[i * n + i] = p;
+        self.prior.coefficients.iter().enumerate().for_each(|(j, &p)| known(3 + j, p));
+        // of platform axes; psi^n is known by the first position, and that of reset carry by every one
+        if self.carry() == Carry::Platform {
+            self.prior.psi.iter().enumerate().for_each(|(k, &p)| known(k, p));
         }
+        State { information, psi: std::array::from_fn(unit), path: Vec::new(), seconds: 0.0 }
     }
 
     /// Whether the order of positions makes a difference.
@@ -391,6 +421,13 @@ impl Evaluator {
         // L^T (G L)
         let weighted = self.weighted(&local, dwelling);
         out.information.copy_from_slice(&state.information);
+        if carry == Carry::Inertial && state.path.is_empty() {
+            // psi^c = C^T psi^n
+            for (i, j) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)] {
+                let known = self.prior.psi.iter().enumerate().map(|(k, p)| c[i][k] * p * c[j][k]);
+                out.information[i * n + j] += known.sum::<f64>();
+            }
+        }
         for i in 0..n {
             let row = &mut out.information[i * n..=i * n + i];
             for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
@@ -417,6 +454,29 @@ impl Evaluator {
                 _ => row.copy_from_slice(&after[k][..n]),
             }
         }
+    }
+}
+
+impl Prior {
+    /// What `conditions` state of the unknowns of `platform`; coefficients in this order.
+    fn of(platform: &Platform, conditions: &Conditions, order: &[usize]) -> Result<Self, DesignError> {
+        let sigmas = resolve(PRIOR, platform, conditions.stated_priors(), f64::INFINITY)?;
+        let scaled = |(sigma, unit): (&f64, &&str)| match is_rate(unit) {
+            true => sigma * conditions.drift_scale,
+            false => *sigma,
+        };
+        let sigmas: Vec<f64> = sigmas.iter().zip(platform.units()).map(scaled).collect();
+        let information = |sigma: f64, unit: &str| (sigma * si_per_shown(unit)).powi(-2);
+        let first = sigmas.len() - platform.coefficients();
+        Ok(Self {
+            psi: std::array::from_fn(|k| information(sigmas[k], "rad")),
+            coefficients: order.iter().map(|&c| information(sigmas[first + c], "deg/h")).collect(),
+        })
+    }
+
+    /// Whether psi is known as well about every axis.
+    pub(super) fn is_alike(&self) -> bool {
+        self.psi.iter().all(|p| *p == self.psi[0])
     }
 }
 

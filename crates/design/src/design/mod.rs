@@ -122,9 +122,11 @@ pub enum DesignError {
     },
     /// Positions are what is searched for.
     #[error(
-        "the requirement for `{found}` is that of one position; expected psi, psi_x, psi_y or psi_z, for every position"
+        "the {what} for `{found}` is that of one position; expected psi, psi_x, psi_y or psi_z, for every position"
     )]
     OnePosition {
+        /// A requirement or a prior.
+        what: &'static str,
         /// The name found.
         found: String,
     },
@@ -493,6 +495,9 @@ fn freely(
     }
     let prepared = Prepared::new(base, conditions, options, going)?;
     prepared.check(k)?;
+    if !prepared.evaluator.prior.is_alike() {
+        return Err(wrong("priors of psi that differ by axis".into()));
+    }
     let found = prepared.evaluator.everywhere(&prepared.task.criterion, k, going);
     let found = found.ok_or(DesignError::Interrupted)?;
     let rounded =
@@ -624,7 +629,7 @@ fn answered(
             positions: k,
             conditions: MeasurementReport::new(base, conditions),
             drift_noise: None,
-            prior: None,
+            prior: prior_in_words(conditions),
             criterion: task.criterion.name().into(),
             unit: task.unit().ok().flatten().map(Into::into),
             examined: best.examined,
@@ -640,6 +645,17 @@ fn answered(
         });
         Ok(out)
     })
+}
+
+/// `psi 0.05 deg, D_F 20`: the priors that are stated, later ones over earlier ones.
+fn prior_in_words(conditions: &Conditions) -> Option<String> {
+    let stated = conditions.stated_priors();
+    let scale = match conditions.drift_scale {
+        1.0 => String::new(),
+        factor => format!(", those of drifts times {factor}"),
+    };
+    let listed: Vec<String> = stated.iter().map(|a| format!("{} {}", a.name, a.value)).collect();
+    (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
 }
 
 /// `2, 5`: at most twenty numbers.

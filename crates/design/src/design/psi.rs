@@ -52,7 +52,7 @@ impl Evaluator {
         })
     }
 
-    /// The variance in rad^2 of component `k` of a position's own psi where the coefficients are known, and by which
+    /// The variance in rad^2 of component `k` of a position's own psi, prior included, where the coefficients are known, and by which
     /// functional of the coefficients it is off where they are not (in the order of the evaluator); `None` where it is
     /// not determined.
     pub(super) fn psi_by_coefficients(&self, candidate: usize, k: usize) -> Option<(f64, Vec<f64>)> {
@@ -62,7 +62,8 @@ impl Evaluator {
         let local = |i: usize, j: usize| dwelling.local[i][j];
         // information on psi^c, and between psi^c and the coefficients
         let weighted = |k: usize, j: usize| (0..3).map(|r| c[r][k] * local(r, j)).sum::<f64>();
-        let own = |i: usize, k: usize| (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();
+        let prior = |i: usize, k: usize| if i == k { self.prior.psi[k] } else { 0.0 };
+        let own = |i: usize, k: usize| prior(i, k) + (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();
         let cross = |i: usize, d: usize| {
             let of = |(r, row): (usize, &Vec<f64>)| row.get(d).map_or(0.0, |x| weighted(i, 3 + r) * x);
             effects.iter().enumerate().map(of).sum::<f64>()

@@ -109,13 +109,15 @@ impl<'a> Screen<'a> {
             return None;
         }
         let (n, count) = (evaluator.n, evaluator.candidates.len());
-        let (start, mut one, mut two) = (evaluator.start(), evaluator.start(), evaluator.start());
+        // what is known beforehand is in the prefix
+        let bare = evaluator.without_prior();
+        let (start, mut one, mut two) = (bare.start(), bare.start(), bare.start());
         let mut mean = vec![0.0; n * n];
         let mut alone = Vec::with_capacity(count);
         for first in 0..count {
-            evaluator.extend(&start, first.into(), &mut one);
+            bare.extend(&start, first.into(), &mut one);
             for second in 0..count {
-                evaluator.extend(&one, second.into(), &mut two);
+                bare.extend(&one, second.into(), &mut two);
                 mean.iter_mut().zip(&two.information).for_each(|(sum, x)| *sum += x);
             }
             alone.push(one.clone());
@@ -460,6 +462,7 @@ mod tests {
     use super::*;
     use crate::design::criterion::Limits;
     use crate::design::{Candidates, State};
+    use obsdeg_core::model::settings::Assignment;
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;
 
@@ -480,12 +483,17 @@ mod tests {
                 ..Scheme::default()
             };
             let d = 3 * terms.split(',').count();
-            let conditions = Conditions {
+            let mut conditions = Conditions {
                 dwell_s: [50.0, 1000.0, 4000.0][below(3)],
                 step_s: 50.0,
                 accelerometer_noise_g: [1e-7, 1e-5, 1e-3][below(3)],
                 ..Conditions::default()
             };
+            if task % 3 == 0 {
+                let known = [("D", [0.01, 1.0][below(2)]), ("psi", 1e-3), ("psi_y", 1e-5)];
+                let stated = known.map(|(name, value)| Assignment { name: name.into(), value });
+                conditions.priors.extend(stated.into_iter().take(1 + below(3)));
+            }
             let cardinals = Candidates::cardinals().attitudes;
             let cardinal = below(2) == 0;
             let candidates: Vec<Euler> = (0..3 + below(5))

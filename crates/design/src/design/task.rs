@@ -5,7 +5,7 @@ use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::{Carry, Euler, Path, Platform, Scheme, Unknowns, c_n_f64};
 use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
-use obsdeg_evidence::simulation::{Conditions, latitude_of, resolve};
+use obsdeg_evidence::simulation::{Conditions, PRIOR, latitude_of, resolve};
 use rayon::prelude::*;
 
 use super::answer::{Found, HalfTurn, Minimum};
@@ -41,6 +41,8 @@ pub(super) struct Task<'a> {
     limits: Limits,
     /// Whether the requirements are those of the program.
     by_default: bool,
+    /// Whether priors are stated.
+    has_prior: bool,
     pub(super) rows: Rows,
     pub(super) symmetry: Symmetry,
     /// Whether repositioning takes time.
@@ -103,9 +105,14 @@ impl<'a> Task<'a> {
                 }
             }
         }
-        if let Some(of_one) = conditions.requirements.iter().find(|r| r.name.contains('@')) {
-            return Err(DesignError::OnePosition { found: of_one.name.clone() });
+        for (what, list) in
+            [("requirement", &conditions.requirements[..]), ("prior", conditions.stated_priors())]
+        {
+            if let Some(of_one) = list.iter().find(|a| a.name.contains('@')) {
+                return Err(DesignError::OnePosition { what, found: of_one.name.clone() });
+            }
         }
+        let priors = resolve(PRIOR, &platform, conditions.stated_priors(), f64::INFINITY)?;
         let all_requirements = resolve("required sigma", &platform, &conditions.requirements, f64::NAN)?;
         let requirements: Vec<f64> = required.iter().map(|c| all_requirements[first + c.1]).collect();
         // with some coefficients asked for, psi is not
@@ -138,9 +145,10 @@ impl<'a> Task<'a> {
         let place = |c: usize| required.iter().position(|r| r.1 == c);
         let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
         // a turn of the platform axes renames psi as well
-        let turned = !uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]);
+        let turned = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
+            && priors[..3].iter().all(|p| *p == priors[0]);
         let same = |i: usize, j: usize| match (place(i), place(j)) {
-            _ if !turned && i != j => false,
+            _ if (!turned || priors[first + i] != priors[first + j]) && i != j => false,
             (None, None) => true,
             (Some(i), Some(j)) => {
                 caps[i] == caps[j] && (!uses_requirements || requirements[i] == requirements[j])
@@ -170,6 +178,7 @@ impl<'a> Task<'a> {
             constraints,
             limits,
             by_default,
+            has_prior: !conditions.stated_priors().is_empty(),
             rows,
             symmetry,
             slews: conditions.slew_rate_deg_s.is_some(),
@@ -347,7 +356,8 @@ impl<'a> Task<'a> {
             required: limit(*required),
             sigma: if determined(first + c) { Ok(*sigma) } else { Err(Miss::NotObservable) },
         });
-        let requirements = Requirements::of(Basis::Predicted, psi.chain(coefficients), self.by_default);
+        let basis = if self.has_prior { Basis::PredictedWithPrior } else { Basis::Predicted };
+        let requirements = Requirements::of(basis, psi.chain(coefficients), self.by_default);
         if self.options.meet && !requirements.all_met() {
             return Ok(None);
         }

@@ -1,6 +1,8 @@
 //! A scheme that was found, as a scheme.
 
-use obsdeg_core::model::settings::Settings;
+use std::collections::BTreeMap;
+
+use obsdeg_core::model::settings::{Settings, concerns};
 use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, parse_attitude};
 use obsdeg_evidence::simulation::{Conditions, latitude_of};
 
@@ -28,6 +30,12 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             p.slew = Some(half_turn(&turn.about));
         }
     }
+    let mut priors = BTreeMap::new();
+    for a in conditions.stated_priors() {
+        // in a file what is of one unknown counts before what is of its family, whichever comes first
+        priors.retain(|name: &String, _| !concerns(&a.name, name));
+        priors.insert(a.name.clone(), a.value);
+    }
     // the defaults come first
     let given = conditions.requirements.iter().skip(Conditions::default().requirements.len());
     Ok(Scheme {
@@ -41,6 +49,7 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             dwell_s: None,
             slew_rate_deg_s: conditions.slew_rate_deg_s,
             accelerometer_noise_g: Some(conditions.accelerometer_noise_g),
+            priors,
             azimuth_noise_deg: base.measured_azimuth.then_some(conditions.azimuth_noise_deg),
             ..base.simulation.clone()
         },

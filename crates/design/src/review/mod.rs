@@ -249,6 +249,8 @@ fn alternatives(
     seed: u64,
 ) -> Alternatives {
     let mut out = Alternatives::default();
+    // beside predictions without prior
+    let conditions = &Conditions { priors: Conditions::default().priors, ..conditions.clone() };
     let mut refused = Vec::new();
     let seen: Vec<String> = (analysis.quantities.iter())
         .filter(|q| q.status == Status::Observable && q.name.starts_with("D_"))

@@ -171,6 +171,11 @@ impl Conditions {
         self.requirements == Self::default().requirements
     }
 
+    /// The priors that a file or an option states: all but those of the program.
+    pub fn stated_priors(&self) -> &[Assignment] {
+        self.priors.strip_prefix(&Self::default().priors[..]).unwrap_or(&self.priors)
+    }
+
     /// The rate in deg/s at which a position is reached; `None`: at once.
     pub fn slew_rate(&self, position: &Position) -> Option<f64> {
         let own = position.slew.as_ref().and_then(|s| s.rate_deg_s);
@@ -252,7 +257,7 @@ pub(crate) const TRUE_VALUE: &str = "true value";
 /// An initial estimate in words.
 pub(crate) const ESTIMATE: &str = "initial estimate";
 /// A prior standard deviation in words.
-pub(crate) const PRIOR: &str = "prior sigma";
+pub const PRIOR: &str = "prior sigma";
 /// A requirement in words.
 pub(crate) const REQUIRED: &str = "required sigma";
 
@@ -299,7 +304,7 @@ pub fn shown_unit(unit: &str) -> &str {
 }
 
 /// Whether an unknown of this unit is a rate.
-pub(crate) fn is_rate(unit: &str) -> bool {
+pub fn is_rate(unit: &str) -> bool {
     unit.starts_with("deg/h")
 }
 

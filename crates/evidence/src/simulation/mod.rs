@@ -17,7 +17,9 @@ pub(crate) mod truth;
 
 pub use answer::*;
 pub use batch::{Batch, batch, diffuse_prior};
-pub use conditions::{Conditions, general_first, latitude_of, resolve, shown_unit, si_per_shown};
+pub use conditions::{
+    Conditions, PRIOR, general_first, is_rate, latitude_of, resolve, shown_unit, si_per_shown,
+};
 pub use consistency::{Consistency, Doubt};
 pub use extended::{Ended, Extended, PlatformMotion};
 pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_without_prior};
@@ -36,7 +38,7 @@ use obsdeg_ekf::EkfError;
 
 use crate::prediction::{Prediction, PredictionError};
 use crate::requirements::{Basis, Claim, Requirements, meets};
-use conditions::{REQUIRED, is_rate};
+use conditions::REQUIRED;
 use consistency::Outcomes;
 
 /// Why a scheme cannot be simulated.

@@ -42,14 +42,15 @@ pub struct Everywhere {
 
 impl Evaluator {
     /// What no scheme of `k` attitudes is below, requirements on psi left out, and the attitudes that weights for it
-    /// need; the candidates are where the search for them begins. `None` as for [`Self::bound`].
+    /// need; the candidates are where the search for them begins. `None` as for [`Self::bound`], and where psi
+    /// is known beforehand about one axis better than about another: `d` is no polynomial then.
     pub fn everywhere(
         &self,
         criterion: &Criterion,
         k: usize,
         going: &dyn Fn() -> bool,
     ) -> Option<Everywhere> {
-        if self.carry() != Carry::Reset || k == 0 {
+        if self.carry() != Carry::Reset || k == 0 || !self.prior.is_alike() {
             return None;
         }
         let aim = match criterion {

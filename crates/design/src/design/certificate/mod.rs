@@ -123,11 +123,15 @@ impl Evaluator {
     fn additive(&self, aim: Aim, k: usize) -> Additive {
         let (n, m) = (self.n, self.n - 3);
         let unit = k as f64 * self.dph * self.dph;
+        let known = |i: usize, j: usize| match i == j {
+            true => self.prior.coefficients[i] * self.dph * self.dph,
+            false => 0.0,
+        };
         let information =
             |own: &Vec<f64>| DMatrix::from_fn(m, m, |i, j| unit * own[(3 + i.max(j)) * n + 3 + i.min(j)]);
         Additive {
             candidates: self.candidates.iter().map(|c| information(&c.own)).collect(),
-            prior: DMatrix::zeros(m, m),
+            prior: DMatrix::from_fn(m, m, known),
             nuisance: self.nuisance,
             aim,
         }
