@@ -45,6 +45,15 @@ pub(crate) struct MeasurementArguments {
     #[arg(long, value_name = "G", value_parser = within(ranges::NOISE_G))]
     noise: Option<f64>,
 
+    /// Bias instability of the accelerometers in ug: B, a first-order Gauss-Markov process of each that goes on from position to position, as
+    /// --bias-instability of gyros (default: none; 1e-9 to 1e9 ug)
+    #[arg(long, value_name = "B", value_parser = within(ranges::INSTABILITY_UG))]
+    accelerometer_instability: Option<f64>,
+
+    /// Its correlation time, in s (default: 3600; 1 to 1e9 s)
+    #[arg(long, value_name = "S", value_parser = within(ranges::CORRELATION_S))]
+    accelerometer_correlation_time: Option<f64>,
+
     /// Noise of a measured azimuth per sample, in deg (default: 0.001; 1e-12 to 1000 deg)
     #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
     azimuth_noise: Option<f64>,
@@ -182,6 +191,8 @@ impl MeasurementArguments {
             step_s: self.step,
             dwell_s: self.dwell,
             accelerometer_noise_g: self.noise,
+            accelerometer_bias_instability_ug: self.accelerometer_instability,
+            accelerometer_correlation_time_s: self.accelerometer_correlation_time,
             azimuth_noise_deg: self.azimuth_noise,
             ..Settings::default()
         });

@@ -107,7 +107,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "angle-random-walk" | "rate-random-walk" | "bias-instability" => {
             &["0.001", "0.01,0,0.02", "0", "1,2", "1e-300", "-1", "x"]
         }
-        "correlation-time" => &["600", "1e9", "1", "0", "nan"],
+        "accelerometer-instability" => &["5", "1e-9", "1e9", "1e-300", "0", "-1", "nan"],
+        "correlation-time" | "accelerometer-correlation-time" => &["600", "1e9", "1", "0", "nan"],
         "propagation" => &["exponential", "rk4", "euler"],
         "value" | "estimate" => {
             &["D_FX=11", "psi=0.1", "D=1e200", "D=1e-300", "psi=-1e6", "D_F=nan", "D_QX=1"]

@@ -162,6 +162,8 @@ fn schema_and_reader_agree() {
         "[simulation]\ndwell_s = 1e7",
         "[simulation]\nslew_rate_deg_s = -1",
         "[simulation]\naccelerometer_noise_g = 1e-30",
+        "[simulation]\naccelerometer_bias_instability_ug = 0",
+        "[simulation]\naccelerometer_correlation_time_s = 0.1",
         "[simulation]\nazimuth_noise_deg = 1e4",
         "[simulation]\ndrift_scale = 0",
         "[simulation]\nangle_random_walk_deg_sqrt_h = -1",
@@ -196,7 +198,7 @@ combinations = [\"D_IX - D_IY\"]
 geometry = {{ X = {{ I = \"+x\", O = \"-z\", S = \"+y\" }}, Y = {{ I = \"+y\", O = \"-z\", S = \"-x\" }}, Z = {{ I = \"+z\", O = \"+x\", S = \"+y\" }}, accelerometers = {{ X = \"+x\", Y = \"+y\", Z = \"+z\" }} }}
 {position}name = \"a\"\ndwell_s = 5\nrotation = {{ about = \"N\", rate_deg_s = 1 }}
 [[position]]\nattitude = \"NUE\"\nslew = {{ rate_deg_s = 1, about = \"X_p\", angle_deg = 90 }}
-[simulation]\ntruth = \"exact\"\nfilter = \"extended\"\nstep_s = 1\ndwell_s = 2\nslew_rate_deg_s = 3\naccelerometer_noise_g = 1e-5\nazimuth_noise_deg = 1
+[simulation]\ntruth = \"exact\"\nfilter = \"extended\"\nstep_s = 1\ndwell_s = 2\nslew_rate_deg_s = 3\naccelerometer_noise_g = 1e-5\naccelerometer_bias_instability_ug = 1\naccelerometer_correlation_time_s = 60\nazimuth_noise_deg = 1
 drift_noise = \"0.1 deg/sqrt(h)\"\nangle_random_walk_deg_sqrt_h = 0.001\nrate_random_walk_dph_sqrt_h = [0.1, 0, 0.1]
 bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift_scale = 2\nvalues = {{ D = 1 }}\nestimates = {{ D = 1 }}\npriors = {{ D = 1 }}
 [requirements]\npsi = 1\n[gimbals]\nalpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"

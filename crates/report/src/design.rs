@@ -1,5 +1,6 @@
 //! Schemes that were found.
 
+use obsdeg_core::model::Carry;
 use obsdeg_design::design::{Certificate, Design, Found, SearchReport, Weight};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
@@ -168,7 +169,9 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         ),
     }));
     out.push(
-        if s.order_matters {
+        if s.order_matters && d.carry == Carry::Reset {
+            "orders of the same positions are different schemes: the noise of Z is correlated from one to the next; a position may be repeated"
+        } else if s.order_matters {
             "orders of the same positions are different schemes: the dwell lets psi move in between; a position may be repeated"
         } else {
             "the order of positions does not matter under reset carry; a position may be repeated"
@@ -224,6 +227,11 @@ pub(crate) fn percent(x: f64) -> String {
 fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     let Some(c) = &s.certificate else {
         let why = match s.order_matters {
+            _ if s.conditions.accelerometer_bias.is_some() => {
+                "not known: the noise of Z is correlated from position to position, so the information of a scheme is no sum over its positions, and \
+                 no bound is computed"
+                    .into()
+            }
             true => format!(
                 "not known: under {} carry the information of a scheme is no sum over its positions, and no bound is computed",
                 d.carry
@@ -330,6 +338,8 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
         |r| format!("slews at {r} deg/s about the eigenaxis, Z not used meanwhile"),
     );
     let azimuth = c.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
+    let bias = c.accelerometer_bias.as_ref();
+    let bias = bias.map_or_else(String::new, |b| format!(", {}, counted", words::accelerometer_bias(b)));
     let none = |what: &Option<String>| what.clone().unwrap_or_else(|| "none".into());
     vec![
         format!(
@@ -337,7 +347,7 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
             c.dwell_s, c.step_s
         ),
         format!(
-            "noise of Z {:e} g per sample and axis{azimuth}; random drift: {}; prior: {}",
+            "noise of Z {:e} g per sample and axis{azimuth}{bias}; random drift: {}; prior: {}",
             c.accelerometer_noise_g,
             none(&s.drift_noise),
             s.prior.as_ref().map_or_else(

@@ -53,6 +53,8 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
         out.push(format!("true drifts and their priors times {}", c.drift_scale));
     }
     out.extend(c.gyro_noise.as_ref().map(words::gyro_noise));
+    let accelerometers = |b| format!("{}: states of filter and truth", words::accelerometer_bias(b));
+    out.extend(c.accelerometer_bias.as_ref().map(accelerometers));
     out.extend(warning(c));
     out
 }

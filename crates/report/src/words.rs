@@ -9,8 +9,8 @@ use obsdeg_core::model::{Carry, Geometry, Source, Term, Unknowns};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
 use obsdeg_evidence::simulation::{
-    CoefficientFloor, Consistency, Doubt, GyroNoise, MeasurementReport, NoiseFloor, Outcome, Reached,
-    SimulationError,
+    AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, MeasurementReport, NoiseFloor,
+    Outcome, Reached, SimulationError,
 };
 
 use crate::document::{number, optional};
@@ -527,7 +527,7 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
             )
         },
     );
-    vec![
+    let mut out = vec![
         PREDICTED.into(),
         format!(
             "noise of Z {:e} g per sample and axis{azimuth}; steps of at most {} s, a sample after each",
@@ -535,7 +535,20 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         ),
         format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
         format!("latitude {} deg{by}", m.latitude_deg),
-    ]
+    ];
+    let left_out = |b: &AccelerometerBias| {
+        format!("left out: {} (a run has it, and `design` counts it)", accelerometer_bias(b))
+    };
+    out.extend(m.accelerometer_bias.as_ref().map(left_out));
+    out
+}
+
+/// The bias instability of the accelerometers.
+pub(crate) fn accelerometer_bias(b: &AccelerometerBias) -> String {
+    format!(
+        "bias instability B {} ug of each accelerometer (first-order Gauss-Markov of {} s, sigma 1.076 B)",
+        b.instability_ug, b.correlation_time_s
+    )
 }
 
 /// What the datasheet of the gyros adds.

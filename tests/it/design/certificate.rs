@@ -9,11 +9,11 @@ use obsdeg_exact::SplitMix64;
 
 use super::*;
 
-const EARTH: f64 = 7.292115e-5;
-const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
+pub(super) const EARTH: f64 = 7.292115e-5;
+pub(super) const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 
 /// (19) of the paper: passive elementary rotations.
-fn attitude(degrees: [f64; 3]) -> Matrix3<f64> {
+pub(super) fn attitude(degrees: [f64; 3]) -> Matrix3<f64> {
     let [a, b, g] = degrees.map(f64::to_radians);
     let x = Matrix3::new(1.0, 0.0, 0.0, 0.0, a.cos(), a.sin(), 0.0, -a.sin(), a.cos());
     let y = Matrix3::new(b.cos(), 0.0, -b.sin(), 0.0, 1.0, 0.0, b.sin(), 0.0, b.cos());
@@ -49,7 +49,7 @@ fn of_a_dwell(latitude: f64, dwell: f64, step: f64, noise: f64) -> SMatrix<f64, 
 }
 
 /// `eps^n = C E(g^c) D`, with D of the terms asked for, in the order F, I, O, S; D in deg/h (per g).
-fn drift(c: &Matrix3<f64>, terms: &str) -> DMatrix<f64> {
+pub(super) fn drift(c: &Matrix3<f64>, terms: &str) -> DMatrix<f64> {
     let g = -c.row(1).transpose();
     let axes = [[g[0], -g[2], g[1]], [g[1], -g[2], -g[0]], [g[2], g[0], g[1]]];
     let factor = |term: char, axis: usize| match term {

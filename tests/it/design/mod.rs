@@ -3,6 +3,7 @@
 mod brute;
 mod certificate;
 mod command;
+mod correlated;
 mod divide;
 mod orders;
 mod parts;

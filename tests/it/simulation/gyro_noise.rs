@@ -1,7 +1,7 @@
 //! Random drift of the gyros as states: the discretisation, Monte Carlo consistency, what a file and options say.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
-use obsdeg_core::model::settings::{Settings, Truth};
+use obsdeg_core::model::settings::{FilterKind, Settings, Truth};
 use obsdeg_core::model::{PerGyro, Rotation};
 use obsdeg_evidence::crosscheck::{Experiment, Prepared, Statistic};
 use obsdeg_evidence::simulation::GyroNoise;
@@ -160,6 +160,62 @@ fn monte_carlo_with_the_states_in_filter_and_truth() {
         let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme);
         assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
     }
+}
+
+/// The same with biases of the accelerometers, large against their white noise.
+#[test]
+fn monte_carlo_with_biases_of_the_accelerometers() {
+    let two = scheme(&["0,0,0", "180,0,0"], Carry::Platform);
+    let mut turning = scheme(&["10,25,40", "130,-50,70"], Carry::Inertial);
+    turning.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
+    let quiet = Conditions::default().without_drift_noise();
+    let both = Conditions {
+        accelerometer_instability_ug: 30.0,
+        accelerometer_correlation_s: 200.0,
+        ..quiet.clone()
+    };
+    let exact = Conditions {
+        truth: Truth::Exact,
+        drift_scale: 1e-3,
+        priors: [both.priors.clone(), vec![Assignment { name: "psi".into(), value: 1e-4 }]].concat(),
+        ..both.clone()
+    };
+    let slews = |c: &Conditions| Conditions { slew_rate_deg_s: Some(2.0), ..c.clone() };
+    for (name, scheme, conditions) in [
+        ("linear", &two, both.clone()),
+        ("exact", &two, exact.clone()),
+        ("linear, slews", &turning, slews(&both)),
+        ("exact, slews", &turning, slews(&exact)),
+    ] {
+        let right = statistics(&conditions, &conditions, scheme);
+        assert_eq!(
+            right.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
+            ["ANEES, 15 unknowns and 3 biases", "NIS"]
+        );
+        assert!(right.iter().all(|s| s.pass), "{name}: {right:?}");
+        let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme);
+        assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
+    }
+    // a filter with full attitudes has the same sigmas where psi and drifts are small, and its innovations are what it believes
+    let small = Conditions {
+        values: [exact.values.clone(), vec![Assignment { name: "psi".into(), value: 1e-4 }]].concat(),
+        ..slews(&exact)
+    };
+    let extended = Conditions { filter: Some(FilterKind::Extended), ..small.clone() };
+    let linear = Conditions { filter: Some(FilterKind::Linear), ..small };
+    let mut nis = 0.0f64;
+    for seed in 0..20 {
+        let (run, _) = simulate(&turning, &extended, seed).expect("simulated");
+        let (other, _) = simulate(&turning, &linear, seed).expect("simulated");
+        for (a, b) in run.quantities.iter().zip(&other.quantities) {
+            assert!((a.sigma / b.sigma - 1.0).abs() < 1e-2, "{}: {} {}", a.name, a.sigma, b.sigma);
+        }
+        nis += run.consistency.nis / 20.0;
+    }
+    assert!((nis - 2.0).abs() < 0.1, "{nis}");
+    let refused = Conditions { accelerometer_instability_ug: 1e10, ..quiet };
+    let refused = simulate(&two, &refused, 1).expect_err("refused").to_string();
+    assert!(refused.starts_with("accelerometer_bias_instability_ug is"), "{refused}");
 }
 
 /// A gyro at a time: the noise of one is no noise about the other axes, whatever its mounting.

@@ -29,6 +29,8 @@ pub const TURN_DEG: Range = range(1e-3, 180.0, "degrees");
 pub const SLEW_RATE_DEG_S: Range = range(1e-3, 1e4, "deg/s");
 /// White noise of the observation.
 pub const NOISE_G: Range = range(1e-15, 1e3, "g");
+/// Bias instability of the accelerometers.
+pub const INSTABILITY_UG: Range = range(1e-9, 1e9, "ug");
 /// Noise of a measured azimuth.
 pub const AZIMUTH_NOISE_DEG: Range = range(1e-12, 1e3, "deg");
 /// Random drift that is not zero, in deg/h or deg/sqrt(h).

@@ -217,6 +217,10 @@ pub struct Settings {
     pub slew_rate_deg_s: Option<f64>,
     /// Noise of the observation per sample in g; 1e-5 when left out.
     pub accelerometer_noise_g: Option<f64>,
+    /// Bias instability of the accelerometers in ug; none when left out.
+    pub accelerometer_bias_instability_ug: Option<f64>,
+    /// Its correlation time in s; 3600 when left out.
+    pub accelerometer_correlation_time_s: Option<f64>,
     /// Noise of a measured azimuth per sample in deg; 0.001 when left out.
     pub azimuth_noise_deg: Option<f64>,
     /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
@@ -249,6 +253,16 @@ impl Settings {
             ("dwell_s", self.dwell_s, ranges::DWELL_S),
             ("slew_rate_deg_s", self.slew_rate_deg_s, ranges::SLEW_RATE_DEG_S),
             ("accelerometer_noise_g", self.accelerometer_noise_g, ranges::NOISE_G),
+            (
+                "accelerometer_bias_instability_ug",
+                self.accelerometer_bias_instability_ug,
+                ranges::INSTABILITY_UG,
+            ),
+            (
+                "accelerometer_correlation_time_s",
+                self.accelerometer_correlation_time_s,
+                ranges::CORRELATION_S,
+            ),
             ("azimuth_noise_deg", self.azimuth_noise_deg, ranges::AZIMUTH_NOISE_DEG),
             ("drift_scale", self.drift_scale, ranges::DRIFT_SCALE),
             ("correlation_time_s", self.correlation_time_s, ranges::CORRELATION_S),

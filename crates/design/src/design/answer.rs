@@ -108,7 +108,8 @@ pub struct SearchReport {
     pub degree_floor: Option<usize>,
     /// The constraints in words.
     pub constraints: Vec<String>,
-    /// How good the best can be; null where no such bound is known: under platform and inertial carry information is no sum over positions.
+    /// How good the best can be; null where no such bound is known: under platform and inertial carry, and where the noise of Z is
+    /// correlated, information is no sum over positions.
     pub certificate: Option<Certificate>,
 }
 

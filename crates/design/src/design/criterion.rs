@@ -48,8 +48,12 @@ impl Evaluator {
     /// The root of the information, psi and the coefficients that do not count first: the block of the others is the
     /// root of the inverse of their covariance. False when one of them is not determined.
     pub(super) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+        self.root_from(if self.carry() == Carry::Reset { 3 } else { 0 }, state, root)
+    }
+
+    /// The same of the unknowns from `first` on.
+    pub(super) fn root_from(&self, first: usize, state: &State, root: &mut Vec<f64>) -> bool {
         let n = self.n;
-        let first = if self.carry() == Carry::Reset { 3 } else { 0 };
         root.resize(n * n, 0.0);
         let l = &mut root[..];
         for i in first..n {

@@ -1,18 +1,22 @@
 //! The information of a sequence of positions, built up position by position: what a search evaluates millions of
 //! times.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, W_IE};
 use obsdeg_core::model::{
     Carry, Euler, Float, Gimbals, LOCAL, Matrix3, PSI_EPS, Platform, Scheme, c_n_f64, earth_rate_in,
     local_dynamics, local_output,
 };
+use obsdeg_ekf::BiasState;
 use obsdeg_ekf::integrate::van_loan;
 use obsdeg_evidence::simulation::{
     Conditions, PRIOR, Plan, SimulationError, is_rate, latitude_of, resolve, si_per_shown, steps,
 };
 
 use super::DesignError;
+use super::correlated::{Joint, OfDwell};
 use super::ways::{Stop, Way};
 
 /// Most unknowns of a search: psi and the coefficients of all terms.
@@ -42,6 +46,8 @@ pub(super) struct Dwelling {
     pub(super) local: [[f64; LOCAL]; LOCAL],
     /// `psi^n` behind it as a function of `(psi^n, eps^n)` before.
     phi: [[f64; PSI_EPS]; 3],
+    /// What its samples say where the noise of Z is correlated.
+    pub(super) correlated: Option<Box<OfDwell>>,
 }
 
 /// What is known beforehand: information, zero where nothing is.
@@ -76,6 +82,8 @@ pub struct Evaluator {
     /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
     pub(super) ways: Vec<Way>,
     pub(super) prior: Prior,
+    /// The process that each accelerometer has beside white noise.
+    pub(super) bias: Option<BiasState>,
     /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its coefficient.
     pub(super) dph: f64,
 }
@@ -87,6 +95,8 @@ pub struct State {
     pub(super) information: Vec<f64>,
     /// psi in the carried axes as a functional of the unknowns (3 x n).
     pub(super) psi: [Vec<f64>; 3],
+    /// Where the noise of Z is correlated: what is known of it by now.
+    pub(super) joint: Option<Joint>,
     /// The candidates in order.
     pub(super) path: Vec<usize>,
     /// Dwells and turns, in s.
@@ -143,6 +153,7 @@ impl Evaluator {
         let prior = Prior::of(&platform, conditions, &order)?;
         let empty = Self {
             prior,
+            bias: conditions.accelerometer().states().first().copied(),
             platform,
             conditions: conditions.clone(),
             nuisance: d - required.len(),
@@ -183,6 +194,8 @@ impl Evaluator {
         let outputs = local_output(&Float, self.platform.observed());
         let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
         let mut local = [[0.0; LOCAL]; LOCAL];
+        let of = |bias| Box::new(self.of_dwell(bias, &step, steps, dwell_s / steps as f64));
+        let correlated = self.bias.as_ref().map(of);
         for _ in 0..steps {
             now = &step * now;
             for (component, h) in &outputs {
@@ -196,7 +209,7 @@ impl Evaluator {
             }
         }
         let phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
-        Ok(Dwelling { seconds: dwell_s, local, phi })
+        Ok(Dwelling { seconds: dwell_s, local, phi, correlated })
     }
 
     /// Every candidate with a dwell of its own, which [`Self::dwell_at`] changes.
@@ -255,14 +268,20 @@ impl Evaluator {
         self.ways.clear();
     }
 
-    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on.
+    /// Where a candidate stands, and how long.
+    pub(super) fn stands(&self, candidate: usize) -> (&Matrix3<f64>, &Dwelling) {
+        let Candidate { c, dwell, .. } = &self.candidates[candidate];
+        (c, &self.dwells[*dwell])
+    }
+
+    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on, or the noise of Z.
     fn information_alone(
         &self,
         c: &Matrix3<f64>,
         effects: &[Vec<f64>; LOCAL - 3],
         dwelling: &Dwelling,
     ) -> Vec<f64> {
-        if self.carry() != Carry::Reset {
+        if self.ordered() {
             return Vec::new();
         }
         let n = self.n;
@@ -283,7 +302,7 @@ impl Evaluator {
             }
         }
         self.prior.psi.iter().enumerate().for_each(|(k, p)| own[k][k] += p);
-        eliminate(&mut own, n, 3);
+        eliminate(&mut own, n, 0..3);
         own[..n]
             .iter()
             .enumerate()
@@ -299,7 +318,7 @@ impl Evaluator {
             row[..LOCAL].copy_from_slice(local);
         }
         self.prior.psi.iter().enumerate().for_each(|(k, p)| all[k][k] += p);
-        eliminate(&mut all, LOCAL, 3);
+        eliminate(&mut all, LOCAL, 0..3);
         std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
     }
 
@@ -349,12 +368,18 @@ impl Evaluator {
         if self.carry() == Carry::Platform {
             self.prior.psi.iter().enumerate().for_each(|(k, &p)| known(k, p));
         }
-        State { information, psi: std::array::from_fn(unit), path: Vec::new(), seconds: 0.0 }
+        State {
+            information,
+            psi: std::array::from_fn(unit),
+            joint: self.bias.as_ref().map(|bias| Joint::start(bias, n)),
+            path: Vec::new(),
+            seconds: 0.0,
+        }
     }
 
     /// Whether the order of positions makes a difference.
     pub(crate) fn ordered(&self) -> bool {
-        self.carry() != Carry::Reset
+        self.carry() != Carry::Reset || self.bias.is_some()
     }
 
     pub(super) fn carry(&self) -> Carry {
@@ -373,6 +398,9 @@ impl Evaluator {
 
     /// Adds a position to `state`; the result goes to `out`.
     pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
+        if let Some(bias) = &self.bias {
+            return self.extend_correlated(bias, state, stop, false, out);
+        }
         // sizes that the compiler knows
         match self.locals {
             PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, out),
@@ -383,7 +411,7 @@ impl Evaluator {
     fn extend_in<const L: usize, const N: usize>(&self, state: &State, stop: Stop, out: &mut State) {
         let n = self.n;
         let carry = self.carry();
-        let Candidate { c, effects, own, dwell } = &self.candidates[stop.candidate];
+        let Candidate { c, own, dwell, .. } = &self.candidates[stop.candidate];
         let dwelling = &self.dwells[*dwell];
         let turn = self.way_to(state.path.last().copied(), stop);
         out.path.clone_from(&state.path);
@@ -396,9 +424,38 @@ impl Evaluator {
             }
             return;
         }
+        let local = self.functionals::<L, N>(state, stop);
+        // L^T (G L)
+        let weighted = self.weighted(&local, dwelling);
+        out.information.copy_from_slice(&state.information);
+        self.know_first(state, c, |i, j, known| out.information[i * n + j] += known);
+        for i in 0..n {
+            let row = &mut out.information[i * n..=i * n + i];
+            for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
+                for (x, y) in row.iter_mut().zip(&w[..=i]) {
+                    *x += l[i] * y;
+                }
+            }
+        }
+        self.go_on(dwelling, c, &local, out);
+    }
+
+    /// The local unknowns of a position behind others as functionals of the unknowns; psi where it goes on.
+    #[inline]
+    pub(super) fn functionals<const L: usize, const N: usize>(
+        &self,
+        state: &State,
+        stop: Stop,
+    ) -> [[f64; N]; L] {
+        let (n, carry) = (self.n, self.carry());
+        let Candidate { c, effects, .. } = &self.candidates[stop.candidate];
+        let turn = self.way_to(state.path.last().copied(), stop);
         let mut local = [[0.0; N]; L];
-        for (row, effect) in local[3..].iter_mut().zip(effects) {
+        for (row, effect) in local[3..].iter_mut().zip(&effects[..self.locals - 3]) {
             row[3..n].copy_from_slice(effect);
+        }
+        if carry == Carry::Reset {
+            return local;
         }
         for r in 0..3 {
             match turn {
@@ -418,23 +475,34 @@ impl Evaluator {
                 }
             }
         }
-        // L^T (G L)
-        let weighted = self.weighted(&local, dwelling);
-        out.information.copy_from_slice(&state.information);
-        if carry == Carry::Inertial && state.path.is_empty() {
-            // psi^c = C^T psi^n
-            for (i, j) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)] {
-                let known = self.prior.psi.iter().enumerate().map(|(k, p)| c[i][k] * p * c[j][k]);
-                out.information[i * n + j] += known.sum::<f64>();
-            }
+        local
+    }
+
+    /// What is known beforehand of psi^n, which is what goes on under inertial carry: by the axes of the first position.
+    #[inline]
+    pub(super) fn know_first(&self, state: &State, c: &Matrix3<f64>, mut add: impl FnMut(usize, usize, f64)) {
+        if self.carry() != Carry::Inertial || !state.path.is_empty() {
+            return;
         }
-        for i in 0..n {
-            let row = &mut out.information[i * n..=i * n + i];
-            for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
-                for (x, y) in row.iter_mut().zip(&w[..=i]) {
-                    *x += l[i] * y;
-                }
-            }
+        // psi^c = C^T psi^n
+        for (i, j) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)] {
+            let known = self.prior.psi.iter().enumerate().map(|(k, p)| c[i][k] * p * c[j][k]);
+            add(i, j, known.sum());
+        }
+    }
+
+    /// psi behind a dwell, in the axes in which it goes on.
+    #[inline]
+    pub(super) fn go_on<const L: usize, const N: usize>(
+        &self,
+        dwelling: &Dwelling,
+        c: &Matrix3<f64>,
+        local: &[[f64; N]; L],
+        out: &mut State,
+    ) {
+        let n = self.n;
+        if self.carry() == Carry::Reset {
+            return;
         }
         let mut after = [[0.0; N]; 3];
         for (row, phi) in after.iter_mut().zip(&dwelling.phi) {
@@ -445,7 +513,7 @@ impl Evaluator {
             }
         }
         for (k, row) in out.psi.iter_mut().enumerate() {
-            match carry {
+            match self.carry() {
                 Carry::Platform => {
                     for (j, x) in row.iter_mut().enumerate() {
                         *x = (0..3).map(|r| c[r][k] * after[r][j]).sum();
@@ -480,14 +548,14 @@ impl Prior {
     }
 }
 
-/// The Schur complement of the first `leading` unknowns of a symmetric matrix (lower triangle); these are set to zero.
-fn eliminate(m: &mut [[f64; MAX]; MAX], n: usize, leading: usize) {
-    for p in 0..leading {
+/// The Schur complement of some unknowns of a symmetric matrix (n x n, lower triangle), those before them zero; these are set to zero.
+pub(super) fn eliminate<const N: usize>(m: &mut [[f64; N]], n: usize, pivots: Range<usize>) {
+    for p in pivots {
         let pivot = m[p][p];
         if pivot <= 0.0 {
             continue;
         }
-        let column: [f64; MAX] = std::array::from_fn(|i| if i < n && i >= p { m[i][p] } else { 0.0 });
+        let column: [f64; N] = std::array::from_fn(|i| if i < n && i >= p { m[i][p] } else { 0.0 });
         for i in p + 1..n {
             for j in p + 1..=i {
                 m[i][j] -= column[i] * column[j] / pivot;

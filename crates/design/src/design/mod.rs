@@ -9,6 +9,7 @@ pub(crate) mod answer;
 pub(crate) mod candidates;
 mod certificate;
 mod certify;
+mod correlated;
 pub(crate) mod criterion;
 mod divide;
 pub(crate) mod information;
@@ -495,6 +496,9 @@ fn freely(
     }
     let prepared = Prepared::new(base, conditions, options, going)?;
     prepared.check(k)?;
+    if prepared.evaluator.bias.is_some() {
+        return Err(wrong("noise of Z that is correlated from position to position".into()));
+    }
     if !prepared.evaluator.prior.is_alike() {
         return Err(wrong("priors of psi that differ by axis".into()));
     }

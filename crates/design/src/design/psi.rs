@@ -28,6 +28,16 @@ impl Evaluator {
         let n = self.n;
         let unit = |k: usize| -> [f64; 3] { std::array::from_fn(|r| f64::from(u8::from(r == k))) };
         match (self.carry(), state.path.first()) {
+            (Carry::Reset, _) if let Some(bias) = &self.bias => (0..state.path.len())
+                .map(|i| {
+                    let root = self.root_with_psi(bias, &state.path, i);
+                    let sigma = |root: &Vec<f64>, k| {
+                        let psi = unit(k).into_iter().chain(std::iter::repeat_n(0.0, n - 3));
+                        Some(norm(&solved(root, n, 0, psi)?).to_degrees())
+                    };
+                    [0, 1, 2].map(|k| root.as_ref().and_then(|r| sigma(r, k)).unwrap_or(f64::INFINITY))
+                })
+                .collect(),
             (Carry::Reset, _) => state.path.iter().map(|&c| self.psi_of_position(c, root)).collect(),
             (carry, first) => {
                 // psi is carried in platform axes, or in n: psi^c = C^T psi^n

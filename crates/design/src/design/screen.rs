@@ -103,9 +103,10 @@ pub(super) struct Scratch {
 }
 
 impl<'a> Screen<'a> {
-    /// The screen of what `evaluator` evaluates; `None` where order does not matter, or where turns take time.
+    /// The screen of what `evaluator` evaluates; `None` where order does not matter, where turns take time, or where
+    /// the noise of Z is correlated, so that what follows a prefix is no information of its own.
     pub(super) fn new(evaluator: &'a Evaluator, criterion: &'a Criterion) -> Option<Self> {
-        if !evaluator.ordered() || !evaluator.ways.is_empty() {
+        if !evaluator.ordered() || !evaluator.ways.is_empty() || evaluator.bias.is_some() {
             return None;
         }
         let (n, count) = (evaluator.n, evaluator.candidates.len());

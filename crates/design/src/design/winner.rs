@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::model::settings::{Settings, concerns};
 use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, parse_attitude};
-use obsdeg_evidence::simulation::{Conditions, latitude_of};
+use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 
 use super::DesignError;
 use super::answer::Found;
@@ -36,6 +36,7 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
         priors.retain(|name: &String, _| !concerns(&a.name, name));
         priors.insert(a.name.clone(), a.value);
     }
+    let bias = AccelerometerBias::of(conditions);
     // the defaults come first
     let given = conditions.requirements.iter().skip(Conditions::default().requirements.len());
     Ok(Scheme {
@@ -50,6 +51,8 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             slew_rate_deg_s: conditions.slew_rate_deg_s,
             accelerometer_noise_g: Some(conditions.accelerometer_noise_g),
             priors,
+            accelerometer_bias_instability_ug: bias.map(|b| b.instability_ug),
+            accelerometer_correlation_time_s: bias.map(|b| b.correlation_time_s),
             azimuth_noise_deg: base.measured_azimuth.then_some(conditions.azimuth_noise_deg),
             ..base.simulation.clone()
         },

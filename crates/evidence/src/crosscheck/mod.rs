@@ -390,8 +390,10 @@ fn controls(
 fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<bool, SimulationError> {
     let samples: usize = truth.stages.iter().map(|s| s.steps * s.outputs.len()).sum();
     let many = samples * truth.unknowns().max(filter.unknowns()) > MOST_NUMBERS;
-    // gyros that wander besides may hide more
-    if many || conditions.gyro_noise != GyroNoise::default() {
+    // sensors that wander besides may hide more
+    let wander =
+        conditions.gyro_noise != GyroNoise::default() || conditions.accelerometer_instability_ug > 0.0;
+    if many || wander {
         return Ok(false);
     }
     let rows = |plan: &Plan| -> Result<DMatrix<f64>, SimulationError> {

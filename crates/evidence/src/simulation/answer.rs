@@ -63,6 +63,9 @@ pub struct ConditionsReport {
     pub slew_rate_deg_s: Option<f64>,
     /// Noise of the observation per sample in g.
     pub accelerometer_noise_g: f64,
+    /// Bias instability of the accelerometers, states of the filter and of the truth; left out where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accelerometer_bias: Option<AccelerometerBias>,
     /// Random drift with its unit.
     pub drift_noise: String,
     /// Its density in deg/sqrt(h) in the shortest and in the longest step of the timeline.
@@ -80,6 +83,25 @@ pub struct ConditionsReport {
     pub drift_scale: f64,
 }
 
+/// The bias instability of the accelerometers: a first-order Gauss-Markov process of each, which goes on in platform axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AccelerometerBias {
+    /// The coefficient B in ug; sigma of the process is 1.076 B.
+    pub instability_ug: f64,
+    /// Its correlation time in s.
+    pub correlation_time_s: f64,
+}
+
+impl AccelerometerBias {
+    /// What the conditions say; none where it is zero.
+    pub fn of(conditions: &Conditions) -> Option<Self> {
+        (conditions.accelerometer_instability_ug > 0.0).then_some(Self {
+            instability_ug: conditions.accelerometer_instability_ug,
+            correlation_time_s: conditions.accelerometer_correlation_s,
+        })
+    }
+}
+
 /// What a predicted sigma rests on: the information of all samples, without prior and without drift noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasurementReport {
@@ -93,6 +115,9 @@ pub struct MeasurementReport {
     pub step_s: f64,
     /// Noise of the observation per sample and axis in g.
     pub accelerometer_noise_g: f64,
+    /// Bias instability of the accelerometers: `design` counts it, a comparison leaves it out; left out where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accelerometer_bias: Option<AccelerometerBias>,
     /// Noise of the azimuth per sample in deg; null where it is not measured.
     pub azimuth_noise_deg: Option<f64>,
     /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
@@ -108,6 +133,7 @@ impl MeasurementReport {
             dwell_s: conditions.dwell_s,
             step_s: conditions.step_s,
             accelerometer_noise_g: conditions.accelerometer_noise_g,
+            accelerometer_bias: AccelerometerBias::of(conditions),
             azimuth_noise_deg: scheme.measured_azimuth.then_some(conditions.azimuth_noise_deg),
             slew_rate_deg_s: conditions.slew_rate_deg_s.filter(|_| conditions.slews),
         }

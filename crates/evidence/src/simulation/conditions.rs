@@ -8,6 +8,8 @@ use obsdeg_core::model::settings::{
 };
 use obsdeg_core::model::{Latitude, Platform, Position, Scheme};
 
+use obsdeg_ekf::SensorNoise;
+
 use super::SimulationError;
 use super::gyro_noise::GyroNoise;
 
@@ -28,6 +30,10 @@ pub struct Conditions {
     pub slews: bool,
     /// White noise of the observation per sample and axis, in g.
     pub accelerometer_noise_g: f64,
+    /// Bias instability of the accelerometers, in ug: the coefficient B, as of gyros; 0: none.
+    pub accelerometer_instability_ug: f64,
+    /// Correlation time in s of the Gauss-Markov process that stands for it.
+    pub accelerometer_correlation_s: f64,
     /// Noise of a measured azimuth per sample, in deg.
     pub azimuth_noise_deg: f64,
     /// Random drift.
@@ -83,6 +89,8 @@ impl Default for Conditions {
             slew_rate_deg_s: None,
             slews: true,
             accelerometer_noise_g: 1e-5,
+            accelerometer_instability_ug: 0.0,
+            accelerometer_correlation_s: 3600.0,
             azimuth_noise_deg: 0.001,
             drift_noise: DriftNoise::OneStep(0.01),
             drift_noise_step_s: 10.0,
@@ -132,6 +140,8 @@ impl Conditions {
         set(&mut self.step_s, settings.step_s);
         set(&mut self.dwell_s, settings.dwell_s);
         set(&mut self.accelerometer_noise_g, settings.accelerometer_noise_g);
+        set(&mut self.accelerometer_instability_ug, settings.accelerometer_bias_instability_ug);
+        set(&mut self.accelerometer_correlation_s, settings.accelerometer_correlation_time_s);
         set(&mut self.azimuth_noise_deg, settings.azimuth_noise_deg);
         if let Some(noise) = settings.drift_noise {
             self.drift_noise = noise;
@@ -182,9 +192,20 @@ impl Conditions {
         own.or(self.slew_rate_deg_s).filter(|_| self.slews)
     }
 
-    /// The same without random drift of any kind.
+    /// The same without random drift of any kind, and without bias instability of the accelerometers: Z has white noise.
     pub fn without_drift_noise(self) -> Self {
-        Self { drift_noise: DriftNoise::OneStep(0.0), gyro_noise: GyroNoise::default(), ..self }
+        Self {
+            drift_noise: DriftNoise::OneStep(0.0),
+            gyro_noise: GyroNoise::default(),
+            accelerometer_instability_ug: 0.0,
+            ..self
+        }
+    }
+
+    /// The accelerometers in g, without their white noise.
+    pub fn accelerometer(&self) -> SensorNoise {
+        let correlation = self.accelerometer_correlation_s;
+        SensorNoise::accelerometer(0.0, 0.0, self.accelerometer_instability_ug, correlation)
     }
 
     /// Checks what the types do not: every number is in its range.
@@ -203,6 +224,11 @@ impl Conditions {
         for (what, x, range) in single {
             range.check(what, x)?;
         }
+        if self.accelerometer_instability_ug != 0.0 {
+            ranges::INSTABILITY_UG
+                .check("accelerometer_bias_instability_ug", self.accelerometer_instability_ug)?;
+        }
+        ranges::CORRELATION_S.check("accelerometer_correlation_time_s", self.accelerometer_correlation_s)?;
         self.drift_noise.check("drift_noise")?;
         self.gyro_noise.validate()?;
         for (what, list, range) in self.lists() {

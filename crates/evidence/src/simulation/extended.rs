@@ -25,7 +25,7 @@ use obsdeg_ekf::{
 
 use super::SimulationError;
 use super::conditions::Conditions;
-use super::gyro_noise::Bias;
+use super::gyro_noise::{Bias, Sensor};
 use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
 use super::record::RunStart;
 use super::state::{PlatformState, inverse_left_jacobian, orthonormal};
@@ -156,7 +156,8 @@ impl PlatformMotion<'_> {
     ) -> (Matrix3<f64>, Errors, Vec<(usize, f64)>) {
         let c = self.plan.attitude(self.segment, self.plan.segments[self.segment].dt);
         let mut by_k = Vec::new();
-        if !self.plan.platform.observed().accelerometers {
+        if !self.plan.platform.observed().accelerometers && self.plan.accelerometer_biases().next().is_none()
+        {
             return (c, Errors { sum: [0.0; 3], slope: [[0.0; 3]; 3] }, by_k);
         }
         let force = apply(&transpose(&times(e, &c)), &G_N).map(|x| -x);
@@ -198,7 +199,8 @@ impl PlatformMotion<'_> {
         let mut now = Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
         let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
         let (coefficients, biases) = d.split_at(self.plan.platform.coefficients());
-        let drifts = self.plan.drift_bound(coefficients) + biases.iter().map(|b| b.abs()).sum::<f64>();
+        let random = self.plan.drift_biases().map(|(k, _)| biases[k].abs()).sum::<f64>();
+        let drifts = self.plan.drift_bound(coefficients) + random;
         let turn = drift_turn(drifts + kick, dt);
         if turn.is_nan() || turn > MOST_TURN {
             return Err(EkfError::Diverged {
@@ -327,7 +329,7 @@ pub struct Extended<'a> {
     conditions: &'a Conditions,
     /// Of every position: `psi^n` of psi in the axes of the unknowns, and which psi it is.
     carried: Vec<(Matrix3<f64>, usize)>,
-    /// How the constants of the state enter the drift: coefficients, then biases of the gyros.
+    /// How the constants of the state enter the drift and Z: coefficients, then biases.
     terms: Vec<ErrorTerm>,
     update: Update,
 }
@@ -370,7 +372,12 @@ impl<'a> Extended<'a> {
             });
         }
         let gyros = plan.platform.scheme().geometry.gyros();
-        let bias = |b: &Bias| ErrorTerm::bias(gyros[b.gyro].I);
+        let bias = |b: &Bias| match b.sensor {
+            Sensor::Gyro(gyro) => ErrorTerm::bias(gyros[gyro].I),
+            Sensor::Accelerometer(axis) => {
+                ErrorTerm { source: Source::Force, ..ErrorTerm::bias(SignedAxis { axis, negative: false }) }
+            }
+        };
         let terms = plan.platform.error_terms().iter().cloned().chain(plan.biases.iter().map(bias)).collect();
         Ok(Self { plan, conditions, carried, terms, update })
     }

@@ -1,5 +1,5 @@
 //! Random drift of the gyros by their datasheet: angle random walk as white drift, rate random walk and bias instability as states behind the
-//! unknowns, in the filter and in the truth alike.
+//! unknowns, in the filter and in the truth alike; and the bias instability of the accelerometers, which is noise of Z that is not white.
 //!
 //! The drift of a gyro is `D_F + b_K + b_B` about its input axis, with g-sensitive terms as ever. `b_K' = w`, `b_K(0) = 0`, is the rate random
 //! walk, `b_B' = -b_B/T + w` the bias instability: so every D is a constant, and D_F is the bias at the *start* of the run, but for what of
@@ -75,21 +75,32 @@ impl GyroNoise {
     }
 }
 
-/// A state behind the unknowns: part of the bias of a gyro, in rad/s.
+/// Whose bias it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensor {
+    /// A gyro: 0, 1, 2 for X, Y, Z. Its bias is a drift, in rad/s.
+    Gyro(usize),
+    /// What accelerometers make of a component of Z, in platform axes x, y, z: 0, 1, 2; in g. Three alike and independent make the same in any
+    /// axes, so the mounting does not matter.
+    Accelerometer(usize),
+}
+
+/// A state behind the unknowns: part of the bias of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bias {
-    /// The gyro: 0, 1, 2 for X, Y, Z.
-    pub gyro: usize,
+    /// Whose.
+    pub sensor: Sensor,
     /// Its process.
     pub process: BiasState,
 }
 
-/// What of all gyros goes on as states.
-pub(super) fn biases(gyros: &[SensorNoise; 3]) -> Vec<Bias> {
-    let of = |(gyro, noise): (usize, &SensorNoise)| {
-        noise.states().into_iter().map(move |process| Bias { gyro, process }).collect::<Vec<_>>()
+/// What of all gyros goes on as states, then what of the accelerometers.
+pub(super) fn biases(gyros: &[SensorNoise; 3], accelerometer: &SensorNoise) -> Vec<Bias> {
+    let of = |sensor: Sensor, noise: &SensorNoise| {
+        noise.states().into_iter().map(move |process| Bias { sensor, process })
     };
-    gyros.iter().enumerate().flat_map(of).collect()
+    let gyros = gyros.iter().enumerate().flat_map(|(g, noise)| of(Sensor::Gyro(g), noise));
+    gyros.chain((0..3).flat_map(|a| of(Sensor::Accelerometer(a), accelerometer))).collect()
 }
 
 /// `(Phi, Q)` of some states over a step.
@@ -101,7 +112,7 @@ impl Plan {
         self.platform.scheme().geometry.gyros()[gyro].I.vector().map(f64::from)
     }
 
-    /// Whether the gyros have random drift of their own.
+    /// Whether sensors have biases that go on, or gyros white drift of their own.
     pub(super) fn is_noisy(&self) -> bool {
         !self.biases.is_empty() || self.gyros.iter().any(|g| g.white > 0.0)
     }
@@ -154,8 +165,8 @@ impl Plan {
             }
         }
         for (k, bias) in self.biases.iter().enumerate() {
-            for i in 0..3 {
-                f[(i, 3 + k)] = axes[bias.gyro][i];
+            if let Sensor::Gyro(gyro) = bias.sensor {
+                (0..3).for_each(|i| f[(i, 3 + k)] = axes[gyro][i]);
             }
             f[(3 + k, 3 + k)] = -bias.process.decay;
             q[(3 + k, 3 + k)] = bias.process.density;
@@ -171,13 +182,26 @@ impl Plan {
         self.biases.iter().map(sigma).collect()
     }
 
+    /// The biases that are drifts.
+    pub(super) fn drift_biases(&self) -> impl Iterator<Item = (usize, &Bias)> {
+        self.biases.iter().enumerate().filter(|(_, b)| matches!(b.sensor, Sensor::Gyro(_)))
+    }
+
+    /// The biases that are errors of accelerometers, with the platform axis of each.
+    pub(super) fn accelerometer_biases(&self) -> impl Iterator<Item = (usize, usize, &Bias)> {
+        self.biases.iter().enumerate().filter_map(|(k, b)| match b.sensor {
+            Sensor::Accelerometer(axis) => Some((k, axis, b)),
+            Sensor::Gyro(_) => None,
+        })
+    }
+
     /// A bound, six sigma, on what biases and white drift of all gyros turn in a step, as a rate: rad/s.
     pub(super) fn random_rate(&self, dt: f64) -> f64 {
         let walked =
             |b: &Bias| if b.process.decay > 0.0 { 0.0 } else { b.process.density * self.duration_s() };
         let bias = |b: &Bias| (b.process.variance + walked(b)).sqrt();
         let white: f64 = self.gyros.iter().map(|g| g.white / dt.sqrt()).sum();
-        6.0 * (self.biases.iter().map(bias).sum::<f64>() + white)
+        6.0 * (self.drift_biases().map(|(_, b)| bias(b)).sum::<f64>() + white)
     }
 }
 
@@ -242,6 +266,11 @@ impl Gyros {
             for (sum, axis) in drift.iter_mut().zip(plan.input_axis(g)) {
                 *sum += axis * next[0] / self.h;
             }
+        }
+        for (k, _, bias) in plan.accelerometer_biases() {
+            let left = (-bias.process.decay * self.h).exp();
+            biases[k] =
+                left * biases[k] + (bias.process.variance * (1.0 - left * left)).sqrt() * noise.normal();
         }
     }
 }

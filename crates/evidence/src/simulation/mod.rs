@@ -23,7 +23,7 @@ pub use conditions::{
 pub use consistency::{Consistency, Doubt};
 pub use extended::{Ended, Extended, PlatformMotion};
 pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_without_prior};
-pub use gyro_noise::{Bias, GyroNoise};
+pub use gyro_noise::{Bias, GyroNoise, Sensor};
 pub use iterated::iterated;
 pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
 pub use record::{Record, RunStart, Series, Traces, run};
@@ -252,6 +252,7 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         step_s: conditions.step_s,
         slew_rate_deg_s: conditions.slew_rate_deg_s,
         accelerometer_noise_g: conditions.accelerometer_noise_g,
+        accelerometer_bias: AccelerometerBias::of(conditions),
         drift_noise: noise.to_string(),
         drift_noise_density_deg_sqrt_h: density,
         drift_noise_step_s: given,

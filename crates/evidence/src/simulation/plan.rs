@@ -103,9 +103,9 @@ pub struct Plan {
     pub stages: Vec<Stage>,
     /// Random errors of the gyros X, Y, Z, in rad/s.
     pub gyros: [SensorNoise; 3],
-    /// What of them is a state, behind the unknowns.
+    /// What of them, and of the accelerometers, is a state, behind the unknowns.
     pub biases: Vec<Bias>,
-    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the biases (rad/s).
+    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the biases (rad/s, g).
     pub noise_roots: Vec<DMatrix<f64>>,
     /// Components of Z that are used (1, 3, with errors of the accelerometers 2, and [`AZIMUTH`]).
     pub components: Vec<usize>,
@@ -167,7 +167,7 @@ impl Plan {
             blocks,
             segments,
             stages: Vec::new(),
-            biases: biases(&gyros),
+            biases: biases(&gyros, &conditions.accelerometer()),
             gyros,
             noise_roots: Vec::new(),
             components,
@@ -345,7 +345,15 @@ impl Plan {
                 .output_rows(segment)
                 .into_iter()
                 .zip(&self.components)
-                .map(|(h, &c)| ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) })
+                .map(|(mut h, &c)| {
+                    // biases of the accelerometers are in platform axes
+                    if c != AZIMUTH {
+                        let attitude = self.attitude(segment, s.dt);
+                        let entry = |(k, axis, _): (usize, usize, &Bias)| (n + k, attitude[c - 1][axis]);
+                        h.extend(self.accelerometer_biases().map(entry).filter(|(_, x)| *x != 0.0));
+                    }
+                    ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) }
+                })
                 .collect(),
         };
         let stage = Stage {

@@ -192,7 +192,11 @@ impl<'a> TruthModel<'a> {
         let seen = apply(&transpose(&e), &G_N);
         let c = plan.attitude(segment, (step + 1) as f64 * s.dt);
         let force = apply(&transpose(&c), &seen).map(|x| -x);
-        let error = plan.accelerometer_error(&c, &force, self.coefficients());
+        let mut error = plan.accelerometer_error(&c, &force, self.coefficients());
+        for (k, axis, _) in plan.accelerometer_biases() {
+            let bias = self.x[plan.unknowns() + k];
+            (0..3).for_each(|r| error[r] += c[r][axis] * bias);
+        }
         for (z, &component) in z.iter_mut().zip(&plan.components) {
             let of_z = |k: usize| G_N[k] - seen[k] + error[k];
             *z = if component == AZIMUTH { psi_n[1] } else { of_z(component - 1) };

@@ -91,6 +91,12 @@ pub(super) struct SimulationEntry {
     /// Noise of the observation per sample in g; 1e-5 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::NOISE_G.low, "maximum" = ranges::NOISE_G.high))]
     pub(super) accelerometer_noise_g: Option<Spanned<f64>>,
+    /// Bias instability of the accelerometers in ug (B of IEEE Std 952), a Gauss-Markov process of each; none when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::INSTABILITY_UG.low, "maximum" = ranges::INSTABILITY_UG.high))]
+    pub(super) accelerometer_bias_instability_ug: Option<Spanned<f64>>,
+    /// Its correlation time in s; 3600 when left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high))]
+    pub(super) accelerometer_correlation_time_s: Option<Spanned<f64>>,
     /// Noise of a measured azimuth per sample in deg; 0.001 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::AZIMUTH_NOISE_DEG.low, "maximum" = ranges::AZIMUTH_NOISE_DEG.high))]
     pub(super) azimuth_noise_deg: Option<Spanned<f64>>,

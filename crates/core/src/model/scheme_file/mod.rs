@@ -116,6 +116,10 @@ impl Reader<'_> {
             dwell_s: self.keep(key("dwell_s"), s.dwell_s.as_ref()),
             slew_rate_deg_s: self.keep(key("slew_rate_deg_s"), s.slew_rate_deg_s.as_ref()),
             accelerometer_noise_g: self.keep(key("accelerometer_noise_g"), s.accelerometer_noise_g.as_ref()),
+            accelerometer_bias_instability_ug: self
+                .keep(key("accelerometer_bias_instability_ug"), s.accelerometer_bias_instability_ug.as_ref()),
+            accelerometer_correlation_time_s: self
+                .keep(key("accelerometer_correlation_time_s"), s.accelerometer_correlation_time_s.as_ref()),
             azimuth_noise_deg: self.keep(key("azimuth_noise_deg"), s.azimuth_noise_deg.as_ref()),
             drift_noise: self.keep(key("drift_noise"), s.drift_noise.as_ref()),
             angle_random_walk_deg_sqrt_h: self

@@ -134,6 +134,8 @@ fn settings(out: &mut String, s: &Settings) {
         ("dwell_s", s.dwell_s.map(number)),
         ("slew_rate_deg_s", s.slew_rate_deg_s.map(number)),
         ("accelerometer_noise_g", s.accelerometer_noise_g.map(number)),
+        ("accelerometer_bias_instability_ug", s.accelerometer_bias_instability_ug.map(number)),
+        ("accelerometer_correlation_time_s", s.accelerometer_correlation_time_s.map(number)),
         ("azimuth_noise_deg", s.azimuth_noise_deg.map(number)),
         ("drift_noise", s.drift_noise.map(|n| quoted(&n.to_string()))),
         ("correlation_time_s", s.correlation_time_s.map(number)),
@@ -227,6 +229,8 @@ mod tests {
             dwell_s in prop::option::of(1e-3f64..1e6),
             slew_rate_deg_s in prop::option::of(1e-3f64..1e4),
             accelerometer_noise_g in prop::option::of(1e-15f64..1e-3),
+            accelerometer_bias_instability_ug in prop::option::of(1e-9f64..1e9),
+            accelerometer_correlation_time_s in prop::option::of(1f64..1e9),
             azimuth_noise_deg in prop::option::of(1e-12f64..1e3),
             noise in prop::option::of((1e-12f64..1e6, any::<bool>())),
             gyros in prop::array::uniform3(prop::option::of((1e-12f64..1e6, prop::array::uniform3(0u8..3)))),
@@ -241,7 +245,7 @@ mod tests {
             Settings {
                 angle_random_walk_deg_sqrt_h: angle, rate_random_walk_dph_sqrt_h: rate, bias_instability_dph: bias,
                 correlation_time_s, truth, filter, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
-                drift_noise, drift_scale, values, estimates, priors,
+                accelerometer_bias_instability_ug, accelerometer_correlation_time_s, drift_noise, drift_scale, values, estimates, priors,
             }
         }
     }

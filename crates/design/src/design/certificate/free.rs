@@ -7,7 +7,7 @@
 //! Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))` over a net that is never further than h.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::{Angle, Carry, Euler, LOCAL, Matrix3, c_n_f64};
+use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64};
 use rayon::prelude::*;
 
 use super::super::criterion::{Criterion, Limits};
@@ -50,7 +50,7 @@ impl Evaluator {
         k: usize,
         going: &dyn Fn() -> bool,
     ) -> Option<Everywhere> {
-        if self.carry() != Carry::Reset || k == 0 || !self.prior.is_alike() {
+        if self.ordered() || k == 0 || !self.prior.is_alike() {
             return None;
         }
         let aim = match criterion {

@@ -8,7 +8,6 @@ mod weights;
 pub use free::Everywhere;
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::Carry;
 
 use super::criterion::{Criterion, Limits};
 use super::information::Evaluator;
@@ -32,7 +31,7 @@ pub struct Bound {
 impl Evaluator {
     /// What no scheme of `k` candidates, in any order and with repetitions, is below; `firsts` are candidates such that
     /// every scheme is as good as one that has one of them. `None` where information does not add over positions
-    /// (platform and inertial carry), where the candidates together do not determine what counts, or when stopped.
+    /// (platform and inertial carry, noise of Z that is correlated), where the candidates together do not determine what counts, or when stopped.
     pub fn bound(
         &self,
         criterion: &Criterion,
@@ -40,7 +39,7 @@ impl Evaluator {
         firsts: &[usize],
         going: &dyn Fn() -> bool,
     ) -> Option<Bound> {
-        if self.carry() != Carry::Reset || self.candidates.is_empty() || k == 0 {
+        if self.ordered() || self.candidates.is_empty() || k == 0 {
             return None;
         }
         let found = match criterion {
