@@ -12,10 +12,11 @@ use crate::failure::Failure;
 use crate::input::{Input, Source};
 
 /// Options that a model takes as well as a scheme, or a model alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 13] = [
+const OF_MODELS: [&str; 14] = [
     "files",
     "starts",
     "profile",
+    "prior",
     "model",
     "order",
     "count_limit",

@@ -30,11 +30,13 @@ Examples:
   obsdeg calibrate scheme.toml wednesday.csv --prior calibration/calibration.json
   gzip -dc record.csv.gz | obsdeg calibrate scheme.toml -
   obsdeg calibrate --model examples/influenza/model.toml examples/influenza/data.csv --profile beta
+  gzip -dc examples/handheld/record.csv.gz | obsdeg calibrate --model examples/handheld/accelerometers.toml -
 
 A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well),
 `Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the
 scheme (empty while the platform turns); without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a mean with a sigma of
-its own. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv (with the whole
+its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts
+instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv (with the whole
 covariance), residuals.csv and figures.
 Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, 2 bad input, 3 internal error, 130 interrupted.";
 
@@ -96,7 +98,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = probability)]
     gate: f64,
 
-    /// A calibration of the same platform before: the JSON that -o writes
+    /// A calibration of the same platform or system before: the JSON that -o writes (one that was not consistent counts with its sigmas rescaled)
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
 
@@ -182,7 +184,12 @@ fn run_model(a: &Arguments, path: &Path) -> Result<(), Failure> {
         return Err(Failure::input(format!("found {} records; expected one with --model", a.files.len())));
     };
     let record = record(data)?;
-    let options = SystemOptions { starts: a.starts as usize, profiles: a.profile.clone(), seed: a.seed };
+    let options = SystemOptions {
+        starts: a.starts as usize,
+        profiles: a.profile.clone(),
+        prior: a.prior.as_deref().map(prior).transpose()?,
+        seed: a.seed,
+    };
     let spinner = Spinner::start("calibrating", a.output.target.quiet);
     let found = calibrate_system(&file.model, record, &options).map_err(|e| match e {
         SystemCalibrationError::Model(e) => file.wrong(&e),
@@ -239,9 +246,15 @@ fn prior(path: &Path) -> Result<CovarianceTable, Failure> {
     };
     let value: serde_json::Value = serde_json::from_str(source.text()).map_err(|e| wrong(e.to_string()))?;
     let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
-    if !schema.starts_with("obsdeg.calibration/") {
-        return Err(wrong("no calibration".into()));
-    }
+    let factor = match schema.split('/').next() {
+        Some("obsdeg.calibration") => &value["fit"]["factor"],
+        Some("obsdeg.system-calibration") => &value["factor"],
+        _ => return Err(wrong("no calibration".into())),
+    };
     let table = value.get("covariance").cloned().unwrap_or_default();
-    serde_json::from_value(table).map_err(|e| wrong(e.to_string()))
+    let mut table: CovarianceTable = serde_json::from_value(table).map_err(|e| wrong(e.to_string()))?;
+    // sigmas that are not to be relied upon as they are
+    let rescaled = factor.as_f64().filter(|f| *f > 1.0 && value["consistent"] == false).unwrap_or(1.0);
+    table.covariance.iter_mut().flatten().for_each(|c| *c *= rescaled * rescaled);
+    Ok(table)
 }

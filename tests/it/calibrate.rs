@@ -172,6 +172,99 @@ fn series_of_the_literature() {
     }
 }
 
+/// The record of a unit moved by hand, unpacked.
+fn handheld(folder: &std::path::Path) -> String {
+    let path = folder.join("record.csv");
+    let unpacked = std::process::Command::new("gzip")
+        .arg("-dc")
+        .arg(crate_root("examples/handheld/record.csv.gz"))
+        .output();
+    fs::write(&path, unpacked.expect("gzip runs").stdout).expect("written");
+    path.display().to_string()
+}
+
+/// Checks estimates against others, in sigma as the fit has it.
+fn agrees(found_in: &Value, others: &[(&str, f64)], most: f64) {
+    for &(name, other) in others {
+        let [x, s] = found(found_in, name);
+        assert!((x - other).abs() < most * s, "{name}: {x} +- {s}, {other}");
+    }
+}
+
+/// A record that nobody here made: the length of the specific force at 38 attitudes that nobody knows.
+#[test]
+fn a_record_by_hand() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = handheld(folder.path());
+    let model = "examples/handheld/accelerometers.toml";
+    let output = run(&["calibrate", "--model", model, &record, "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let v: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(
+        (&v["samples"], &v["intervals"], &v["degrees_of_freedom"]),
+        (&51175.into(), &38.into(), &29.into())
+    );
+    let g = &v["outputs"][0];
+    let [left, expected] = ["rms", "expected_rms"].map(|k| g[k].as_f64().expect("a number"));
+    assert!((left / 1e-3 - 1.0).abs() < 0.15 && (expected / 3e-4 - 1.0).abs() < 0.15, "{left} {expected}");
+    assert_eq!(v["findings"].as_array().map(Vec::len), Some(1), "{}", v["findings"]);
+    assert_eq!(v["findings"][0]["kind"], "noise");
+    // least squares with equal weights, by another program; then what is published with the method, of its own program on this record
+    let plain = [33123.9, 33275.1, 32364.5, 414.42, 412.03, 414.62, 0.0034, -0.0092, 0.0214];
+    let published =
+        [33124.2, 33275.2, 32364.4, 414.459, 412.01, 414.649, 0.003_359_3, -0.008_906_39, 0.021_334_1];
+    let names = ["bx", "by", "bz", "sx", "sy", "sz", "ayz", "azy", "azx"];
+    for others in [plain, published] {
+        agrees(&v, &names.into_iter().zip(others).collect::<Vec<_>>(), 4.0);
+    }
+    // other columns, and what is no input
+    let text = fs::read_to_string(crate_root(model)).expect("the model");
+    let other = folder.path().join("other.toml");
+    for (from, to, message) in [
+        (
+            "[record]\n",
+            "[record]\ncolumns = { ax = \"accX\" }\n",
+            "no column `accX`, which record.columns has as `ax`",
+        ),
+        ("by = [\"ax\"", "by = [\"a\"", "`a` is no known input of the model; expected one of ax, ay, az"),
+        ("window = 1", "window = 60", "static.initial is 30; expected at least static.window, 60"),
+        ("g = 9.81744", "G = 9.81744", "`G` is no output of the model; expected one of g"),
+        ("shortest = 1", "shortest = 100", "intervals at rest; expected two at least"),
+    ] {
+        fs::write(&other, text.replace(from, to)).expect("written");
+        let output = run(&["calibrate", "--model", &other.display().to_string(), &record]);
+        let found = stderr(&output);
+        assert!(output.status.code() == Some(2) && found.contains(message), "{message}: {found}");
+    }
+}
+
+/// Then its gyros, by the turns between: `cargo test --release --test it -- --ignored gyros_by_hand` (a minute in debug).
+#[test]
+#[ignore = "a minute"]
+fn gyros_by_hand() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = handheld(folder.path());
+    let before = folder.path().join("before").display().to_string();
+    run(&["calibrate", "--model", "examples/handheld/accelerometers.toml", &record, "-o", &before, "-q"]);
+    let prior = format!("{before}/calibration.json");
+    let model = "examples/handheld/gyros.toml";
+    let line =
+        ["calibrate", "--model", model, &record, "--prior", &prior, "--starts", "1", "--format", "json"];
+    let v: Value = serde_json::from_slice(&run(&line).stdout).expect("JSON");
+    let published = [
+        ("kx", 4777.96),
+        ("ky", 4764.21),
+        ("kz", 4773.66),
+        ("gyz", -0.005_936_34),
+        ("gzy", 0.001_111_01),
+        ("gxz", 0.008_088_12),
+        ("gzx", 0.053_556_9),
+        ("gxy", -0.025_306_7),
+        ("gyx", -0.002_551_3),
+    ];
+    agrees(&v, &published, 2.0);
+}
+
 /// Prey alone are counted: the predators' number and what each eats are told only as a product, and the profile of either is flat.
 #[test]
 fn a_profile_is_flat_where_the_verdict_says_so() {

@@ -97,6 +97,17 @@ pub enum Finding {
         /// Probability that independent ones are correlated so.
         probability: f64,
     },
+    /// The residuals of a component go with the temperature.
+    Temperature {
+        /// The record.
+        record: String,
+        /// The component.
+        channel: String,
+        /// The coefficient of correlation.
+        correlation: f64,
+        /// Probability of that by chance.
+        probability: f64,
+    },
     /// Too many measurements lie far off for all of them to be outliers; none of these was left out.
     Outliers {
         /// How many.
@@ -225,6 +236,17 @@ pub struct ChannelFit {
     pub degrees_of_freedom: f64,
     /// Smallest probability over the records that independent residuals are correlated as these are; null for few.
     pub whiteness_probability: Option<f64>,
+    /// How residuals go with the temperature, in the record where that is least likely by chance; null without one, and for few.
+    pub temperature: Option<Warmth>,
+}
+
+/// How residuals go with the temperature, position by position.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Warmth {
+    /// The coefficient of correlation at the position where it is strongest.
+    pub correlation: f64,
+    /// Probability that residuals that do not depend on it are correlated so, all positions together (R. A. Fisher, Metron 1, 1921).
+    pub probability: f64,
 }
 
 /// A measurement that was left out.
@@ -281,6 +303,8 @@ pub struct RecordReport {
     pub ignored: Vec<String>,
     /// The mean length of the specific force, in g, where the record has it.
     pub force_g: Option<f64>,
+    /// How far the gimbals are from the attitudes of the scheme at most, in deg, where the record has their angles.
+    pub gimbals_deg: Option<f64>,
 }
 
 /// What says where a sample was taken.
@@ -293,6 +317,8 @@ pub enum PositionsBy {
     Timeline,
     /// A column of labels that agrees with the timeline of the scheme, which says when a position begins and ends.
     Both,
+    /// Intervals at rest that were found, as many as the scheme has positions: turns are in the middle of what is between them.
+    Static,
 }
 
 /// What was assumed.

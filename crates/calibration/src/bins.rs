@@ -27,6 +27,8 @@ pub struct Bin {
     pub lines: (u64, u64),
     /// Per channel; `None` where nothing was measured.
     pub channels: Vec<Option<Mean>>,
+    /// The mean temperature, where the record has it.
+    pub temperature: Option<f64>,
 }
 
 /// A sample that no line explains.
@@ -55,6 +57,8 @@ pub struct Sample {
     pub z: Vec<Option<f64>>,
     /// Per channel, where the record says so.
     pub sigma: Option<Vec<f64>>,
+    /// The temperature, where the record has it.
+    pub temperature: Option<f64>,
 }
 
 /// Fewest samples of a line of which some may be spikes.
@@ -94,7 +98,9 @@ impl Binner {
         let (first, last) = (now.first()?, now.last()?);
         let t = first.t + now.iter().map(|s| s.t - first.t).sum::<f64>() / now.len() as f64;
         let channels = (0..self.sigmas.len()).map(|c| self.channel(&now, c, t, spikes)).collect();
-        Some(Bin { t, lines: (first.line, last.line), channels })
+        let warm: Vec<f64> = now.iter().filter_map(|s| s.temperature).collect();
+        let temperature = (!warm.is_empty()).then(|| warm.iter().sum::<f64>() / warm.len() as f64);
+        Some(Bin { t, lines: (first.line, last.line), channels, temperature })
     }
 
     fn channel(&self, now: &[Sample], c: usize, t: f64, spikes: &mut Vec<Spike>) -> Option<Mean> {
@@ -164,7 +170,7 @@ mod tests {
     use super::*;
 
     fn sample(line: u64, t: f64, z: f64) -> Sample {
-        Sample { line, t, z: vec![Some(z)], sigma: None }
+        Sample { line, t, z: vec![Some(z)], sigma: None, temperature: None }
     }
 
     fn binned(samples: impl Iterator<Item = Sample>) -> (Vec<Bin>, Vec<Spike>) {
@@ -214,8 +220,13 @@ mod tests {
     /// What the record gives a sigma is a bin of its own; gaps are none.
     #[test]
     fn given_sigmas_and_gaps() {
-        let given =
-            |line: u64, z: Option<f64>| Sample { line, t: line as f64, z: vec![z], sigma: Some(vec![0.5]) };
+        let given = |line: u64, z: Option<f64>| Sample {
+            line,
+            t: line as f64,
+            z: vec![z],
+            sigma: Some(vec![0.5]),
+            temperature: None,
+        };
         let (bins, _) = binned([given(1, Some(2.0)), given(2, None), given(3, Some(4.0))].into_iter());
         let of: Vec<_> = bins.iter().map(|b| b.channels[0].map(|m| (m.value, m.variance, m.given))).collect();
         assert_eq!(of, [Some((2.0, 0.25, true)), None, Some((4.0, 0.25, true))]);

@@ -8,6 +8,7 @@ pub mod bins;
 pub mod least_squares;
 pub mod platform;
 pub mod record;
+pub mod still;
 pub mod system;
 
 pub use answer::Calibration;

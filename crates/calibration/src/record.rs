@@ -5,6 +5,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
 
+use obsdeg_core::model::Recording;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 
@@ -67,6 +68,14 @@ pub enum RecordError {
         /// The units that would do.
         expected: String,
     },
+    /// A unit of the file that is none.
+    #[error("record.units.{name}: found `{found}`; expected a unit, or what one count is, as in `2.44e-5 g`")]
+    Count {
+        /// The column, as the file names it.
+        name: String,
+        /// What it says.
+        found: String,
+    },
     /// Not a number.
     #[error("{place}: expected a number, found `{found}`")]
     Number {
@@ -116,12 +125,14 @@ pub enum RecordError {
 }
 
 /// A column of a header.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Its name.
     pub name: String,
     /// Its unit, if it says one.
     pub unit: Option<String>,
+    /// What one of its numbers is of that unit.
+    pub count: f64,
     /// As it is written.
     pub text: String,
 }
@@ -134,7 +145,7 @@ impl Column {
             None => (whole, None),
         };
         let sound = !name.is_empty() && !name.contains(']');
-        sound.then(|| Self { name: name.into(), unit, text: whole.into() })
+        sound.then(|| Self { name: name.into(), unit, count: 1.0, text: whole.into() })
     }
 }
 
@@ -269,6 +280,37 @@ impl Record {
         &self.columns
     }
 
+    /// Names and units that a file gives the columns.
+    ///
+    /// # Errors
+    /// [`RecordError`] for a column that is not there, two of one name, or a unit that is none.
+    pub fn named(mut self, by: &Recording) -> Result<Self, RecordError> {
+        let found: Vec<Option<usize>> = by.columns.values().map(|own| self.find(own)).collect();
+        for ((name, own), column) in by.columns.iter().zip(found) {
+            let column = column
+                .ok_or_else(|| self.missing(&format!("`{own}`, which record.columns has as `{name}`")))?;
+            self.columns[column].name.clone_from(name);
+        }
+        let twice = |i: &usize| self.columns[..*i].iter().any(|c| c.name == self.columns[*i].name);
+        if let Some(i) = (0..self.columns.len()).find(twice) {
+            return Err(RecordError::Header { place: self.at(1, i) });
+        }
+        for (name, text) in &by.units {
+            let column =
+                self.find(name).ok_or_else(|| self.missing(&format!("`{name}`, of record.units")))?;
+            let (count, unit) = match text.trim().split_once(char::is_whitespace) {
+                Some((count, unit)) => (count.parse().unwrap_or(f64::NAN), unit.trim()),
+                None => (1.0, text.trim()),
+            };
+            if !(count.is_finite() && count != 0.0) || unit.is_empty() {
+                return Err(RecordError::Count { name: name.clone(), found: text.clone() });
+            }
+            self.columns[column].count = count;
+            self.columns[column].unit = Some(unit.into());
+        }
+        Ok(self)
+    }
+
     /// The index of the column of this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|c| c.name == name)
@@ -281,12 +323,18 @@ impl Record {
     pub fn wanted(&self, column: usize, units: &[(&str, f64)]) -> Result<Wanted, RecordError> {
         let own = &self.columns[column];
         let found = own.unit.as_ref().and_then(|u| units.iter().find(|(name, _)| name == u));
-        found.map(|&(_, scale)| Wanted { column, scale }).ok_or_else(|| RecordError::Unit {
-            place: self.at(1, column),
-            expected: format!(
-                "a unit, {}",
-                units.iter().map(|(u, _)| format!("`{} [{u}]`", own.name)).collect::<Vec<_>>().join(" or ")
-            ),
+        found.map(|&(_, scale)| Wanted { column, scale: scale * own.count }).ok_or_else(|| {
+            RecordError::Unit {
+                place: self.at(1, column),
+                expected: format!(
+                    "a unit, {}",
+                    units
+                        .iter()
+                        .map(|(u, _)| format!("`{} [{u}]`", own.name))
+                        .collect::<Vec<_>>()
+                        .join(" or ")
+                ),
+            }
         })
     }
 
@@ -457,6 +505,34 @@ mod tests {
         assert_eq!(rows[0], (3, vec![Some(0.5), Some(1.5)], "p1".to_string()));
         assert_eq!(rows[1], (5, vec![Some(1.5), None], String::new()));
         assert_eq!(rows[2], (6, vec![Some(2.5005), Some(-1e-3)], "p 2".to_string()));
+    }
+
+    /// Names and counts that a file gives.
+    #[test]
+    fn names_and_counts() {
+        let by = |columns: &[(&str, &str)], units: &[(&str, &str)]| {
+            let of = |l: &[(&str, &str)]| l.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
+            Recording { columns: of(columns), units: of(units), ..Recording::default() }
+        };
+        let read = |by: &Recording| {
+            let text = "Time [ms],AccX,g\n500,3,1\n";
+            let record = Record::csv("r.csv", Box::new(std::io::Cursor::new(text)))?.named(by)?;
+            let of =
+                |name: &str, unit: &str| record.wanted(record.find(name).expect("there"), &[(unit, 10.0)]);
+            Ok::<_, RecordError>((of("t", "ms")?, of("fx", "g")?))
+        };
+        let (t, f) = read(&by(&[("t", "Time"), ("fx", "AccX")], &[("fx", "2.5e-5 g")])).expect("named");
+        assert_eq!((t, f), (Wanted { column: 0, scale: 10.0 }, Wanted { column: 1, scale: 2.5e-4 }));
+        let message = |by| read(&by).expect_err("wrong").to_string();
+        assert_eq!(
+            message(by(&[("t", "Zeit")], &[])),
+            "r.csv: no column `Zeit`, which record.columns has as `t`; found `Time [ms]`, `AccX`, `g`"
+        );
+        assert!(message(by(&[("g", "AccX")], &[])).starts_with("r.csv: line 1, column `g`: expected a name"));
+        assert_eq!(
+            message(by(&[("t", "Time"), ("fx", "AccX")], &[("fx", "much g")])),
+            "record.units.fx: found `much g`; expected a unit, or what one count is, as in `2.44e-5 g`"
+        );
     }
 
     #[test]

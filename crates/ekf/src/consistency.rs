@@ -30,6 +30,11 @@ pub fn chi_square_quantile(dof: f64, confidence: f64) -> f64 {
     ChiSquared::new(dof).map_or(f64::INFINITY, |chi| chi.inverse_cdf(confidence))
 }
 
+/// The probability that a chi-square of `dof` degrees of freedom is above `x`.
+pub fn chi_square_tail(dof: f64, x: f64) -> f64 {
+    ChiSquared::new(dof).map_or(0.0, |chi| chi.sf(x))
+}
+
 /// `e^T P^-1 e` of a fixed covariance for any number of errors, by `P = U diag(d) U^T`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nees {

@@ -5,7 +5,7 @@ use obsdeg_calibration::answer::{
     CovarianceTable, Estimated, Finding, PositionFit, PositionsBy, RecordReport,
 };
 
-use crate::document::{Block, Document, left, number, optional, right};
+use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, words};
@@ -58,6 +58,11 @@ fn finding(f: &Finding, records: &[RecordReport]) -> String {
             of(record, records),
             number(*probability)
         ),
+        Finding::Temperature { record, channel, correlation, probability } => format!(
+            "the residuals of {channel}{} go with the temperature (correlation {correlation:+.2}, probability {}), which no unknown of the scheme explains",
+            of(record, records),
+            number(*probability)
+        ),
         Finding::Outliers { count, of } => {
             format!(
                 "{count} of {of} measurements are far off, too many to be outliers: none of them was left out"
@@ -95,7 +100,7 @@ fn row(e: &Estimated) -> Vec<String> {
         e.name.clone(),
         e.unit.clone(),
         words::degree(e.degree),
-        optional(e.estimate),
+        estimate(e.estimate, e.sigma),
         optional(e.sigma),
         optional(e.sigma_rescaled),
         optional(e.predicted_sigma),
@@ -137,6 +142,8 @@ fn records(c: &Calibration) -> Vec<String> {
                 PositionsBy::Timeline => "the timeline of the scheme",
                 PositionsBy::Both =>
                     "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end",
+                PositionsBy::Static =>
+                    "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two",
             }
         );
         if r.unused > 0 {
@@ -144,6 +151,9 @@ fn records(c: &Calibration) -> Vec<String> {
         }
         if let Some(f) = r.force_g {
             out += &format!("; the specific force is {f:.6} g long on average");
+        }
+        if let Some(off) = r.gimbals_deg {
+            out += &format!("; the gimbals are within {} deg of the scheme", number(off));
         }
         if !r.ignored.is_empty() {
             out += &format!("; nothing was made of the columns {}", r.ignored.join(", "));
@@ -277,6 +287,7 @@ impl Answer for Calibration {
             right("scatter"),
             right("chi-square"),
             right("whiteness"),
+            right("temperature"),
         ];
         let rows = self.channels.iter().map(|c| {
             vec![
@@ -286,10 +297,14 @@ impl Answer for Calibration {
                 optional(c.scatter),
                 number(c.chi_square),
                 optional(c.whiteness_probability),
+                c.temperature.map_or_else(
+                    || "-".into(),
+                    |w| format!("{:+.2} ({})", w.correlation, number(w.probability)),
+                ),
             ]
         });
         blocks.push(Block::table(
-            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: probability of correlations like these)",
+            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: probability of correlations like these; temperature: correlation with it, and the probability of that)",
             columns,
             rows,
         ));

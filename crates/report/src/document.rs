@@ -200,6 +200,17 @@ pub(crate) fn number(x: f64) -> String {
     }
 }
 
+/// An estimate with the digits that its standard deviation leaves: two of those that are uncertain.
+pub(crate) fn estimate(x: Option<f64>, sigma: Option<f64>) -> String {
+    let (Some(x), Some(sigma)) = (x, sigma) else { return optional(x) };
+    let decimals = 1.0 - sigma.log10().floor();
+    if (1e-3..1e9).contains(&x.abs()) && (0.0..=9.0).contains(&decimals) {
+        format!("{x:.*}", decimals as usize)
+    } else {
+        number(x)
+    }
+}
+
 /// A number, or a dash.
 pub(crate) fn optional(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), number)

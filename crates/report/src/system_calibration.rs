@@ -2,7 +2,7 @@
 
 use obsdeg_calibration::system::{SystemCalibration, SystemEstimated, SystemFinding};
 
-use crate::document::{Block, Document, left, number, optional, right};
+use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, words};
@@ -49,7 +49,7 @@ fn row(e: &SystemEstimated) -> Vec<String> {
         e.name.clone(),
         e.unit.clone(),
         words::degree(e.degree),
-        optional(e.estimate),
+        estimate(e.estimate, e.sigma),
         optional(e.sigma),
         optional(e.sigma_rescaled),
         verdict,
@@ -116,6 +116,7 @@ impl Answer for SystemCalibration {
             left("from"),
             right("chi-square"),
             right("rms left"),
+            right("expected"),
             right("whiteness"),
         ];
         let rows = self.outputs.iter().map(|o| {
@@ -126,10 +127,15 @@ impl Answer for SystemCalibration {
                 if o.estimated { "what is left" } else { "given" }.into(),
                 number(o.chi_square),
                 number(o.rms),
+                number(o.expected_rms),
                 optional(o.whiteness_probability),
             ]
         });
-        blocks.push(Block::table("Outputs", columns, rows));
+        blocks.push(Block::table(
+            "Outputs (root mean squares of what is left, and of what sigmas let expect)",
+            columns,
+            rows,
+        ));
         if !self.others.is_empty() {
             let names: Vec<&str> = self.unknowns.iter().map(|u| u.name.as_str()).collect();
             let of = |o: &obsdeg_calibration::system::OtherSolution| {
@@ -147,10 +153,14 @@ impl Answer for SystemCalibration {
                 p.points.iter().map(|(x, c)| vec![number(*x), number(*c)]),
             ));
         }
-        let mut read = vec![format!(
+        let mut read: Vec<String> = Vec::new();
+        read.extend(self.intervals.map(|n| {
+            format!("{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of its samples", self.samples)
+        }));
+        read.push(format!(
             "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} times the usual steps of integration; seed {}",
             self.rows, self.substeps, self.seed
-        )];
+        ));
         if !self.ignored.is_empty() {
             read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
         }

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{AZIMUTH, Scheme};
-use obsdeg_ekf::consistency::{autocorrelation, chi_square_band, ljung_box};
+use obsdeg_ekf::consistency::{autocorrelation, chi_square_band, chi_square_tail, ljung_box};
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
@@ -18,7 +18,7 @@ use super::run::Key;
 use super::{CalibrationError, Options};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, CovarianceTable, Estimated, Finding, Fit, Moved, Outlier, PositionFit,
-    PositionsBy, RecordReport, Repeatability, Residual, SCHEMA, SecondPath,
+    PositionsBy, RecordReport, Repeatability, Residual, SCHEMA, SecondPath, Warmth,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 
@@ -28,6 +28,8 @@ const WIDE: f64 = 100.0;
 const STRICT: f64 = 0.999;
 /// Fewest residuals of which a correlation is told.
 const FEWEST: usize = 40;
+/// Fewest residuals of a position whose correlation with the temperature is told.
+const FEWEST_WARM: usize = 10;
 /// Lags of the correlation.
 const LAGS: usize = 20;
 /// The paths agree to this, in sigma.
@@ -430,6 +432,9 @@ impl Parts<'_> {
                 chi_square: chi / free.max(f64::MIN_POSITIVE),
                 degrees_of_freedom: free,
                 whiteness_probability: white.reduce(f64::min),
+                temperature: (0..self.problem.runs.len())
+                    .filter_map(|r| self.warmth(r, c))
+                    .min_by(|a, b| a.probability.total_cmp(&b.probability)),
             }
         };
         self.planned.components.iter().enumerate().map(of).collect()
@@ -443,6 +448,26 @@ impl Parts<'_> {
         (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
     }
 
+    /// How the residuals of a channel go with the temperature, position by position: what is fixed to the platform changes its sign in n.
+    fn warmth(&self, run: usize, channel: usize) -> Option<Warmth> {
+        let reading = &self.problem.runs[run].reading;
+        let places: Vec<(usize, usize)> = self.problem.runs[run].bins.iter().flatten().copied().collect();
+        let mut pairs = vec![Vec::new(); reading.bins.len()];
+        for l in self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel) {
+            let (position, i) = places[l.key.bin];
+            pairs[position].extend(reading.bins[position][i].temperature.map(|t| (t, l.normalised)));
+        }
+        // of independent ones artanh r is normal, with variance 1/(n - 3)
+        let all = pairs.iter().filter(|p| p.len() >= FEWEST_WARM).filter_map(|p| {
+            let r = correlation(p)?;
+            Some((r, r.clamp(-1.0, 1.0).atanh() * (p.len() as f64 - 3.0).sqrt()))
+        });
+        let all: Vec<(f64, f64)> = all.collect();
+        let strongest = all.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        let chi: f64 = all.iter().map(|(_, z)| z * z).sum();
+        Some(Warmth { correlation: strongest.0, probability: chi_square_tail(all.len() as f64, chi) })
+    }
+
     fn records(&self) -> Vec<RecordReport> {
         let of = |run: &super::run::Run| RecordReport {
             name: run.reading.name.clone(),
@@ -454,7 +479,9 @@ impl Parts<'_> {
                 By::Label => PositionsBy::Labels,
                 By::Timeline => PositionsBy::Timeline,
                 By::Both => PositionsBy::Both,
+                By::Static => PositionsBy::Static,
             },
+            gimbals_deg: run.reading.gimbals,
             ignored: run.reading.ignored.clone(),
             force_g: run.reading.force,
         };
@@ -575,6 +602,14 @@ impl Parts<'_> {
                     let (record, channel) = (record.name.clone(), channel.channel.clone());
                     out.push(Finding::Correlated { record, channel, probability });
                 }
+                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < 1.0 - STRICT) {
+                    out.push(Finding::Temperature {
+                        record: record.name.clone(),
+                        channel: channel.channel.clone(),
+                        correlation: w.correlation,
+                        probability: w.probability,
+                    });
+                }
             }
         }
         out.extend(self.too_many.map(|count| Finding::Outliers { count, of: self.found.all.len() }));
@@ -647,6 +682,15 @@ impl Parts<'_> {
         let chi = left.norm_squared() / dof;
         (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
     }
+}
+
+/// The coefficient of correlation; `None` where one of the two is constant.
+fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
+    let n = pairs.len() as f64;
+    let (x, y) = pairs.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let sum = |of: fn(f64, f64) -> f64| pairs.iter().map(|p| of(p.0 - x, p.1 - y)).sum::<f64>();
+    let r = sum(|x, y| x * y) / (sum(|x, _| x * x) * sum(|_, y| y * y)).sqrt();
+    r.is_finite().then_some(r)
 }
 
 /// Both ends of a band.

@@ -75,6 +75,34 @@ pub enum CalibrationError {
         /// Positions that it fits.
         like: String,
     },
+    /// Other intervals at rest than positions.
+    #[error(
+        "{record}: {found} intervals at rest; expected {expected}, one for each position of the scheme{spans} (record.static says how they are found; a column `position` says what is where)"
+    )]
+    Rests {
+        /// The record.
+        record: String,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+        /// Where they are.
+        spans: String,
+    },
+    /// Gimbals that point elsewhere.
+    #[error(
+        "{record}: line {line}: at {position} the gimbals are {off_deg} deg from where the scheme has them"
+    )]
+    Gimbals {
+        /// The record.
+        record: String,
+        /// The line.
+        line: u64,
+        /// The position.
+        position: String,
+        /// By how much.
+        off_deg: String,
+    },
     /// A standard deviation that is none.
     #[error(
         "{record}: line {line}: no standard deviation of {channel}; expected one above zero beside every value"

@@ -1,12 +1,13 @@
 //! A record of a platform: which columns it has, at which position every sample was taken, and bins of them in n.
 
 use obsdeg_core::model::slew::apply;
-use obsdeg_core::model::{AZIMUTH, Matrix3};
+use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
 use crate::bins::{Bin, Binner, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
+use crate::still::{Detector, Told};
 
 /// Units of forces, and what they are of g where gravity is as it is (`None`: that of a metre per second squared).
 const FORCES: [(&str, Option<f64>); 4] =
@@ -17,11 +18,15 @@ const ANGLES: [(&str, f64); 4] = [
     ("deg", std::f64::consts::PI / 180.0),
     ("arcsec", std::f64::consts::PI / 648000.0),
 ];
+/// Units of a temperature, whose zero does not matter.
+const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
 pub(crate) const TIMES: [(&str, f64); 5] =
     [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0), ("h", 3600.0)];
 /// The specific force of a position of the scheme is no further from the vertical than this, in deg.
 const TILT_DEG: f64 = 20.0;
+/// What the gimbals read is no further from the attitude of the scheme than this, in deg.
+const GIMBALS_DEG: f64 = 5.0;
 
 /// What the three columns of a record are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +48,8 @@ pub(crate) enum By {
     Timeline,
     /// By labels that agree with the timeline.
     Both,
+    /// By intervals at rest that were found.
+    Static,
 }
 
 /// A record beside its scheme.
@@ -64,14 +71,19 @@ pub(crate) struct Reading {
     pub ignored: Vec<String>,
     /// The mean length of the specific force, in g, where the record has it.
     pub force: Option<f64>,
+    /// How far the gimbals are off at most, in deg, where the record has their angles.
+    pub gimbals: Option<f64>,
 }
 
-/// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations of the three.
+/// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations of the three, gimbal angles, temperature.
 struct Layout {
     observed: Observed,
     wanted: Vec<Wanted>,
     azimuth: bool,
     sigmas: bool,
+    /// The first of the three gimbal angles among what is wanted.
+    gimbals: Option<usize>,
+    temperature: Option<usize>,
     label: Option<usize>,
     ignored: Vec<String>,
 }
@@ -123,16 +135,30 @@ impl Layout {
                 }
             }
         }
+        let mut gimbals = None;
+        let angles = ["alpha", "beta", "gamma"];
+        if angles.iter().any(|a| record.find(a).is_some()) {
+            gimbals = Some(wanted.len());
+            for name in angles {
+                let column = record.find(name);
+                let column = column.ok_or_else(|| record.missing(&format!("`{name} [deg]`")))?;
+                wanted.push(record.wanted(column, &ANGLES)?);
+            }
+        }
+        let mut temperature = None;
+        if let Some(column) = record.find("T") {
+            temperature = Some(wanted.len());
+            wanted.push(record.wanted(column, &TEMPERATURES)?);
+        }
         let label = record.find("position");
         let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
         let ignored = record.columns().iter().enumerate().filter(|(i, _)| !used(*i));
         let ignored = ignored.map(|(_, c): (usize, &Column)| c.text.clone()).collect();
-        Ok(Self { observed, wanted, azimuth, sigmas, label, ignored })
+        Ok(Self { observed, wanted, azimuth, sigmas, gimbals, temperature, label, ignored })
     }
 
     /// Components 1, 2, 3 of Z in n, and the azimuth, of a row taken where `C_c^n` is `c`.
-    fn in_n(&self, row: &Row<'_>, c: &Matrix3<f64>) -> [Option<f64>; 4] {
-        let n = row.numbers;
+    fn in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> [Option<f64>; 4] {
         let azimuth = if self.azimuth { n[4] } else { None };
         let turned = match (n[1], n[2], n[3]) {
             (Some(x), Some(y), Some(z)) => Some(apply(c, &[x, y, z])),
@@ -148,11 +174,20 @@ impl Layout {
         }
     }
 
+    /// How far the attitude that the gimbals read is from `c`, in deg: the angle of the turn between them.
+    fn gimbals_off(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> Option<f64> {
+        let first = self.gimbals?;
+        let [alpha, beta, gamma] = [n[first]?, n[first + 1]?, n[first + 2]?];
+        let turn = |axis: usize, angle: f64| elementary(&Float, axis, &(angle.cos(), angle.sin()));
+        let read = product(&Float, &product(&Float, &turn(0, alpha), &turn(1, beta)), &turn(2, gamma));
+        let trace: f64 = (0..3).map(|i| (0..3).map(|j| read[i][j] * c[i][j]).sum::<f64>()).sum();
+        Some(((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees())
+    }
+
     /// Their standard deviations where the record has them: those of platform axes turned, without their correlation.
-    fn sigmas_in_n(&self, row: &Row<'_>, c: &Matrix3<f64>) -> Option<[Option<f64>; 3]> {
+    fn sigmas_in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> Option<[Option<f64>; 3]> {
         let first = if self.azimuth { 5 } else { 4 };
-        let own =
-            self.sigmas.then(|| [row.numbers[first], row.numbers[first + 1], row.numbers[first + 2]])?;
+        let own = self.sigmas.then(|| [n[first], n[first + 1], n[first + 2]])?;
         if self.observed == Observed::Geographic {
             return Some(own);
         }
@@ -174,6 +209,9 @@ fn at_time(plan: &Plan, t: f64) -> Option<usize> {
     (!matches!(found.kind, SegmentKind::Slew(_))).then_some(found.position)
 }
 
+/// A row that is kept: its line and its numbers.
+type Kept = (u64, Vec<Option<f64>>);
+
 /// What happens to a sample.
 struct Taking<'a> {
     layout: &'a Layout,
@@ -189,6 +227,13 @@ struct Taking<'a> {
     /// Per position: the sum of what is Z in n (1, 2, 3), its samples, and the line of the first.
     sums: Vec<([f64; 3], usize, u64)>,
     length: f64,
+    /// Finds the positions, where the file says how.
+    detector: Option<Detector<Kept>>,
+    told: Vec<Told<Kept>>,
+    /// First and last time of every interval at rest.
+    rests: Vec<(f64, f64)>,
+    /// The position whose gimbals are furthest off, by how much in deg, and the line.
+    gimbals: Option<(usize, f64, u64)>,
 }
 
 impl Taking<'_> {
@@ -202,7 +247,7 @@ impl Taking<'_> {
     fn position(&self, row: &Row<'_>, t: f64) -> Result<Option<usize>, CalibrationError> {
         let positions = &self.plan.platform.scheme().positions;
         match self.out.by {
-            By::Timeline | By::Both => Ok(at_time(self.plan, t)),
+            By::Timeline | By::Both | By::Static => Ok(at_time(self.plan, t)),
             By::Label if row.label.is_empty() => Ok(None),
             By::Label => {
                 let found = positions.iter().position(|p| p.name == row.label);
@@ -237,8 +282,46 @@ impl Taking<'_> {
         }
         self.out.span.1 = time;
         self.out.samples += 1;
-        let from = |begin: f64| time - begin;
-        let found = self.position(row, from(if self.out.by == By::Label { self.begin } else { 0.0 }))?;
+        if let Some(mut detector) = self.detector.take() {
+            // a row without forces says nothing of rest
+            if let [Some(x), Some(y), Some(z)] = row.numbers[1..4] {
+                let mut told = std::mem::take(&mut self.told);
+                detector.push(time, vec![x, y, z], (row.line, row.numbers.to_vec()), &mut told);
+                told.drain(..).try_for_each(|one| self.at_rest(&one))?;
+                self.told = told;
+            } else {
+                self.out.unused += 1;
+            }
+            self.detector = Some(detector);
+            return Ok(());
+        }
+        let found = self.position(row, time - if self.out.by == By::Label { self.begin } else { 0.0 })?;
+        self.put(row.line, row.numbers, time, found)
+    }
+
+    /// A sample of which it is known whether it is at rest.
+    fn at_rest(&mut self, told: &Told<Kept>) -> Result<(), CalibrationError> {
+        let (line, numbers) = &told.sample;
+        let Some(time) = numbers[0] else { return Ok(()) };
+        if let Some(k) = told.interval {
+            if k == self.rests.len() {
+                self.rests.push((time, time));
+            }
+            self.rests[k].1 = time;
+        }
+        let positions = self.plan.attitudes.len();
+        self.put(*line, numbers, time, told.interval.filter(|k| *k < positions))
+    }
+
+    /// Puts a sample where it was taken.
+    fn put(
+        &mut self,
+        line: u64,
+        numbers: &[Option<f64>],
+        time: f64,
+        found: Option<usize>,
+    ) -> Result<(), CalibrationError> {
+        let own_time = matches!(self.out.by, By::Label | By::Static);
         if found != self.now {
             self.end();
         }
@@ -247,11 +330,11 @@ impl Taking<'_> {
             self.now = None;
             return Ok(());
         };
-        if self.out.by == By::Label && self.out.stays.is_empty() {
+        if own_time && self.out.stays.is_empty() {
             self.begin = time;
         }
         self.agrees &= at_time(self.plan, time) == Some(p);
-        let t = time - if self.out.by == By::Label { self.begin } else { 0.0 };
+        let t = time - if own_time { self.begin } else { 0.0 };
         if self.now != Some(p) {
             // the timeline may begin late, or leave positions out
             while self.out.stays.len() <= p {
@@ -261,11 +344,16 @@ impl Taking<'_> {
         self.now = Some(p);
         self.out.stays[p].1 = t;
         let c = &self.plan.attitudes[p];
-        let in_n = self.layout.in_n(row, c);
+        if let Some(off) = self.layout.gimbals_off(numbers, c)
+            && self.gimbals.is_none_or(|(_, most, _)| off > most)
+        {
+            self.gimbals = Some((p, off, line));
+        }
+        let in_n = self.layout.in_n(numbers, c);
         if let [Some(x), Some(y), Some(z), _] = in_n {
-            let (sum, count, line) = &mut self.sums[p];
+            let (sum, count, first) = &mut self.sums[p];
             if *count == 0 {
-                *line = row.line;
+                *first = line;
             }
             *count += 1;
             [x, y, z].iter().zip(sum).for_each(|(x, s)| *s += x);
@@ -274,20 +362,21 @@ impl Taking<'_> {
         let z = self.plan.components.iter().map(|&k| if k == AZIMUTH { in_n[3] } else { in_n[k - 1] });
         let z: Vec<Option<f64>> = z.collect();
         let mut sigma = None;
-        if let Some(own) = self.layout.sigmas_in_n(row, c) {
+        if let Some(own) = self.layout.sigmas_in_n(numbers, c) {
             let of = |&k: &usize| if k == AZIMUTH { None } else { own[k - 1] };
             let all: Vec<f64> = self.plan.components.iter().map(|k| of(k).unwrap_or(f64::NAN)).collect();
             // a value with a sigma that is none is a mistake; without a value nobody asks
             if let Some(k) = (0..z.len()).find(|&k| z[k].is_some() && (all[k].is_nan() || all[k] <= 0.0)) {
                 return Err(CalibrationError::Sigma {
                     record: self.out.name.clone(),
-                    line: row.line,
+                    line,
                     channel: channel_name(self.plan.components[k]),
                 });
             }
             sigma = Some(all);
         }
-        let bin = self.binner.push(Sample { line: row.line, t, z, sigma }, &mut self.out.spikes);
+        let temperature = self.layout.temperature.and_then(|i| numbers[i]);
+        let bin = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
         if let Some(bin) = bin {
             self.out.bins[p].push(bin);
         }
@@ -348,9 +437,15 @@ pub(crate) fn observe(
     bin_s: f64,
     sigmas: Vec<f64>,
 ) -> Result<Reading, CalibrationError> {
+    let record = record.named(&plan.platform.scheme().recording)?;
     let layout = Layout::of(&record, plan, gravity)?;
     let positions = plan.platform.scheme().positions.len();
-    let by = if layout.label.is_some() { By::Label } else { By::Timeline };
+    let still = plan.platform.scheme().recording.still.as_ref().filter(|_| layout.label.is_none());
+    let by = match still {
+        _ if layout.label.is_some() => By::Label,
+        Some(_) => By::Static,
+        None => By::Timeline,
+    };
     let out = Reading {
         name: record.name().into(),
         by,
@@ -362,22 +457,59 @@ pub(crate) fn observe(
         span: (0.0, 0.0),
         ignored: layout.ignored.clone(),
         force: None,
+        gimbals: None,
     };
     let sums = vec![([0.0; 3], 0, 0); positions];
     let binner = Binner::new(bin_s, sigmas);
-    let mut taking =
-        Taking { layout: &layout, plan, binner, out, now: None, begin: 0.0, agrees: true, sums, length: 0.0 };
+    let mut taking = Taking {
+        layout: &layout,
+        plan,
+        binner,
+        out,
+        now: None,
+        begin: 0.0,
+        agrees: true,
+        sums,
+        length: 0.0,
+        detector: still.map(Detector::new),
+        told: Vec::new(),
+        rests: Vec::new(),
+        gimbals: None,
+    };
     record.read(&layout.wanted, layout.label, false, |row| taking.take(&row))?;
+    if let Some(mut detector) = taking.detector.take() {
+        let mut told = Vec::new();
+        detector.end(&mut told);
+        told.iter().try_for_each(|one| taking.at_rest(one))?;
+        if taking.rests.len() != positions {
+            let spans: Vec<String> = taking.rests.iter().map(|(a, b)| format!("{a} to {b}")).collect();
+            return Err(CalibrationError::Rests {
+                record: taking.out.name,
+                found: spans.len(),
+                expected: positions,
+                spans: if spans.is_empty() { String::new() } else { format!(": {} s", spans.join(", ")) },
+            });
+        }
+    }
     taking.end();
     let all = layout.observed != Observed::Geographic;
     if all {
         taking.check_attitudes()?;
     }
+    if let Some((p, off, line)) = taking.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
+        return Err(CalibrationError::Gimbals {
+            record: taking.out.name.clone(),
+            line,
+            position: plan.platform.scheme().positions[p].name.clone(),
+            off_deg: format!("{off:.1}"),
+        });
+    }
     let count: usize = taking.sums.iter().map(|s| s.1).sum();
     let force = (layout.observed == Observed::Force && count > 0).then(|| taking.length / count as f64);
     let (agrees, begin) = (taking.agrees, taking.begin);
+    let gimbals = taking.gimbals.map(|(_, off, _)| off);
     let mut out = taking.out;
-    out.force = force;
+    (out.force, out.gimbals) = (force, gimbals);
     if out.by == By::Label && agrees {
         // which says when each position begins and ends, where samples only say what is between
         out.by = By::Both;
@@ -391,7 +523,7 @@ pub(crate) fn observe(
             record: out.name,
             position: scheme.positions[p].name.clone(),
             hint: match by {
-                By::Label | By::Both => "its label does not occur".into(),
+                By::Label | By::Both | By::Static => "its label does not occur".into(),
                 By::Timeline => format!(
                     "the record is of {} to {} s, the scheme of 0 to {} s (a column `position` says what is where)",
                     out.span.0,

@@ -69,13 +69,23 @@ impl Run {
     ) -> Result<Self, CalibrationError> {
         let mut own = scheme.clone();
         let mut begins = vec![0.0; own.positions.len()];
-        if reading.by == By::Label {
+        let mut stays = reading.stays.clone();
+        let slew_s = |p: usize| -> f64 {
+            let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
+            planned.segments.iter().filter(slew).map(|s| s.dt * s.steps as f64).sum()
+        };
+        if reading.by == By::Static {
+            // a window is no longer at rest before and behind a turn alike: the turn is in the middle of the gap
+            for p in 1..stays.len() {
+                stays[p - 1].1 += ((stays[p].0 - stays[p - 1].1 - slew_s(p)) / 2.0).max(0.0);
+            }
+        }
+        if matches!(reading.by, By::Label | By::Static) {
             // the platform leaves a position after its last sample, and what of a gap is no slew is spent at the next
             let mut left = 0.0;
             for (p, position) in own.positions.iter_mut().enumerate() {
-                let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
-                let turned: f64 = planned.segments.iter().filter(slew).map(|s| s.dt * s.steps as f64).sum();
-                let (first, last) = reading.stays[p];
+                let turned = slew_s(p);
+                let (first, last) = stays[p];
                 begins[p] = left + turned;
                 if begins[p] > first {
                     return Err(CalibrationError::Slew {

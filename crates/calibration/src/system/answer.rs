@@ -45,6 +45,10 @@ pub struct SystemCalibration {
     /// Profiles that were asked for.
     pub profiles: Vec<Profile>,
     /// Rows of the record.
+    pub samples: usize,
+    /// Intervals at rest, where the file says how they are found.
+    pub intervals: Option<usize>,
+    /// Rows that the model is held against: those of the record, or the intervals and what is between them.
     pub rows: usize,
     /// Columns that nothing was made of.
     pub ignored: Vec<String>,
@@ -125,6 +129,8 @@ pub struct OutputFit {
     pub chi_square: f64,
     /// Root of the mean square of what is left, in the unit of the output.
     pub rms: f64,
+    /// The same of what sigmas let expect.
+    pub expected_rms: f64,
     /// Probability that independent residuals are correlated as these are; null for few.
     pub whiteness_probability: Option<f64>,
 }
@@ -214,6 +220,22 @@ pub enum SystemCalibrationError {
         found: usize,
         /// Unknowns.
         unknowns: usize,
+    },
+    /// A calibration of another system.
+    #[error("the prior calibration says nothing of this model: it has {found}")]
+    Prior {
+        /// What it has.
+        found: String,
+    },
+    /// Nothing to learn from intervals at rest.
+    #[error(
+        "{record}: {found} intervals at rest; expected two at least (record.static says how they are found)"
+    )]
+    NoRest {
+        /// The record.
+        record: String,
+        /// How many there are.
+        found: usize,
     },
     /// Nowhere a number.
     #[error(

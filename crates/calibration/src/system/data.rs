@@ -1,15 +1,21 @@
 //! The data of a model: the rows of a record, by experiment.
 
+use std::ops::Range;
+
+use obsdeg_core::model::Still;
 use obsdeg_core::system::{KnownInput, ModelError, SystemModel};
 
 use super::answer::SystemCalibrationError;
 use crate::record::{MOST, Record, Row, Wanted};
+use crate::still::Detector;
 
 /// A row of the record.
 #[derive(Debug, Clone)]
 pub(super) struct Data {
     pub(super) line: u64,
     pub(super) experiment: usize,
+    /// Rows of another run begin at the start anew.
+    pub(super) run: usize,
     pub(super) t: f64,
     /// Values of inputs, and their standard deviations.
     pub(super) inputs: Vec<(f64, f64)>,
@@ -22,16 +28,30 @@ pub(super) struct Data {
 /// The data of a model.
 pub(super) struct Read {
     pub(super) rows: Vec<Data>,
-    /// Known inputs that are columns.
+    /// Known inputs that have values in every row.
     pub(super) inputs: Vec<usize>,
     pub(super) ignored: Vec<String>,
+    pub(super) samples: usize,
+    /// Intervals at rest, where they are sought.
+    pub(super) intervals: Option<usize>,
+}
+
+/// Where the value of a known input comes from.
+#[derive(Debug, Clone, Copy)]
+enum From {
+    /// A wanted number, and that of its standard deviation.
+    Column(usize, Option<usize>),
+    /// The mean of another of the inputs in the interval before.
+    Before(usize),
 }
 
 /// Which wanted numbers of a row are what.
 struct Columns {
     wanted: Vec<Wanted>,
-    inputs: Vec<(usize, Option<usize>)>,
-    outputs: Vec<(usize, Option<usize>)>,
+    /// Known inputs with values in every row, and where these come from.
+    inputs: Vec<(usize, From)>,
+    /// Outputs: a column and that of its standard deviation, or what it is known to be.
+    outputs: Vec<Result<(usize, Option<usize>), f64>>,
     label: Option<usize>,
     ignored: Vec<String>,
 }
@@ -46,11 +66,17 @@ impl Columns {
             wanted.len() - 1
         };
         let mut inputs = Vec::new();
-        let mut given = Vec::new();
+        let before = |name: &str| {
+            let of = name.strip_suffix("_before").filter(|_| model.recording.still.is_some())?;
+            model.known_inputs.iter().position(|i| i.0.name == of).filter(|_| record.find(of).is_some())
+        };
         for (k, (named, kind)) in model.known_inputs.iter().enumerate() {
             match (record.find(&named.name), kind) {
                 (None, KnownInput::Function(_)) => {}
                 (None, _) if model.simulation.inputs.contains_key(&named.name) => {}
+                (None, _) if before(&named.name).is_some() => {
+                    inputs.extend(before(&named.name).map(|of| (k, From::Before(of))));
+                }
                 (None, _) => return Err(record.missing(&format!("`{}` (a known input)", named.name)).into()),
                 (Some(_), KnownInput::Function(_)) => {
                     let what = format!("the known input {}", named.name);
@@ -59,20 +85,28 @@ impl Columns {
                     return Err(ModelError { what, message: message.into(), span: None }.into());
                 }
                 (Some(column), _) => {
-                    given.push(k);
-                    inputs.push((want(column), record.find(&format!("sigma_{}", named.name)).map(&mut want)));
+                    let sigma = record.find(&format!("sigma_{}", named.name));
+                    inputs.push((k, From::Column(want(column), sigma.map(&mut want))));
                 }
             }
         }
         let mut outputs = Vec::new();
         for (named, _) in &model.outputs {
             let column = record.find(&named.name);
+            if let (None, Some(value)) = (column, model.recording.value(&named.name)) {
+                outputs.push(Err(value));
+                continue;
+            }
             let column = column.ok_or_else(|| record.missing(&format!("`{}` (an output)", named.name)))?;
-            outputs.push((want(column), record.find(&format!("sigma_{}", named.name)).map(&mut want)));
+            outputs.push(Ok((want(column), record.find(&format!("sigma_{}", named.name)).map(&mut want))));
         }
         let label = record.find("experiment");
         if label.is_none() && model.experiments > 1 {
             return Err(record.missing("`experiment` (1, 2, ...)").into());
+        }
+        if label.is_some() && model.recording.still.is_some() {
+            let what = "intervals at rest that are sought and a column `experiment`";
+            return Err(SystemCalibrationError::NotYet { what });
         }
         let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
         let columns = record.columns().iter().enumerate();
@@ -85,10 +119,9 @@ impl Columns {
 }
 
 pub(super) fn read(record: Record, model: &SystemModel) -> Result<Read, SystemCalibrationError> {
+    let record = record.named(&model.recording)?;
     let columns = Columns::of(&record, model)?;
-    let inputs: Vec<usize> = (0..model.known_inputs.len())
-        .filter(|&k| record.find(&model.known_inputs[k].0.name).is_some())
-        .collect();
+    let still = model.recording.still.as_ref();
     let (name, experiments) = (record.name().to_string(), model.experiments.max(1));
     let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
     let mut rows: Vec<Data> = Vec::new();
@@ -109,7 +142,7 @@ pub(super) fn read(record: Record, model: &SystemModel) -> Result<Read, SystemCa
             }
         };
         let t = row.numbers[0].unwrap_or(f64::NAN);
-        if t < 0.0 {
+        if t < 0.0 && still.is_none() {
             return Err(refuse(&texts[0], t.to_string(), "a time from 0, the start of the model, on"));
         }
         let value = |i: usize| row.numbers[i];
@@ -122,18 +155,115 @@ pub(super) fn read(record: Record, model: &SystemModel) -> Result<Read, SystemCa
             }
         };
         let mut of_inputs = Vec::new();
-        for &(i, s) in &columns.inputs {
+        for &(_, from) in &columns.inputs {
+            let From::Column(i, s) = from else {
+                of_inputs.push((f64::NAN, 0.0));
+                continue;
+            };
             let x =
                 value(i).ok_or_else(|| refuse(&texts[i], "nothing".into(), "the value of a known input"))?;
             of_inputs.push((x, sigma(s)?.unwrap_or(0.0)));
         }
-        let outputs = columns.outputs.iter().map(|&(i, _)| value(i)).collect();
-        let sigmas = columns.outputs.iter().map(|&(_, s)| sigma(s)).collect::<Result<_, _>>()?;
-        rows.push(Data { line: row.line, experiment, t, inputs: of_inputs, outputs, sigmas });
+        let outputs = columns.outputs.iter().map(|o| o.map_or_else(Some, |(i, _)| value(i))).collect();
+        let sigmas = columns.outputs.iter().map(|o| o.map_or(Ok(None), |(_, s)| sigma(s)));
+        let sigmas = sigmas.collect::<Result<_, _>>()?;
+        rows.push(Data {
+            line: row.line,
+            experiment,
+            run: experiment,
+            t,
+            inputs: of_inputs,
+            outputs,
+            sigmas,
+        });
         Ok(())
     };
     record.read(&columns.wanted, columns.label, true, take)?;
-    // each experiment in one piece
-    rows.sort_by_key(|r| r.experiment);
-    Ok(Read { rows, inputs, ignored: columns.ignored })
+    let (samples, mut intervals) = (rows.len(), None);
+    if let Some(still) = still {
+        let place =
+            |name: &String| columns.inputs.iter().position(|(k, _)| model.known_inputs[*k].0.name == *name);
+        let by: Vec<usize> = still.by.iter().filter_map(place).collect();
+        let found = at_rest(&rows, &by, still);
+        if found.len() < 2 {
+            return Err(SystemCalibrationError::NoRest { record: name, found: found.len() });
+        }
+        intervals = Some(found.len());
+        rows = if model.states.is_empty() {
+            found.iter().map(|r| mean(&rows[r.clone()], &columns.inputs, None)).collect()
+        } else {
+            ways(&rows, &found, &columns.inputs)
+        };
+    } else {
+        // each experiment in one piece
+        rows.sort_by_key(|r| r.experiment);
+    }
+    let inputs = columns.inputs.iter().map(|(k, _)| *k).collect();
+    Ok(Read { rows, inputs, ignored: columns.ignored, samples, intervals })
+}
+
+/// The intervals at rest, by the inputs `by`.
+fn at_rest(rows: &[Data], by: &[usize], still: &Still) -> Vec<Range<usize>> {
+    let (mut detector, mut told) = (Detector::new(still), Vec::new());
+    for (i, row) in rows.iter().enumerate() {
+        detector.push(row.t, by.iter().map(|&k| row.inputs[k].0).collect(), i, &mut told);
+    }
+    detector.end(&mut told);
+    let mut out: Vec<Range<usize>> = Vec::with_capacity(detector.found());
+    for one in told {
+        match one.interval {
+            Some(k) if k + 1 == out.len() => out[k].end = one.sample + 1,
+            Some(_) => out.push(one.sample..one.sample + 1),
+            None => {}
+        }
+    }
+    out
+}
+
+/// The mean of some rows, with the standard deviations of all means: those of independent samples. Inputs of the interval before are those of `before`.
+fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data {
+    let of = |values: &mut dyn Iterator<Item = f64>| {
+        let values: Vec<f64> = values.collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let scatter = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+        (!values.is_empty()).then(|| (mean, (scatter / n).sqrt()))
+    };
+    let input = |(i, (_, from)): (usize, &(usize, From))| match (from, before) {
+        (From::Before(k), Some(before)) => {
+            let at = inputs.iter().position(|(of, _)| of == k).unwrap_or(i);
+            before.inputs[at]
+        }
+        _ => of(&mut rows.iter().map(|r| r.inputs[i].0)).unwrap_or((f64::NAN, 0.0)),
+    };
+    let output = |j: usize| of(&mut rows.iter().filter_map(|r| r.outputs[j]));
+    let (first, last) = (&rows[0], &rows[rows.len() - 1]);
+    let outputs: Vec<_> = (0..first.outputs.len()).map(output).collect();
+    Data {
+        line: first.line,
+        experiment: 0,
+        run: 0,
+        t: (first.t + last.t) / 2.0,
+        inputs: inputs.iter().enumerate().map(input).collect(),
+        outputs: outputs.iter().map(|o| o.map(|(mean, _)| mean)).collect(),
+        // what is the same in every row is known
+        sigmas: outputs.iter().map(|o| o.map(|(_, sigma)| sigma).filter(|s| *s > 0.0)).collect(),
+    }
+}
+
+/// The ways from each interval to the next, a run each: the samples between them, then the means of the next, where outputs are measured.
+fn ways(rows: &[Data], intervals: &[Range<usize>], inputs: &[(usize, From)]) -> Vec<Data> {
+    let mut out = Vec::new();
+    for (run, pair) in intervals.windows(2).enumerate() {
+        let (from, to) = (pair[0].end - 1, pair[1].start);
+        let before = mean(&rows[pair[0].clone()], inputs, None);
+        let begin = rows[from].t;
+        for row in &rows[from..to] {
+            let own = mean(std::slice::from_ref(row), inputs, Some(&before));
+            let outputs = vec![None; own.outputs.len()];
+            out.push(Data { run, t: row.t - begin, outputs, ..own });
+        }
+        out.push(Data { run, t: rows[to].t - begin, ..mean(&rows[pair[1].clone()], inputs, Some(&before)) });
+    }
+    out
 }

@@ -54,6 +54,8 @@ pub struct SystemOptions {
     pub starts: usize,
     /// Unknowns of which a profile is wanted.
     pub profiles: Vec<String>,
+    /// A calibration before: what it says of unknowns of the same names.
+    pub prior: Option<CovarianceTable>,
     /// Seed.
     pub seed: u64,
 }
@@ -67,6 +69,8 @@ struct Problem<'a> {
     noise: Vec<f64>,
     /// Longest step of integration.
     longest: f64,
+    /// Rows and values of what was known before of the free unknowns, with unit errors.
+    known: (DMatrix<f64>, DVector<f64>),
 }
 
 /// Rows of the model at some unknowns: a row of derivatives by the free unknowns, what is left, and sigma.
@@ -76,12 +80,20 @@ struct At {
     sigmas: Vec<f64>,
     /// Row of the data and output.
     keys: Vec<(usize, usize)>,
+    /// The same of what was known before, with unit errors.
+    known: (DMatrix<f64>, DVector<f64>),
 }
 
 impl At {
     /// The sum of squares in sigma.
     fn cost(&self) -> f64 {
-        self.left.iter().zip(&self.sigmas).map(|(e, s)| (e / s).powi(2)).sum()
+        self.cost_by(&self.sigmas)
+    }
+
+    /// The same with other sigmas: those of errors of inputs are what they are at the unknowns of the moment.
+    fn cost_by(&self, sigmas: &[f64]) -> f64 {
+        let measured: f64 = self.left.iter().zip(sigmas).map(|(e, s)| (e / s).powi(2)).sum();
+        measured + self.known.1.norm_squared()
     }
 }
 
@@ -116,15 +128,20 @@ impl Problem<'_> {
         let start = self.all(base, x);
         let to_start = self.of_free(base, x);
         let segments = self.numeric.segments();
-        let mut out =
-            At { rows: DMatrix::zeros(0, 0), left: DVector::zeros(0), sigmas: Vec::new(), keys: Vec::new() };
+        let mut out = At {
+            rows: DMatrix::zeros(0, 0),
+            left: DVector::zeros(0),
+            sigmas: Vec::new(),
+            keys: Vec::new(),
+            known: (self.known.0.clone(), &self.known.1 - &self.known.0 * x),
+        };
         let (mut rows, mut left): (Vec<RowDVector<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
         let data = self.data;
         let ones = vec![1.0; self.noise.len()];
         let mut now = (usize::MAX, 0.0, start.clone(), to_start.clone());
         for (k, row) in data.rows.iter().enumerate() {
-            if now.0 != row.experiment {
-                now = (row.experiment, 0.0, start.clone(), to_start.clone());
+            if now.0 != row.run {
+                now = (row.run, 0.0, start.clone(), to_start.clone());
             }
             let part = row.experiment * segments;
             // what was held until here, then what is held from here on
@@ -132,10 +149,13 @@ impl Problem<'_> {
                 let process = self.numeric.process(part);
                 let steps = ((row.t - now.1) / self.longest).ceil().max(1.0) as usize * finer;
                 let next = runge_kutta(&process, now.1, &now.2, row.t - now.1, steps)?;
-                now = (row.experiment, row.t, next.x, next.phi * now.3);
+                now = (row.run, row.t, next.x, next.phi * now.3);
             }
             for (&input, (value, _)) in data.inputs.iter().zip(&row.inputs) {
                 self.numeric.hold(input, *value);
+            }
+            if row.outputs.iter().all(Option::is_none) {
+                continue;
             }
             let h = self.numeric.measurement(part, &ones).h(row.t, &now.2);
             let jacobian = Measurement::jacobian(&self.numeric.measurement(part, &ones), row.t, &now.2);
@@ -190,6 +210,7 @@ fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, EkfError> {
     let weights = DVector::from_iterator(at.sigmas.len(), at.sigmas.iter().map(|s| 1.0 / s));
     let whitened = DMatrix::from_fn(at.rows.nrows(), n, |i, j| at.rows[(i, j)] * weights[i]);
     rows.add(&whitened, &at.left.component_mul(&weights));
+    rows.add(&at.known.0, &at.known.1);
     let pulls = DVector::from_iterator(n, x.iter().map(|v| pull / size(*v)));
     rows.add(&DMatrix::from_diagonal(&pulls), &DVector::zeros(n));
     rows.solve()
@@ -214,6 +235,7 @@ fn settle(
     let freeze = |at: &mut At| {
         if let Some(j) = fixed {
             at.rows.column_mut(j).fill(0.0);
+            at.known.0.column_mut(j).fill(0.0);
         }
     };
     let mut at = problem.at(base, &x, finer)?;
@@ -225,7 +247,8 @@ fn settle(
     for _ in 0..PASSES {
         let solution = step(&at, &x, pull)?;
         let moved = &x + &solution.x;
-        let next = problem.at(base, &moved, finer).ok().filter(|n| n.cost() <= cost * (1.0 + 1e-12));
+        let next = problem.at(base, &moved, finer).ok();
+        let next = next.filter(|n| n.cost_by(&at.sigmas) <= cost * (1.0 + 1e-12));
         let scale = (cost / at.sigmas.len() as f64).max(1.0).sqrt();
         // how far it would go without the pull
         let weak = step(&at, &x, 1.0 / WEAK)?;
@@ -254,7 +277,8 @@ fn settle(
 /// How far a step moves the outputs, in sigma.
 fn determined_part(at: &At, solution: &Solution) -> f64 {
     let moved = &at.rows * &solution.x;
-    moved.iter().zip(&at.sigmas).map(|(m, s)| (m / s).powi(2)).sum::<f64>().sqrt()
+    let measured: f64 = moved.iter().zip(&at.sigmas).map(|(m, s)| (m / s).powi(2)).sum();
+    (measured + (&at.known.0 * &solution.x).norm_squared()).sqrt()
 }
 
 /// Calibrates `model` from a record.
@@ -276,6 +300,31 @@ pub fn calibrate_system(
     let data = read(record, model)?;
     let numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
     Calibrating::new(model, &compiled, numeric, &data, options)?.run()
+}
+
+/// Rows and values of what a calibration before says of the unknowns `names`, with unit errors.
+fn said_before(
+    table: &CovarianceTable,
+    names: &[&str],
+) -> Result<(DMatrix<f64>, DVector<f64>), SystemCalibrationError> {
+    let nothing = || SystemCalibrationError::Prior { found: table.names.join(", ") };
+    let n = table.names.len();
+    let shapes = table.estimates.len() == n && table.covariance.len() == n;
+    if !shapes || table.covariance.iter().any(|row| row.len() != n) {
+        return Err(nothing());
+    }
+    let place = |k: usize| names.iter().position(|name| *name == table.names[k]).map(|j| (k, j));
+    let found: Vec<(usize, usize)> = (0..n).filter_map(place).collect();
+    if found.is_empty() {
+        return Err(nothing());
+    }
+    let m = found.len();
+    let p = DMatrix::from_fn(m, m, |i, j| table.covariance[found[i].0][found[j].0]);
+    let root = nalgebra::Cholesky::new(p).ok_or_else(nothing)?.l();
+    let rows = DMatrix::from_fn(m, names.len(), |i, j| f64::from(u8::from(found[i].1 == j)));
+    let values = DMatrix::from_fn(m, 1, |i, _| table.estimates[found[i].0]);
+    let solve = |b: DMatrix<f64>| root.solve_lower_triangular(&b).ok_or_else(nothing);
+    Ok((solve(rows)?, solve(values)?.column(0).into_owned()))
 }
 
 /// Everything on the way.
@@ -337,7 +386,12 @@ impl<'a> Calibrating<'a> {
         }
         let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
         let longest = nominal.step.unwrap_or(f64::INFINITY).min(if last > 0.0 { last / 50.0 } else { 1.0 });
-        let problem = Problem { numeric, data, free, noise, longest };
+        let names: Vec<&str> = free.iter().map(|&i| numeric.names[i].as_str()).collect();
+        let known = match &options.prior {
+            Some(table) => said_before(table, &names)?,
+            None => (DMatrix::zeros(0, free.len()), DVector::zeros(0)),
+        };
+        let problem = Problem { numeric, data, free, noise, longest, known };
         Ok(Self { model, compiled, data, options, problem, base, estimated })
     }
 
@@ -421,6 +475,7 @@ impl<'a> Calibrating<'a> {
             })
             .collect();
         let rank = rank(&solution, &best.x);
+        let measured = measured + self.problem.known.1.len();
         if measured <= rank {
             return Err(SystemCalibrationError::TooFew { found: measured, unknowns: rank });
         }
@@ -518,6 +573,8 @@ impl<'a> Calibrating<'a> {
             others,
             starts: (starts.len(), led),
             profiles,
+            samples: self.data.samples,
+            intervals: self.data.intervals,
             rows: self.data.rows.len(),
             ignored: self.data.ignored.clone(),
             substeps: finer,
@@ -569,10 +626,11 @@ impl<'a> Calibrating<'a> {
     fn outputs(&self, residuals: &[SystemResidual], at: &At, solution: &Solution) -> Vec<OutputFit> {
         let of = |j: usize| {
             let own: Vec<&SystemResidual> = residuals.iter().filter(|r| r.output == j).collect();
-            let free: f64 = (0..at.keys.len())
-                .filter(|&i| at.keys[i].1 == j)
-                .map(|i| 1.0 - leverage(at, solution, i))
-                .sum();
+            let of_output = (0..at.keys.len()).filter(|&i| at.keys[i].1 == j);
+            let (free, variance) = of_output.fold((0.0, 0.0), |(sum, variance), i| {
+                let free = 1.0 - leverage(at, solution, i);
+                (sum + free, variance + free * at.sigmas[i] * at.sigmas[i])
+            });
             let chi: f64 = own.iter().map(|r| (r.residual / r.sigma).powi(2)).sum();
             let squares: f64 = own.iter().map(|r| r.residual * r.residual).sum();
             let series: Vec<f64> = own.iter().map(|r| r.normalised).collect();
@@ -585,6 +643,7 @@ impl<'a> Calibrating<'a> {
                 estimated: self.estimated[j],
                 chi_square: if free > 1e-9 { chi / free } else { 0.0 },
                 rms: (squares / own.len().max(1) as f64).sqrt(),
+                expected_rms: (f64::max(variance, 0.0) / own.len().max(1) as f64).sqrt(),
                 whiteness_probability: (series.len() >= FEWEST)
                     .then(|| ljung_box(&autocorrelation(&series, lags), series.len())),
             }

@@ -2,5 +2,6 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod handheld;
 mod round_trip;
 mod simulator;

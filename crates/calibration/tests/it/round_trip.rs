@@ -1,15 +1,15 @@
 //! From a bench to a record to an estimate: is it what the bench had, and what its sigmas say?
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_calibration::answer::Finding;
+use obsdeg_calibration::answer::{Finding, PositionsBy};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, CalibrationError, Options, calibrate};
 use obsdeg_core::model::settings::DriftNoise;
-use obsdeg_core::model::{Carry, Path, Scheme, parse_attitude};
+use obsdeg_core::model::{Carry, Path, Recording, Scheme, Still, parse_attitude};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::Conditions;
 
-use crate::simulator::{Bench, csv};
+use crate::simulator::{Bench, Sample, csv};
 
 /// The scheme that a bench runs.
 pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
@@ -329,6 +329,125 @@ fn faults_are_named() {
         e.contains("column `position`: no position is called `P5`; expected p1, p2, p3, p4, p5, p6"),
         "{e}"
     );
+}
+
+/// Short positions and small drifts, so that a window tells rest from turns.
+fn quick(seed: u64) -> Bench {
+    let mut positions = six().positions;
+    positions.iter_mut().for_each(|p| p.2 = 300.0);
+    Bench {
+        positions,
+        drift: [[1.1, 1.2, 1.3], [0.5; 3], [0.5; 3], [0.5; 3]],
+        step_s: 1.0,
+        dropped: 0,
+        ..real(seed)
+    }
+}
+
+fn with_recording(
+    bench: &Bench,
+    recording: Recording,
+    text: String,
+) -> Result<Calibration, CalibrationError> {
+    let mut scheme = scheme(bench, "F,I,O,S");
+    scheme.recording = recording;
+    let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text)))?;
+    calibrate(&scheme, &conditions(bench), vec![record], &Options::default())
+}
+
+/// Without labels and late, by the intervals at rest: the estimate is that by labels but for a part of sigma; other schemes are refused.
+#[test]
+fn positions_are_found() {
+    let bench = quick(11);
+    let samples = bench.record();
+    let labelled = of_csv(&bench, "F,I,O,S", csv(&samples)).expect("calibrated");
+    is_right(&labelled);
+    let shifted: Vec<Sample> = samples.iter().map(|s| Sample { t: s.t + 4321.0, ..s.clone() }).collect();
+    let bare = csv(&shifted).replace("position", "note");
+    let still = Still { by: vec![], initial: 60.0, window: 10.0, factor: 50.0, shortest: 60.0 };
+    let recording = Recording { still: Some(still.clone()), ..Recording::default() };
+    let c = with_recording(&bench, recording.clone(), bare.clone()).expect("calibrated");
+    is_right(&c);
+    assert_eq!(
+        (c.records[0].positions_by, &c.records[0].ignored),
+        (PositionsBy::Static, &vec!["note".to_string()])
+    );
+    for (a, b) in labelled.unknowns.iter().zip(&c.unknowns) {
+        let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
+        assert!(
+            (x - y).abs() < 0.6 * s && (b.sigma.expect("there") / s - 1.0).abs() < 0.1,
+            "{}: {x} {y} +- {s}",
+            a.name
+        );
+    }
+    let mut other = bench.clone();
+    (other.positions[1].1, other.positions[3].1) = (bench.positions[3].1, bench.positions[1].1);
+    let e = with_recording(&other, recording.clone(), bare.clone()).expect_err("other attitudes").to_string();
+    assert!(e.contains("at p2 the specific force is") && e.ends_with("it is that of p4"), "{e}");
+    other.positions.pop();
+    let e = with_recording(&other, recording, bare.clone()).expect_err("five positions").to_string();
+    assert!(
+        e.starts_with("run.csv: 6 intervals at rest; expected 5, one for each position of the scheme: 43"),
+        "{e}"
+    );
+    let long = Recording { still: Some(Still { shortest: 400.0, ..still }), ..Recording::default() };
+    let e = with_recording(&bench, long, bare).expect_err("none so long").to_string();
+    assert!(
+        e.starts_with("run.csv: 0 intervals at rest; expected 6, one for each position of the scheme ("),
+        "{e}"
+    );
+}
+
+/// Names and counts of the file, gimbals, temperature: what goes with it is named.
+#[test]
+fn columns_of_all_kinds() {
+    let bench = quick(12);
+    let samples = bench.record();
+    let right = of_csv(&bench, "F,I,O,S", csv(&samples)).expect("calibrated");
+    let map = |list: &[(&str, &str)]| list.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
+    let recording = Recording {
+        columns: map(&[("t", "Time"), ("fx", "X"), ("fy", "Y"), ("fz", "Z")]),
+        units: map(&[("fx", "1e-6 g"), ("fy", "-1e-3 mg"), ("fz", "1 ug")]),
+        ..Recording::default()
+    };
+    let angles = |label: &str| bench.positions.iter().find(|p| p.0 == label).map_or([0.0; 3], |p| p.1);
+    // warmer and colder with time, and Z with it by as much as four times the noise of a measurement
+    let text = |by: f64, turned: f64| {
+        let head = "Time [ms],position,X,Y,Z,alpha [deg],beta [deg],gamma [deg],T [degC]\n".to_string();
+        let line = |s: &Sample| {
+            let warm = (s.t / 37.0).sin();
+            let f = s.f.map(|x| (x + by * warm) * 1e6);
+            let [a, b, c] = angles(s.label);
+            format!(
+                "{},{},{},{},{},{a},{b},{},{}\n",
+                s.t * 1e3,
+                s.label,
+                f[0],
+                -f[1],
+                f[2],
+                c + turned,
+                20.0 + warm
+            )
+        };
+        std::iter::once(head).chain(samples.iter().map(line)).collect::<String>()
+    };
+    let c = with_recording(&bench, recording.clone(), text(0.0, 360.5)).expect("calibrated");
+    is_right(&c);
+    for (a, b) in right.unknowns.iter().zip(&c.unknowns) {
+        let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
+        assert!((x - y).abs() < 1e-3 * s, "{}: {x} {y} +- {s}", a.name);
+    }
+    assert!((c.records[0].gimbals_deg.expect("there") - 0.5).abs() < 1e-6);
+    assert!(
+        c.channels.iter().all(|c| c.temperature.is_some_and(|w| w.probability > 1e-3)),
+        "{:?}",
+        c.channels
+    );
+    let e = with_recording(&bench, recording.clone(), text(0.0, 7.0)).expect_err("turned").to_string();
+    assert!(e.contains("at p1 the gimbals are 7.0 deg from where the scheme has them"), "{e}");
+    let c = with_recording(&bench, recording, text(1.5e-5, 0.0)).expect("calibrated");
+    let warm = |f: &Finding| matches!(f, Finding::Temperature { correlation, .. } if correlation.abs() > 0.5);
+    assert!(c.findings.iter().any(warm), "{:?}", c.findings);
 }
 
 /// The record of examples/bench-day.

@@ -14,6 +14,7 @@ pub(crate) mod path;
 pub(crate) mod per_gyro;
 pub(crate) mod platform;
 pub mod ranges;
+pub(crate) mod recording;
 pub(crate) mod ring;
 pub(crate) mod rotation;
 pub(crate) mod scheme;
@@ -37,6 +38,7 @@ pub use platform::{
     AZIMUTH, Block, LOCAL, Observed, PSI_EPS, Platform, Point, RandomValues, Sample, earth_rate_in,
     local_dynamics, local_output,
 };
+pub use recording::{Recording, Still};
 pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
 pub use scheme::{

@@ -13,6 +13,7 @@ use super::dwell::Dwell;
 use super::geometry::Geometry;
 use super::gimbals::Gimbals;
 use super::path::{self, Path, PathError, PathStep, StepError};
+use super::recording::Recording;
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
 use super::terms::{Source, Term, Unknowns};
@@ -287,6 +288,8 @@ pub struct Scheme {
     pub gimbals: Gimbals,
     /// How the platform is turned from one position to the next, where a position does not say.
     pub path: Option<Path>,
+    /// How the records of its runs are read.
+    pub recording: Recording,
 }
 
 /// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.

@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
 use crate::model::expression::{Expression, Function, nearest};
+use crate::model::recording::Recording;
 
 /// Where something is written.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -149,6 +150,8 @@ pub struct SystemModel {
     pub combinations: Vec<PlacedExpression>,
     /// Numbers for a simulation.
     pub simulation: Nominal,
+    /// How its records are read.
+    pub recording: Recording,
 }
 
 /// Why a model cannot be judged.
@@ -397,11 +400,11 @@ impl SystemModel {
         self.compile_into(Dag::default())
     }
 
-    /// Checks what needs no graph: at least one state and output, names of their own.
+    /// Checks what needs no graph: at least one state or parameter and one output, names of their own.
     pub(super) fn check(&self) -> Result<(), ModelError> {
         let refuse = |what: String, message: String| Err(ModelError { what, message, span: None });
-        if self.states.is_empty() {
-            return refuse("the model".into(), "no state; expected at least one".into());
+        if self.states.is_empty() && self.parameters.is_empty() {
+            return refuse("the model".into(), "no state and no parameter; expected at least one".into());
         }
         if self.outputs.is_empty() {
             return refuse("the model".into(), "no output; expected at least one".into());

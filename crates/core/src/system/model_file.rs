@@ -16,6 +16,7 @@ use super::nominal::nominal;
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
 use crate::model::expression::{Shape, Shapes, nearest};
 use crate::model::file_error::explain;
+use crate::model::recording::ModelRecord;
 
 /// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan atan2 exp log sqrt tanh abs sign`, `pi`, `deg`
 /// and the names of the model; `t` is the time. A name such as `"p[3]"` declares a vector, `"C[3,3]"` a matrix: `p` stands for the whole
@@ -31,7 +32,9 @@ pub struct ModelFile {
     /// What it is and where it comes from.
     #[serde(default)]
     description: String,
-    /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value), unit, description.
+    /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value), unit, description. None: what is
+    /// observed depends on parameters and inputs alone.
+    #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     states: BTreeMap<String, Spanned<Value>>,
     /// Unknown constants: a list of names, or tables with unit and description.
@@ -79,6 +82,9 @@ pub struct ModelFile {
     /// Numbers for `obsdeg simulate --model`.
     #[serde(default)]
     simulation: SimulationEntry,
+    /// How the record of `obsdeg calibrate --model` is read.
+    #[schemars(with = "Option<ModelRecord>")]
+    record: Option<Spanned<ModelRecord>>,
 }
 
 /// Numbers for a simulation, in the units of the model.
@@ -382,7 +388,7 @@ impl Reader<'_> {
 
 /// Whether a text is meant as a model, not a scheme.
 pub fn is_model(text: &str) -> bool {
-    text.lines().any(|l| l.trim_start().starts_with("[states"))
+    text.lines().map(str::trim_start).any(|l| l.starts_with("[states") || l.starts_with("[outputs"))
 }
 
 /// Reads a model.
@@ -476,6 +482,14 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         model.combinations.extend(entries.map(|(part, text)| PlacedExpression { text, ..part }));
     }
     nominal(&r, &outputs, &file.simulation, &mut model)?;
+    if let Some(record) = &file.record {
+        let inputs: Vec<&str> = model.known_inputs.iter().map(|i| i.0.name.as_str()).collect();
+        let outputs: Vec<&str> = model.outputs.iter().map(|o| o.0.name.as_str()).collect();
+        let wrong = |message| r.at(record.span(), "the record".into(), message);
+        let recording = crate::model::Recording::from(record.get_ref().clone());
+        recording.check_model(&inputs, &outputs).map_err(wrong)?;
+        model.recording = recording;
+    }
     let placed =
         |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
     model.check().map_err(placed)?;

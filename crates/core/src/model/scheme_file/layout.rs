@@ -9,6 +9,7 @@ use serde_spanned::Spanned;
 use crate::model::geometry::Geometry;
 use crate::model::path::Path;
 use crate::model::ranges;
+use crate::model::recording::SchemeRecord;
 use crate::model::scheme::Carry;
 use crate::model::settings::{DriftNoise, FilterKind, Propagation, Truth};
 use crate::model::terms::{DefinedBy, Term};
@@ -65,6 +66,9 @@ pub struct SchemeFile {
     /// How far the gimbals turn; freely when left out.
     #[serde(default)]
     pub(super) gimbals: GimbalEntry,
+    /// How the records of `obsdeg calibrate` are read.
+    #[schemars(with = "Option<SchemeRecord>")]
+    pub(super) record: Option<Spanned<SchemeRecord>>,
     /// The positions in order.
     #[serde(default, rename = "position")]
     #[schemars(with = "Vec<PositionEntry>")]

@@ -232,6 +232,10 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         requirements: r.numbers("requirements", &file.requirements),
         ..Scheme::default()
     };
+    if let Some(record) = &file.record {
+        scheme.recording = record.get_ref().clone().into();
+        scheme.recording.check().map_err(|e| r.at(record.span(), format!("record: {e}")))?;
+    }
     for (i, text) in file.combinations.iter().enumerate() {
         scheme.combinations.extend(r.keep(format!("combinations.{i}"), Some(text)));
         r.places.insert("combinations".into(), text.span());

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
-use crate::model::{Geometry, PerGyro, SlewAxis, Unknowns};
+use crate::model::{Geometry, PerGyro, Recording, SlewAxis, Unknowns};
 
 /// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
 pub fn write(scheme: &Scheme) -> String {
@@ -55,6 +55,7 @@ pub fn write(scheme: &Scheme) -> String {
         }
     }
     table(&mut out, "gimbals", &gimbals);
+    recording(&mut out, &scheme.recording);
     for p in &scheme.positions {
         position(&mut out, p);
     }
@@ -110,6 +111,23 @@ fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
         line(&mut lines, &quoted(key), &number(*x));
     }
     table(out, name, &lines);
+}
+
+fn recording(out: &mut String, r: &Recording) {
+    for (name, texts) in [("record.columns", &r.columns), ("record.units", &r.units)] {
+        let mut lines = String::new();
+        texts.iter().for_each(|(key, text)| line(&mut lines, &quoted(key), &quoted(text)));
+        table(out, name, &lines);
+    }
+    if let Some(s) = &r.still {
+        let mut lines = String::new();
+        for (key, x) in
+            [("initial", s.initial), ("window", s.window), ("factor", s.factor), ("shortest", s.shortest)]
+        {
+            line(&mut lines, key, &number(x));
+        }
+        table(out, "record.static", &lines);
+    }
 }
 
 fn settings(out: &mut String, s: &Settings) {
@@ -279,6 +297,14 @@ mod tests {
                 let accelerometers = &mut geometry.accelerometers;
                 (accelerometers.X, accelerometers.Y) = (accelerometers.Y, "-x".parse().expect("an axis"));
             }
+            let texts = || [("f x".into(), description.clone())].into();
+            let still = crate::model::Still { by: vec![], initial: 30.0, window: 0.5, factor: 6.0, shortest: 1e-4 };
+            let recording = Recording {
+                columns: texts(),
+                units: if mirrored { texts() } else { [].into() },
+                still: mirrored.then_some(still),
+                ..Recording::default()
+            };
             let limits = limit.map(|(low, high)| [low * 1_234_567_891, high * 1_000_000_000]);
             Scheme {
                 name, description, positions, carry,
@@ -291,6 +317,7 @@ mod tests {
                 simulation,
                 requirements,
                 gimbals: Gimbals { limits: [None, limits, None] },
+                recording: if combination { recording } else { Recording::default() },
             }
         }
     }

@@ -1,0 +1,187 @@
+//! What a file says of the records of its runs: what columns are called, their units, and how the intervals at rest are found.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How the records of `obsdeg calibrate` are read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recording {
+    /// What a column is called in the record, by its name here.
+    pub columns: BTreeMap<String, String>,
+    /// The unit of a column, or what one count of it is, by its name here: `2.44e-5 g`.
+    pub units: BTreeMap<String, String>,
+    /// What outputs of a model are known to be, where they are no columns.
+    pub values: BTreeMap<String, f64>,
+    /// How the intervals at rest are found from the data.
+    pub still: Option<Still>,
+}
+
+/// Intervals at rest are where the scatter within a window about each sample, all columns together, is within so many times that of the beginning of the
+/// record. (D. Tedaldi, A. Pretto, E. Menegatti, ICRA 2014, doi:10.1109/ICRA.2014.6907297.)
+#[derive(Debug, Clone, PartialEq)]
+pub struct Still {
+    /// The known inputs of a model whose scatter decides; of a scheme the forces.
+    pub by: Vec<String>,
+    /// How long the record is at rest at first, in the unit of its time (s of a scheme), as are the others.
+    pub initial: f64,
+    /// The window.
+    pub window: f64,
+    /// So many times the variance of the beginning.
+    pub factor: f64,
+    /// Shorter intervals are none.
+    pub shortest: f64,
+}
+
+/// How the records of `obsdeg calibrate` are read.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SchemeRecord {
+    /// What a column is called in the record, by its name here, as in `fx = "AccX"`.
+    #[serde(default)]
+    columns: BTreeMap<String, String>,
+    /// The unit of a column whose header has none, or what one count of it is, by its name here: `fx = "2.44e-5 g"`.
+    #[serde(default)]
+    units: BTreeMap<String, String>,
+    /// Positions are intervals at rest, found by the scatter of the forces, where no column `position` says what is where.
+    #[serde(default, rename = "static")]
+    still: Option<SchemeStill>,
+}
+
+/// At rest is what scatters, within a window about each sample, by at most so many times the variance of the beginning.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SchemeStill {
+    /// How long the record is at rest at first, in s.
+    initial: f64,
+    /// The window, in s.
+    window: f64,
+    /// So many times the variance of the beginning; 6 when left out.
+    #[serde(default = "six")]
+    factor: f64,
+    /// Shorter intervals, in s, are none.
+    shortest: f64,
+}
+
+/// How the record of `obsdeg calibrate --model` is read.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ModelRecord {
+    /// What a column is called in the record, by its name in the model.
+    #[serde(default)]
+    columns: BTreeMap<String, String>,
+    /// What an output is known to be in every row, where it is no column, as in `g = 9.81`; of a vector all entries, or each.
+    #[serde(default)]
+    values: BTreeMap<String, f64>,
+    /// Every interval at rest is a row of its means, each with its standard deviation; of a model with states the samples on the way from each to the next
+    /// are a run of their own, `NAME_before` is a known input's mean before the way, and outputs are measured at its end.
+    #[serde(default, rename = "static")]
+    still: Option<ModelStill>,
+}
+
+/// At rest is what scatters, within a window about each sample, by at most so many times the variance of the beginning. Times are in the unit of `t`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ModelStill {
+    /// The known inputs whose scatter decides, all together.
+    by: Vec<String>,
+    /// How long the record is at rest at first.
+    initial: f64,
+    /// The window.
+    window: f64,
+    /// So many times the variance of the beginning; 6 when left out.
+    #[serde(default = "six")]
+    factor: f64,
+    /// Shorter intervals are none.
+    shortest: f64,
+}
+
+impl From<SchemeRecord> for Recording {
+    fn from(r: SchemeRecord) -> Self {
+        let still = r.still.map(|SchemeStill { initial, window, factor, shortest }| Still {
+            by: Vec::new(),
+            initial,
+            window,
+            factor,
+            shortest,
+        });
+        Self { columns: r.columns, units: r.units, values: BTreeMap::new(), still }
+    }
+}
+
+impl From<ModelRecord> for Recording {
+    fn from(r: ModelRecord) -> Self {
+        let still = r.still.map(|ModelStill { by, initial, window, factor, shortest }| Still {
+            by,
+            initial,
+            window,
+            factor,
+            shortest,
+        });
+        Self { columns: r.columns, units: BTreeMap::new(), values: r.values, still }
+    }
+}
+
+fn six() -> f64 {
+    6.0
+}
+
+impl Recording {
+    /// What an output is known to be: of an entry of a vector its own value, or that of the whole.
+    pub fn value(&self, output: &str) -> Option<f64> {
+        let whole = output.split('[').next().unwrap_or(output);
+        self.values.get(output).or_else(|| self.values.get(whole)).copied()
+    }
+
+    /// What is wrong with it, whatever the file.
+    ///
+    /// # Errors
+    /// What was found and expected.
+    pub fn check(&self) -> Result<(), String> {
+        if let Some(s) = &self.still {
+            for (key, x, least) in [
+                ("initial", s.initial, 0.0),
+                ("window", s.window, 0.0),
+                ("shortest", s.shortest, 0.0),
+                ("factor", s.factor, 1.0),
+            ] {
+                if !(x.is_finite() && x > least) {
+                    return Err(format!("static.{key} is {x}; expected a number above {least}"));
+                }
+            }
+            if s.initial < s.window {
+                return Err(format!(
+                    "static.initial is {}; expected at least static.window, {}",
+                    s.initial, s.window
+                ));
+            }
+        }
+        let bad = self.values.iter().find(|(_, x)| !x.is_finite());
+        bad.map_or(Ok(()), |(name, x)| Err(format!("values.{name} is {x}; expected a finite number")))
+    }
+
+    /// The same for a model with these known `inputs` and `outputs`.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(crate) fn check_model(&self, inputs: &[&str], outputs: &[&str]) -> Result<(), String> {
+        self.check()?;
+        let none = |kind: &str, list: &[&str], name: &str| {
+            format!("`{name}` is no {kind} of the model; expected one of {}", list.join(", "))
+        };
+        let is = |o: &&str, n: &str| *o == n || o.strip_prefix(n).is_some_and(|rest| rest.starts_with('['));
+        if let Some(name) = self.values.keys().find(|n| !outputs.iter().any(|o| is(o, n))) {
+            return Err(none("output", outputs, name));
+        }
+        if let Some(s) = &self.still {
+            if s.by.is_empty() {
+                return Err("static.by is missing; expected the known inputs whose scatter decides".into());
+            }
+            if let Some(name) = s.by.iter().find(|n| !inputs.contains(&n.as_str())) {
+                return Err(none("known input", inputs, name));
+            }
+        }
+        Ok(())
+    }
+}
