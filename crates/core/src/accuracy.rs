@@ -9,11 +9,12 @@
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::series::{SeriesEchelon, SeriesRing};
-use obsdeg_exact::{Echelon, Field, SplitMix64, gcd};
+use obsdeg_exact::{Echelon, SplitMix64, gcd};
 
 use crate::degree::ensemble::Verdicts;
 use crate::degree::platform_rows::{LocalRow, local_chain};
-use crate::model::platform::{Block, LOCAL, Platform, Sample, local_dynamics};
+use crate::degree::transition::{AtATime, LiftField, transition};
+use crate::model::platform::{Block, LOCAL, Platform, Sample};
 use crate::model::ring::Ring;
 use crate::model::{Carry, Dwell, Scheme, Unknowns};
 
@@ -79,6 +80,9 @@ impl Accuracy {
     /// [`AccuracyError`].
     pub fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Result<Self, AccuracyError> {
         let scheme = platform.scheme();
+        if scheme.by_course() {
+            return Err(AccuracyError::Rotation);
+        }
         if scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift {
             let order = verdicts.degrees.degree.clone();
             let order_at_end = order.clone();
@@ -162,8 +166,9 @@ fn module(
     let blocks = platform.blocks(point);
 
     let mut full = Echelon::new(field, n);
-    let at_a_time = AtATime::random(field, point.w_n, point.w_u, rng);
-    let power = |j: usize| field.pow(at_a_time.t, j as u64);
+    let time = 1 + rng.below(field.modulus() - 1);
+    let at_a_time = AtATime::random(field, [point.w_n, point.w_u], time, rng);
+    let power = |j: usize| field.pow(time, j as u64);
     for row in dwell_rows(&field, &blocks, &chain, power, |i| at_a_time.phi(dwells[i])).0 {
         full.insert(&row);
     }
@@ -178,7 +183,7 @@ fn module(
             })
             .collect();
         let power = |j: usize| ring.monomial(field.one(), j);
-        let phi = |i: usize| transition(&ring, point.w_n, point.w_u, dwells[i]);
+        let phi = |i: usize| transition(&ring, point.w_n, point.w_u, field.from_u64(dwells[i]));
         let (rows, psi_at_end) = dwell_rows(&ring, &blocks, &chain, power, phi);
         let series = SeriesEchelon::new(ring, n, rows.into_iter().map(|r| r.concat()).collect());
         if series.rank() == full.rank() && precision > 2 * series.largest_valuation() {
@@ -236,114 +241,6 @@ fn dwell_rows<R: LiftField>(
         });
     }
     (rows, psi)
-}
-
-/// Rings that hold the prime field.
-trait LiftField: Ring {
-    fn lift(&self, x: u64) -> Self::Element;
-}
-
-impl LiftField for Field {
-    fn lift(&self, x: u64) -> u64 {
-        x
-    }
-}
-
-impl LiftField for SeriesRing {
-    fn lift(&self, x: u64) -> Vec<u64> {
-        self.monomial(x, 0)
-    }
-}
-
-/// The psi rows of `exp(F r T)` as series: the sum of `F^k (r T)^k / k!`.
-fn transition(ring: &SeriesRing, w_n: u64, w_u: u64, ratio: u64) -> [[Vec<u64>; LOCAL]; 3] {
-    let f = &ring.field;
-    let dynamics = local_dynamics(f, &w_n, &w_u);
-    let mut out: [[Vec<u64>; LOCAL]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| ring.zero()));
-    for (r, row) in out.iter_mut().enumerate() {
-        let mut term: [u64; LOCAL] = std::array::from_fn(|c| if c == r { f.one() } else { 0 });
-        for k in 0..ring.precision {
-            for (entry, &x) in row.iter_mut().zip(&term) {
-                entry[k] = x;
-            }
-            let scale = f.mul(f.from_u64(ratio), f.from_ratio(1, k as i64 + 1));
-            let old = term;
-            term =
-                std::array::from_fn(|c| f.mul(scale, f.dot(0, (0..LOCAL).map(|j| (old[j], dynamics[j][c])))));
-        }
-    }
-    out
-}
-
-/// The transition matrix at a random time: `T`, `cos wT` and `sin wT` are independent but for
-/// `cos^2 + sin^2 = 1`, so a random point of the circle stands for any dwell.
-struct AtATime {
-    field: Field,
-    /// `T`.
-    t: u64,
-    /// `cos wT` and `sin(wT)/w`.
-    circle: (u64, u64),
-    w2: u64,
-    /// `psi' = W psi + eps`, and `W^2`.
-    w: [[u64; 3]; 3],
-    w_squared: [[u64; 3]; 3],
-}
-
-impl AtATime {
-    fn random(field: Field, w_n: u64, w_u: u64, rng: &mut SplitMix64) -> Self {
-        let f = field;
-        let w2 = f.dot(0, [(w_n, w_n), (w_u, w_u)]);
-        let (t, circle) = loop {
-            let draw = [0; 2].map(|_| 1 + rng.below(f.modulus() - 1));
-            let s2 = f.mul(w2, f.mul(draw[1], draw[1]));
-            let den = f.add(f.one(), s2);
-            if den != 0 {
-                let inverse = f.inv(den);
-                let sine = f.mul(f.add(draw[1], draw[1]), inverse);
-                break (draw[0], (f.mul(f.sub(f.one(), s2), inverse), sine));
-            }
-        };
-        let dynamics = local_dynamics(&f, &w_n, &w_u);
-        let w: [[u64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| dynamics[i][j]));
-        let w_squared = crate::model::attitude::product(&f, &w, &w);
-        Self { field, t, circle, w2, w, w_squared }
-    }
-
-    /// `(cos, sin/w)` of the sum of two angles.
-    fn turn(&self, a: (u64, u64), b: (u64, u64)) -> (u64, u64) {
-        let f = &self.field;
-        let cos = f.sub(f.mul(a.0, b.0), f.mul(self.w2, f.mul(a.1, b.1)));
-        (cos, f.add(f.mul(a.0, b.1), f.mul(a.1, b.0)))
-    }
-
-    /// The psi rows of `exp(F r T)`: `I + s W + (1-c)/w^2 W^2` and `rT I + (1-c)/w^2 W + (rT-s)/w^2 W^2`.
-    fn phi(&self, ratio: u64) -> [[u64; LOCAL]; 3] {
-        let f = &self.field;
-        let (mut angle, mut base, mut e) = ((f.one(), 0), self.circle, ratio);
-        while e > 0 {
-            if e & 1 == 1 {
-                angle = self.turn(angle, base);
-            }
-            base = self.turn(base, base);
-            e >>= 1;
-        }
-        let (cos, sin) = angle;
-        let time = f.mul(f.from_u64(ratio), self.t);
-        let inverse = f.inv(self.w2);
-        let versine = f.mul(f.sub(f.one(), cos), inverse);
-        let rest = f.mul(f.sub(time, sin), inverse);
-        let combine = |i: usize, j: usize, [unit, w, w_squared]: [u64; 3]| {
-            let unit = if i == j { unit } else { 0 };
-            f.dot(unit, [(w, self.w[i][j]), (w_squared, self.w_squared[i][j])])
-        };
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| match j {
-                0..3 => combine(i, j, [f.one(), sin, versine]),
-                3..6 => combine(i, j - 3, [time, versine, rest]),
-                _ => 0,
-            })
-        })
-    }
 }
 
 /// The size of the claim: rows as in the verdicts, times the transition matrices, of degree N in the rates as

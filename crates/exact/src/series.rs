@@ -184,6 +184,38 @@ impl SeriesEchelon {
         self.order_of_series(&constants)
     }
 
+    /// A basis of the functionals c with constant coefficients (shape: columns) for which `T^d c` is in the module: the coefficients of c in the
+    /// basis `T^-v_i r_i` of what it spans must have no powers below `v_i - d`, and nothing may be left. As exact as [`Self::order`].
+    pub fn constants_of_order(&self, d: usize) -> Vec<Vec<u64>> {
+        let (n, f) = (self.ring.precision, &self.ring.field);
+        let known = n - self.largest_valuation();
+        // per column what must vanish
+        let conditions: Vec<Vec<u64>> = (0..self.columns)
+            .map(|column| {
+                let mut rest = vec![0; self.columns * n];
+                rest[column * n] = f.one();
+                let mut out = Vec::new();
+                for pivot in &self.rows {
+                    let entry = &rest[pivot.column * n..(pivot.column + 1) * n];
+                    let amount: Vec<u64> = entry.iter().map(|&x| f.neg(x)).collect();
+                    for (e, b) in rest.chunks_exact_mut(n).zip(pivot.entries.chunks_exact(n)) {
+                        let mut primitive = b[pivot.valuation..].to_vec();
+                        primitive.resize(n, 0);
+                        self.ring.add_product(e, &amount, &primitive);
+                    }
+                    out.extend(&amount[..pivot.valuation.saturating_sub(d).min(known)]);
+                }
+                out.extend(rest.chunks_exact(n).flat_map(|e| &e[..known]));
+                out
+            })
+            .collect();
+        let mut all = crate::Echelon::new(*f, self.columns);
+        for i in 0..conditions.first().map_or(0, Vec::len) {
+            all.insert(&conditions.iter().map(|c| c[i]).collect::<Vec<_>>());
+        }
+        all.null_space()
+    }
+
     /// The same for a functional that is a series itself (shape of `c`: columns x N).
     pub fn order_of_series(&self, c: &[u64]) -> Option<usize> {
         let n = self.ring.precision;
@@ -262,6 +294,16 @@ mod tests {
                     span.contains(&unit.iter().flat_map(|&x| r.monomial(x, d)).collect::<Vec<_>>())
                 });
                 prop_assert_eq!(module.order(&unit), smallest);
+            }
+            // combinations too: those of order d are the constants whose T^d multiple is a member
+            for d in 0..3 {
+                let found = module.constants_of_order(d);
+                let multiple = |c: &[u64]| c.iter().flat_map(|&x| r.monomial(x, d)).collect::<Vec<_>>();
+                prop_assert!(found.iter().all(|c| span.contains(&multiple(c))));
+                let members = (0..2).filter(|&c| module.order(&[0, 1].map(|j| if j == c { r.field.one() } else { 0 })).is_some_and(|k| k <= d));
+                let least = members.count();
+                let some = (-3i64..=3).any(|x| span.contains(&multiple(&[r.field.one(), r.field.from_i64(x)])));
+                prop_assert!(found.len() >= least.max(usize::from(some)));
             }
         }
     }

@@ -201,14 +201,23 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
                 .into(),
         );
     }
-    if a.positions.iter().any(|p| p.rotation.is_some()) {
+    let turns = a.positions.iter().any(|p| p.rotation.is_some());
+    if turns && has_others {
+        out.push(
+            "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these errors share: at almost any rate; psi in n \
+             moves in it, by drift and by what torquer errors leave"
+                .into(),
+        );
+    } else if turns {
         out.push(
             "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \
              goes on through it"
                 .into(),
         );
     }
-    if let Some(s) = a.stations.iter().find(|s| s.turned_deg.is_some_and(|t| t != 0.0)) {
+    let solved = a.quantities.iter().any(|q| q.solution.is_some());
+    let turned = a.stations.iter().find(|s| s.turned_deg.is_some_and(|t| t != 0.0));
+    if let Some(s) = turned.filter(|_| solved || !has_others) {
         let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());
         let rate = s.rate.as_deref().unwrap_or_default();
         out.push(format!(

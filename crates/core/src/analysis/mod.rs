@@ -65,7 +65,10 @@ pub fn analyze(
     let mut solver = judged.solver(options.frame, worker);
     let findings = judged.findings(&mut solver);
 
-    let mut printer = Printer { solver, options, stations: stations(scheme), notes: Vec::new() };
+    // derivatives of Z while the platform turns with such errors hold its rate
+    let course = scheme.by_course();
+    let printed = AnalysisOptions { solutions: options.solutions && !course, ..options };
+    let mut printer = Printer { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
     printer.notes.extend(findings.accuracy.as_ref().err().map(ToString::to_string));
     let quantities = quantities(&platform, &findings, &mut printer)?;
     let combinations = findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
@@ -84,7 +87,7 @@ pub fn analyze(
                 .into(),
         );
     }
-    if options.solutions {
+    if options.solutions && !course {
         let note = engine_note(built, &mut printer.solver);
         printer.notes.extend(note);
     }
@@ -299,13 +302,19 @@ fn notes(scheme: &Scheme) -> Vec<String> {
         "at attitudes where the force is along one input axis the product of two components is zero: Kx is not excited there",
     );
     say(
+        scheme.by_course(),
+        "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers look like, so a rotating segment is \
+         judged by the course of Z, at almost any rate: a degree is a power of time, the order of the derivative at positions, and what has \
+         accumulated in psi while the platform turned counts by its power; expressions are not written out",
+    );
+    say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
-        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act by the earth rate alone, \
+        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act at positions alone, \
          as if nothing had been torqued in between; real slews need inertial carry and a path",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
-        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act by the earth rate alone",
+        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act at positions alone",
     );
     out
 }
@@ -345,7 +354,9 @@ fn turns(platform: &Platform) -> Vec<Vec<Turn>> {
     let turn = |(from, turn): (Matrix3<f64>, &TurnAt<f64>)| {
         Slew::by(&from, &turn.axis.map(|x| x * turn.angle), 1.0).turn()
     };
-    (0..point.turns.len()).map(|i| point.turns_to(i).into_iter().map(turn).collect()).collect()
+    let stations = platform.scheme().stations();
+    let starts = (0..point.turns.len()).filter(|&i| !stations[i].continues);
+    starts.map(|i| point.turns_to(i).into_iter().map(turn).collect()).collect()
 }
 
 /// What is found under the other carries, and why nothing is under one of them.

@@ -3,6 +3,7 @@
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, PrimeError, gcd};
 
+use super::courses;
 use super::platform_rows::PlatformRows;
 use super::reset::reset_degrees;
 use super::staircase::{Degrees, climb};
@@ -54,7 +55,7 @@ pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> 
 /// [`EnsembleError`].
 pub(crate) fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, EnsembleError> {
     let scheme = platform.scheme();
-    if scheme.carry != Carry::Reset || scheme.unknowns == Unknowns::Drift {
+    if scheme.carry != Carry::Reset || scheme.unknowns == Unknowns::Drift || scheme.by_course() {
         return Ok(judge(platform, seed)?.degrees);
     }
     Ok(agreed(platform, seed, &|sample| (reset_degrees(platform, sample), ()))?.0)
@@ -84,6 +85,9 @@ fn agreed<T>(
 
 /// The degrees and the bases of `V_0, V_1, ...` at one sample.
 pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>) {
+    if platform.scheme().by_course() {
+        return courses::staircase(platform, sample);
+    }
     let mut rows = PlatformRows::new(platform, sample);
     let mut basis = Echelon::new(sample.point.ring, platform.names().len());
     let mut stairs = Vec::new();
@@ -103,14 +107,21 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     // of a row: psi of its position, and the coefficients
     let entries = 3 + platform.coefficients();
     let torquers = usize::from(scheme.unknowns.have(Source::Rate));
+    let turning = scheme.positions.iter().filter(|p| scheme.by_course() && p.rotation.is_some());
+    let rotations = turning.count();
+    let harmonics = platform.errors().harmonics();
+    let turning_bits = rotations as f64 * courses::bits(harmonics);
     // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
     let bits = 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0;
     Claim {
         unknowns,
         decisions: orders * (1 + unknowns),
         order,
-        row_degree: orders + if generic { 6 * (1 + factors) } else { 0 } + torquers,
-        row_bits: bits + torquer_bits(platform),
+        row_degree: orders
+            + if generic { 6 * (1 + factors) } else { 0 }
+            + torquers
+            + rotations * courses::degree(harmonics),
+        row_bits: bits + torquer_bits(platform) + turning_bits,
     }
 }
 

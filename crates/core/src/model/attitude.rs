@@ -15,6 +15,16 @@ pub fn product<R: Ring>(ring: &R, a: &Matrix3<R::Element>, b: &Matrix3<R::Elemen
     std::array::from_fn(|i| std::array::from_fn(|j| ring.dot((0..3).map(|k| (&a[i][k], &b[k][j])))))
 }
 
+/// The transpose.
+pub(crate) fn transpose<E: Clone>(m: &Matrix3<E>) -> Matrix3<E> {
+    std::array::from_fn(|i| std::array::from_fn(|j| m[j][i].clone()))
+}
+
+/// 1.
+pub(crate) fn unit<R: Ring>(ring: &R) -> Matrix3<R::Element> {
+    std::array::from_fn(|i| std::array::from_fn(|j| if i == j { ring.one() } else { ring.zero() }))
+}
+
 /// The elementary passive rotation about `axis` (0, 1, 2) by the angle of cosine `c` and sine `s`:
 /// `Mx = [[1,0,0],[0,c,s],[0,-s,c]]` and cyclic.
 pub fn elementary<R: Ring>(ring: &R, axis: usize, (c, s): &(R::Element, R::Element)) -> Matrix3<R::Element> {

@@ -5,6 +5,7 @@ pub(crate) mod attitude;
 mod canonical;
 pub(crate) mod combination;
 pub(crate) mod dwell;
+pub(crate) mod error_model;
 pub mod expression;
 pub(crate) mod file_error;
 pub(crate) mod geometry;
@@ -30,13 +31,14 @@ pub use attitude::{
     Euler, Matrix3, Turned, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary, product,
 };
 pub use dwell::{Dwell, DwellError};
+pub use error_model::{Columns, ErrorModel};
 pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, SignedAxis};
 pub use gimbals::{GimbalError, Gimbals};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{
-    AZIMUTH, Block, LOCAL, Observed, PSI_EPS, Platform, Point, RandomValues, Sample, earth_rate_in,
-    local_dynamics, local_output,
+    AZIMUTH, Block, LOCAL, Observed, PSI_EPS, Platform, Point, RandomValues, Sample, SteadyTurn,
+    earth_rate_in, local_dynamics, local_output,
 };
 pub use recording::{Recording, Still};
 pub use ring::{Float, Ring, Text};

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::angle::Angle;
-use super::attitude::{Matrix3, c_n_f64, elementary, product};
+use super::attitude::{Matrix3, Turned, c_n, c_n_f64, elementary, product};
 use super::ring::{Float, Ring};
 use super::rotation::{Axis, SlewAxis};
 use super::scheme::Position;
@@ -216,7 +216,7 @@ fn cross<R: Ring>(ring: &R, v: &[R::Element; 3]) -> Matrix3<R::Element> {
     out
 }
 
-/// The way from one position to the next, where neither turns.
+/// The way from one position, with all that it turns, to the next.
 ///
 /// # Errors
 /// [`StepError`].
@@ -229,10 +229,11 @@ pub(super) fn steps(from: &Position, to: &Position, path: Path) -> Result<Vec<Pa
     if from.angles.iter().chain(&to.angles).any(|a| a.generic().is_some()) {
         return Err(generic());
     }
+    let turned = from.rotation.as_ref().map(|r| Turned { axis: r.axis, angle: r.angle.clone() });
+    let start = c_n(&Float, &from.angles, turned.as_ref(), |a| a.turn().cos_sin_f64());
     let how = own.cloned().unwrap_or_default();
-    let Some(turn) = Slew::to(&c_n_f64(&from.angles), &c_n_f64(&to.angles), &how, 1.0)
-        .map_err(|_| StepError::NoWay)?
-        .map(|s| s.turn())
+    let Some(turn) =
+        Slew::to(&start, &c_n_f64(&to.angles), &how, 1.0).map_err(|_| StepError::NoWay)?.map(|s| s.turn())
     else {
         return Ok(Vec::new());
     };

@@ -4,11 +4,12 @@ use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order}
 
 use super::angle::Angle;
 use super::attitude::{Matrix3, product};
-use super::geometry::SignedAxis;
+use super::error_model::{Columns, ErrorModel};
 use super::path::{PathError, PathStep, TurnAt};
 use super::ring::{Float, Ring};
-use super::scheme::{Carry, Scheme, SchemeError, Station};
-use super::terms::{ErrorTerm, Source, Unknowns};
+use super::rotation::Axis;
+use super::scheme::{Carry, Position, Scheme, SchemeError, Station};
+use super::terms::{ErrorTerm, Unknowns};
 
 /// The local unknowns of one position, in n: `psi^n`, `eps^n`, then the error of the accelerometers in `Z^n`.
 pub const LOCAL: usize = 9;
@@ -26,7 +27,7 @@ pub struct Platform {
     scheme: Scheme,
     names: Vec<String>,
     units: Vec<&'static str>,
-    terms: Vec<ErrorTerm>,
+    errors: ErrorModel,
     /// The turns that lead to every position, where torquer errors act on them.
     paths: Vec<Vec<PathStep>>,
 }
@@ -58,7 +59,7 @@ pub struct Point<R: Ring> {
     pub w_u: R::Element,
     /// `C_c^n` of every station of the scheme.
     pub attitudes: Vec<Matrix3<R::Element>>,
-    /// The turns that lead to every position, on which torquer errors act; empty where none does.
+    /// The turns that lead to every station, on which torquer errors act; empty where none does.
     pub turns: Vec<Vec<TurnAt<R::Element>>>,
 }
 
@@ -87,32 +88,26 @@ impl Platform {
         scheme.validate()?;
         let mut names = Vec::new();
         let mut units = Vec::new();
-        let mut terms = Vec::new();
-        match &scheme.unknowns {
-            Unknowns::Drift => {
-                names.extend(LOCAL_NAMES[..PSI_EPS].iter().map(|n| n.to_string()));
-                units.extend(["rad", "rad", "rad", "deg/h", "deg/h", "deg/h"]);
-            }
-            Unknowns::Coefficients(unknown) => {
-                let copies = if scheme.carry == Carry::Reset { scheme.positions.len() } else { 1 };
-                for i in 1..=copies {
-                    for axis in ['x', 'y', 'z'] {
-                        let at = if scheme.carry == Carry::Reset { format!("@{i}") } else { String::new() };
-                        names.push(format!("psi_{axis}{at}"));
-                        units.push("rad");
-                    }
-                }
-                for term in unknown {
-                    for (name, effect) in term.coefficients(&scheme.geometry) {
-                        names.push(name);
-                        units.push(term.unit());
-                        terms.push(effect);
-                    }
+        if scheme.unknowns == Unknowns::Drift {
+            names.extend(LOCAL_NAMES[..PSI_EPS].iter().map(|n| n.to_string()));
+            units.extend(["rad", "rad", "rad", "deg/h", "deg/h", "deg/h"]);
+        } else {
+            let copies = if scheme.carry == Carry::Reset { scheme.positions.len() } else { 1 };
+            for i in 1..=copies {
+                for axis in ['x', 'y', 'z'] {
+                    let at = if scheme.carry == Carry::Reset { format!("@{i}") } else { String::new() };
+                    names.push(format!("psi_{axis}{at}"));
+                    units.push("rad");
                 }
             }
         }
+        for term in scheme.unknowns.terms() {
+            names.extend(term.coefficients(&scheme.geometry).into_iter().map(|(name, _)| name));
+            units.resize(names.len(), term.unit());
+        }
+        let errors = scheme.error_model();
         let paths = scheme.paths()?;
-        let platform = Self { scheme, names, units, terms, paths };
+        let platform = Self { scheme, names, units, errors, paths };
         platform.check_paths()?;
         Ok(platform)
     }
@@ -127,7 +122,7 @@ impl Platform {
             let found = self.paths[index].iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
             PathError::NotExact { name: self.scheme.positions[index].name.clone(), index, found }
         };
-        match values.turns(&self.paths, &roots, &values.attitudes(&self.scheme, &roots)) {
+        match values.turns(&self.scheme, &self.paths, &roots, &values.attitudes(&self.scheme, &roots)) {
             Ok(_) => Ok(()),
             Err(at) => Err(inexact(at.min(index)).into()),
         }
@@ -155,8 +150,7 @@ impl Platform {
 
     /// What is observed.
     pub fn observed(&self) -> Observed {
-        let accelerometers = self.scheme.unknowns.have(Source::Force);
-        Observed { azimuth: self.scheme.measured_azimuth, accelerometers }
+        self.scheme.observed()
     }
 
     /// The turns that lead to every position, where torquer errors act on them; empty where they do not.
@@ -175,7 +169,7 @@ impl Platform {
             });
             return vec![Block { columns: (0..PSI_EPS).collect(), rows }];
         }
-        let first_d = self.names.len() - self.terms.len();
+        let first_d = self.names.len() - self.coefficients();
         let accelerometers = self.observed().accelerometers;
         // psi^n as a function of psi at the start of the scheme, and psi in platform axes where a rotation ended
         let mut psi_block = &point.attitudes[0];
@@ -183,7 +177,7 @@ impl Platform {
         let mut handed_on: Option<Matrix3<R::Element>> = None;
         // what torquer errors have left in psi^n
         let mut torqued: Option<Columns<R::Element>> = None;
-        let (no_psi, nothing) = ([0; 3].map(|_| ring.zero()), vec![ring.zero(); self.terms.len()]);
+        let (no_psi, nothing) = ([0; 3].map(|_| ring.zero()), vec![ring.zero(); self.coefficients()]);
         let row = |psi: &[R::Element; 3], rest: &[R::Element]| {
             let mut row = Vec::with_capacity(3 + rest.len());
             row.extend_from_slice(psi);
@@ -211,7 +205,7 @@ impl Platform {
                 let left = times(
                     ring,
                     &product(ring, &from, &turn.integral(ring)),
-                    &self.torquer_columns(ring, &turn.axis),
+                    &self.errors.torquer_columns(ring, &turn.axis),
                 );
                 torqued = Some(match torqued {
                     None => left,
@@ -221,9 +215,9 @@ impl Platform {
                 });
             }
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
-            let drift = self.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
+            let drift = self.errors.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
             let accelerometer =
-                if accelerometers { self.accelerometer_rows(ring, c) } else { Default::default() };
+                if accelerometers { self.errors.accelerometer_rows(ring, c) } else { Default::default() };
             let rows = std::array::from_fn(|r| match r {
                 0..3 => row(&psi_block[r], torqued.as_ref().map_or(&nothing, |left| &left[r])),
                 3..PSI_EPS => row(&no_psi, &drift[r - 3]),
@@ -238,7 +232,8 @@ impl Platform {
 }
 
 impl<R: Ring> Point<R> {
-    /// The turns to a position, each with the attitude from which it goes.
+    /// The turns to a station, each with the attitude from which it goes.
+    #[expect(clippy::type_complexity, reason = "pairs, which would be no plainer under a name")]
     pub fn turns_to(&self, i: usize) -> Vec<(Matrix3<R::Element>, &TurnAt<R::Element>)> {
         let (Some(turns), Some(before)) = (self.turns.get(i), i.checked_sub(1)) else { return Vec::new() };
         let mut from = self.attitudes[before].clone();
@@ -251,16 +246,9 @@ impl<R: Ring> Point<R> {
     }
 }
 
-/// A vector with one column per coefficient, in n.
-type Columns<E> = [Vec<E>; 3];
-
 /// `m v`.
 fn times<R: Ring>(ring: &R, m: &Matrix3<R::Element>, v: &Columns<R::Element>) -> Columns<R::Element> {
     std::array::from_fn(|r| (0..v[0].len()).map(|k| ring.dot((0..3).map(|j| (&m[r][j], &v[j][k])))).collect())
-}
-
-fn unit<R: Ring>(ring: &R) -> Matrix3<R::Element> {
-    std::array::from_fn(|i| std::array::from_fn(|j| if i == j { ring.one() } else { ring.zero() }))
 }
 
 /// `C^T (wN, wU, 0)`: the earth rate in the axes of c.
@@ -274,84 +262,34 @@ pub fn earth_rate_in<R: Ring>(
 }
 
 impl Platform {
-    /// The rows of `eps^n = C E D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
-    /// coefficient; none when the unknowns are the drift itself. `rate` is that with which the gyros are torqued, in c; it is asked for
-    /// where a torquer error is unknown.
+    /// How the coefficients enter.
+    pub fn errors(&self) -> &ErrorModel {
+        &self.errors
+    }
+
+    /// [`ErrorModel::drift_rows`].
     pub fn drift_rows<R: Ring>(
         &self,
         ring: &R,
         c: &Matrix3<R::Element>,
         rate: impl FnOnce() -> [R::Element; 3],
-    ) -> [Vec<R::Element>; 3] {
-        let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
-        let rate = self.scheme.unknowns.have(Source::Rate).then(rate);
-        let of = |source: Source| match source {
-            Source::Gravity => Some(&g),
-            Source::Rate => rate.as_ref(),
-            Source::Force => None,
-        };
-        self.error_rows(ring, c, of)
+    ) -> Columns<R::Element> {
+        self.errors.drift_rows(ring, c, rate)
     }
 
-    /// The rows of the error of the accelerometers in `Z^n` at any attitude `C`, with the specific force `f = C^T (0,1,0)`: three rows, one
-    /// column per coefficient.
-    pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> [Vec<R::Element>; 3] {
-        let f = c[1].clone();
-        self.error_rows(ring, c, |source| (source == Source::Force).then_some(&f))
-    }
-
-    /// The errors of the accelerometers in c, at the specific force `f`: three rows, one column per coefficient.
-    pub fn accelerometer_columns<R: Ring>(&self, ring: &R, f: &[R::Element; 3]) -> [Vec<R::Element>; 3] {
-        self.error_rows(ring, &unit(ring), |source| (source == Source::Force).then_some(f))
-    }
-
-    /// `E(u)` of torquer errors in c, for a rate along `u`: three rows, one column per coefficient.
-    pub fn torquer_columns<R: Ring>(&self, ring: &R, u: &[R::Element; 3]) -> [Vec<R::Element>; 3] {
-        self.error_rows(ring, &unit(ring), |source| (source == Source::Rate).then_some(u))
-    }
-
-    /// One column per coefficient, in n: along the input axis, times the components of what the term is a function of (3); zero where `of`
-    /// says nothing of it.
-    fn error_rows<'a, R: Ring>(
-        &self,
-        ring: &R,
-        c: &Matrix3<R::Element>,
-        of: impl Fn(Source) -> Option<&'a [R::Element; 3]>,
-    ) -> [Vec<R::Element>; 3]
-    where
-        R::Element: 'a,
-    {
-        let signed = |a: &SignedAxis, x: &R::Element| if a.negative { ring.neg(x) } else { x.clone() };
-        let excitation = |t: &ErrorTerm| {
-            let x = of(t.source)?;
-            Some(match t.factors.split_first() {
-                None => ring.one(),
-                Some((first, rest)) => rest
-                    .iter()
-                    .fold(signed(first, &x[first.axis]), |e, a| ring.mul(&e, &signed(a, &x[a.axis]))),
-            })
-        };
-        let mut rows = [0; 3].map(|_| Vec::with_capacity(self.terms.len()));
-        for t in &self.terms {
-            let e = excitation(t);
-            for (row, c) in rows.iter_mut().zip(c) {
-                row.push(match &e {
-                    Some(e) => ring.mul(&signed(&t.input, &c[t.input.axis]), e),
-                    None => ring.zero(),
-                });
-            }
-        }
-        rows
+    /// [`ErrorModel::accelerometer_rows`].
+    pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
+        self.errors.accelerometer_rows(ring, c)
     }
 
     /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift itself.
     pub fn error_terms(&self) -> &[ErrorTerm] {
-        &self.terms
+        self.errors.terms()
     }
 
     /// The number of coefficients.
     pub fn coefficients(&self) -> usize {
-        self.terms.len()
+        self.errors.terms().len()
     }
 }
 
@@ -395,6 +333,21 @@ pub struct Sample {
     pub roots: RootField,
     /// The point.
     pub point: Point<Field>,
+    /// The rotation of every position, where rotations are judged by their course; empty where none is.
+    pub arcs: Vec<Option<SteadyTurn>>,
+}
+
+/// A rotation at a steady rate, in a field.
+#[derive(Debug, Clone)]
+pub struct SteadyTurn {
+    /// About what.
+    pub axis: Axis,
+    /// Cosine and sine of the whole angle.
+    pub cos_sin: (u64, u64),
+    /// Its rate, times the unit T of time.
+    pub rate: u64,
+    /// Its duration, in units of T.
+    pub duration: u64,
 }
 
 /// Everything random that a sample needs, so that a conjugate embedding can reuse it.
@@ -406,6 +359,8 @@ pub struct RandomValues {
     generic: Vec<(String, u64)>,
     /// The image of pi, where torquer errors act in turns.
     pi: Option<u64>,
+    /// The rate of the rotation of every position, where rotations are judged by their course.
+    turning: Vec<u64>,
 }
 
 impl RandomValues {
@@ -425,8 +380,10 @@ impl RandomValues {
         let mut nonzero = || 1 + rng.below(p - 1);
         let rates = (nonzero(), nonzero());
         let generic = scheme.generic_names().into_iter().map(|n| (n, nonzero())).collect();
-        let pi = scheme.torquers_act().then(nonzero);
-        Ok(Self { roots, rates, generic, pi })
+        let pi = (scheme.torquers_act() || scheme.by_course()).then(&mut nonzero);
+        let rotations = if scheme.by_course() { scheme.positions.len() } else { 0 };
+        let turning = (0..rotations).map(|_| nonzero()).collect();
+        Ok(Self { roots, rates, generic, pi, turning })
     }
 
     /// The field.
@@ -486,23 +443,42 @@ impl RandomValues {
         scheme.stations().iter().map(|station| station.attitude(&roots.field, cos_sin)).collect()
     }
 
-    /// The turns to every position ([`Point::turns`]).
+    /// The turns to every station ([`Point::turns`]).
     ///
     /// # Errors
     /// The index of the first position whose way has no image, or does not lead there.
     fn turns(
         &self,
+        scheme: &Scheme,
         paths: &[Vec<PathStep>],
         roots: &RootField,
         attitudes: &[Matrix3<u64>],
     ) -> Result<Vec<Vec<TurnAt<u64>>>, usize> {
-        let Some(pi) = self.pi else { return Ok(Vec::new()) };
+        let Some(pi) = self.pi.filter(|_| !paths.is_empty()) else { return Ok(Vec::new()) };
         let f = roots.field;
         let cos_sin = |angle: &Angle| self.angle_cos_sin(roots, angle);
         let at = |step: &PathStep, from: &Matrix3<u64>, to: Option<&Matrix3<u64>>| {
             step.at_field(roots, from, to, pi, cos_sin)
         };
-        turns_of(&f, paths, attitudes, at, |reached, to| reached == to)
+        turns_of(&f, scheme, paths, attitudes, at, |reached, to| reached == to)
+    }
+
+    /// The rotations of every position, where rotations are judged by their course.
+    fn arcs(&self, scheme: &Scheme, roots: &RootField) -> Vec<Option<SteadyTurn>> {
+        let Some(pi) = self.pi else { return Vec::new() };
+        let f = roots.field;
+        let arc = |(rate, position): (&u64, &Position)| {
+            let rotation = position.rotation.as_ref()?;
+            let angle = f.mul(pi, f.from_ratio(rotation.angle.nanodeg(), 180_000_000_000));
+            let cos_sin = self.angle_cos_sin(roots, &rotation.angle);
+            Some(SteadyTurn {
+                axis: rotation.axis,
+                cos_sin,
+                rate: *rate,
+                duration: f.mul(angle, f.inv(*rate)),
+            })
+        };
+        self.turning.iter().zip(&scheme.positions).map(arc).collect()
     }
 
     /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
@@ -517,38 +493,50 @@ impl RandomValues {
                 (f.mul(self.rates.0, c), f.mul(self.rates.0, s))
             }
         };
+        self.sample_at(scheme, a, [w_n, w_u])
+    }
+
+    /// The same at other rates `(wN, wU)` of the earth.
+    pub fn sample_at(&self, scheme: &Scheme, a: u64, [w_n, w_u]: [u64; 2]) -> Sample {
+        let roots = self.roots.conjugate(a);
         let attitudes = self.attitudes(scheme, &roots);
         let paths = scheme.paths().unwrap_or_default();
-        let turns = self.turns(&paths, &roots, &attitudes);
+        let turns = self.turns(scheme, &paths, &roots, &attitudes);
         let turns = turns.expect("the ways of a platform have images in the fields of its angles");
-        Sample { roots, point: Point { ring: f, w_n, w_u, attitudes, turns } }
+        let arcs = self.arcs(scheme, &roots);
+        Sample { roots, arcs, point: Point { ring: roots.field, w_n, w_u, attitudes, turns } }
     }
 }
 
-/// The turns to every position ([`Point::turns`]) in a ring, where rotating segments have none: `at` gives one of a way that starts at an
-/// attitude, and ends at another where it is the only one; `arrives` says whether a way ends where it should.
+/// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an attitude, and ends at another where it
+/// is the only one; `arrives` says whether a way ends where it should.
 ///
 /// # Errors
 /// The index of the first position whose way `at` does not know, or that does not lead there.
 fn turns_of<R: Ring>(
     ring: &R,
+    scheme: &Scheme,
     paths: &[Vec<PathStep>],
     attitudes: &[Matrix3<R::Element>],
     at: impl Fn(&PathStep, &Matrix3<R::Element>, Option<&Matrix3<R::Element>>) -> Option<TurnAt<R::Element>>,
     arrives: impl Fn(&Matrix3<R::Element>, &Matrix3<R::Element>) -> bool,
 ) -> Result<Vec<Vec<TurnAt<R::Element>>>, usize> {
-    let mut out = Vec::with_capacity(paths.len());
-    for (i, path) in paths.iter().enumerate() {
+    if paths.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut out = Vec::with_capacity(attitudes.len());
+    for (i, station) in scheme.stations().iter().enumerate() {
+        let path = if station.continues { &[][..] } else { &paths[station.index][..] };
         let mut attitude = attitudes[i.saturating_sub(1)].clone();
         let only = (path.len() == 1).then_some(&attitudes[i]);
         let mut turns = Vec::with_capacity(path.len());
         for step in path {
-            let turn = at(step, &attitude, only).ok_or(i)?;
+            let turn = at(step, &attitude, only).ok_or(station.index)?;
             attitude = product(ring, &attitude, &turn.rotation(ring));
             turns.push(turn);
         }
-        if i > 0 && !arrives(&attitude, &attitudes[i]) {
-            return Err(i);
+        if i > 0 && !station.continues && !arrives(&attitude, &attitudes[i]) {
+            return Err(station.index);
         }
         out.push(turns);
     }
@@ -558,12 +546,13 @@ fn turns_of<R: Ring>(
 impl Point<Float> {
     /// The platform in floating point at these rates of the earth.
     pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64) -> Self {
-        let stations = platform.scheme().stations();
+        let scheme = platform.scheme();
         let cos_sin = |angle: &Angle| angle.turn().cos_sin_f64();
-        let attitudes: Vec<_> = stations.iter().map(|s| s.attitude(&Float, cos_sin)).collect();
+        let attitudes: Vec<_> = scheme.stations().iter().map(|s| s.attitude(&Float, cos_sin)).collect();
         // where they lead was found when the platform was made
         let at = |step: &PathStep, from: &Matrix3<f64>, _: Option<&Matrix3<f64>>| Some(step.at_f64(from));
-        let turns = turns_of(&Float, &platform.paths, &attitudes, at, |_, _| true).unwrap_or_default();
+        let turns = turns_of(&Float, scheme, &platform.paths, &attitudes, at, |_, _| true);
+        let turns = turns.unwrap_or_default();
         Self { ring: Float, w_n, w_u, attitudes, turns }
     }
 }

@@ -10,9 +10,11 @@ use serde::{Deserialize, Serialize};
 use super::angle::{Angle, AngleError, MAX_NAME, excerpt, format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, Turned, c_n, cardinal, cardinal_name};
 use super::dwell::Dwell;
+use super::error_model::ErrorModel;
 use super::geometry::Geometry;
 use super::gimbals::Gimbals;
 use super::path::{self, Path, PathError, PathStep, StepError};
+use super::platform::Observed;
 use super::recording::Recording;
 use super::ring::Ring;
 use super::rotation::{MIN_ROTATION, Rotation, SlewTo};
@@ -149,6 +151,8 @@ pub struct Station<'a> {
     pub turned: Option<Turned>,
     /// psi^n goes on from the station before, whatever the carry.
     pub continues: bool,
+    /// An end of a rotation that is judged by its course: no derivative row is taken here.
+    pub course: bool,
 }
 
 impl Station<'_> {
@@ -393,20 +397,6 @@ pub enum SchemeError {
         /// The limits.
         limits: String,
     },
-    /// While it turns steadily, drifts integrate to what errors of accelerometers and torquers look like: `(D/w) sin` beside `K0 sin`. The
-    /// rows of attitudes of the arc would tell them apart.
-    #[error(
-        "`{name}` turns, and {terms} are unknown: rotating segments are judged with drifts alone; expected positions, or terms out of F, I, O, S, II, OO, \
-         SS, IO, IS, OS"
-    )]
-    RotationTerms {
-        /// The segment.
-        name: String,
-        /// Its index.
-        index: usize,
-        /// The terms that are not drifts.
-        terms: String,
-    },
     /// A slew to the first position.
     #[error("`{name}` is the first position; expected no slew to it")]
     FirstSlew {
@@ -463,9 +453,7 @@ impl SchemeError {
             Self::Combinations { .. } => Some("combinations".into()),
             Self::Range(e) => Some(e.what.clone()),
             Self::DriftPositions { .. } | Self::Terms(_) => Some("terms".into()),
-            Self::Rotation { index, .. } | Self::RotationTerms { index, .. } => {
-                Some(format!("position.{index}.rotation"))
-            }
+            Self::Rotation { index, .. } => Some(format!("position.{index}.rotation")),
             Self::Gimbals { index, .. } => Some(format!("position.{index}")),
             Self::FirstSlew { .. } => Some("position.0.slew".into()),
             Self::Geometry(_) => Some("geometry".into()),
@@ -520,11 +508,6 @@ impl Scheme {
             let none = |r: &Rotation| r.angle.generic().is_some() || r.angle.nanodeg().abs() < MIN_ROTATION;
             if p.rotation.as_ref().is_some_and(none) {
                 return Err(SchemeError::Rotation { name, index });
-            }
-            let others = self.unknowns.terms().iter().filter(|t| t.source() != Source::Gravity);
-            let terms = others.map(|t| t.letters()).collect::<Vec<_>>().join(", ");
-            if p.rotation.is_some() && !terms.is_empty() {
-                return Err(SchemeError::RotationTerms { name, index, terms });
             }
             if index == 0 && p.slew.is_some() {
                 return Err(SchemeError::FirstSlew { name });
@@ -627,25 +610,45 @@ impl Scheme {
         self.positions.iter().any(|p| p.rotation.is_some())
     }
 
+    /// Whether rotations are judged by the course of Z while they go on, not at attitudes of the arc: where not only drifts are unknown.
+    pub fn by_course(&self) -> bool {
+        self.rotates() && (self.unknowns.have(Source::Rate) || self.unknowns.have(Source::Force))
+    }
+
+    /// What is observed.
+    pub fn observed(&self) -> Observed {
+        Observed { azimuth: self.measured_azimuth, accelerometers: self.unknowns.have(Source::Force) }
+    }
+
+    /// How the unknown coefficients enter.
+    pub fn error_model(&self) -> ErrorModel {
+        let terms = self.unknowns.terms().iter().flat_map(|t| t.coefficients(&self.geometry));
+        terms.map(|(_, effect)| effect).collect::<Vec<_>>().into()
+    }
+
     /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric polynomials of its
     /// angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for each component of g^c): any
-    /// 2m+1 different angles of the arc span what all of it spans. The end is added, where psi is handed on.
+    /// 2m+1 different angles of the arc span what all of it spans. The end is added, where psi is handed on. Of a rotation that is judged by its
+    /// course both ends are there, and no row is taken at them.
     pub fn stations(&self) -> Vec<Station<'_>> {
         let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0);
+        let course = self.by_course();
         let mut out = Vec::with_capacity(self.positions.len());
         for (index, position) in self.positions.iter().enumerate() {
             let Some(r) = &position.rotation else {
-                out.push(Station { position, index, turned: None, continues: false });
+                out.push(Station { position, index, turned: None, continues: false, course: false });
                 continue;
             };
             let whole = r.angle.nanodeg();
             let step = whole.clamp(-FULL_TURN, FULL_TURN) / STATION_STEPS;
-            let angles = (0..=2 * degree as i64).map(|k| k * step).chain([whole]);
+            let along = if course { 0..=0 } else { 0..=2 * degree as i64 };
+            let angles = along.map(|k| k * step).chain([whole]);
             out.extend(angles.map(|angle| Station {
                 position,
                 index,
                 turned: Some(Turned { axis: r.axis, angle: Angle::from_nanodeg(angle) }),
                 continues: angle != 0,
+                course,
             }));
         }
         out

@@ -111,7 +111,9 @@ pub(crate) fn combinations(
     };
     let mut out: Vec<Combination> = chosen.into_iter().filter_map(sum).collect();
     let labels = stations(platform.scheme());
-    for (k, basis) in verdicts.stairs.iter().enumerate() {
+    // what else is determined while it turns holds rates of turning, and has no name
+    let positions = if platform.scheme().by_course() { &[][..] } else { &verdicts.stairs[..] };
+    for (k, basis) in positions.iter().enumerate() {
         let mut span = singles(k);
         for c in out.iter().filter(|c| c.degree <= k) {
             span.insert(&c.vector);

@@ -29,6 +29,9 @@ pub(crate) enum FormulasError {
     /// Torquer errors have no symbols.
     #[error("no formulas of Z: those with torquer errors (GS, GM, GM3) are not written out")]
     Torquers,
+    /// What turning adds to derivatives of Z of accelerometers is not among them.
+    #[error("no formulas of Z: those with accelerometer errors of a platform that turns are not written out")]
+    Turning,
     /// Nobody derives them.
     #[error("formulas of Z need the symbolic engine")]
     NoEngine,
@@ -45,6 +48,9 @@ pub(crate) enum FormulasError {
 pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, FormulasError> {
     if platform.scheme().unknowns.have(Source::Rate) {
         return Err(FormulasError::Torquers);
+    }
+    if platform.scheme().by_course() {
+        return Err(FormulasError::Turning);
     }
     let observed = platform.observed();
     let locals = observed.locals();

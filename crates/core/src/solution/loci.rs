@@ -69,6 +69,9 @@ pub(crate) enum LociError {
     /// Their sines and cosines are no numbers of the factors.
     #[error("degenerate loci are computed when all other angles and offsets are multiples of 90 deg")]
     OtherAngles,
+    /// Minors that hold rates of turning are not factored.
+    #[error("degenerate angles of a scheme whose rotations are judged by the course of Z are not computed")]
+    Course,
     /// The engine's answer could not be read.
     #[error("factor `{text}`: {error}")]
     Factor {
@@ -99,6 +102,9 @@ pub(crate) fn loci(
     let names = platform.scheme().generic_names();
     if names.is_empty() {
         return Ok(Found::default());
+    }
+    if platform.scheme().by_course() {
+        return Err(LociError::Course);
     }
     let stations = platform.scheme().stations();
     if !stations.iter().flat_map(Station::angles).all(|a| a.turn().is_multiple_of_deg(90)) {

@@ -81,18 +81,20 @@ impl<'a> Solver<'a> {
         let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
         // turns of torquer errors hold pi, and their drift sums of rates: neither is among the symbols
         let torquers = platform.scheme().unknowns.have(Source::Rate);
-        let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES && !torquers;
+        let others = torquers || platform.scheme().by_course();
+        let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES && !others;
         let mut text = Vec::new();
         if usable {
             text = rows_at(platform, &text_point, &tables.observables);
             text.extend(motion_rows(platform, &text_point));
         }
-        let floats = platform.scheme().generic_names().is_empty().then(|| {
-            let point = float_point(platform, &tables, FLOAT_RATES);
-            let mut rows = rows_at(platform, &point, &tables.observables);
-            rows.extend(motion_rows(platform, &point));
-            (point, rows)
-        });
+        let floats =
+            (platform.scheme().generic_names().is_empty() && !platform.scheme().by_course()).then(|| {
+                let point = float_point(platform, &tables, FLOAT_RATES);
+                let mut rows = rows_at(platform, &point, &tables.observables);
+                rows.extend(motion_rows(platform, &point));
+                (point, rows)
+            });
         let stations = platform.scheme().stations();
         let stations = stations.iter().map(|s| (s.index, s.turned.as_ref().map(|t| t.axis))).collect();
         Self { platform, verdicts, tables, symbols, text, text_point, floats, worker, frame, stations }

@@ -5,7 +5,7 @@ use obsdeg_exact::radical::embeddings;
 
 use super::local::{LocalObservable, RateZeros, local_observables, rows_at};
 use super::turning::motion_rows;
-use crate::degree::ensemble::Verdicts;
+use crate::degree::ensemble::{Verdicts, staircase};
 use crate::model::Platform;
 use crate::model::platform::{RandomValues, Sample};
 
@@ -15,7 +15,7 @@ pub(crate) struct Table {
     /// Field and embedding.
     pub sample: Sample,
     /// One row per station and local observable, station by station; then, if the scheme rotates, one per station of
-    /// [`motion_rows`].
+    /// [`motion_rows`]. Where rotations are judged by their course, the bases of `V_0, V_1, ...` instead.
     pub rows: Vec<Vec<u64>>,
 }
 
@@ -32,8 +32,10 @@ impl Table {
 pub(crate) struct Tables {
     /// The observables of one position.
     pub observables: Vec<LocalObservable>,
-    /// How many rows are those of local observables.
+    /// How many rows there are but those of [`motion_rows`].
     pub observable_rows: usize,
+    /// The orders of the rows where these are bases of `V_0, V_1, ...`; empty elsewhere.
+    stairs: Vec<usize>,
     /// Zeros of the rates.
     pub zeros: RateZeros,
     /// `tables[field][embedding]`.
@@ -55,8 +57,12 @@ impl Tables {
             [draw(zeros.w_n), draw(zeros.w_u)]
         };
         let table = |values: &RandomValues, a: u64, [w_n, w_u]: [u64; 2]| {
-            let mut sample = values.sample(scheme, a);
-            (sample.point.w_n, sample.point.w_u) = (w_n, w_u);
+            let sample = values.sample_at(scheme, a, [w_n, w_u]);
+            if scheme.by_course() {
+                let stairs = staircase(platform, &sample).1;
+                let rows = stairs.iter().flat_map(|basis| (0..basis.rank()).map(|i| basis.row(i).to_vec()));
+                return Table { rows: rows.collect(), sample };
+            }
             let mut rows = rows_at(platform, &sample.point, &observables);
             rows.extend(motion_rows(platform, &sample.point));
             Table { sample, rows }
@@ -69,8 +75,14 @@ impl Tables {
         });
         let first = &verdicts.values[0];
         let other_rates = table(first, 1, rates(first.roots()));
-        let observable_rows = scheme.stations().len() * observables.len();
-        Self { observables, observable_rows, zeros, tables, other_rates }
+        let mut stairs = Vec::new();
+        let mut observable_rows = scheme.stations().len() * observables.len();
+        if scheme.by_course() {
+            let ranks = verdicts.stairs.iter().map(|basis| basis.rank()).enumerate();
+            stairs = ranks.flat_map(|(order, rank)| std::iter::repeat_n(order, rank)).collect();
+            observable_rows = stairs.len();
+        }
+        Self { observables, observable_rows, stairs, zeros, tables, other_rates }
     }
 
     /// The two fields.
@@ -80,7 +92,8 @@ impl Tables {
 
     /// The derivative order of a row.
     pub(crate) fn order(&self, row: usize) -> usize {
-        self.observables[row % self.observables.len()].order
+        let of_stairs = self.stairs.get(row).copied();
+        of_stairs.unwrap_or_else(|| self.observables[row % self.observables.len()].order)
     }
 
     /// The station of a row.
@@ -93,7 +106,7 @@ impl Tables {
         self.observable_rows + station
     }
 
-    /// The rows of local observables of order up to `degree`.
+    /// The rows of order up to `degree`.
     pub(crate) fn rows_up_to(&self, degree: usize) -> Vec<usize> {
         (0..self.observable_rows).filter(|&j| self.order(j) <= degree).collect()
     }

@@ -69,7 +69,7 @@ pub(crate) fn drift_derivative<R: Ring>(
 /// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform stands. `Z1''`
 /// is the only second derivative that solutions use (16).
 pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &Point<R>) -> Vec<Vec<R::Element>> {
-    if !platform.scheme().rotates() {
+    if !platform.scheme().rotates() || platform.scheme().by_course() {
         return Vec::new();
     }
     let ring = &point.ring;

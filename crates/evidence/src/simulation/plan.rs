@@ -414,8 +414,8 @@ fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
         scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
     let mut point = Point::in_floats(platform, W_IE * c, W_IE * s);
     // turns that take time are integrated
-    for (position, turns) in scheme.positions.iter().zip(&mut point.turns) {
-        if conditions.slew_rate(position).is_some() {
+    for (station, turns) in scheme.stations().iter().zip(&mut point.turns) {
+        if conditions.slew_rate(station.position).is_some() {
             turns.clear();
         }
     }
@@ -620,7 +620,7 @@ impl Plan {
         f: &[f64; 3],
         coefficients: &[f64],
     ) -> [f64; 3] {
-        let rows = self.platform.accelerometer_columns(&Float, f);
+        let rows = self.platform.errors().accelerometer_columns(&Float, f);
         apply(c, &rows.map(|row| row.iter().zip(coefficients).map(|(a, k)| a * k).sum()))
     }
 

@@ -1,0 +1,104 @@
+//! How unknown coefficients enter: the drift of the gyros and the errors of the accelerometers at any attitude.
+
+use super::attitude::{Matrix3, unit};
+use super::geometry::SignedAxis;
+use super::ring::Ring;
+use super::terms::{ErrorTerm, Source};
+
+/// A vector with one column per coefficient.
+pub type Columns<E> = [Vec<E>; 3];
+
+/// The error terms of the unknown coefficients, in their order.
+#[derive(Debug, Clone, Default)]
+pub struct ErrorModel {
+    terms: Vec<ErrorTerm>,
+}
+
+impl From<Vec<ErrorTerm>> for ErrorModel {
+    fn from(terms: Vec<ErrorTerm>) -> Self {
+        Self { terms }
+    }
+}
+
+impl ErrorModel {
+    /// The terms; none when the unknowns are the drift itself.
+    pub fn terms(&self) -> &[ErrorTerm] {
+        &self.terms
+    }
+
+    /// While the platform turns about one axis, drifts and errors of the accelerometers in n are trigonometric polynomials of the angle of this
+    /// degree: one for `C_c^n`, one for each component that a coefficient multiplies.
+    pub fn harmonics(&self) -> usize {
+        1 + self.terms.iter().map(|t| t.factors.len()).max().unwrap_or(0)
+    }
+
+    /// The rows of `eps^n = C E D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
+    /// coefficient; none when the unknowns are the drift itself. `rate` is that with which the gyros are torqued, in c; it is asked for
+    /// where a torquer error is unknown.
+    pub fn drift_rows<R: Ring>(
+        &self,
+        ring: &R,
+        c: &Matrix3<R::Element>,
+        rate: impl FnOnce() -> [R::Element; 3],
+    ) -> Columns<R::Element> {
+        let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
+        let rate = self.terms.iter().any(|t| t.source == Source::Rate).then(rate);
+        let of = |source: Source| match source {
+            Source::Gravity => Some(&g),
+            Source::Rate => rate.as_ref(),
+            Source::Force => None,
+        };
+        self.rows(ring, c, of)
+    }
+
+    /// The rows of the error of the accelerometers in `Z^n` at any attitude `C`, with the specific force `f = C^T (0,1,0)`: three rows, one
+    /// column per coefficient.
+    pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
+        let f = c[1].clone();
+        self.rows(ring, c, |source| (source == Source::Force).then_some(&f))
+    }
+
+    /// The errors of the accelerometers in c, at the specific force `f`: three rows, one column per coefficient.
+    pub fn accelerometer_columns<R: Ring>(&self, ring: &R, f: &[R::Element; 3]) -> Columns<R::Element> {
+        self.rows(ring, &unit(ring), |source| (source == Source::Force).then_some(f))
+    }
+
+    /// `E(u)` of torquer errors in c, for a rate along `u`: three rows, one column per coefficient.
+    pub fn torquer_columns<R: Ring>(&self, ring: &R, u: &[R::Element; 3]) -> Columns<R::Element> {
+        self.rows(ring, &unit(ring), |source| (source == Source::Rate).then_some(u))
+    }
+
+    /// One column per coefficient, in n: along the input axis, times the components of what the term is a function of (3); zero where `of`
+    /// says nothing of it.
+    fn rows<'a, R: Ring>(
+        &self,
+        ring: &R,
+        c: &Matrix3<R::Element>,
+        of: impl Fn(Source) -> Option<&'a [R::Element; 3]>,
+    ) -> Columns<R::Element>
+    where
+        R::Element: 'a,
+    {
+        let signed = |a: &SignedAxis, x: &R::Element| if a.negative { ring.neg(x) } else { x.clone() };
+        let excitation = |t: &ErrorTerm| {
+            let x = of(t.source)?;
+            Some(match t.factors.split_first() {
+                None => ring.one(),
+                Some((first, rest)) => rest
+                    .iter()
+                    .fold(signed(first, &x[first.axis]), |e, a| ring.mul(&e, &signed(a, &x[a.axis]))),
+            })
+        };
+        let mut rows = [0; 3].map(|_| Vec::with_capacity(self.terms.len()));
+        for t in &self.terms {
+            let e = excitation(t);
+            for (row, c) in rows.iter_mut().zip(c) {
+                row.push(match &e {
+                    Some(e) => ring.mul(&signed(&t.input, &c[t.input.axis]), e),
+                    None => ring.zero(),
+                });
+            }
+        }
+        rows
+    }
+}
