@@ -58,7 +58,7 @@ pub(crate) struct MeasurementArguments {
     #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
     azimuth_noise: Option<f64>,
 
-    /// Largest standard deviation allowed for an unknown or family in deg, deg/h, deg/h/g: D=0.05, D_FX=0.01
+    /// Largest standard deviation allowed for an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D=0.05, D_FX=0.01, K1=5
     /// (default: psi 0.01, D 0.1; 1e-12 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
     requirement: Vec<Assignment>,
@@ -132,7 +132,7 @@ pub(crate) struct ConditionArguments {
     #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = one_of([("exponential", Propagation::Exponential), ("rk4", Propagation::Rk4)]))]
     propagation: Option<Propagation>,
 
-    /// True value of an unknown or family in deg, deg/h, deg/h/g: D_FX=11, D_I=5, psi=0.1 (the paper's;
+    /// True value of an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_FX=11, D_I=5, psi=0.1 (the paper's;
     /// -1e6 to 1e6)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
     value: Vec<Assignment>,

@@ -45,7 +45,7 @@ and bound): eight of the 24 cardinal attitudes in some minutes. Under reset carr
 differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
 winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
-Exit codes: 0 done, 2 bad input (also when nothing can be found), 3 internal error, 130 interrupted before anything was found.";
+Exit codes: 0 done (with --minimum also when no positions do), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
 /// The words of `--criterion`.
 const CRITERIA: [(&str, CriterionName); 5] = [
@@ -133,7 +133,7 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     measurement: MeasurementArguments,
 
-    /// What is known of an unknown or family beforehand, as standard deviation in deg, deg/h, deg/h/g: D_F=0.1, psi=0.05. It counts in the
+    /// What is known of an unknown or family beforehand, as standard deviation in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_F=0.1, psi=0.05. It counts in the
     /// criterion, in sigmas and in the bound, not in what is observable; priors that a scheme file states count too (default: none; 1e-9 to 1e9)
     #[arg(long, value_name = "NAME=X", help_heading = "Measurement", value_parser = assigned(PRIOR))]
     prior: Vec<Assignment>,

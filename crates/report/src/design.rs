@@ -310,7 +310,8 @@ fn minimum(d: &Design) -> Vec<String> {
     let chance = format!("not proven: wrong with a probability of up to {:.0e}", d.error_bound);
     if !m.never.is_empty() {
         let never = format!("all candidates together leave {} unobservable", m.never.join(", "));
-        return std::iter::once(never).chain((!m.proven).then_some(chance)).collect();
+        let reasons = words::reasons(&d.terms, &d.candidates);
+        return std::iter::once(never).chain((!m.proven).then_some(chance)).chain(reasons).collect();
     }
     let mut out = match m.positions {
         Some(k) => vec![format!("{k} positions: {}", m.witness.join(" "))],

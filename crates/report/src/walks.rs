@@ -4,6 +4,7 @@ use obsdeg_design::design::Walks;
 
 use crate::Answer;
 use crate::document::{Block, Document, left, right};
+use crate::words::reasons;
 
 /// What was examined, and what that says.
 fn examined(w: &Walks) -> Vec<String> {
@@ -30,6 +31,9 @@ fn examined(w: &Walks) -> Vec<String> {
         }
         (None, _) => "no walk was found that does".into(),
     });
+    if !w.never.is_empty() {
+        out.extend(reasons(&w.terms, &w.candidates));
+    }
     out
 }
 
@@ -50,10 +54,13 @@ impl Answer for Walks {
                 self.most_turn_deg
             ),
         };
-        let summary = format!(
-            "{} of {} unknowns are determined; inertial carry, torquer errors act in every turn",
-            self.rank[0], self.rank[1]
-        );
+        let summary = match self.positions {
+            Some(_) => format!(
+                "{} of {} unknowns are determined; inertial carry, torquer errors act in every turn",
+                self.rank[0], self.rank[1]
+            ),
+            None => "inertial carry, torquer errors act in every turn".into(),
+        };
         Document {
             title,
             lead: vec![summary],

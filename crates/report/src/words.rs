@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::analysis::{Analysis, CarryReport, Component, PositionReport, Quantity, Solution};
+use obsdeg_core::analysis::{
+    Analysis, CarryReport, Component, PositionReport, Quantity, Solution, term_notes,
+};
 use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::{Carry, Geometry, Source, Term, Unknowns};
+use obsdeg_core::model::{Carry, Geometry, Scheme, Source, Term, Unknowns, parse_attitude};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
 use obsdeg_evidence::simulation::{
@@ -111,11 +113,53 @@ pub(crate) fn difference(d: &Difference) -> String {
     format!("{} {} -> {}", d.name, verdict(&d.here), verdict(&d.there))
 }
 
+/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: those that change alike together.
+fn differences(all: &[Difference]) -> String {
+    let mut groups: Vec<(&Difference, Vec<(&str, Vec<&str>)>)> = Vec::new();
+    for d in all {
+        let place = groups.iter().position(|(first, _)| (first.here, first.there) == (d.here, d.there));
+        let place = place.unwrap_or_else(|| {
+            groups.push((d, Vec::new()));
+            groups.len() - 1
+        });
+        let (name, position) = d.name.split_once('@').unwrap_or((&d.name, ""));
+        let names = &mut groups[place].1;
+        match names.iter_mut().find(|(n, _)| *n == name) {
+            Some((_, positions)) => positions.push(position),
+            None => names.push((name, vec![position])),
+        }
+    }
+    let named = |(name, positions): &(&str, Vec<&str>)| match positions[..] {
+        [""] => name.to_string(),
+        [one] => format!("{name}@{one}"),
+        [first, .., last] if consecutive(positions) => format!("{name}@{first} to @{last}"),
+        _ => format!("{name}@{}", positions.join(", @")),
+    };
+    let group = |(d, names): &(&Difference, Vec<(&str, Vec<&str>)>)| {
+        let names: Vec<String> = names.iter().map(named).collect();
+        format!("{} {} -> {}", names.join(", "), verdict(&d.here), verdict(&d.there))
+    };
+    groups.iter().map(group).collect::<Vec<_>>().join("; ")
+}
+
+/// Whether numbers in words follow each other.
+fn consecutive(positions: &[&str]) -> bool {
+    let numbers: Option<Vec<usize>> = positions.iter().map(|p| p.parse().ok()).collect();
+    numbers.is_some_and(|n| n.windows(2).all(|pair| pair[1] == pair[0] + 1))
+}
+
+/// Why candidates leave coefficients unobservable, where the terms themselves say so.
+pub(crate) fn reasons(terms: &str, candidates: &[String]) -> Vec<String> {
+    let attitudes: Result<Vec<_>, _> = candidates.iter().map(|c| parse_attitude(c)).collect();
+    let (Ok(unknowns), Ok(attitudes)) = (terms.parse(), attitudes) else { return Vec::new() };
+    term_notes(&Scheme { unknowns, ..Scheme::of_angles(attitudes) })
+}
+
 /// `inertial (rank profile 2 6 8 of 15): no verdict differs`, a line for each of the other carries.
 pub(crate) fn carries(a: &Analysis) -> Vec<String> {
     let line = |c: &CarryReport| {
-        let differs: Vec<String> = c.differs.iter().map(difference).collect();
-        let differs = if differs.is_empty() { "no verdict differs".into() } else { differs.join("; ") };
+        let differs =
+            if c.differs.is_empty() { "no verdict differs".into() } else { differences(&c.differs) };
         format!("{} (rank profile {} of {}): {differs}", c.carry, list(&c.rank_profile), c.unknowns)
     };
     a.carries.iter().map(line).collect()
@@ -148,7 +192,7 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let has_others = has(Source::Rate) || has(Source::Force);
     let units = [
         has(Source::Rate).then_some("GS and GM as numbers, "),
-        has(Source::Force).then_some("K0 and K2 in g, K1 and M as numbers, "),
+        has(Source::Force).then_some("K0, K2, K3 and Kx in g, K1 and M as numbers, "),
     ];
     let units: String = units.into_iter().flatten().collect();
     let z = match (a.frame, has(Source::Force)) {
@@ -230,7 +274,8 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     if let Some(c) = a.combinations.iter().find(|c| local(c)) {
         let at = c.expression.rsplit_once('@').map_or("", |(_, at)| at);
         out.push(format!(
-            "eps_x^n@{at} is the drift along North at {at}, psi^n and y (Up), z (East) likewise; --formulas writes them in the unknowns"
+            "eps_x^n@{at} is the drift along North at {at}, psi^n and y (Up), z (East) likewise{}",
+            if has(Source::Rate) { "" } else { "; --formulas writes them in the unknowns" }
         ));
     }
     if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {

@@ -77,7 +77,7 @@ pub fn analyze(
     printer.notes.extend(found.incomplete);
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
-    printer.notes.extend(notes(scheme));
+    printer.notes.extend(term_notes(scheme));
     let (carries, untold) = carry_reports(&platform, &findings.verdicts)?;
     printer.notes.extend(untold);
     if scheme.slews() && !scheme.torquers_act() {
@@ -267,7 +267,7 @@ fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
 }
 
 /// What the unknown terms of a scheme cannot but mean, whatever its verdicts are.
-fn notes(scheme: &Scheme) -> Vec<String> {
+pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     let terms = scheme.unknowns.terms();
     let have = |all: &[Term]| all.iter().all(|t| terms.contains(t));
     let force = |p: &Position| -> Vec<f64> {
