@@ -303,7 +303,9 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     // parts need files of their own
     let left_out = |name: &&str| ["help", "part", "merge"].contains(name) || always.contains(name);
     let some = options.keys().map(String::as_str).filter(|name| !left_out(name));
-    let some: Vec<&str> = some.filter(|_| rng.below(10) == 0).collect();
+    // of many options as many at once as of few
+    let one_of = (options.len() as u64 / 3).max(10);
+    let some: Vec<&str> = some.filter(|_| rng.below(one_of) == 0).collect();
     for name in always.iter().copied().chain(some) {
         let value = values(name).map(|from| pick(rng, from));
         assert_eq!(value.is_some(), options[name], "--{name} of {command}");

@@ -431,8 +431,14 @@ pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
         label: "no scheme of the candidates in equal dwells is below".into(),
         color: BLACK,
         stroke: Stroke::Dashed,
-        points: bound.iter().map(|p| (p[0], p[1])).collect(),
+        points: bound_steps(bound),
     }
+}
+
+/// Between two times the bound is that of the longer: more time is never worse.
+pub(crate) fn bound_steps(bound: &[[f64; 2]]) -> Vec<(f64, f64)> {
+    let steps = bound.windows(2).flat_map(|w| [(w[0][0], w[0][1]), (w[0][0], w[1][1])]);
+    steps.chain(bound.last().map(|p| (p[0], p[1]))).collect()
 }
 
 /// The front of total time against the criterion; none when there is no search.

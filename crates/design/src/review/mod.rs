@@ -6,7 +6,7 @@ pub use answer::*;
 
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::{Dwell, Scheme};
+use obsdeg_core::model::{Carry, Dwell, Scheme};
 use obsdeg_core::system::{ModelError, SystemModel, SystemOptions, analyze_system};
 use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
@@ -23,6 +23,8 @@ const LATITUDE_STEP: i32 = 5;
 const OCTAVES: i32 = 3;
 /// Most positions of the schemes that the front is searched for.
 const FRONT_POSITIONS: usize = 5;
+/// The same under reset carry, where sets are searched and a bound says when a scheme is good enough.
+const FRONT_OF_SETS: usize = 12;
 /// Most positions of a scheme whose smallest sufficient part is looked for.
 const SUBSETS: usize = 24;
 
@@ -249,8 +251,12 @@ fn alternatives(
     seed: u64,
 ) -> Alternatives {
     let mut out = Alternatives::default();
-    // beside predictions without prior
-    let conditions = &Conditions { priors: Conditions::default().priors, ..conditions.clone() };
+    // beside predictions, which have no prior and white noise of Z
+    let conditions = &Conditions {
+        priors: Conditions::default().priors,
+        accelerometer_instability_ug: 0.0,
+        ..conditions.clone()
+    };
     let mut refused = Vec::new();
     let seen: Vec<String> = (analysis.quantities.iter())
         .filter(|q| q.status == Status::Observable && q.name.starts_with("D_"))
@@ -286,7 +292,8 @@ fn alternatives(
     }
     out.all = run(task(Candidates::cardinals(), None, &[])).map(|d| d.minimum);
     if !seen.is_empty() {
-        let positions = scheme.positions.len().min(FRONT_POSITIONS);
+        let most = if scheme.carry == Carry::Reset { FRONT_OF_SETS } else { FRONT_POSITIONS };
+        let positions = scheme.positions.len().min(most);
         let found = run(task(Candidates::cardinals(), Some(positions), &seen));
         if let Some(found) = found {
             out.front = found.front;

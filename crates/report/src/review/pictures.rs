@@ -7,6 +7,7 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::crosscheck::{CrossCheck, SlopeCurve};
 use obsdeg_evidence::simulation::Traces;
 
+use crate::design::bound_steps;
 use crate::document::{Block, Drawing, Picture};
 use crate::figure::{BLACK, BLUE, Figure, GREEN, Line, ORANGE, Stroke, heat, style};
 use crate::figures::{error_figure, file_name, history_figure, series_title, slope_figure};
@@ -185,18 +186,20 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         let worst = s.dwells.worst(&s.alternatives.required);
         let points: Vec<(f64, f64)> = worst.into_iter().map(|(f, y)| (dwell * f + slews, y)).collect();
         let (color, _) = style(i);
+        // a legend on the page knows colours, not strokes: where there is room each line has its own
+        let (found, least) = if schemes.len() == 1 { (ORANGE, BLACK) } else { (color, color) };
         if points.len() > 1 {
             lines.push(line(&s.name, color, Stroke::Solid, points));
         }
         let points: Vec<(f64, f64)> = s.alternatives.front.iter().map(|f| (f.total_s, f.value)).collect();
         if points.len() > 1 {
             let label = format!("best of 24, {} positions ({})", s.alternatives.front_positions, s.name);
-            lines.push(line(&label, color, Stroke::Dotted, points));
+            lines.push(line(&label, found, Stroke::Dotted, points));
         }
         let bound = s.alternatives.certificate.as_ref().map_or(&[][..], |c| &c.front);
         if bound.len() > 1 {
             let label = format!("none of {} of 24 is below ({})", s.alternatives.front_positions, s.name);
-            lines.push(line(&label, color, Stroke::DashDot, bound.iter().map(|p| (p[0], p[1])).collect()));
+            lines.push(line(&label, least, Stroke::DashDot, bound_steps(bound)));
         }
     }
     let figure = Figure {
@@ -208,8 +211,8 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         ..Figure::default()
     };
     let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
-                   dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most, for the same \
-                   coefficients; under reset carry with the bound that no scheme of as many cardinal attitudes crosses";
+                   dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most (twelve under reset carry), for \
+                   the same coefficients; under reset carry with the bound that no scheme of as many cardinal attitudes in equal dwells crosses";
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
