@@ -4,7 +4,8 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_design::design::{
-    Best, Candidates, Constraints, Criterion, Design, DesignOptions, Evaluator, Rows, Search, design,
+    Best, Candidates, Constraints, Criterion, CriterionName, Design, DesignOptions, Evaluator, Rows, Search,
+    design,
 };
 use obsdeg_evidence::simulation::Conditions;
 
@@ -23,6 +24,78 @@ fn base(carry: Carry) -> Scheme {
 fn sets_of_six(bencher: Bencher<'_, '_>, carry: &Carry) {
     let rows = Rows::new(&base(*carry), &Candidates::cardinals().attitudes, &ALL, 1).expect("rows");
     bencher.counter(ItemsCount::new(134_596usize)).bench(|| black_box(rows.observable_sets(6).len()));
+}
+
+/// The bound on twelve of the 24 cardinal attitudes under reset carry: optimal weights, and what they prove.
+#[divan::bench(args = ["D", "worst", "E"])]
+fn certificate_of_twelve(bencher: Bencher<'_, '_>, criterion: &str) {
+    let candidates = Candidates::cardinals();
+    let evaluator = reset(&candidates);
+    let criterion = match criterion {
+        "D" => Criterion::D,
+        "E" => Criterion::E,
+        _ => Criterion::Worst,
+    };
+    bencher.bench(|| evaluator.bound(black_box(&criterion), 12, &[], &|| true).expect("a bound"));
+}
+
+/// The same over all attitudes, from a grid of 45 degrees, on all cores.
+#[divan::bench(sample_count = 5)]
+fn certificate_over_all_attitudes(bencher: Bencher<'_, '_>) {
+    let evaluator = reset(&Candidates::grid(45_000_000_000).expect("a grid"));
+    bencher.bench(|| evaluator.everywhere(black_box(&Criterion::D), 12, &|| true).expect("a bound"));
+}
+
+/// A scheme of twelve cardinal attitudes and its certificate, without a front, on all cores.
+#[divan::bench(sample_count = 5)]
+fn twelve_certified(bencher: Bencher<'_, '_>) {
+    let candidates = Candidates::cardinals();
+    let base = base(Carry::Reset);
+    bencher.bench(|| {
+        let rows = Rows::new(&base, &candidates.attitudes, &ALL, 1).expect("rows");
+        let evaluator = reset(&candidates);
+        let search = Search {
+            rows: &rows,
+            walks: false,
+            evaluator: &evaluator,
+            criterion: &Criterion::D,
+            constraints: &Constraints::default(),
+            keep: 1,
+            floor: 2,
+            progress: &|_| true,
+        };
+        let found = search.exchange(12, &[], 200, 1);
+        let bound = evaluator.bound(&Criterion::D, 12, &[], &|| true).expect("a bound");
+        let efficiency = (bound.value / found.found[0].worth.value).powi(2);
+        assert!(efficiency > 0.9999, "{efficiency}");
+        efficiency
+    });
+}
+
+/// What the command does for them: with the front, its bound, and that over all attitudes.
+#[divan::bench(sample_count = 3, args = ["D", "worst"])]
+fn the_command_for_twelve_of_24(criterion: &str) -> Design {
+    let criterion = if criterion == "D" { CriterionName::D } else { CriterionName::Worst };
+    let options =
+        DesignOptions { positions: Some(12), criterion, everywhere: true, ..DesignOptions::default() };
+    design(&base(Carry::Reset), &Conditions::default(), &options, &|_| true).expect("designed")
+}
+
+fn reset(candidates: &Candidates) -> Evaluator {
+    let evaluator = Evaluator::new(&base(Carry::Reset), &candidates.attitudes, &ALL, &Conditions::default());
+    evaluator.expect("an evaluator")
+}
+
+/// The same where the noise of Z is correlated.
+#[divan::bench]
+fn sigma_of_five_correlated(bencher: Bencher<'_, '_>) {
+    let conditions = Conditions { accelerometer_instability_ug: 3.0, ..Conditions::default() };
+    let candidates = Candidates::cardinals().attitudes;
+    let evaluator =
+        Evaluator::new(&base(Carry::Inertial), &candidates, &ALL, &conditions).expect("an evaluator");
+    bencher
+        .counter(ItemsCount::new(1usize))
+        .bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10]), &Criterion::Worst));
 }
 
 /// The information of a sequence of five and its worst sigma, from nothing, on one core.

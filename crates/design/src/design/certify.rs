@@ -1,6 +1,7 @@
 //! What is said of how good the best can be: bounds on the schemes of a task.
 
 use obsdeg_core::model::Euler;
+use rayon::prelude::*;
 
 use super::answer::{Certificate, EverywhereReport, Weight};
 use super::certificate::{Bound, Everywhere};
@@ -59,7 +60,7 @@ impl Task<'_> {
         &self,
         evaluator: &Evaluator,
         (k, dwell_s): (usize, f64),
-        going: &dyn Fn() -> bool,
+        going: &(dyn Fn() -> bool + Sync),
     ) -> Vec<[f64; 2]> {
         let mut counts = vec![k];
         counts.extend(self.options.front.iter().filter(|f| **f != k));
@@ -80,6 +81,6 @@ impl Task<'_> {
                 .min_by(f64::total_cmp)
                 .map(|value| [total, value])
         };
-        totals.into_iter().filter_map(at).collect()
+        totals.into_par_iter().filter_map(at).collect()
     }
 }

@@ -608,14 +608,18 @@ fn answered(
         out.front = task.all_found(evaluator, &best.front)?;
         let mut certificate = bound.map(|bound| task.certificate(&bound, first.worth.value));
         if best.complete {
-            task.front(evaluator, &search, (k, conditions.dwell_s), &best, &mut out)?;
-            if let Some(certificate) = &mut certificate {
-                if options.everywhere && every.is_none() {
-                    every = evaluator.everywhere(&task.criterion, k, &going);
-                }
+            let of = (k, conditions.dwell_s);
+            let wanted = certificate.is_some() && options.everywhere && every.is_none();
+            let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();
+            let line = || certificate.is_some().then(|| task.front_bound(evaluator, of, &going));
+            let (front, (found, line)) =
+                rayon::join(|| task.front(evaluator, &search, of, &best), || rayon::join(over_all, line));
+            out.front.extend(front?);
+            if let (Some(certificate), Some(line)) = (&mut certificate, line) {
                 let value = first.worth.value;
+                let every = every.or(found);
                 certificate.everywhere = every.map(|every| certify::everywhere(&every, value, options.free));
-                certificate.front = task.front_bound(evaluator, (k, conditions.dwell_s), &going);
+                certificate.front = line;
             }
         }
         if options.refine && going() {

@@ -17,7 +17,7 @@ use super::search::{Best, Constraints, Scored, Search};
 use super::symmetry::Symmetry;
 use super::walks::is_walk;
 use super::ways::Stop;
-use super::{CriterionName, Design, DesignError, DesignOptions, EXHAUSTIVE, divide, refine, winner};
+use super::{CriterionName, DesignError, DesignOptions, EXHAUSTIVE, divide, refine, winner};
 
 /// Most sets whose keys are held.
 const MOST_SETS: u64 = 5_000_000;
@@ -382,15 +382,15 @@ impl<'a> Task<'a> {
         }))
     }
 
-    /// Adds what is found at other dwells and numbers of positions.
+    /// What is found at other dwells and numbers of positions.
     pub(super) fn front(
         &self,
         evaluator: &Evaluator,
         search: &Search<'_>,
         (k, dwell_s): (usize, f64),
         main: &Best,
-        out: &mut Design,
-    ) -> Result<(), DesignError> {
+    ) -> Result<Vec<Found>, DesignError> {
+        let mut out = Vec::new();
         let mut counts = vec![k];
         counts.extend(self.options.front.iter().filter(|f| **f != k));
         for count in counts {
@@ -407,13 +407,13 @@ impl<'a> Task<'a> {
                 let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };
                 let best = there.exchange(count, &given, restarts, self.options.seed);
                 if !best.complete {
-                    return Ok(());
+                    return Ok(out);
                 }
                 given.extend(best.found.iter().map(|s| s.sequence.clone()));
-                out.front.extend(self.all_found(&other, &best.front)?);
+                out.extend(self.all_found(&other, &best.front)?);
             }
         }
-        Ok(())
+        Ok(out)
     }
 
     /// The attitudes of a sequence, and the way through them where they are the candidates.

@@ -67,8 +67,10 @@ impl Evaluator {
         for _ in 0..ROUNDS {
             let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
             let most = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
-            let new: Vec<Euler> =
-                peaks(&energy).into_iter().filter(|e| energy(&c_n_f64(e)) > most * (1.0 + GAIN)).collect();
+            let new: Vec<Euler> = peaks(self.degree(), &energy)
+                .into_iter()
+                .filter(|e| energy(&c_n_f64(e)) > most * (1.0 + GAIN))
+                .collect();
             if new.is_empty() || !going() {
                 break;
             }
@@ -87,7 +89,7 @@ impl Evaluator {
         let h = 5f64.sqrt() * (FINE as f64 / 2.0).to_radians();
         let n = self.degree() as f64;
         let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
-        let on_net = net(FINE).into_par_iter().map(|e| energy(&matrix(e))).reduce(|| 0.0, f64::max);
+        let on_net = on_net(FINE, self.degree(), &energy).map(|(_, d)| d).reduce(|| 0.0, f64::max);
         let known = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
         let most = (2.0 * on_net / (1.0 + (n * h).cos())).max(known) * (1.0 + ROUNDING);
         let value = problem.lower_bound_over(&found.dual, most).sqrt();
@@ -117,11 +119,31 @@ impl Evaluator {
     }
 }
 
-/// Euler angles of a net in degrees.
-fn net(step: usize) -> Vec<[f64; 3]> {
-    let full = || (0..360).step_by(step);
-    let half = || (0..=180).step_by(step).map(|b| b as f64 - 90.0);
-    full().flat_map(|a| half().flat_map(move |b| full().map(move |g| [a as f64, b, g as f64]))).collect()
+/// A function of the attitude on a net of Euler angles in degrees. Along alpha and gamma, which turn about fixed axes, it is a trigonometric
+/// polynomial of degree n: 2 n + 1 values of each determine the others (the interpolation adds a few roundings to them).
+fn on_net(
+    step: usize,
+    n: usize,
+    energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync),
+) -> impl ParallelIterator<Item = ([f64; 3], f64)> {
+    let nodes = 2 * n + 1;
+    let node = move |i: usize| 360.0 * i as f64 / nodes as f64;
+    let full: Vec<f64> = (0..360).step_by(step).map(f64::from).collect();
+    let kernel = |x: f64| (1..=n).map(|k| 2.0 * (k as f64 * x).cos()).sum::<f64>() + 1.0;
+    let weights =
+        DMatrix::from_fn(full.len(), nodes, |a, i| kernel((full[a] - node(i)).to_radians()) / nodes as f64);
+    let half: Vec<f64> = (0..=180).step_by(step).map(|b| f64::from(b) - 90.0).collect();
+    half.into_par_iter().flat_map_iter(move |b| {
+        let at =
+            |i: usize, j: usize| [node(i), b, node(j)].map(|x| Angle::from_nanodeg((x * 1e9).round() as i64));
+        let values = DMatrix::from_fn(nodes, nodes, |i, j| energy(&c_n_f64(&at(i, j))));
+        let all = &weights * values * weights.transpose();
+        let full = full.clone();
+        (0..full.len() * full.len()).map(move |k| {
+            let (i, j) = (k / full.len(), k % full.len());
+            ([full[i], b, full[j]], all[(i, j)])
+        })
+    })
 }
 
 fn matrix(degrees: [f64; 3]) -> Matrix3<f64> {
@@ -146,9 +168,8 @@ fn angles(c: &Matrix3<f64>) -> Euler {
 }
 
 /// Attitudes where the energy is largest near the points of the coarse net that have most of it, largest first.
-fn peaks(energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
-    let mut points: Vec<([f64; 3], f64)> =
-        net(COARSE).into_par_iter().map(|e| (e, energy(&matrix(e)))).collect();
+fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
+    let mut points: Vec<([f64; 3], f64)> = on_net(COARSE, n, energy).collect();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut taken: Vec<([f64; 3], Matrix3<f64>)> = Vec::new();
     for (e, _) in points {
@@ -182,4 +203,42 @@ fn peaks(energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
         euler(at)
     });
     polished.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Candidates;
+    use obsdeg_core::model::Scheme;
+    use obsdeg_evidence::simulation::Conditions;
+    use obsdeg_exact::SplitMix64;
+
+    /// What is interpolated is what it is where it is evaluated, whatever the terms; a degree less would not do.
+    #[test]
+    fn a_net_is_interpolated() {
+        let mut rng = SplitMix64::new(3);
+        for terms in ["F", "F,I,O,S", "F,II,OO", "F,I,GS,GM", "F,K0,K1,K2,M6"] {
+            let base = Scheme {
+                carry: obsdeg_core::model::Carry::Reset,
+                latitude: "28.2".parse().ok(),
+                unknowns: terms.parse().expect("terms"),
+                ..Scheme::default()
+            };
+            let some = &Candidates::cardinals().attitudes[..1];
+            let evaluator = Evaluator::new(&base, some, &[0], &Conditions::default()).expect("an evaluator");
+            let mut draw = || rng.below(1 << 20) as f64 / f64::from(1 << 19) - 1.0;
+            let x = DMatrix::from_fn(evaluator.n - 3, 3, |_, _| draw());
+            let energy = |c: &Matrix3<f64>| evaluator.energy(c, &x);
+            let off = |n: usize| {
+                let all: Vec<_> = on_net(20, n, &energy).collect();
+                assert_eq!(all.len(), 18 * 10 * 18);
+                let largest = all.iter().map(|(_, d)| *d).fold(0.0, f64::max);
+                let far = all.iter().map(|(e, d)| (d - energy(&matrix(*e))).abs()).fold(0.0, f64::max);
+                far / largest
+            };
+            let n = evaluator.degree();
+            assert!(off(n) < 1e-9, "{terms}: {}", off(n));
+            assert!(off(n / 2 - 1) > 1e-6, "{terms}");
+        }
+    }
 }
