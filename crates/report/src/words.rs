@@ -113,17 +113,23 @@ pub(crate) fn difference(d: &Difference) -> String {
     format!("{} {} -> {}", d.name, verdict(&d.here), verdict(&d.there))
 }
 
+/// Unknowns that change alike, with the positions that their names hold.
+struct Change<'a> {
+    of: &'a Difference,
+    names: Vec<(&'a str, Vec<&'a str>)>,
+}
+
 /// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: those that change alike together.
 fn differences(all: &[Difference]) -> String {
-    let mut groups: Vec<(&Difference, Vec<(&str, Vec<&str>)>)> = Vec::new();
+    let mut groups: Vec<Change<'_>> = Vec::new();
     for d in all {
-        let place = groups.iter().position(|(first, _)| (first.here, first.there) == (d.here, d.there));
+        let place = groups.iter().position(|g| (g.of.here, g.of.there) == (d.here, d.there));
         let place = place.unwrap_or_else(|| {
-            groups.push((d, Vec::new()));
+            groups.push(Change { of: d, names: Vec::new() });
             groups.len() - 1
         });
         let (name, position) = d.name.split_once('@').unwrap_or((&d.name, ""));
-        let names = &mut groups[place].1;
+        let names = &mut groups[place].names;
         match names.iter_mut().find(|(n, _)| *n == name) {
             Some((_, positions)) => positions.push(position),
             None => names.push((name, vec![position])),
@@ -135,9 +141,9 @@ fn differences(all: &[Difference]) -> String {
         [first, .., last] if consecutive(positions) => format!("{name}@{first} to @{last}"),
         _ => format!("{name}@{}", positions.join(", @")),
     };
-    let group = |(d, names): &(&Difference, Vec<(&str, Vec<&str>)>)| {
-        let names: Vec<String> = names.iter().map(named).collect();
-        format!("{} {} -> {}", names.join(", "), verdict(&d.here), verdict(&d.there))
+    let group = |g: &Change<'_>| {
+        let names: Vec<String> = g.names.iter().map(named).collect();
+        format!("{} {} -> {}", names.join(", "), verdict(&g.of.here), verdict(&g.of.there))
     };
     groups.iter().map(group).collect::<Vec<_>>().join("; ")
 }
