@@ -16,7 +16,7 @@ const OF_MODELS: [&str; 14] = [
     "files",
     "starts",
     "profile",
-    "prior",
+    "before",
     "model",
     "order",
     "count_limit",

@@ -1,12 +1,16 @@
 //! `obsdeg calibrate`: what a scheme determines, from the record of its run.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
-use obsdeg_calibration::answer::CovarianceTable;
+use obsdeg_calibration::answer::{CovarianceTable, Finding};
 use obsdeg_calibration::platform::STANDARD_GRAVITY;
 use obsdeg_calibration::record::Record;
-use obsdeg_calibration::{Options, SystemCalibrationError, SystemOptions, calibrate, calibrate_system};
+use obsdeg_calibration::system::SystemFinding;
+use obsdeg_calibration::{
+    Going, Options, SystemCalibrationError, SystemOptions, calibrate, calibrate_system,
+};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges;
 use obsdeg_core::model::settings::{DriftNoise, Settings};
@@ -21,7 +25,7 @@ use crate::failure::Failure;
 use crate::input::{Source, open};
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
-use crate::progress::Spinner;
+use crate::progress::Bar;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -38,7 +42,8 @@ scheme (empty while the platform turns); without that column the timeline of the
 its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts
 instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv (with the whole
 covariance), residuals.csv and figures.
-Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, 2 bad input, 3 internal error, 130 interrupted.";
+Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are
+read).";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
@@ -99,8 +104,8 @@ pub(crate) struct Arguments {
     gate: f64,
 
     /// A calibration of the same platform or system before: the JSON that -o writes (one that was not consistent counts with its sigmas rescaled)
-    #[arg(long, value_name = "FILE")]
-    prior: Option<PathBuf>,
+    #[arg(long = "prior", value_name = "FILE")]
+    before: Option<PathBuf>,
 
     /// Seed of the exact verdicts
     #[arg(long, default_value_t = 1)]
@@ -136,10 +141,15 @@ fn number_within(text: &str, low: f64, high: f64) -> Result<f64, String> {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
-    interrupt::ends()?;
+    let interrupted = interrupt::flag()?;
     a.output.target.check_folder()?;
+    let bar = Bar::start(0, "", a.output.target.quiet);
+    let going = |now: Going<'_>| {
+        bar.calibrates(now);
+        !interrupted.load(Ordering::Relaxed)
+    };
     if let Some(model) = &a.model {
-        return run_model(a, model);
+        return run_model(a, model, &going);
     }
     let Some((file, records)) = a.files.split_first() else { return Ok(()) };
     if records.is_empty() {
@@ -155,12 +165,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         gravity_m_s2: a.gravity,
         estimate_noise: a.estimate_noise,
         gate: a.gate,
-        prior: a.prior.as_deref().map(prior).transpose()?,
+        prior: a.before.as_deref().map(prior).transpose()?,
         seed: a.seed,
     };
-    let spinner = Spinner::start("calibrating", a.output.target.quiet);
-    let calibration = calibrate(&scheme, &a.conditions(&scheme), records, &options)?;
-    drop(spinner);
+    let calibration = calibrate(&scheme, &a.conditions(&scheme), records, &options, &going)?;
+    drop(bar);
     a.output.write_folder(&calibration, "calibration.json", || {
         let coefficients = obsdeg_report::written(
             &calibration,
@@ -174,11 +183,19 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         files.extend(calibration_figures(&calibration)?);
         Ok::<_, ReportError>(files)
     })?;
+    if calibration.findings.contains(&Finding::Interrupted) {
+        return Err(unfinished());
+    }
     if calibration.consistent { Ok(()) } else { Err(Failure::check()) }
 }
 
+/// Ctrl-C; what there is was written.
+fn unfinished() -> Failure {
+    Failure::unfinished("interrupted".into())
+}
+
 /// A model and its data.
-fn run_model(a: &Arguments, path: &Path) -> Result<(), Failure> {
+fn run_model(a: &Arguments, path: &Path, going: &dyn Fn(Going<'_>) -> bool) -> Result<(), Failure> {
     let file = Source::read(path, "model")?.model()?;
     let [data] = &a.files[..] else {
         return Err(Failure::input(format!("found {} records; expected one with --model", a.files.len())));
@@ -187,15 +204,14 @@ fn run_model(a: &Arguments, path: &Path) -> Result<(), Failure> {
     let options = SystemOptions {
         starts: a.starts as usize,
         profiles: a.profile.clone(),
-        prior: a.prior.as_deref().map(prior).transpose()?,
+        prior: a.before.as_deref().map(prior).transpose()?,
         seed: a.seed,
     };
-    let spinner = Spinner::start("calibrating", a.output.target.quiet);
-    let found = calibrate_system(&file.model, record, &options).map_err(|e| match e {
+    let found = calibrate_system(&file.model, record, &options, going).map_err(|e| match e {
         SystemCalibrationError::Model(e) => file.wrong(&e),
+        SystemCalibrationError::Interrupted => unfinished(),
         e => Failure::input(e.to_string()),
     })?;
-    drop(spinner);
     a.output.write_folder(&found, "calibration.json", || {
         let text =
             obsdeg_report::written(&found, obsdeg_report::Format::Csv, obsdeg_report::Layout::default())?;
@@ -206,6 +222,9 @@ fn run_model(a: &Arguments, path: &Path) -> Result<(), Failure> {
         files.extend(system_calibration_figures(&found)?);
         Ok::<_, ReportError>(files)
     })?;
+    if found.findings.contains(&SystemFinding::Interrupted) {
+        return Err(unfinished());
+    }
     if found.consistent == Some(false) { Err(Failure::check()) } else { Ok(()) }
 }
 

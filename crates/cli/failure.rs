@@ -115,6 +115,7 @@ impl From<CalibrationError> for Failure {
     fn from(e: CalibrationError) -> Self {
         match e {
             CalibrationError::Simulation(e) => e.into(),
+            CalibrationError::Interrupted => Self::unfinished(e.to_string()),
             _ => Self::input(e.to_string()),
         }
     }

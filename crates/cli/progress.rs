@@ -5,6 +5,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use obsdeg_calibration::Going;
 use obsdeg_design::design::Progress;
 use obsdeg_report::visible;
 
@@ -70,6 +71,21 @@ impl Bar {
         let best = if now.best.is_finite() { format!(", best {:.4}", now.best) } else { String::new() };
         self.bar.set_message(format!("searching, {}/s{best}", HumanCount(rate as u64)));
         self.at(now.done);
+    }
+
+    /// How far a calibration is: nobody knows how much there is.
+    pub(crate) fn calibrates(&self, now: Going<'_>) {
+        let (what, done) = match now {
+            Going::Reads { record, samples } => (format!("reading {record}"), samples),
+            Going::Passes(passes) => ("calibrating, linearisations".into(), passes),
+        };
+        if self.bar.message() != visible(&what) {
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}: {human_pos}, {elapsed}") {
+                self.bar.set_style(style);
+            }
+            self.says(&what);
+        }
+        self.at(done as u64);
     }
 
     /// What is being done.

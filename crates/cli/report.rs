@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
+use obsdeg_calibration::Calibration;
 use obsdeg_core::system::SystemModel;
 use obsdeg_design::review::{ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
@@ -23,6 +24,7 @@ Examples:
   obsdeg report a.toml b.toml --carry inertial --requirement D=0.05 -o review.html
   obsdeg report scheme.toml -o review.pdf                (with the cargo feature `pdf`)
   obsdeg report examples/two-compartment/model.toml -o review.md
+  obsdeg report scheme.toml --calibration calibration -o review.html
 
 The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their
 pictures in a folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
@@ -52,6 +54,10 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     assumptions: Assumptions,
+
+    /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several times
+    #[arg(long, value_name = "FOLDER")]
+    calibration: Vec<PathBuf>,
 
     /// Monte Carlo runs of the evidence
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
@@ -107,6 +113,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             }
         }
     }
+    let calibrations = a.calibration.iter().map(|path| calibration(path)).collect::<Result<Vec<_>, _>>()?;
     if !entries.is_empty() {
         a.conditions.concern(entries.iter().map(|e| &e.scheme))?;
     }
@@ -125,9 +132,22 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         e @ (ReviewError::Analysis { .. } | ReviewError::Interrupted) => Failure::input(e.to_string()),
     })?;
     bar.says("writing");
-    let written = obsdeg_report::review(&reviewed, format, &folder)?;
+    let written = obsdeg_report::review(&reviewed, &calibrations, format, &folder)?;
     notice(worker.as_ref(), a.target.quiet);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))
+}
+
+/// A calibration of a scheme, and what it is called: its folder.
+fn calibration(path: &Path) -> Result<(String, Calibration), Failure> {
+    let file = if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() };
+    let source = Source::read(&file, "calibration")?;
+    let found = serde_json::from_str(source.text()).map_err(|e| {
+        let expected = "expected what `obsdeg calibrate -o` wrote of a scheme";
+        Failure::input(format!("{}: {e}; {expected}", file.display()))
+    })?;
+    let named = if path.is_dir() { Some(path) } else { path.parent() };
+    let name = named.and_then(Path::file_name).map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    Ok((name, found))
 }
 
 /// The format that is asked for, or that of the file's ending.

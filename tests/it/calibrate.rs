@@ -31,7 +31,19 @@ fn a_day_at_the_bench() {
     names.sort();
     assert_eq!(
         names,
-        ["calibration.json", "coefficients.csv", "residuals.csv", "residuals.png", "residuals.svg"]
+        [
+            "allan.png",
+            "allan.svg",
+            "calibration.json",
+            "coefficients.csv",
+            "estimates.png",
+            "estimates.svg",
+            "residuals.csv",
+            "residuals.png",
+            "residuals.svg",
+            "whiteness.png",
+            "whiteness.svg"
+        ]
     );
     let found = json(&["calibrate", SCHEME, RECORD, "--format", "json"]);
     let text = fs::read_to_string(format!("{at}/calibration.json")).expect("written");
@@ -62,6 +74,55 @@ fn a_day_at_the_bench() {
             - found["unknowns"][k]["estimate"].as_f64().expect("a number");
         assert!(moved.abs() < 1e-3 * sigma(u), "{u}");
     }
+}
+
+/// A review has the calibration beside what the scheme promised, in every format; what is none is refused.
+#[test]
+fn a_review_of_the_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let at = path("day");
+    assert!(run(&["calibrate", SCHEME, RECORD, "-o", &at, "-q"]).status.success());
+    for file in ["a.html", "b.md", "c.tex"] {
+        let line = ["report", SCHEME, "--calibration", &at, "--runs", "2", "-o", &path(file), "-q"];
+        let output = run(&line);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let text = fs::read_to_string(path(file)).expect("written");
+        for words in [
+            "Calibration day",
+            "consistent: the model and its sigmas explain the record",
+            "15 of 15 unknowns",
+            "Allan deviation",
+        ] {
+            assert!(text.contains(words), "{file}: {words}");
+        }
+    }
+    // what the picture has is what the file has
+    let v: Value =
+        serde_json::from_str(&fs::read_to_string(format!("{at}/calibration.json")).expect("written"))
+            .expect("JSON");
+    let series = v["series"].as_array().expect("series");
+    assert_eq!(series.len(), 2);
+    let rows = fs::read_to_string(format!("{at}/residuals.csv")).expect("written");
+    let z1: Vec<Vec<f64>> = rows
+        .lines()
+        .filter(|l| l.contains(",Z1,"))
+        .map(|l| l.split(',').skip(3).map(|x| x.parse().expect("a number")).collect())
+        .collect();
+    assert_eq!(z1.len(), series[0]["points"].as_array().expect("points").len());
+    for (row, point) in z1.iter().zip(series[0]["points"].as_array().expect("points")) {
+        let of = |i: usize| point[i].as_f64().expect("a number");
+        assert_eq!((row[0], row[1], row[2]), (of(0), of(1), of(2)));
+    }
+    fs::write(path("x.json"), "{}").expect("written");
+    let output = run(&["report", SCHEME, "--calibration", &path("x.json"), "-o", &path("no.html")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains("expected what `obsdeg calibrate -o` wrote of a scheme"),
+        "{}",
+        stderr(&output)
+    );
+    assert!(!folder.path().join("no.html").exists());
 }
 
 /// The same record as Parquet, on stdin, and twice.

@@ -138,6 +138,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "round" => &["5", "0", "x"],
         "starts" => &["2", "1", "0", "x"],
         "profile" => &["x", "D_FX", ""],
+        "calibration" => &["c.json", "none.json", "s.toml", "out", ""],
         "gravity" => &["9.81744", "9.80665", "9", "10.5", "1", "nan"],
         "gate" => &["0.999", "1", "0.5", "0", "2", "nan"],
         "within" => &["0.01", "0", "x"],

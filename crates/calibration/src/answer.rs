@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) const SCHEMA: &str = "obsdeg.calibration/1";
 
 /// A calibration from records.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Calibration {
     /// `obsdeg.calibration/1`.
     pub schema: String,
@@ -42,6 +42,8 @@ pub struct Calibration {
     pub records: Vec<RecordReport>,
     /// What was assumed.
     pub assumed: Assumed,
+    /// What is left over time, by record and component.
+    pub series: Vec<ResidualSeries>,
     /// Every measurement and what the estimate leaves of it.
     #[serde(skip)]
     #[schemars(skip)]
@@ -49,9 +51,11 @@ pub struct Calibration {
 }
 
 /// What speaks against the model or its sigmas.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Finding {
+    /// The iteration was interrupted: the estimates are where it was then.
+    Interrupted,
     /// The iteration did not settle.
     NotSettled,
     /// The specific force is not one g long, and no unknown explains that.
@@ -133,7 +137,7 @@ pub enum Finding {
 }
 
 /// An unknown or a combination.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimated {
     /// Its name.
     pub name: String,
@@ -173,7 +177,7 @@ pub struct CovarianceTable {
 }
 
 /// How well everything fits.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
     /// The sum of squares of all residuals, in sigma.
     pub chi_square: f64,
@@ -188,7 +192,7 @@ pub struct Fit {
 }
 
 /// How well a position fits.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PositionFit {
     /// The record.
     pub record: String,
@@ -211,7 +215,7 @@ pub struct PositionFit {
 }
 
 /// An unknown that moves.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Moved {
     /// Its name.
     pub name: String,
@@ -220,7 +224,7 @@ pub struct Moved {
 }
 
 /// How well a component of Z fits.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChannelFit {
     /// `Z1`, `Z2`, `Z3` or `Za`.
     pub channel: String,
@@ -241,7 +245,7 @@ pub struct ChannelFit {
 }
 
 /// How residuals go with the temperature, position by position.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warmth {
     /// The coefficient of correlation at the position where it is strongest.
     pub correlation: f64,
@@ -250,7 +254,7 @@ pub struct Warmth {
 }
 
 /// A measurement that was left out.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Outlier {
     /// The record.
     pub record: String,
@@ -265,7 +269,7 @@ pub struct Outlier {
 }
 
 /// The filter against least squares, with one wide prior for both.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SecondPath {
     /// The largest difference of the estimates at the end of a record, in sigma.
     pub difference: f64,
@@ -274,7 +278,7 @@ pub struct SecondPath {
 }
 
 /// Several records, one platform.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Repeatability {
     /// What the coefficients of the records differ by, as chi-square per degree of freedom.
     pub chi_square: f64,
@@ -285,7 +289,7 @@ pub struct Repeatability {
 }
 
 /// A record that was read.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordReport {
     /// Its name.
     pub name: String,
@@ -308,7 +312,7 @@ pub struct RecordReport {
 }
 
 /// What says where a sample was taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionsBy {
     /// A column of labels: a position ends with its last sample, and the next begins when the slew is over.
@@ -322,7 +326,7 @@ pub enum PositionsBy {
 }
 
 /// What was assumed.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Assumed {
     /// In deg.
     pub latitude_deg: f64,
@@ -344,6 +348,26 @@ pub struct Assumed {
     pub known: Vec<String>,
     /// Seed of the exact verdicts.
     pub seed: u64,
+}
+
+/// What is left of a component of a record, in the order of time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ResidualSeries {
+    /// The record.
+    pub record: String,
+    /// The component.
+    pub channel: String,
+    /// The unit of residuals.
+    pub unit: String,
+    /// Time in s, residual and its sigma by the noise that was assumed: at most a thousand, evenly picked.
+    pub points: Vec<(f64, f64, f64)>,
+    /// Their correlation with those one, two, ... measurements later.
+    pub autocorrelation: Vec<f64>,
+    /// How many there are.
+    pub count: usize,
+    /// Cluster time in s, the overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of white ones of the assumed sigma; turns
+    /// between positions take no time here.
+    pub allan: Vec<(f64, f64, f64)>,
 }
 
 /// A measurement and what is left of it.

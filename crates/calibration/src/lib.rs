@@ -11,6 +11,20 @@ pub mod record;
 pub mod still;
 pub mod system;
 
+/// How far a calibration is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Going<'a> {
+    /// So many samples of a record are read.
+    Reads {
+        /// The record.
+        record: &'a str,
+        /// The samples.
+        samples: usize,
+    },
+    /// So many linearisations of all runs, or evaluations of a model, were made.
+    Passes(usize),
+}
+
 pub use answer::Calibration;
 pub use platform::{CalibrationError, Options, calibrate};
 pub use system::{SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system};

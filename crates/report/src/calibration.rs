@@ -2,11 +2,14 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    CovarianceTable, Estimated, Finding, PositionFit, PositionsBy, RecordReport,
+    CovarianceTable, Estimated, Finding, PositionFit, PositionsBy, RecordReport, ResidualSeries,
 };
 
-use crate::document::{Block, Document, estimate, left, number, optional, right};
-use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
+use crate::document::{
+    Block, Document, Drawing, Finding as StatusRow, Grade, Picture, Status, estimate, left, number, optional,
+    right,
+};
+use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, words};
 
@@ -29,6 +32,7 @@ fn of(record: &str, records: &[RecordReport]) -> String {
 
 fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
+        Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
         Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up".into(),
         Finding::Force { record, length_g } => format!(
             "the specific force{} is {length_g:.6} g long on average: a scale error of {}, or another gravity, which no unknown of the scheme explains (K1 would)",
@@ -378,44 +382,220 @@ pub fn residuals_csv(c: &Calibration) -> Result<String, ReportError> {
     crate::csv_text::write(std::iter::once(head.to_vec()).chain(rows))
 }
 
-/// The figures of a calibration: what is left of the measurements over time, by component and record, with three sigma.
+/// The figures of a calibration: what is left of the measurements over time, by component and record, with three sigma; its Allan deviation and its
+/// correlation with itself; the estimates with three sigma.
 ///
 /// # Errors
 /// [`FigureError`].
 pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
     let mut files = Vec::new();
     for (k, record) in c.records.iter().enumerate() {
-        let figures: Vec<_> = (0..c.channels.len()).map(|channel| residual_figure(c, k, channel)).collect();
-        let name = if c.records.len() > 1 { format!("residuals-{}", k + 1) } else { "residuals".into() };
-        let title = format!("What the estimate leaves of {}", record.name);
-        files.extend(picture(&name, grid(&figures, figures.len().min(2), &title))?);
+        let own: Vec<&ResidualSeries> = c.series.iter().filter(|s| s.record == record.name).collect();
+        let end = if c.records.len() > 1 { format!("-{}", k + 1) } else { String::new() };
+        let mut draw = |name: &str, title: &str, figure: &dyn Fn(&ResidualSeries) -> Figure| {
+            let figures: Vec<Figure> = own.iter().map(|s| figure(s)).collect();
+            let title = format!("{title} {}", record.name);
+            files.extend(picture(&format!("{name}{end}"), grid(&figures, figures.len().min(2), &title))?);
+            Ok::<_, FigureError>(())
+        };
+        draw("residuals", "What the estimate leaves of", &|s| residual_figure(c, s))?;
+        draw("allan", "Allan deviation of what is left of", &allan_figure)?;
+        draw("whiteness", "Correlation of what is left of", &whiteness_figure)?;
     }
+    let figures = estimate_figures(c);
+    files.extend(picture("estimates", grid(&figures, figures.len().min(3), "Estimates, with three sigma"))?);
     Ok(files)
 }
 
 /// What is left of a component.
-fn residual_figure(c: &Calibration, record: usize, channel: usize) -> crate::figure::Figure {
-    let some: Vec<_> = c.residuals.iter().filter(|r| r.record == record && r.channel == channel).collect();
-    let points: Vec<(f64, f64)> = some.iter().map(|r| (r.t_s, r.residual)).collect();
-    let band = |r: &&obsdeg_calibration::answer::Residual| (r.t_s, -3.0 * r.sigma, 3.0 * r.sigma);
-    let count = c.positions.len() / c.records.len();
-    let own = &c.positions[record * count..(record + 1) * count];
+fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figure {
+    let points: Vec<(f64, f64)> = series.points.iter().map(|p| (p.0, p.1)).collect();
+    let band = series.points.iter().map(|p| (p.0, -3.0 * p.2, 3.0 * p.2));
+    let own = c.positions.iter().filter(|p| p.record == series.record);
     let (first, last) = (points.first().map_or(0.0, |p| p.0), points.last().map_or(1.0, |p| p.0));
-    let largest = some.iter().map(|r| r.residual.abs().max(3.0 * r.sigma)).fold(0.0, f64::max);
+    let largest = series.points.iter().map(|p| p.1.abs().max(3.0 * p.2)).fold(0.0, f64::max);
     let half = if largest > 0.0 { 1.15 * largest } else { 1.0 };
-    let name = &c.channels[channel];
-    crate::figure::Figure {
-        title: format!("{}: measurement minus estimate", name.channel),
+    Figure {
+        title: format!("{}: measurement minus estimate", series.channel),
         x_label: "t [s]".into(),
-        y_label: format!("residual [{}]", name.unit),
-        bands: vec![Band { color: SKY, points: some.iter().map(band).collect() }],
+        y_label: format!("residual [{}]", series.unit),
+        bands: vec![Band { color: SKY, points: band.collect() }],
         lines: vec![
             line("zero", BLACK, Stroke::Dotted, vec![(first, 0.0), (last, 0.0)]),
             line("residual, band of +-3 sigma", BLUE, Stroke::Solid, points),
         ],
-        marks: own.iter().skip(1).map(|p| p.start_s).collect(),
+        marks: own.skip(1).map(|p| p.start_s).collect(),
         x_range: Some((first.min(0.0), last)),
         y_range: Some((-half, half)),
-        ..crate::figure::Figure::default()
+        ..Figure::default()
+    }
+}
+
+/// The Allan deviation of what is left, beside that of white noise.
+fn allan_figure(series: &ResidualSeries) -> Figure {
+    let curve = |of: fn(&(f64, f64, f64)) -> f64| series.allan.iter().map(|p| (p.0, 1e6 * of(p))).collect();
+    Figure {
+        title: format!("{}: Allan deviation", series.channel),
+        x_label: "cluster time [s]".into(),
+        y_label: format!("deviation [u{}]", series.unit),
+        lines: vec![
+            line("residuals", BLUE, Stroke::Solid, curve(|p| p.1)),
+            line("white, of the assumed sigma", BLACK, Stroke::Dotted, curve(|p| p.2)),
+        ],
+        log: true,
+        ..Figure::default()
+    }
+}
+
+/// The correlation of what is left with itself, as a bar per lag, and where that of independent residuals lies.
+fn whiteness_figure(series: &ResidualSeries) -> Figure {
+    let lags = series.autocorrelation.len();
+    let mut bars = vec![(0.5, 0.0)];
+    for (k, r) in series.autocorrelation.iter().enumerate() {
+        let x = k as f64 + 1.0;
+        bars.extend([(x - 0.25, 0.0), (x - 0.25, *r), (x + 0.25, *r), (x + 0.25, 0.0)]);
+    }
+    let band = 1.96 / (series.count.max(1) as f64).sqrt();
+    let last = lags as f64 + 0.5;
+    let largest = series.autocorrelation.iter().fold(2.0 * band, |m, r| m.max(r.abs()));
+    Figure {
+        title: format!("{}: correlation of residuals", series.channel),
+        x_label: "lag [measurements]".into(),
+        y_label: "correlation".into(),
+        bands: vec![Band { color: SKY, points: vec![(0.5, -band, band), (last, -band, band)] }],
+        lines: vec![line("correlation, band of 95 % if independent", BLUE, Stroke::Solid, bars)],
+        x_range: Some((0.5, last)),
+        y_range: Some((-1.15 * largest, 1.15 * largest)),
+        ..Figure::default()
+    }
+}
+
+/// Estimates by family, each a bar of three sigma as the fit has it.
+fn estimate_figures(c: &Calibration) -> Vec<Figure> {
+    let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
+    for e in c.unknowns.iter().filter(|e| e.determined) {
+        // D_FX, GM_XY, psi_x (record 2)
+        let name = e.name.split(' ').next().unwrap_or(&e.name);
+        let family = name.trim_end_matches(['X', 'Y', 'Z', 'x', 'y', 'z']).trim_end_matches('_');
+        match families.iter_mut().find(|f| f.0 == family) {
+            Some((_, own)) => own.push(e),
+            None => families.push((family.into(), vec![e])),
+        }
+    }
+    let combinations: Vec<&Estimated> = c.combinations.iter().filter(|e| e.determined).collect();
+    for e in combinations {
+        families.push((e.name.clone(), vec![e]));
+    }
+    let figure = |(family, own): &(String, Vec<&Estimated>)| {
+        let last = own.len() as f64 + 0.5;
+        let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.5, 0.0), (last, 0.0)])];
+        for (i, e) in own.iter().enumerate() {
+            let (Some(x), Some(sigma)) = (e.estimate, e.sigma_rescaled) else { continue };
+            let (at, half) = (i as f64 + 1.0, 3.0 * sigma);
+            // up, with ends, and the estimate across
+            let bar = [
+                (at - 0.1, x - half),
+                (at + 0.1, x - half),
+                (at, x - half),
+                (at, x),
+                (at - 0.2, x),
+                (at + 0.2, x),
+                (at, x),
+                (at, x + half),
+                (at - 0.1, x + half),
+                (at + 0.1, x + half),
+            ];
+            lines.push(line("", BLUE, Stroke::Solid, bar.to_vec()));
+        }
+        let names = own.iter().enumerate().map(|(i, e)| format!("{}: {}", i + 1, e.name));
+        Figure {
+            title: family.clone(),
+            x_label: if own.len() > 1 { names.collect::<Vec<_>>().join(", ") } else { String::new() },
+            y_label: format!("estimate [{}]", own[0].unit),
+            lines,
+            x_range: Some((0.5, last)),
+            ..Figure::default()
+        }
+    };
+    families.iter().map(figure).collect()
+}
+
+/// What a review has of a calibration: its answer, and its pictures; `id` begins their names.
+pub(crate) fn section(c: &Calibration, id: &str) -> Vec<Block> {
+    let Document { lead, blocks, .. } = c.document();
+    let mut out: Vec<Block> = lead.into_iter().map(Block::Text).collect();
+    let curves = |name: String, caption: String, figure: Figure| {
+        Block::Picture(Picture { name, caption, drawing: Drawing::Curves(Box::new(figure)) })
+    };
+    out.extend(blocks);
+    out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
+        Block::Picture(Picture {
+            name: format!("{id}_estimates_{}", i + 1),
+            caption: format!("Estimates of {}, with three sigma as the fit has it", figure.title),
+            drawing: Drawing::Still(figure.svg()),
+        })
+    }));
+    for (i, s) in c.series.iter().enumerate() {
+        let of = if c.records.len() > 1 { format!(" of {}", s.record) } else { String::new() };
+        let name = |kind: &str| format!("{id}_{kind}_{}", i + 1);
+        let what = &s.channel;
+        out.push(curves(
+            name("residuals"),
+            format!("What the estimate leaves of {what}{of}, with three sigma"),
+            residual_figure(c, s),
+        ));
+        if s.allan.len() > 1 {
+            let caption = format!(
+                "Allan deviation of what is left of {what}{of}: white noise falls with the root of the time, what rises is none of the model"
+            );
+            out.push(curves(name("allan"), caption, allan_figure(s)));
+        }
+        if !s.autocorrelation.is_empty() {
+            let caption = format!("Correlation of what is left of {what}{of} with what comes later");
+            out.push(Block::Picture(Picture {
+                name: name("whiteness"),
+                caption,
+                drawing: Drawing::Still(whiteness_figure(s).svg()),
+            }));
+        }
+    }
+    out
+}
+
+/// The answers that a review begins with.
+pub(crate) fn status(c: &Calibration, title: String) -> Status {
+    let row = |what, grade, text| StatusRow { what, grade, text };
+    let all = c.unknowns.len();
+    let determined = c.unknowns.iter().filter(|u| u.determined).count();
+    let first = c.findings.first().map(|f| finding(f, &c.records));
+    let f = &c.fit;
+    Status {
+        title,
+        rows: vec![
+            row(
+                "Consistent",
+                if c.consistent { Grade::Good } else { Grade::Missed },
+                first.unwrap_or_else(|| "model and sigmas explain the record".into()),
+            ),
+            row(
+                "Determined",
+                if determined == all { Grade::Good } else { Grade::Limited },
+                format!("{determined} of {all} unknowns"),
+            ),
+            row(
+                "Chi-square",
+                if (f.band.0..=f.band.1).contains(&(f.factor * f.factor)) {
+                    Grade::Good
+                } else {
+                    Grade::Limited
+                },
+                format!(
+                    "{:.3} per degree of freedom ({:.3} to {:.3})",
+                    f.factor * f.factor,
+                    f.band.0,
+                    f.band.1
+                ),
+            ),
+        ],
     }
 }

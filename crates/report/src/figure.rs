@@ -136,7 +136,12 @@ impl Figure {
             layout = layout.with_log_y().with_y_tick_format(TickFormat::Sci);
         }
         if self.log && anything(|p| p.0) && anything(|p| p.1) {
-            layout = layout.with_log_scale().with_y_tick_format(TickFormat::Sci);
+            layout = layout.with_log_scale();
+            // plain numbers where they are short
+            let short = |p: &(f64, f64)| (0.01..1e4).contains(&p.1);
+            if !self.lines.iter().flat_map(|l| &l.points).all(short) {
+                layout = layout.with_y_tick_format(TickFormat::Sci);
+            }
         }
         if let Some((low, high)) = self.x_range {
             layout = layout.with_x_axis_min(low).with_x_axis_max(high);

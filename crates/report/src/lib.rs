@@ -36,6 +36,7 @@ pub use visible::visible;
 use std::fmt;
 use std::str::FromStr;
 
+use obsdeg_calibration::Calibration;
 use obsdeg_design::design::Design;
 use obsdeg_design::review::DesignReview;
 
@@ -188,12 +189,17 @@ pub fn picture_folder(stem: &str) -> String {
     format!("{}_figures", stem.chars().map(plain).collect::<String>())
 }
 
-/// The files of a design review: the text first, then the pictures that it refers to, in `folder` beside it.
+/// The files of a design review, with calibrations by name: the text first, then the pictures that it refers to, in `folder` beside it.
 ///
 /// # Errors
 /// [`ReportError`].
-pub fn review(r: &DesignReview, format: ReviewFormat, folder: &str) -> Result<Vec<File>, ReportError> {
-    let boxes = review::document(r);
+pub fn review(
+    r: &DesignReview,
+    calibrations: &[(String, Calibration)],
+    format: ReviewFormat,
+    folder: &str,
+) -> Result<Vec<File>, ReportError> {
+    let boxes = review::document(r, calibrations);
     let document = if format == ReviewFormat::Html { boxes } else { boxes.plain() };
     match format {
         ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),

@@ -4,6 +4,7 @@ mod model;
 mod pictures;
 mod verdict;
 
+use obsdeg_calibration::Calibration;
 use obsdeg_core::analysis::Analysis;
 use obsdeg_design::review::{DesignReview, PositionReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
@@ -12,12 +13,14 @@ use obsdeg_evidence::crosscheck::CrossCheck;
 use crate::analysis::null_vector;
 use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
-use crate::{Answer, compare, latex, simulation, words};
+use crate::{Answer, calibration, compare, latex, simulation, words};
 
 /// A review as one document.
-pub(crate) fn document(r: &DesignReview) -> Document {
+pub(crate) fn document(r: &DesignReview, calibrations: &[(String, Calibration)]) -> Document {
     let schemes = r.schemes.iter().zip(&r.comparison.schemes).map(|(s, review)| verdict::status(s, review));
-    let mut blocks = vec![Block::Status(schemes.chain(r.models.iter().map(model::status)).collect())];
+    let run = calibrations.iter().map(|(name, c)| calibration::status(c, format!("Calibration {name}")));
+    let all = schemes.chain(r.models.iter().map(model::status)).chain(run).collect();
+    let mut blocks = vec![Block::Status(all)];
     let alone = r.schemes.len() + r.models.len() == 1;
     let level = if alone { 1 } else { 2 };
     for (i, (s, review)) in r.schemes.iter().zip(&r.comparison.schemes).enumerate() {
@@ -38,6 +41,10 @@ pub(crate) fn document(r: &DesignReview) -> Document {
             blocks.push(section(1, format!("Model {}", m.analysis.name)));
         }
         model::part(&mut blocks, m, level, &format!("m{}", i + 1));
+    }
+    for (i, (name, c)) in calibrations.iter().enumerate() {
+        blocks.push(section(1, format!("Calibration {name}")));
+        blocks.extend(calibration::section(c, &format!("c{}", i + 1)));
     }
     blocks.push(section(1, "About this report"));
     blocks.push(Block::list(

@@ -12,6 +12,9 @@ const LISTED: usize = 20;
 
 fn finding(f: &SystemFinding) -> String {
     match f {
+        SystemFinding::Interrupted => {
+            "interrupted: the estimates are where the best iteration was then, from the starts that were tried so far".into()
+        }
         SystemFinding::NotSettled => {
             "no start settled: the estimates are where the iteration was given up".into()
         }

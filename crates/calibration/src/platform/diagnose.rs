@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{AZIMUTH, Scheme};
+use obsdeg_ekf::allan::overlapping_deviation;
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_band, chi_square_tail, ljung_box};
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
@@ -18,7 +19,7 @@ use super::run::Key;
 use super::{CalibrationError, Options};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, CovarianceTable, Estimated, Finding, Fit, Moved, Outlier, PositionFit,
-    PositionsBy, RecordReport, Repeatability, Residual, SCHEMA, SecondPath, Warmth,
+    PositionsBy, RecordReport, Repeatability, Residual, ResidualSeries, SCHEMA, SecondPath, Warmth,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 
@@ -30,6 +31,8 @@ const STRICT: f64 = 0.999;
 const FEWEST: usize = 40;
 /// Fewest residuals of a position whose correlation with the temperature is told.
 const FEWEST_WARM: usize = 10;
+/// Most points of a series.
+const POINTS: usize = 1000;
 /// Lags of the correlation.
 const LAGS: usize = 20;
 /// The paths agree to this, in sigma.
@@ -186,6 +189,7 @@ pub(crate) struct Parts<'a> {
     pub found: &'a Diagnosed,
     pub too_many: Option<usize>,
     pub known: Vec<String>,
+    pub interrupted: bool,
 }
 
 /// A functional that is reported.
@@ -329,6 +333,7 @@ impl Parts<'_> {
             repeatability,
             records,
             assumed: self.assumed(),
+            series: self.series(),
             residuals: self.residuals(),
         };
         out.findings = self.findings(&out);
@@ -579,10 +584,52 @@ impl Parts<'_> {
         self.found.all.iter().map(of).collect()
     }
 
+    /// What is left over time.
+    fn series(&self) -> Vec<ResidualSeries> {
+        let all = self.residuals();
+        let mut out = Vec::new();
+        for (r, run) in self.problem.runs.iter().enumerate() {
+            for (c, &component) in self.planned.components.iter().enumerate() {
+                let own: Vec<&Residual> = all.iter().filter(|l| l.record == r && l.channel == c).collect();
+                if own.is_empty() {
+                    continue;
+                }
+                let n = own.len();
+                let values: Vec<f64> = own.iter().map(|l| l.residual).collect();
+                let normalised: Vec<f64> = own.iter().map(|l| l.normalised).collect();
+                let mut steps: Vec<f64> = own.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
+                steps.sort_by(f64::total_cmp);
+                let step = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+                let sigma = (own.iter().map(|l| l.sigma * l.sigma).sum::<f64>() / n as f64).sqrt();
+                let clusters = std::iter::successors(Some(1), |m| Some(2 * m)).take_while(|m| 3 * m <= n);
+                let allan = clusters.filter_map(|m| {
+                    let found = overlapping_deviation(&values, m).ok()?;
+                    Some((m as f64 * step, found, sigma / (m as f64).sqrt()))
+                });
+                out.push(ResidualSeries {
+                    record: run.reading.name.clone(),
+                    channel: channel_name(component),
+                    unit: if component == AZIMUTH { "rad".into() } else { "g".into() },
+                    allan: allan.collect(),
+                    points: own
+                        .iter()
+                        .step_by(n.div_ceil(POINTS))
+                        .map(|l| (l.t_s, l.residual, l.sigma))
+                        .collect(),
+                    autocorrelation: autocorrelation(&normalised, LAGS.min(n / 4)),
+                    count: n,
+                });
+            }
+        }
+        out
+    }
+
     /// What speaks against all of it.
     fn findings(&self, c: &Calibration) -> Vec<Finding> {
         let mut out = Vec::new();
-        if !self.estimate.converged {
+        if self.interrupted {
+            out.push(Finding::Interrupted);
+        } else if !self.estimate.converged {
             out.push(Finding::NotSettled);
         }
         if !self.planned.platform.observed().accelerometers {

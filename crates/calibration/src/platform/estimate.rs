@@ -3,6 +3,8 @@
 //! What no record can tell (the null space of the exact verdict) is held loosely about its first estimate, so that steps stay where the model is near linear; nothing
 //! of it is reported. A weak pull on all else is towards where the iteration is, and so leaves no trace in where it ends.
 
+use std::cell::Cell;
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{EkfError, Manifold};
 use obsdeg_evidence::prediction::Combination;
@@ -10,6 +12,7 @@ use obsdeg_evidence::simulation::{Conditions, PlatformState};
 
 use super::CalibrationError;
 use super::run::{Key, Run};
+use crate::Going;
 use crate::least_squares::{Information, Linearised, Rows, Solution};
 
 /// Most linearisations.
@@ -120,6 +123,12 @@ pub(crate) struct Problem<'a> {
     pub sigmas: Vec<f64>,
     /// What was known before of some combinations: rows and values in SI, with unit errors.
     pub known: Option<(DMatrix<f64>, DVector<f64>)>,
+    /// Hears of every linearisation; where it says no, the iteration ends.
+    pub going: &'a dyn Fn(Going<'_>) -> bool,
+    /// How many there were.
+    pub passes: Cell<usize>,
+    /// Whether it said no.
+    pub stopped: Cell<bool>,
 }
 
 /// Every run linearised at the estimate.
@@ -143,6 +152,10 @@ pub(crate) struct Estimate {
 impl Problem<'_> {
     /// Linearises all runs at `x`, of each the first `part` of its bins.
     fn at(&self, x: Vec<PlatformState>, part: f64) -> Result<At, CalibrationError> {
+        self.passes.set(self.passes.get() + 1);
+        if !(self.going)(Going::Passes(self.passes.get())) {
+            self.stopped.set(true);
+        }
         let most = |run: &Run| ((run.len() as f64 * part).ceil() as usize).max(1);
         let each = self.runs.iter().zip(&x);
         let runs = each.map(|(run, x)| run.along(self.conditions, &self.sigmas, x, most(run)));
@@ -235,7 +248,7 @@ impl Problem<'_> {
         let mut at = self.at(x, part)?;
         let mut solution = self.step(&at, WEAK)?;
         let (mut passes, mut converged) = (1, false);
-        while passes < PASSES {
+        while passes < PASSES && !self.stopped.get() {
             let size = (&solution.root * &solution.x).norm();
             if size <= SETTLED * self.scale(&at) {
                 converged = true;
@@ -270,7 +283,7 @@ impl Problem<'_> {
     pub(crate) fn estimate(&self, x: Vec<PlatformState>, first: bool) -> Result<Estimate, CalibrationError> {
         let direct = self.settle(x.clone(), 1.0);
         let poor = |e: &Estimate| !e.converged || e.at.cost > 2.0 * self.rows(e);
-        if direct.as_ref().is_ok_and(|e| !first || !poor(e)) {
+        if direct.as_ref().is_ok_and(|e| !first || !poor(e) || self.stopped.get()) {
             return direct;
         }
         let by_and_by = || -> Result<Estimate, CalibrationError> {

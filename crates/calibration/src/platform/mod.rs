@@ -5,6 +5,8 @@ mod estimate;
 mod observe;
 mod run;
 
+use std::cell::Cell;
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
@@ -13,6 +15,7 @@ use obsdeg_evidence::simulation::{
     Conditions, Plan, PlatformState, RunStart, SimulationError, predict, si_per_shown,
 };
 
+use crate::Going;
 use crate::answer::{Calibration, CovarianceTable};
 use crate::record::{Record, RecordError};
 use diagnose::Diagnosed;
@@ -137,6 +140,9 @@ pub enum CalibrationError {
         /// The segment.
         position: String,
     },
+    /// Interrupted before there was anything.
+    #[error("interrupted before anything was estimated")]
+    Interrupted,
     /// Nothing to estimate.
     #[error("nothing is determined by these records: no unknown and no combination")]
     Nothing,
@@ -191,7 +197,8 @@ const ROUNDS: usize = 6;
 /// More than this part of all measurements are no outliers.
 const MOST_OUTLIERS: f64 = 0.02;
 
-/// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and slews.
+/// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and slews. `going` hears now and then how far it is; where
+/// it says no while a record is read there is none, later the estimate is where the iteration is then, and a finding.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -200,6 +207,7 @@ pub fn calibrate(
     conditions: &Conditions,
     records: Vec<Record>,
     options: &Options,
+    going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Calibration, CalibrationError> {
     if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
         return Err(CalibrationError::Rotates { position: p.name.clone() });
@@ -209,8 +217,14 @@ pub fn calibrate(
     let mut sigmas: Vec<f64> = planned.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
     let mut runs = Vec::with_capacity(records.len());
     for record in records {
-        let reading =
-            observe::observe(record, &planned, options.gravity_m_s2, conditions.step_s, sigmas.clone())?;
+        let reading = observe::observe(
+            record,
+            &planned,
+            options.gravity_m_s2,
+            conditions.step_s,
+            sigmas.clone(),
+            going,
+        )?;
         runs.push(Run::new(reading, scheme, &planned, &own)?);
     }
     let prediction = predict(&planned, options.seed)?;
@@ -228,7 +242,7 @@ pub fn calibrate(
     let (known, known_names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
     let mut x: Vec<PlatformState> =
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
-    let (mut round, mut too_many) = (0, None);
+    let (mut round, mut passes, mut too_many) = (0, 0, None);
     loop {
         round += 1;
         let problem = Problem {
@@ -237,10 +251,15 @@ pub fn calibrate(
             unknowns: &unknowns,
             sigmas: sigmas.clone(),
             known: known.clone(),
+            going,
+            passes: Cell::new(passes),
+            stopped: Cell::new(false),
         };
         let estimate = problem.estimate(x, round == 1)?;
         let found = Diagnosed::of(&problem, &estimate, &prediction)?;
-        let last = round == ROUNDS;
+        passes = problem.passes.get();
+        let interrupted = problem.stopped.get();
+        let last = round == ROUNDS || interrupted;
         // noise first: a gate needs it
         let rescaled = options.estimate_noise.then(|| found.channel_factors(sigmas.len()));
         let settled = rescaled.as_ref().is_none_or(|f| f.iter().all(|f| (f - 1.0).abs() < 1e-3));
@@ -262,6 +281,7 @@ pub fn calibrate(
                 found: &found,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
+                interrupted,
             };
             return parts.answer();
         }

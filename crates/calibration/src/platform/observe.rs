@@ -5,6 +5,7 @@ use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
+use crate::Going;
 use crate::bins::{Bin, Binner, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{Detector, Told};
@@ -27,6 +28,9 @@ pub(crate) const TIMES: [(&str, f64); 5] =
 const TILT_DEG: f64 = 20.0;
 /// What the gimbals read is no further from the attitude of the scheme than this, in deg.
 const GIMBALS_DEG: f64 = 5.0;
+
+/// It is told that a record is read every so many samples.
+const OFTEN: usize = 10_000;
 
 /// What the three columns of a record are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -436,6 +440,7 @@ pub(crate) fn observe(
     gravity: f64,
     bin_s: f64,
     sigmas: Vec<f64>,
+    going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Reading, CalibrationError> {
     let record = record.named(&plan.platform.scheme().recording)?;
     let layout = Layout::of(&record, plan, gravity)?;
@@ -476,7 +481,14 @@ pub(crate) fn observe(
         rests: Vec::new(),
         gimbals: None,
     };
-    record.read(&layout.wanted, layout.label, false, |row| taking.take(&row))?;
+    let (name, mut rows) = (record.name().to_string(), 0);
+    record.read(&layout.wanted, layout.label, false, |row| {
+        rows += 1;
+        if rows % OFTEN == 0 && !going(Going::Reads { record: &name, samples: rows }) {
+            return Err(CalibrationError::Interrupted);
+        }
+        taking.take(&row)
+    })?;
     if let Some(mut detector) = taking.detector.take() {
         let mut told = Vec::new();
         detector.end(&mut told);

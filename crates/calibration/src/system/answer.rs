@@ -66,6 +66,8 @@ pub struct SystemCalibration {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum SystemFinding {
+    /// Interrupted: the estimates are where the best iteration was then.
+    Interrupted,
     /// No start settled.
     NotSettled,
     /// Chi-square is outside its band.
@@ -221,6 +223,9 @@ pub enum SystemCalibrationError {
         /// Unknowns.
         unknowns: usize,
     },
+    /// Interrupted before there was anything.
+    #[error("interrupted before anything was estimated")]
+    Interrupted,
     /// A calibration of another system.
     #[error("the prior calibration says nothing of this model: it has {found}")]
     Prior {

@@ -6,8 +6,12 @@ use obsdeg_core::model::Still;
 use obsdeg_core::system::{KnownInput, ModelError, SystemModel};
 
 use super::answer::SystemCalibrationError;
+use crate::Going;
 use crate::record::{MOST, Record, Row, Wanted};
 use crate::still::Detector;
+
+/// It is told that a record is read every so many samples.
+const OFTEN: usize = 10_000;
 
 /// A row of the record.
 #[derive(Debug, Clone)]
@@ -118,7 +122,11 @@ impl Columns {
     }
 }
 
-pub(super) fn read(record: Record, model: &SystemModel) -> Result<Read, SystemCalibrationError> {
+pub(super) fn read(
+    record: Record,
+    model: &SystemModel,
+    going: &dyn Fn(Going<'_>) -> bool,
+) -> Result<Read, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
     let columns = Columns::of(&record, model)?;
     let still = model.recording.still.as_ref();
@@ -126,6 +134,10 @@ pub(super) fn read(record: Record, model: &SystemModel) -> Result<Read, SystemCa
     let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
     let mut rows: Vec<Data> = Vec::new();
     let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
+        let samples = rows.len() + 1;
+        if samples % OFTEN == 0 && !going(Going::Reads { record: &name, samples }) {
+            return Err(SystemCalibrationError::Interrupted);
+        }
         let refuse = |column: &str, found: String, expected: &str| SystemCalibrationError::Value {
             record: name.clone(),
             line: row.line,

@@ -17,6 +17,7 @@ pub use answer::{
     SystemFinding, SystemResidual,
 };
 
+use crate::Going;
 use crate::answer::CovarianceTable;
 use crate::least_squares::{Rows, Solution};
 use crate::record::Record;
@@ -71,6 +72,12 @@ struct Problem<'a> {
     longest: f64,
     /// Rows and values of what was known before of the free unknowns, with unit errors.
     known: (DMatrix<f64>, DVector<f64>),
+    /// Hears of every evaluation; where it says no, iterations end.
+    going: &'a dyn Fn(Going<'_>) -> bool,
+    /// How many there were.
+    passes: usize,
+    /// Whether it said no.
+    stopped: bool,
 }
 
 /// Rows of the model at some unknowns: a row of derivatives by the free unknowns, what is left, and sigma.
@@ -125,6 +132,8 @@ impl Problem<'_> {
 
     /// The model at free values `x`, in steps `1/finer` as long.
     fn at(&mut self, base: &DVector<f64>, x: &DVector<f64>, finer: usize) -> Result<At, EkfError> {
+        self.passes += 1;
+        self.stopped |= !(self.going)(Going::Passes(self.passes));
         let start = self.all(base, x);
         let to_start = self.of_free(base, x);
         let segments = self.numeric.segments();
@@ -245,6 +254,9 @@ fn settle(
     let mut pull = 1e-2 * (cost.max(1.0)).sqrt();
     let mut converged = false;
     for _ in 0..PASSES {
+        if problem.stopped {
+            break;
+        }
         let solution = step(&at, &x, pull)?;
         let moved = &x + &solution.x;
         let next = problem.at(base, &moved, finer).ok();
@@ -289,6 +301,7 @@ pub fn calibrate_system(
     model: &SystemModel,
     record: Record,
     options: &SystemOptions,
+    going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     if !model.constraints.is_empty() {
         return Err(SystemCalibrationError::NotYet { what: "constraints" });
@@ -297,9 +310,9 @@ pub fn calibrate_system(
         return Err(SystemCalibrationError::NotYet { what: "several segments" });
     }
     let compiled = model.compile()?;
-    let data = read(record, model)?;
+    let data = read(record, model, going)?;
     let numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
-    Calibrating::new(model, &compiled, numeric, &data, options)?.run()
+    Calibrating::new(model, &compiled, numeric, &data, options, going)?.run()
 }
 
 /// Rows and values of what a calibration before says of the unknowns `names`, with unit errors.
@@ -347,6 +360,7 @@ impl<'a> Calibrating<'a> {
         numeric: Numeric<'a>,
         data: &'a Read,
         options: &'a SystemOptions,
+        going: &'a dyn Fn(Going<'_>) -> bool,
     ) -> Result<Self, SystemCalibrationError> {
         let nominal = &model.simulation;
         let known = |state: &FilterState| match *state {
@@ -391,7 +405,8 @@ impl<'a> Calibrating<'a> {
             Some(table) => said_before(table, &names)?,
             None => (DMatrix::zeros(0, free.len()), DVector::zeros(0)),
         };
-        let problem = Problem { numeric, data, free, noise, longest, known };
+        let problem =
+            Problem { numeric, data, free, noise, longest, known, going, passes: 0, stopped: false };
         Ok(Self { model, compiled, data, options, problem, base, estimated })
     }
 
@@ -418,6 +433,10 @@ impl<'a> Calibrating<'a> {
         let mut first_error = None;
         let mut ends: Vec<Settled> = Vec::new();
         for x in &starts {
+            // what there is so far is the answer
+            if self.problem.stopped && !ends.is_empty() {
+                break;
+            }
             match settle(&mut self.problem, &self.base, x.clone(), 1, None) {
                 Ok(end) => ends.push(end),
                 Err(e) => drop(first_error.get_or_insert(e)),
@@ -435,6 +454,9 @@ impl<'a> Calibrating<'a> {
         let mut finer = 1;
         let mut best = best;
         for _ in 0..DOUBLINGS {
+            if self.problem.stopped {
+                break;
+            }
             let coarse = self.problem.at(&self.base, &best.x, finer).map_err(nowhere)?;
             let fine = self.problem.at(&self.base, &best.x, 2 * finer).map_err(nowhere)?;
             let scale = (coarse.cost() / coarse.sigmas.len() as f64).max(1.0).sqrt();
@@ -536,7 +558,9 @@ impl<'a> Calibrating<'a> {
         let band = chi_square_band(degrees_of_freedom as f64, 1.0, STRICT);
         let band = (band.0 / degrees_of_freedom as f64, band.1 / degrees_of_freedom as f64);
         let mut findings = Vec::new();
-        if !best.converged {
+        if self.problem.stopped {
+            findings.push(SystemFinding::Interrupted);
+        } else if !best.converged {
             findings.push(SystemFinding::NotSettled);
         }
         if !all_estimated && !(band.0..=band.1).contains(&mean) {

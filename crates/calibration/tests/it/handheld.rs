@@ -110,7 +110,8 @@ fn calibrated(file: &str, text: &str, options: &SystemOptions) -> SystemCalibrat
     let model =
         model.replace("noise = { turn = 0.016, rate = 1e-4 }", "noise = { turn = 6e-3, rate = 1e-6 }");
     let record = Record::csv("hand.csv", Box::new(std::io::Cursor::new(text.to_string()))).expect("a record");
-    calibrate_system(&model_file::read(&model).expect("a model"), record, options).expect("calibrated")
+    calibrate_system(&model_file::read(&model).expect("a model"), record, options, &|_| true)
+        .expect("calibrated")
 }
 
 /// Accelerometers by the length of the force, gyros by the turns between, what is known of the first as a prior of the second.

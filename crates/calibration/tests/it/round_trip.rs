@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::answer::{Finding, PositionsBy};
 use obsdeg_calibration::record::Record;
-use obsdeg_calibration::{Calibration, CalibrationError, Options, calibrate};
+use obsdeg_calibration::{Calibration, CalibrationError, Going, Options, calibrate};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Carry, Path, Recording, Scheme, Still, parse_attitude};
 use obsdeg_ekf::consistency::chi_square_band;
@@ -41,7 +41,7 @@ pub(crate) fn conditions(bench: &Bench) -> Conditions {
 
 pub(crate) fn of_csv(bench: &Bench, terms: &str, text: String) -> Result<Calibration, CalibrationError> {
     let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text)))?;
-    calibrate(&scheme(bench, terms), &conditions(bench), vec![record], &Options::default())
+    calibrate(&scheme(bench, terms), &conditions(bench), vec![record], &Options::default(), &|_| true)
 }
 
 pub(crate) fn six() -> Bench {
@@ -237,8 +237,8 @@ fn what_is_not_told_apart_has_no_estimate() {
     other.priors.iter_mut().for_each(|p| p.value *= 0.5);
     let record =
         Record::csv("run.csv", Box::new(std::io::Cursor::new(csv(&bench.record())))).expect("a record");
-    let again =
-        calibrate(&scheme(&bench, "F,I,O,S"), &other, vec![record], &Options::default()).expect("calibrated");
+    let again = calibrate(&scheme(&bench, "F,I,O,S"), &other, vec![record], &Options::default(), &|_| true)
+        .expect("calibrated");
     for (a, b) in
         c.unknowns.iter().chain(&c.combinations).zip(again.unknowns.iter().chain(&again.combinations))
     {
@@ -352,7 +352,7 @@ fn with_recording(
     let mut scheme = scheme(bench, "F,I,O,S");
     scheme.recording = recording;
     let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text)))?;
-    calibrate(&scheme, &conditions(bench), vec![record], &Options::default())
+    calibrate(&scheme, &conditions(bench), vec![record], &Options::default(), &|_| true)
 }
 
 /// Without labels and late, by the intervals at rest: the estimate is that by labels but for a part of sigma; other schemes are refused.
@@ -448,6 +448,72 @@ fn columns_of_all_kinds() {
     let c = with_recording(&bench, recording, text(1.5e-5, 0.0)).expect("calibrated");
     let warm = |f: &Finding| matches!(f, Finding::Temperature { correlation, .. } if correlation.abs() > 0.5);
     assert!(c.findings.iter().any(warm), "{:?}", c.findings);
+}
+
+/// Noise that nobody knows is estimated, component by component; then it is consistent, and sigmas are those of who knows it.
+#[test]
+fn noise_is_estimated() {
+    let bench = Bench { noise_g: 3e-5, ..real(14) };
+    let text = csv(&bench.record());
+    let knows = of_csv(&bench, "F,I,O,S", text.clone()).expect("calibrated");
+    let run = |estimate_noise: bool| {
+        let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text.clone()))).expect("a record");
+        let believed = Bench { noise_g: 1e-5, ..bench.clone() };
+        let options = Options { estimate_noise, ..Options::default() };
+        calibrate(&scheme(&bench, "F,I,O,S"), &conditions(&believed), vec![record], &options, &|_| true)
+            .expect("calibrated")
+    };
+    assert!(matches!(run(false).findings[..], [Finding::Noise { .. }]));
+    let c = run(true);
+    is_right(&c);
+    assert!(c.assumed.noise_estimated && (c.fit.factor - 1.0).abs() < 1e-2, "{:?}", c.fit);
+    for channel in &c.channels {
+        // 1200 samples, two a measurement: a standard deviation is known to 3 %
+        assert!((channel.sigma / 3e-5 - 1.0).abs() < 0.12, "{channel:?}");
+    }
+    for (a, b) in knows.unknowns.iter().zip(&c.unknowns) {
+        let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
+        assert!((x - y).abs() < 0.3 * s && (b.sigma.expect("there") / s - 1.0).abs() < 0.12, "{}", a.name);
+    }
+}
+
+/// An interrupt while a record is read leaves nothing; later it leaves the iteration where it is, and says so.
+#[test]
+fn an_interrupt_leaves_what_there_is() {
+    let bench = Bench { step_s: 0.2, ..quick(13) };
+    let text = csv(&bench.record());
+    let until = |most: usize, reads: bool| {
+        let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text.clone()))).expect("a record");
+        let heard = std::cell::Cell::new(0);
+        let going = |now: Going<'_>| {
+            let counts = matches!(now, Going::Reads { .. }) == reads;
+            heard.set(heard.get() + usize::from(counts));
+            !counts || heard.get() < most
+        };
+        calibrate(&scheme(&bench, "F,I,O,S"), &conditions(&bench), vec![record], &Options::default(), &going)
+    };
+    assert_eq!(until(1, true), Err(CalibrationError::Interrupted));
+    let whole = until(usize::MAX, false).expect("calibrated");
+    is_right(&whole);
+    let c = until(2, false).expect("calibrated");
+    assert_eq!((c.consistent, c.findings.first()), (false, Some(&Finding::Interrupted)));
+    // two linearisations are near
+    for (a, b) in whole.unknowns.iter().zip(&c.unknowns) {
+        let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
+        assert!((x - y).abs() < 100.0 * s, "{}: {x} {y} +- {s}", a.name);
+    }
+    // what is left over time is that of white noise
+    for s in &whole.series {
+        assert!(s.points.len() <= 1000 && s.count == s.points.len() && s.autocorrelation.len() == 20);
+        let band = 4.0 / (s.count as f64).sqrt();
+        assert!(s.autocorrelation.iter().all(|r| r.abs() < band), "{:?}", s.autocorrelation);
+        for (k, (tau, found, white)) in s.allan.iter().enumerate() {
+            assert!((tau / 10.0 - f64::from(1 << k)).abs() < 0.1, "{tau}");
+            // of n/m clusters
+            let scatter = 4.0 * (tau / 10.0 / s.count as f64).sqrt();
+            assert!((found / white - 1.0).abs() < scatter + 0.1, "{tau}: {found} {white}");
+        }
+    }
 }
 
 /// The record of examples/bench-day.
