@@ -481,10 +481,10 @@ pub(crate) fn observe(
         rests: Vec::new(),
         gimbals: None,
     };
-    let (name, mut rows) = (record.name().to_string(), 0);
+    let (name, mut rows) = (record.name().to_string(), 0_usize);
     record.read(&layout.wanted, layout.label, false, |row| {
         rows += 1;
-        if rows % OFTEN == 0 && !going(Going::Reads { record: &name, samples: rows }) {
+        if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
             return Err(CalibrationError::Interrupted);
         }
         taking.take(&row)

@@ -135,7 +135,7 @@ pub(super) fn read(
     let mut rows: Vec<Data> = Vec::new();
     let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
         let samples = rows.len() + 1;
-        if samples % OFTEN == 0 && !going(Going::Reads { record: &name, samples }) {
+        if samples.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples }) {
             return Err(SystemCalibrationError::Interrupted);
         }
         let refuse = |column: &str, found: String, expected: &str| SystemCalibrationError::Value {
