@@ -45,7 +45,8 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     let k = degrees.len();
     let psis = if carry == Carry::Reset { 3 * k } else { 3 };
     let n = psis + 3 * terms.len();
-    let (mut rows, mut at): (Vec<DVector<f64>>, Vec<(f64, [f64; 3])>) = (Vec::new(), Vec::new());
+    let mut rows: Vec<DVector<f64>> = Vec::new();
+    let mut at: Vec<(f64, [f64; 3])> = Vec::new();
     let mut before = Matrix3::identity();
     // psi^n as a functional of the unknowns
     let mut psi = Matrix3xX::<f64>::zeros(n);
