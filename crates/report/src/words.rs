@@ -240,7 +240,7 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     if has(Source::Rate) {
         out.push(
             "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, GM_XY that of gyro X times the \
-             torqued rate along the input axis of gyro Y; at a position that is the earth rate"
+             torqued rate along the input axis of gyro Y; at a position that is the earth rate, in a rotation that of the turn besides"
                 .into(),
         );
     }

@@ -309,12 +309,12 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
-        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act at positions alone, \
+        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act at positions and in rotations alone, \
          as if nothing had been torqued in between; real slews need inertial carry and a path",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
-        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act at positions alone",
+        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act at positions and in rotations alone",
     );
     out
 }
