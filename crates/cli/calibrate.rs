@@ -48,7 +48,7 @@ read).";
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
-    /// The scheme file (TOML), then one or more records of its runs (CSV or Parquet; - is CSV on stdin); with --model the record alone
+    /// The scheme file (TOML), then one or more records of its runs (CSV or Parquet; - is stdin); with --model the record alone
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 
@@ -243,11 +243,11 @@ impl Arguments {
     }
 }
 
-/// A record that is a file, or CSV on stdin.
+/// A record that is a file, or stdin.
 fn record(path: &Path) -> Result<Record, Failure> {
     let wrong = |e: &dyn std::fmt::Display| Failure::input(e.to_string());
     if path == Path::new("-") {
-        return Record::csv("stdin", Box::new(std::io::stdin())).map_err(|e| wrong(&e));
+        return Record::stream("stdin", Box::new(std::io::stdin())).map_err(|e| wrong(&e));
     }
     let name = path.display().to_string();
     let file = open(path).map_err(|e| Failure::input(format!("cannot read the record {name}: {e}")))?;

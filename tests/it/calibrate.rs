@@ -147,6 +147,12 @@ fn the_same_from_everywhere() {
     let piped: Value =
         serde_json::from_slice(&child.wait_with_output().expect("it ends").stdout).expect("JSON");
     assert_eq!(estimates(&csv), estimates(&piped));
+    let mut piped = obsdeg(&["calibrate", SCHEME, "-", "--format", "json"]);
+    let mut child = piped.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+    child.stdin.take().expect("a pipe").write_all(&parquet(&text)).expect("written");
+    let piped: Value =
+        serde_json::from_slice(&child.wait_with_output().expect("it ends").stdout).expect("JSON");
+    assert_eq!(estimates(&csv), estimates(&piped));
     // twice the same record: coefficients as before, with sigmas smaller by the root of two, and a psi for each
     // (what fits badly by chance fits as badly twice: there is a check that fails)
     let twice = run(&["calibrate", SCHEME, RECORD, &name, "--format", "json"]);

@@ -152,7 +152,7 @@ impl Column {
 /// What rows come from.
 enum Rows {
     Csv(Lines),
-    Parquet(SerializedFileReader<File>),
+    Parquet(Box<dyn FileReader>),
 }
 
 /// Lines of CSV with their numbers.
@@ -242,9 +242,29 @@ impl Record {
             whole && &magic == b"PAR1"
         };
         if !parquet {
-            return Self::csv(name, Box::new(file));
+            return Self::stream(name, Box::new(file));
         }
-        let reader = SerializedFileReader::new(file).map_err(|e| wrong(&e))?;
+        Self::parquet(name, Box::new(SerializedFileReader::new(file).map_err(|e| wrong(&e))?))
+    }
+
+    /// A record from a pipe: Parquet, which ends with its header and so is read whole, if it begins so, else CSV.
+    ///
+    /// # Errors
+    /// [`RecordError`].
+    pub fn stream(name: &str, mut from: Box<dyn Read>) -> Result<Self, RecordError> {
+        let wrong =
+            |e: &dyn std::fmt::Display| RecordError::Read { record: name.into(), reason: e.to_string() };
+        let mut begin = Vec::new();
+        (&mut from).take(4).read_to_end(&mut begin).map_err(|e| wrong(&e))?;
+        if begin != b"PAR1" {
+            return Self::csv(name, Box::new(std::io::Cursor::new(begin).chain(from)));
+        }
+        from.read_to_end(&mut begin).map_err(|e| wrong(&e))?;
+        let reader = SerializedFileReader::new(bytes::Bytes::from(begin)).map_err(|e| wrong(&e))?;
+        Self::parquet(name, Box::new(reader))
+    }
+
+    fn parquet(name: &str, reader: Box<dyn FileReader>) -> Result<Self, RecordError> {
         let fields = reader.metadata().file_metadata().schema().get_fields();
         let headers: Vec<String> = fields.iter().map(|f| f.name().to_string()).collect();
         Ok(Self { name: name.into(), columns: columns(name, headers, 0)?, rows: Rows::Parquet(reader) })
