@@ -397,12 +397,14 @@ fn scheme_file(
     let unit = search.and_then(|s| s.unit.as_deref());
     let prior = search.and_then(|s| s.prior.as_ref());
     let prior = prior.map_or_else(|| "no prior".into(), |p| format!("prior {}", visible(p)));
+    let name = search.map_or("", |s| s.criterion.as_str());
+    let largest = |sigma: f64| format!("largest sigma of {what} {sigma:.3e} deg/h (per g)");
     let reached = match (unit, best.worst_sigma_dph) {
-        (Some("deg/h"), Some(sigma)) => format!("largest sigma of {what} {sigma:.3e} deg/h (per g)"),
-        _ => {
-            let name = search.map_or("", |s| s.criterion.as_str());
-            let unit = unit.map_or_else(String::new, |u| format!(" {u}"));
-            format!("criterion {name} of {what} {:.3e}{unit}", best.value)
+        (Some("deg/h"), Some(sigma)) if name == "worst" => largest(sigma),
+        (unit, sigma) => {
+            let own = unit.map_or_else(String::new, |u| format!(" {u}"));
+            let sigma = sigma.filter(|_| unit == Some("deg/h")).map(|s| format!("; {}", largest(s)));
+            format!("criterion {name} of {what} {:.3e}{own}{}", best.value, sigma.unwrap_or_default())
         }
     };
     Ok(format!(

@@ -158,7 +158,8 @@ fn consecutive(positions: &[&str]) -> bool {
 pub(crate) fn reasons(terms: &str, candidates: &[String]) -> Vec<String> {
     let attitudes: Result<Vec<_>, _> = candidates.iter().map(|c| parse_attitude(c)).collect();
     let (Ok(unknowns), Ok(attitudes)) = (terms.parse(), attitudes) else { return Vec::new() };
-    term_notes(&Scheme { unknowns, ..Scheme::of_angles(attitudes) })
+    // what a carry means is no reason
+    term_notes(&Scheme { carry: Carry::Inertial, unknowns, ..Scheme::of_angles(attitudes) })
 }
 
 /// `inertial (rank profile 2 6 8 of 15): no verdict differs`, a line for each of the other carries.

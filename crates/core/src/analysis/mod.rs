@@ -305,7 +305,8 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
         scheme.by_course(),
         "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers look like, so a rotating segment is \
          judged by the course of Z, at almost any rate: a degree is a power of time, the order of the derivative at positions, and what has \
-         accumulated in psi while the platform turned counts by its power; expressions are not written out",
+         accumulated in psi while the platform turned counts by its power; expressions are not written out, and of combinations and \
+         directions whose coefficients hold the rate of turning the former are not listed, the latter named without numbers",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
