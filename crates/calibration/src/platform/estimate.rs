@@ -4,6 +4,7 @@
 //! of it is reported. A weak pull on all else is towards where the iteration is, and so leaves no trace in where it ends.
 
 use std::cell::Cell;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{EkfError, Manifold};
@@ -25,6 +26,9 @@ const NEARLY: f64 = 0.02;
 const HALVINGS: usize = 12;
 /// How much wider than the prior what nobody can know is held.
 const LOOSE: f64 = 10.0;
+/// No coefficient is tried that is further from its first estimate, in prior standard deviations: what is held so weakly may go anywhere, and such a
+/// platform turns so fast that to follow it takes minutes.
+const FAR: f64 = 100.0;
 /// How much wider than the prior everything is pulled to where the iteration is.
 pub(crate) const WEAK: f64 = 1e7;
 
@@ -43,6 +47,8 @@ pub(crate) struct Unknowns {
     pub loose: DMatrix<f64>,
     /// Biases of all runs: their prior is a property of the gyros.
     pub biases: Vec<usize>,
+    /// The coefficients, which all runs have in common.
+    coefficients: Range<usize>,
 }
 
 impl Unknowns {
@@ -85,7 +91,7 @@ impl Unknowns {
         }
         let loose = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
         let biases = index.iter().flat_map(|i| i[psi + coefficients..].iter().copied()).collect();
-        Self { index, n, prior: all, first: start, loose, biases }
+        Self { index, n, prior: all, first: start, loose, biases, coefficients: runs * own..n }
     }
 
     /// Rows that hold the loose directions, the least information that does with the prior as its measure, and biases.
@@ -99,6 +105,12 @@ impl Unknowns {
         rows = rows.resize_vertically(m + self.biases.len(), 0.0);
         self.biases.iter().enumerate().for_each(|(k, &i)| rows[(m + k, i)] = 1.0 / self.prior[i]);
         rows
+    }
+
+    /// Whether a coefficient is beyond all that is tried.
+    fn far(&self, at: &[PlatformState]) -> bool {
+        let to = self.to_first(at);
+        self.coefficients.clone().any(|i| to[i].abs() > FAR * self.prior[i])
     }
 
     /// Local coordinates of all unknowns at the first estimates, seen from `at`.
@@ -258,7 +270,8 @@ impl Problem<'_> {
             let mut found = None;
             for _ in 0..=HALVINGS {
                 passes += 1;
-                let next = self.at(self.moved(&at.x, &step), part).ok();
+                let next = self.moved(&at.x, &step);
+                let next = if self.unknowns.far(&next) { None } else { self.at(next, part).ok() };
                 // by rounding, a sum of squares may grow at the end
                 found = next.filter(|n| n.cost <= at.cost * (1.0 + 1e-9) + 1e-6);
                 if found.is_some() {
