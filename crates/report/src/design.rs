@@ -273,7 +273,7 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         percent(every.within_percent)
     ));
     out.push(format!(
-        "weights on {} attitudes would reach {}: {}",
+        "weights on {} attitudes close to these would reach {} (angles are rounded here; exactly there it may be more): {}",
         every.weights.len(),
         number(every.attained),
         weights(&every.weights)
@@ -286,8 +286,8 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
             percent(100.0 * (c.attained / every.attained - 1.0).max(0.0))
         )),
         None if ratio > FAR => out.push(format!(
-            "these candidates cost: weights on other attitudes would reach a criterion {ratio:.2} times smaller than any scheme of these has \
-             (--candidates free finds them)"
+            "these candidates cost: weights on other attitudes, as if positions could be divided, would reach a criterion {ratio:.2} times smaller than any scheme of these has \
+             (--candidates free or --refine look for them; so few positions may not come near it)"
         )),
         None => {}
     }
