@@ -107,8 +107,8 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     // of a row: psi of its position, and the coefficients
     let entries = 3 + platform.coefficients();
     let torquers = usize::from(scheme.unknowns.have(Source::Rate));
-    let turning = scheme.positions.iter().filter(|p| scheme.by_course() && p.rotation.is_some());
-    let rotations = turning.count();
+    let rotations =
+        if scheme.by_course() { scheme.positions.iter().filter(|p| p.rotation.is_some()).count() } else { 0 };
     let harmonics = platform.errors().harmonics();
     let turning_bits = rotations as f64 * courses::bits(harmonics);
     // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin

@@ -267,21 +267,6 @@ impl Platform {
         &self.errors
     }
 
-    /// [`ErrorModel::drift_rows`].
-    pub fn drift_rows<R: Ring>(
-        &self,
-        ring: &R,
-        c: &Matrix3<R::Element>,
-        rate: impl FnOnce() -> [R::Element; 3],
-    ) -> Columns<R::Element> {
-        self.errors.drift_rows(ring, c, rate)
-    }
-
-    /// [`ErrorModel::accelerometer_rows`].
-    pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
-        self.errors.accelerometer_rows(ring, c)
-    }
-
     /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift itself.
     pub fn error_terms(&self) -> &[ErrorTerm] {
         self.errors.terms()

@@ -62,7 +62,8 @@ pub(crate) fn drift_derivative<R: Ring>(
     let slope = attitude_derivative(ring, c, axis, 1);
     let both: Matrix3<[R::Element; 2]> =
         std::array::from_fn(|i| std::array::from_fn(|j| [c[i][j].clone(), slope[i][j].clone()]));
-    let rows = platform.drift_rows(&Dual(ring), &both, || std::array::from_fn(|_| Dual(ring).zero()));
+    let rows =
+        platform.errors().drift_rows(&Dual(ring), &both, || std::array::from_fn(|_| Dual(ring).zero()));
     rows.map(|row| row.into_iter().map(|[_, slope]| slope).collect())
 }
 
@@ -112,7 +113,7 @@ mod tests {
             let h = 0.01f64.to_radians();
             let [first, second] = [1, 2].map(|k| attitude_derivative(&Float, &zero, axis, k));
             let drift = drift_derivative(&platform, &Float, &zero, axis);
-            let rows = [&minus, &plus].map(|c| platform.drift_rows(&Float, c, || [0.0; 3]));
+            let rows = [&minus, &plus].map(|c| platform.errors().drift_rows(&Float, c, || [0.0; 3]));
             for i in 0..3 {
                 for j in 0..3 {
                     assert!(((plus[i][j] - minus[i][j]) / (2.0 * h) - first[i][j]).abs() < 1e-7);

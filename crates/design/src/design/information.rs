@@ -238,14 +238,14 @@ impl Evaluator {
             let earth = earth_rate_in(&Float, c, &self.w[1][2], &-self.w[0][2]);
             std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
         };
-        self.platform.drift_rows(&Float, c, rate)
+        self.platform.errors().drift_rows(&Float, c, rate)
     }
 
     /// [`Candidate::effects`] of an attitude.
     pub(super) fn effects(&self, c: &Matrix3<f64>) -> [Vec<f64>; LOCAL - 3] {
         let [x, y, z] = self.ordered_columns(self.drift_rows(c, None));
         let [a, b, c] = match self.platform.observed().accelerometers {
-            true => self.ordered_columns(self.platform.accelerometer_rows(&Float, c)),
+            true => self.ordered_columns(self.platform.errors().accelerometer_rows(&Float, c)),
             false => Default::default(),
         };
         [x, y, z, a, b, c]

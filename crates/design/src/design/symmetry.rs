@@ -116,8 +116,8 @@ fn renames(f: &Field, platform: &Platform, p: &Matrix3<u64>, same: &dyn Fn(usize
     let c: Matrix3<u64> = std::array::from_fn(|_| std::array::from_fn(|_| rng.below(f.modulus())));
     let [w_n, w_u] = [0; 2].map(|_| rng.below(f.modulus()));
     let columns = |c: &Matrix3<u64>| -> Vec<[u64; 6]> {
-        let drift = platform.drift_rows(f, c, || earth_rate_in(f, c, &w_n, &w_u));
-        let of_z = platform.accelerometer_rows(f, c);
+        let drift = platform.errors().drift_rows(f, c, || earth_rate_in(f, c, &w_n, &w_u));
+        let of_z = platform.errors().accelerometer_rows(f, c);
         let entry = |r: usize, k: usize| if r < 3 { drift[r][k] } else { of_z[r - 3][k] };
         (0..platform.coefficients()).map(|k| std::array::from_fn(|r| entry(r, k))).collect()
     };

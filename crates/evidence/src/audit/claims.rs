@@ -95,7 +95,7 @@ fn common_mode(seed: u64) -> Result<CommonMode, AnalysisError> {
     let mut out = CommonMode { vertical: true, unseen: true, ends_at_two: true, unseen_at_pole: true };
     for sample in samples(&platform, seed)? {
         let f = sample.point.ring;
-        let drift = platform.drift_rows(&f, &sample.point.attitudes[0], || [0; 3]);
+        let drift = platform.errors().drift_rows(&f, &sample.point.attitudes[0], || [0; 3]);
         let first = platform.names().len() - platform.coefficients();
         let along = |row: &[u64]| {
             ["D_IX", "D_IY", "D_IZ"].iter().fold(0, |sum, n| f.add(sum, row[column(&platform, n) - first]))
@@ -157,7 +157,7 @@ impl Told {
             let f = sample.point.ring;
             let mut span = Echelon::new(f, n);
             for c in &sample.point.attitudes {
-                span.insert(&platform.drift_rows(&f, c, || [0; 3])[row]);
+                span.insert(&platform.errors().drift_rows(&f, c, || [0; 3])[row]);
             }
             for (c, single) in out.single.iter_mut().enumerate() {
                 *single &= span.has_unit(c);

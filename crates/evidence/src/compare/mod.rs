@@ -257,7 +257,7 @@ fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
     let (plan, platform) = (&judged.plan, judged.platform());
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
         let rows = plan.drift_rows(c, None);
-        let seen = platform.accelerometer_rows(&Float, c);
+        let seen = platform.errors().accelerometer_rows(&Float, c);
         // the rate of a torquer in that of the earth
         let unit = |t: &ErrorTerm| if t.source == Source::Rate { W_IE } else { 1.0 };
         let square = |(d, t): (usize, &ErrorTerm)| -> f64 {

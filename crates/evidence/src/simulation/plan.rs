@@ -272,7 +272,7 @@ impl Plan {
         let s = &self.segments[segment];
         let mut block = Cow::Borrowed(&self.blocks[s.position]);
         if let (SegmentKind::Rotation(turn), true) = (&s.kind, self.platform.observed().accelerometers) {
-            let rows = self.platform.accelerometer_rows(&Float, &turn.at(s.dt));
+            let rows = self.platform.errors().accelerometer_rows(&Float, &turn.at(s.dt));
             for (old, new) in block.to_mut().rows[LOCAL - 3..].iter_mut().zip(rows) {
                 old[3..].copy_from_slice(&new);
             }
@@ -578,7 +578,7 @@ pub(super) const G_N: [f64; 3] = [0.0, -1.0, 0.0];
 impl Plan {
     /// The rows of `eps^n` at an attitude: torquers act with the earth rate, and with the rate at which a slew turns (rad/s).
     pub(crate) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
-        self.platform.drift_rows(&Float, c, || self.torqued_rate(c, slew))
+        self.platform.errors().drift_rows(&Float, c, || self.torqued_rate(c, slew))
     }
 
     /// The rate with which the gyros are torqued where `C_c^n` is `c`, in the axes of c (rad/s).

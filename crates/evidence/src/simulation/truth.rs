@@ -256,7 +256,7 @@ impl<'a> TruthModel<'a> {
 
     /// `eps^n = C_p^n E(g^p) D` at the true attitude; torquers have the rate that is commanded.
     fn drift_n(&self, c: &Matrix3<f64>, rate: impl FnOnce() -> [f64; 3]) -> [f64; 3] {
-        let rows = self.plan.platform.drift_rows(&Float, c, rate);
+        let rows = self.plan.platform.errors().drift_rows(&Float, c, rate);
         std::array::from_fn(|r| rows[r].iter().zip(self.coefficients()).map(|(a, d)| a * d).sum())
     }
 
