@@ -13,7 +13,7 @@ use obsdeg_design::design::{
     design, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::{Conditions, general_first};
-use obsdeg_report::{File, design_figures, visible};
+use obsdeg_report::{File, design_figures, position_figure, visible};
 
 use crate::arguments::{Assumptions, TermArguments, one_of};
 use crate::conditions::{MeasurementArguments, assigned, concern_some, within};
@@ -44,7 +44,7 @@ starts. Where order matters and repositioning takes no time, a bound on what the
 and bound): eight of the 24 cardinal attitudes in some minutes. Under reset carry information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units
 differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
-winner.toml (a scheme file) and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
+winner.toml (a scheme file), its positions as a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 Exit codes: 0 done (with --minimum also when no positions do), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
 /// The words of `--criterion`.
@@ -366,6 +366,7 @@ fn files(found: &Design, base: &Scheme, conditions: &Conditions) -> Result<Vec<F
     if let Some(best) = found.found.first() {
         let bytes = scheme_file(found, best, base, conditions)?.into_bytes();
         files.push(File { name: "winner.toml".into(), bytes });
+        files.push(position_figure(&scheme_found(best, base, conditions)?));
     }
     files.extend(design_figures(found)?);
     Ok(files)

@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 
 use crate::figure::Figure;
+use crate::poses::Panels;
 
 /// A part of a document.
 pub(crate) enum Block {
@@ -169,6 +170,8 @@ pub(crate) enum Drawing {
     Curves(Box<Figure>),
     /// A picture as it is, SVG.
     Still(String),
+    /// Positions, which stand side by side as far as there is room.
+    Panels(Panels),
 }
 
 impl Picture {
@@ -176,6 +179,7 @@ impl Picture {
         match &self.drawing {
             Drawing::Curves(figure) => figure.svg(),
             Drawing::Still(svg) => svg.clone(),
+            Drawing::Panels(panels) => panels.svg(),
         }
     }
 }

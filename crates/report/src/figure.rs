@@ -84,7 +84,7 @@ const SIZE: (f64, f64) = (640.0, 400.0);
 const MARGINS: (f64, f64) = (88.0, 28.0);
 /// Longer titles are broken.
 const TITLE: usize = 48;
-const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
+pub(crate) const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
 
 impl Figure {
     fn plots(&self) -> Vec<Plot> {

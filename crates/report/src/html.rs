@@ -91,9 +91,14 @@ fn picture(p: &Picture) -> Json {
     let plot = match &p.drawing {
         // `</script>` must not occur in a script
         Drawing::Curves(figure) => Json::from(curves(figure).to_string().replace('<', "\\u003c")),
-        Drawing::Still(_) => Json::Null,
+        Drawing::Still(_) | Drawing::Panels(_) => Json::Null,
     };
-    json!({ "name": p.name, "caption": p.caption, "svg": inlined(p), "plot": plot })
+    let panels: Option<Vec<String>> = match &p.drawing {
+        Drawing::Panels(panels) => Some(panels.each().map(|svg| in_page_colors(&svg)).collect()),
+        Drawing::Still(_) | Drawing::Curves(_) => None,
+    };
+    let svg = if panels.is_some() { String::new() } else { inlined(p) };
+    json!({ "name": p.name, "caption": p.caption, "svg": svg, "panels": panels, "plot": plot })
 }
 
 /// MathML; program notation where the LaTeX is none.
@@ -145,11 +150,16 @@ fn inlined(p: &Picture) -> String {
     };
     let size = attribute("width").zip(attribute("height"));
     let view = size.map_or_else(String::new, |(w, h)| format!(" viewBox=\"0 0 {w} {h}\""));
-    svg.replacen("<svg ", &format!("<svg class=\"still\" role=\"img\" aria-label=\"{}\"{view} ", p.name), 1)
+    let svg = svg
+        .replacen("<svg ", &format!("<svg class=\"still\" role=\"img\" aria-label=\"{}\"{view} ", p.name), 1)
         .replace("kuva-clip", &format!("{}-clip", p.name))
-        .replacen("<rect width=\"100%\" height=\"100%\" fill=\"white\" />", "", 1)
-        .replace("\"#000000\"", "\"currentColor\"")
-        .replace("\"black\"", "\"currentColor\"")
+        .replacen("<rect width=\"100%\" height=\"100%\" fill=\"white\" />", "", 1);
+    in_page_colors(&svg)
+}
+
+/// Black is the colour of the page's text; the page has others for the rest in the dark.
+fn in_page_colors(svg: &str) -> String {
+    svg.replace("\"#000000\"", "\"currentColor\"").replace("\"black\"", "\"currentColor\"")
 }
 
 /// So many significant digits.

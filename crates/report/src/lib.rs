@@ -15,6 +15,7 @@ mod latex;
 mod markdown;
 #[cfg(feature = "pdf")]
 mod pdf;
+mod poses;
 mod review;
 mod series;
 mod simulation;
@@ -29,6 +30,7 @@ pub use calibration::{calibration_figures, residuals_csv};
 pub use document::Document;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
+pub use poses::position_figure;
 pub use series::{series_csv, series_parquet};
 pub use system_calibration::{system_calibration_figures, system_residuals_csv};
 pub use visible::visible;

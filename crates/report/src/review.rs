@@ -280,6 +280,8 @@ fn positions(
         ],
         rows,
     ));
+    let at = &s.simulation.conditions;
+    blocks.extend(pictures::poses(&s.poses, at.latitude_deg, at.latitude_by_default, id));
     blocks.push(pictures::attitudes(s, &format!("{id}_attitude")));
     if coefficients.iter().any(|q| !q.excitation.is_empty()) {
         blocks.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));

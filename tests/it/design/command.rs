@@ -94,7 +94,7 @@ fn the_winner_is_a_scheme_file() {
     assert!(found.status.success(), "{}", stderr(&found));
     let found: serde_json::Value = serde_json::from_slice(&found.stdout).expect("JSON");
     assert_eq!((&found["schema"], &found["search"]["proven"]), (&"obsdeg.design/1".into(), &true.into()));
-    for name in ["design.json", "front.svg", "front.png"] {
+    for name in ["design.json", "front.svg", "front.png", "positions.svg"] {
         assert!(place.path().join("found").join(name).is_file(), "{name}");
     }
     let compared = json(&["compare", &winner, "--format", "json"]);
@@ -122,6 +122,8 @@ fn the_winner_is_a_scheme_file() {
             !turns.is_empty() && turns.len() == axes.map(|a| text.matches(a).count()).iter().sum::<usize>(),
             "{text}"
         );
+        let drawn = std::fs::read_to_string(place.path().join("found/positions.svg")).expect("a picture");
+        assert_eq!(drawn.matches("; after 180 deg about ").count(), turns.len(), "{drawn}");
         let promised = found["found"][0]["worst_sigma_dph"].as_f64().expect("a number");
         let sigma = |rows: &serde_json::Value| {
             let row = rows.as_array().expect("rows").iter().find(|q| q["name"] == "D_FY").expect("D_FY");

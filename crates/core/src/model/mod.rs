@@ -14,6 +14,7 @@ mod parser;
 pub(crate) mod path;
 pub(crate) mod per_gyro;
 pub(crate) mod platform;
+pub(crate) mod pose;
 pub mod ranges;
 pub(crate) mod recording;
 pub(crate) mod ring;
@@ -40,6 +41,7 @@ pub use platform::{
     AZIMUTH, Block, LOCAL, Observed, PSI_EPS, Platform, Point, RandomValues, Sample, SteadyTurn,
     earth_rate_in, local_dynamics, local_output,
 };
+pub use pose::{Pose, Way};
 pub use recording::{Recording, Still};
 pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};

@@ -1,6 +1,7 @@
 //! What a review holds: plain data.
 
 use obsdeg_core::analysis::Analysis;
+use obsdeg_core::model::Pose;
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_evidence::compare::Comparison;
@@ -39,6 +40,8 @@ pub struct SchemeReview {
     pub analysis: Analysis,
     /// Its positions.
     pub positions: Vec<PositionReview>,
+    /// The platform at each of them, and the turns between them.
+    pub poses: Vec<Pose>,
     /// The way of gravity through the platform.
     pub attitudes: Vec<Attitude>,
     /// One run of the filter.

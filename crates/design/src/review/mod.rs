@@ -6,7 +6,7 @@ pub use answer::*;
 
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::{Carry, Dwell, Scheme};
+use obsdeg_core::model::{Carry, Dwell, Pose, Scheme};
 use obsdeg_core::system::{ModelError, SystemModel, SystemOptions, analyze_system};
 use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
@@ -146,6 +146,7 @@ fn scheme(
         name: name.clone(),
         description: scheme.description.clone(),
         positions: positions(scheme, conditions, &plan),
+        poses: poses(scheme, conditions),
         attitudes: attitudes(&plan),
         analysis,
         simulation,
@@ -190,6 +191,13 @@ fn positions(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Vec<Posit
         }
     };
     scheme.positions.iter().enumerate().map(row).collect()
+}
+
+/// The platform at every position; a slew rate of the conditions says how each is reached.
+fn poses(scheme: &Scheme, conditions: &Conditions) -> Vec<Pose> {
+    let mut scheme = scheme.clone();
+    scheme.simulation.slew_rate_deg_s = conditions.slew_rate_deg_s.filter(|_| conditions.slews);
+    scheme.poses()
 }
 
 /// Gravity along the platform axes over time.

@@ -1,6 +1,7 @@
 //! The pictures of a review.
 
 use obsdeg_core::analysis::Analysis;
+use obsdeg_core::model::Pose;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::review::{SchemeReview, Sweep};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
@@ -11,6 +12,7 @@ use crate::design::bound_steps;
 use crate::document::{Block, Drawing, Picture};
 use crate::figure::{BLACK, BLUE, Figure, GREEN, Line, ORANGE, Stroke, heat, style};
 use crate::figures::{error_figure, file_name, history_figure, series_title, slope_figure};
+use crate::poses::{caption, panels};
 
 /// At most this many points a curve.
 const POINTS: usize = 160;
@@ -67,6 +69,29 @@ pub(super) fn staircase(a: &Analysis, name: &str) -> Block {
 
 pub(super) fn model_staircase(a: &SystemAnalysis, name: &str) -> Block {
     curves(name, "Rank over the order of derivatives", stairs(&a.rank_profile, a.unknowns))
+}
+
+/// At most this many positions are drawn, so many in a picture.
+const POSES: usize = 96;
+const PANELS: usize = 12;
+
+/// The platform at every position.
+pub(super) fn poses(poses: &[Pose], latitude_deg: f64, by_default: bool, id: &str) -> Vec<Block> {
+    let drawn = &poses[..poses.len().min(POSES)];
+    let of = |(i, some): (usize, &[Pose])| {
+        let caption = match (i, some) {
+            (0, _) => caption(poses, latitude_deg, by_default),
+            (_, [first, .., last]) => format!("The same at {} to {}", first.name, last.name),
+            (_, others) => format!("The same at {}", others[0].name),
+        };
+        let drawing = Drawing::Panels(panels(some, latitude_deg));
+        Block::Picture(Picture { name: format!("{id}_positions_{}", i + 1), caption, drawing })
+    };
+    let mut out: Vec<Block> = drawn.chunks(PANELS).enumerate().map(of).collect();
+    if drawn.len() < poses.len() {
+        out.push(Block::Text(format!("The first {POSES} of {} positions are drawn.", poses.len())));
+    }
+    out
 }
 
 /// Gravity along the platform axes over time.
