@@ -9,7 +9,7 @@ use obsdeg_calibration::platform::STANDARD_GRAVITY;
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::system::SystemFinding;
 use obsdeg_calibration::{
-    Going, Options, SystemCalibrationError, SystemOptions, calibrate, calibrate_system,
+    Before, Going, Options, SystemCalibrationError, SystemOptions, calibrate, calibrate_system,
 };
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges;
@@ -165,7 +165,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         gravity_m_s2: a.gravity,
         estimate_noise: a.estimate_noise,
         gate: a.gate,
-        prior: a.before.as_deref().map(prior).transpose()?,
+        prior: a.before.as_deref().map(|p| prior(p, "obsdeg.calibration", "scheme")).transpose()?,
         seed: a.seed,
     };
     let calibration = calibrate(&scheme, &a.conditions(&scheme), records, &options, &going)?;
@@ -204,7 +204,7 @@ fn run_model(a: &Arguments, path: &Path, going: &dyn Fn(Going<'_>) -> bool) -> R
     let options = SystemOptions {
         starts: a.starts as usize,
         profiles: a.profile.clone(),
-        prior: a.before.as_deref().map(prior).transpose()?,
+        prior: a.before.as_deref().map(|p| prior(p, "obsdeg.system-calibration", "model")).transpose()?,
         seed: a.seed,
     };
     let found = calibrate_system(&file.model, record, &options, going).map_err(|e| match e {
@@ -254,26 +254,35 @@ fn record(path: &Path) -> Result<Record, Failure> {
     Record::file(&name, file).map_err(|e| wrong(&e))
 }
 
-/// Estimates and covariance of a calibration.
-fn prior(path: &Path) -> Result<CovarianceTable, Failure> {
+/// A calibration before, of a scheme or a model as `kind` and `of`, the schema and the key that says what it is of.
+fn prior<S: serde::de::DeserializeOwned>(path: &Path, kind: &str, of: &str) -> Result<Before<S>, Failure> {
     let source = Source::read(path, "calibration")?;
-    let wrong = |reason: String| {
+    let wrong = |found: &str| {
         Failure::input(format!(
-            "{}: {reason}; expected the calibration.json of `obsdeg calibrate -o`",
+            "{}: {found}; expected the calibration.json that `obsdeg calibrate -o` wrote of a {of}",
             path.display()
         ))
     };
-    let value: serde_json::Value = serde_json::from_str(source.text()).map_err(|e| wrong(e.to_string()))?;
-    let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
-    let factor = match schema.split('/').next() {
-        Some("obsdeg.calibration") => &value["fit"]["factor"],
-        Some("obsdeg.system-calibration") => &value["factor"],
-        _ => return Err(wrong("no calibration".into())),
+    let value: serde_json::Value = match serde_json::from_str(source.text()) {
+        Ok(value) => value,
+        Err(_) if !source.text().trim_start().starts_with('{') => return Err(wrong("no JSON")),
+        Err(e) => return Err(wrong(&format!("JSON that cannot be read ({e})"))),
     };
-    let table = value.get("covariance").cloned().unwrap_or_default();
-    let mut table: CovarianceTable = serde_json::from_value(table).map_err(|e| wrong(e.to_string()))?;
+    let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
+    match schema.split('/').next().unwrap_or_default() {
+        found if found == kind => {}
+        "obsdeg.calibration" => return Err(wrong("the calibration of a scheme")),
+        "obsdeg.system-calibration" => return Err(wrong("the calibration of a model")),
+        _ => return Err(wrong("no calibration")),
+    }
+    let key = |name: &str| value.get(name).cloned().unwrap_or_default();
+    let older = |e: serde_json::Error| wrong(&format!("a calibration of another version ({e})"));
+    let mut estimates: CovarianceTable = serde_json::from_value(key("covariance")).map_err(older)?;
     // sigmas that are not to be relied upon as they are
-    let rescaled = factor.as_f64().filter(|f| *f > 1.0 && value["consistent"] == false).unwrap_or(1.0);
-    table.covariance.iter_mut().flatten().for_each(|c| *c *= rescaled * rescaled);
-    Ok(table)
+    if value["consistent"] == false {
+        estimates.covariance.clone_from(&estimates.rescaled);
+    }
+    let rests_on = serde_json::from_value(key("rests_on")).map_err(older)?;
+    let of = serde_json::from_value(key(if of == "scheme" { "setup" } else { of })).map_err(older)?;
+    Ok(Before { estimates, rests_on, of })
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use obsdeg_calibration::Calibration;
+use obsdeg_calibration::{Calibration, Setup};
 use obsdeg_core::system::SystemModel;
 use obsdeg_design::review::{ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
@@ -113,7 +113,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             }
         }
     }
-    let calibrations = a.calibration.iter().map(|path| calibration(path)).collect::<Result<Vec<_>, _>>()?;
+    let calibration = |path: &PathBuf| calibration(path, &entries);
+    let calibrations = a.calibration.iter().map(calibration).collect::<Result<Vec<_>, _>>()?;
     if !entries.is_empty() {
         a.conditions.concern(entries.iter().map(|e| &e.scheme))?;
     }
@@ -137,14 +138,28 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))
 }
 
-/// A calibration of a scheme, and what it is called: its folder.
-fn calibration(path: &Path) -> Result<(String, Calibration), Failure> {
+/// A calibration of one of the schemes, and what it is called: its folder.
+fn calibration(path: &Path, entries: &[Entry]) -> Result<(String, Calibration), Failure> {
     let file = if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() };
     let source = Source::read(&file, "calibration")?;
-    let found = serde_json::from_str(source.text()).map_err(|e| {
-        let expected = "expected what `obsdeg calibrate -o` wrote of a scheme";
-        Failure::input(format!("{}: {e}; {expected}", file.display()))
+    let wrong = |found: &str| {
+        let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";
+        Failure::input(format!("{}: {found}; {expected}", file.display()))
+    };
+    let of_model = source.text().contains("\"obsdeg.system-calibration/");
+    let found: Calibration = serde_json::from_str(source.text()).map_err(|e| match of_model {
+        true => wrong("the calibration of a model"),
+        false => wrong(&e.to_string()),
     })?;
+    let differences = entries.iter().map(|e| (&e.name, Setup::of(&e.scheme).differences(&found.setup)));
+    let nearest = differences.min_by_key(|(_, d)| d.len());
+    match nearest {
+        None => return Err(wrong("no scheme is reviewed that it could be of")),
+        Some((_, d)) if d.is_empty() => {}
+        Some((name, d)) => {
+            return Err(wrong(&format!("the calibration of another scheme than {name} ({})", d.join("; "))));
+        }
+    }
     let named = if path.is_dir() { Some(path) } else { path.parent() };
     let name = named.and_then(Path::file_name).map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     Ok((name, found))

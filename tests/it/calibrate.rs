@@ -57,15 +57,12 @@ fn a_day_at_the_bench() {
     let residuals = fs::read_to_string(format!("{at}/residuals.csv")).expect("written");
     assert_eq!(residuals.lines().count(), 601);
     // a second run with what the first says before: sigmas are smaller by about the root of two
-    let again = json(&[
-        "calibrate",
-        SCHEME,
-        RECORD,
-        "--format",
-        "json",
-        "--prior",
-        &format!("{at}/calibration.json"),
-    ]);
+    let prior = format!("{at}/calibration.json");
+    let other = folder.path().join("other.csv");
+    fs::write(&other, another(&fs::read_to_string(crate_root(RECORD)).expect("the record")))
+        .expect("written");
+    let other = other.display().to_string();
+    let again = json(&["calibrate", SCHEME, &other, "--format", "json", "--prior", &prior]);
     for (k, u) in again["unknowns"].as_array().expect("unknowns").iter().enumerate().skip(3) {
         let sigma = |u: &Value| u["sigma"].as_f64().expect("a number");
         let factor = sigma(&found["unknowns"][k]) / sigma(u);
@@ -74,6 +71,28 @@ fn a_day_at_the_bench() {
             - found["unknowns"][k]["estimate"].as_f64().expect("a number");
         assert!(moved.abs() < 1e-3 * sigma(u), "{u}");
     }
+    // the first says nothing twice, and other files are no calibration
+    for (record, prior, message) in [
+        (RECORD, prior.as_str(), "which the calibration before rests on; expected records of different runs"),
+        (
+            &other,
+            &format!("{at}/coefficients.csv"),
+            "coefficients.csv: no JSON; expected the calibration.json",
+        ),
+        (&other, "crates/calibration/Cargo.toml", "Cargo.toml: no JSON; expected the calibration.json"),
+    ] {
+        let output = run(&["calibrate", SCHEME, record, "--prior", prior]);
+        let found = stderr(&output);
+        assert!(output.status.code() == Some(2) && found.contains(message), "{message}: {found}");
+    }
+    let output = run(&["calibrate", SCHEME, RECORD, RECORD]);
+    assert!(stderr(&output).contains("expected records of different runs"), "{}", stderr(&output));
+}
+
+/// The record of another run that says the same: one number is another by its last digit.
+fn another(text: &str) -> String {
+    assert!(text.contains("-0.5758776999999999"));
+    text.replacen("-0.5758776999999999", "-0.5758777", 1)
 }
 
 /// A review has the calibration beside what the scheme promised, in every format; what is none is refused.
@@ -122,6 +141,28 @@ fn a_review_of_the_run() {
         "{}",
         stderr(&output)
     );
+    // of another scheme, or of a model
+    let other = fs::read_to_string(crate_root(SCHEME)).expect("the scheme");
+    fs::write(path("other.toml"), other.replace("[60, 80, 15]", "[61, 80, 15]")).expect("written");
+    let model = path("model");
+    run(&[
+        "calibrate",
+        "--model",
+        "examples/theophylline/model.toml",
+        "examples/theophylline/data.csv",
+        "-o",
+        &model,
+        "-q",
+    ]);
+    for (scheme, calibration, message) in [
+        (path("other.toml").as_str(), &at, "(angles of p4 60,80,15 instead of 61,80,15)"),
+        (SCHEME, &model, "the calibration of a model; expected what"),
+        ("examples/theophylline/model.toml", &at, "no scheme is reviewed that it could be of"),
+    ] {
+        let output = run(&["report", scheme, "--calibration", calibration, "-o", &path("no.html")]);
+        let found = stderr(&output);
+        assert!(output.status.code() == Some(2) && found.contains(message), "{message}: {found}");
+    }
     assert!(!folder.path().join("no.html").exists());
 }
 
@@ -153,8 +194,9 @@ fn the_same_from_everywhere() {
     let piped: Value =
         serde_json::from_slice(&child.wait_with_output().expect("it ends").stdout).expect("JSON");
     assert_eq!(estimates(&csv), estimates(&piped));
-    // twice the same record: coefficients as before, with sigmas smaller by the root of two, and a psi for each
+    // a record and one that says the same: coefficients as before, with sigmas smaller by the root of two, and a psi for each
     // (what fits badly by chance fits as badly twice: there is a check that fails)
+    fs::write(&path, parquet(&another(&text))).expect("written");
     let twice = run(&["calibrate", SCHEME, RECORD, &name, "--format", "json"]);
     let twice: Value = serde_json::from_slice(&twice.stdout).expect("JSON");
     let find = |v: &Value, name: &str| -> [f64; 2] {
@@ -432,10 +474,7 @@ fn bad_records_are_refused_with_their_place() {
         ),
         (with(2, "nan"), "bad.csv: line 3, column `fx [g]`: found NaN, expected a finite number"),
         (with(2, "much"), "bad.csv: line 3, column `fx [g]`: expected a number, found `much`"),
-        (
-            with(0, "4"),
-            "bad.csv: line 3, column `t [s]`: the time 4 s is not after that of the row before, 4 s",
-        ),
+        (with(0, "4"), "bad.csv: line 3, column `t [s]`: the time 4 is not after that of the row before, 4"),
         (with(1, "p7"), "bad.csv: line 3, column `position`: no position is called `p7`; expected p1, p2"),
         (with(1, "p2"), "bad.csv: line 4, column `position`: found `p1`, expected p3 (the scheme's"),
         (right.replace(",p6,", ",,"), "bad.csv: the position p6 of the scheme has no samples"),

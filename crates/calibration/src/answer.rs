@@ -4,6 +4,8 @@ use obsdeg_core::degree::Status;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::setup::{Basis, Setup};
+
 /// Name and version of the JSON layout.
 pub(crate) const SCHEMA: &str = "obsdeg.calibration/1";
 
@@ -42,6 +44,10 @@ pub struct Calibration {
     pub records: Vec<RecordReport>,
     /// What was assumed.
     pub assumed: Assumed,
+    /// What it is of.
+    pub setup: Setup,
+    /// The records that it rests on, those of the calibration before too.
+    pub rests_on: Vec<Basis>,
     /// What is left over time, by record and component.
     pub series: Vec<ResidualSeries>,
     /// Every measurement and what the estimate leaves of it.
@@ -153,10 +159,12 @@ pub struct Estimated {
     pub estimate: Option<f64>,
     /// Its standard deviation, by the noise that was assumed.
     pub sigma: Option<f64>,
-    /// The same times the root of chi-square per degree of freedom, where that is above one.
+    /// The same with errors of the records times the root of chi-square per degree of freedom, where that is above one; what was known before stays as it is.
     pub sigma_rescaled: Option<f64>,
-    /// What the scheme, run as it says, promised.
+    /// What the linear model has at the times and with the noise of the records (and what was known before), where the platform is at the attitudes of the scheme.
     pub predicted_sigma: Option<f64>,
+    /// What sigma is times that with all known that nothing determines: above one where the nonlinear model bends what is held within its prior into the estimate.
+    pub held_factor: Option<f64>,
     /// How far the prior of the scheme would move the estimate, in sigma.
     pub prior_shift: Option<f64>,
     /// What it would make of sigma: 1 where it does not matter.
@@ -174,6 +182,8 @@ pub struct CovarianceTable {
     pub estimates: Vec<f64>,
     /// The covariance of their errors, by the noise that was assumed.
     pub covariance: Vec<Vec<f64>>,
+    /// The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known before stays as it is.
+    pub rescaled: Vec<Vec<f64>>,
 }
 
 /// How well everything fits.
@@ -346,6 +356,10 @@ pub struct Assumed {
     pub gate: f64,
     /// Names taken from a calibration before.
     pub known: Vec<String>,
+    /// What is different in the scheme of that.
+    pub known_differs: Vec<String>,
+    /// What nothing determines, unknown by unknown: the standard deviation within which it is held, in its unit.
+    pub held: Vec<(String, f64, String)>,
     /// Seed of the exact verdicts.
     pub seed: u64,
 }

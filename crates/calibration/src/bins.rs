@@ -62,7 +62,7 @@ pub struct Sample {
 }
 
 /// Fewest samples of a line of which some may be spikes.
-const FEWEST: usize = 8;
+pub(crate) const FEWEST: usize = 8;
 /// A spike is so many standard deviations off: of a million samples of a right record none is, but by a chance of one in five hundred.
 const SPIKE: f64 = 6.0;
 

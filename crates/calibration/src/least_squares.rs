@@ -5,7 +5,7 @@
 //! doi:10.1007/BF00929453; Bierman 1977, chapter X). At the start the triangle is the root of the information on the start, its last entry what no start explains;
 //! going forward again, the rows of `xi` give every state of the run with its covariance.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 use obsdeg_ekf::{EkfError, Stage};
 
 /// A run linearised along one trajectory: of every step Phi, Q and rows ([`Stage`]s of one step), a root of Q, and what the trajectory leaves of the measurements.
@@ -234,10 +234,31 @@ impl Solution {
         &self.inverse_root * self.inverse_root.transpose()
     }
 
+    /// The covariance of two functionals where errors of the rows are `factor` times as large as they were taken for, but for those of the rows `known` (any x n):
+    /// `a^T C (f^2 (C^-1 - K^T K) + K^T K) C b`.
+    pub fn covariance_with(
+        &self,
+        a: &[(usize, f64)],
+        b: &[(usize, f64)],
+        factor: f64,
+        known: &DMatrix<f64>,
+    ) -> f64 {
+        let more = factor * factor;
+        // by roots: what nothing determines is huge in the covariance itself
+        let (a, b) = (self.whitened(a), self.whitened(b));
+        let known = known * &self.inverse_root;
+        more * a.dot(&b) - (more - 1.0) * (&known * a.transpose()).dot(&(&known * b.transpose()))
+    }
+
+    /// A functional of the unknowns as one of unit errors.
+    fn whitened(&self, terms: &[(usize, f64)]) -> RowDVector<f64> {
+        let zero = RowDVector::zeros(self.inverse_root.ncols());
+        terms.iter().fold(zero, |sum, &(i, k)| sum + self.inverse_root.row(i) * k)
+    }
+
     /// The standard deviation of a functional of the unknowns.
     pub fn sigma(&self, terms: &[(usize, f64)]) -> f64 {
-        let zero = nalgebra::RowDVector::zeros(self.inverse_root.ncols());
-        terms.iter().fold(zero, |sum, &(i, k)| sum + self.inverse_root.row(i) * k).norm()
+        self.whitened(terms).norm()
     }
 }
 
@@ -246,6 +267,23 @@ mod tests {
     use obsdeg_ekf::{ProcessNoise, ScalarOutput, Transition};
 
     use super::*;
+
+    /// Errors of the data three times as large, those of what is known as they were: `A^-1 (9 J^T J + K^T K) A^-1`, where `A = J^T J + K^T K`.
+    #[test]
+    fn what_is_known_stays_as_it_is() {
+        let j = DMatrix::from_fn(5, 3, |i, k| ((3 * i + k) as f64 * 1.7).sin() * 4.0);
+        let known = DMatrix::from_row_slice(2, 3, &[2.0, 0.3, 0.0, -1.0, 4.0, 0.5]);
+        let mut rows = Rows::new(3);
+        rows.add(&j, &DVector::zeros(5));
+        rows.add(&known, &DVector::zeros(2));
+        let solution = rows.solve().expect("determined");
+        let (data, before) = (j.transpose() * &j, known.transpose() * &known);
+        let inverse = (&data + &before).try_inverse().expect("regular");
+        let expected = &inverse * (data * 9.0 + before) * &inverse;
+        let found =
+            DMatrix::from_fn(3, 3, |i, k| solution.covariance_with(&[(i, 1.0)], &[(k, 1.0)], 3.0, &known));
+        assert!((found - expected).amax() < 1e-12);
+    }
 
     /// A walk in two states with a constant, seen in part: against the normal equations of all states at once.
     #[test]

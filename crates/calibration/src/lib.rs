@@ -8,6 +8,7 @@ pub mod bins;
 pub mod least_squares;
 pub mod platform;
 pub mod record;
+mod setup;
 pub mod still;
 pub mod system;
 
@@ -27,4 +28,5 @@ pub enum Going<'a> {
 
 pub use answer::Calibration;
 pub use platform::{CalibrationError, Options, calibrate};
+pub use setup::{Basis, Before, Setup};
 pub use system::{SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system};

@@ -8,6 +8,7 @@ use std::io::{BufRead, BufReader, Read, Seek};
 use obsdeg_core::model::Recording;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
+use sha2::{Digest, Sha256};
 
 /// Where something of a record is wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,6 +44,18 @@ pub enum RecordError {
     Empty {
         /// The record.
         record: String,
+    },
+    /// Columns that no commas part.
+    #[error(
+        "{record}: line {line}: the columns are parted by {found}; expected commas (and points in numbers)"
+    )]
+    Separator {
+        /// The record.
+        record: String,
+        /// The line of the header.
+        line: u64,
+        /// What parts them.
+        found: &'static str,
     },
     /// A header that is none.
     #[error("{place}: expected a name, or a name with its unit as in `fx [g]`, once")]
@@ -106,7 +119,7 @@ pub enum RecordError {
     },
     /// Time that does not go on.
     #[error(
-        "{place}: the time {found} s is not after that of the row before, {before} s; expected times that increase"
+        "{place}: the time {found} is not after that of the row before, {before}; expected times that increase"
     )]
     Time {
         /// Where.
@@ -286,6 +299,12 @@ impl Record {
         if !lines.next(name)? {
             return Err(RecordError::Empty { record: name.into() });
         }
+        if let [header] = &lines.cells[..]
+            && let Some((_, found)) =
+                [(';', "semicolons"), ('\t', "tabs")].into_iter().find(|(c, _)| header.contains(*c))
+        {
+            return Err(RecordError::Separator { record: name.into(), line: lines.line, found });
+        }
         let columns = columns(name, lines.cells.clone(), lines.line)?;
         Ok(Self { name: name.into(), columns, rows: Rows::Csv(lines) })
     }
@@ -369,7 +388,8 @@ impl Record {
     }
 
     /// Goes through all rows: of each the `wanted` numbers and the text of the `label` column. The first wanted is the time, which must be there and
-    /// increase; it may begin anew with another label where `anew` says so.
+    /// increase; it may begin anew with another label where `anew` says so. Gives the digest of these numbers, by which two records are the same: the first half
+    /// of SHA-256 (FIPS 180-4), in hexadecimal.
     ///
     /// # Errors
     /// [`RecordError`], and what `each` refuses.
@@ -379,8 +399,9 @@ impl Record {
         label: Option<usize>,
         anew: bool,
         mut each: impl FnMut(Row<'_>) -> Result<(), E>,
-    ) -> Result<(), E> {
+    ) -> Result<String, E> {
         let Self { name, columns, rows } = self;
+        let mut digest = Sha256::new();
         let mut before = f64::NEG_INFINITY;
         let mut last = String::new();
         let mut any = false;
@@ -407,10 +428,16 @@ impl Record {
                 last = label.into();
             }
             if t <= before {
-                let (found, before) = (t.to_string(), before.to_string());
+                // as they are written, but for rounding
+                let written = |t: f64| (t / wanted[0].scale * 1e9).round() / 1e9;
+                let (found, before) = (written(t).to_string(), written(before).to_string());
                 return Err(RecordError::Time { place: at(), found, before }.into());
             }
             (before, any) = (t, true);
+            // what is not there is NaN
+            for x in &numbers[..wanted.len()] {
+                digest.update((x.unwrap_or(f64::NAN) + 0.0).to_le_bytes());
+            }
             each(Row { line, numbers: &numbers[..wanted.len()], label })
         };
         match rows {
@@ -443,7 +470,10 @@ impl Record {
                 }
             }
         }
-        if any { Ok(()) } else { Err(RecordError::NoRows { record: name }.into()) }
+        if !any {
+            return Err(RecordError::NoRows { record: name }.into());
+        }
+        Ok(digest.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect())
     }
 }
 
@@ -579,11 +609,19 @@ mod tests {
                 "t [s],f [g]\n0,NaN\n",
                 "r.csv: line 2, column `f [g]`: found NaN, expected a finite number (an empty cell is a value that is not there)",
             ),
+            (
+                "t [s];f [g]\n0;1\n",
+                "r.csv: line 1: the columns are parted by semicolons; expected commas (and points in numbers)",
+            ),
+            (
+                "t [ms],f [g]\n100,1\n100,1\n",
+                "r.csv: line 3, column `t [ms]`: the time 100 is not after that of the row before, 100; expected times that increase",
+            ),
             ("t [s],f [g]\n,1\n", "r.csv: line 2, column `t [s]`: expected a number, found ``"),
             ("t [s],f [g]\n0,1\n0.5\n", "r.csv: line 3: 1 cells; expected 2, as in the header"),
             (
                 "t [s],f [g]\n0,1\n0,1\n",
-                "r.csv: line 3, column `t [s]`: the time 0 s is not after that of the row before, 0 s; expected times that increase",
+                "r.csv: line 3, column `t [s]`: the time 0 is not after that of the row before, 0; expected times that increase",
             ),
         ] {
             assert_eq!(all(text).expect_err(text).to_string(), message);

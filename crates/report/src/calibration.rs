@@ -87,9 +87,16 @@ fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
+/// From this factor of sigma on, what is held shows.
+const HELD: f64 = 1.05;
+
 /// Why there is no estimate, or what is to be said of it.
 fn verdict(e: &Estimated) -> String {
+    let held = e.held_factor.filter(|f| e.determined && *f > HELD);
     match (e.determined, e.degree) {
+        (true, _) if held.is_some() => {
+            format!("estimated; sigma x{} by what is HELD (see there)", number(held.unwrap_or(1.0)))
+        }
         (true, Some(_)) => "estimated".into(),
         (true, None) => "estimated; not by derivatives alone".into(),
         (false, Some(_)) => "observable by the scheme, not determined by these records".into(),
@@ -120,11 +127,11 @@ fn row(e: &Estimated) -> Vec<String> {
 fn position(p: &PositionFit, record: Option<usize>) -> Vec<String> {
     vec![
         format!("{}{}", p.position, record.map_or_else(String::new, |r| format!(" (record {})", r + 1))),
-        number(p.start_s),
-        number(p.end_s),
+        format!("{:.1}", p.start_s),
+        format!("{:.1}", p.end_s),
         p.measurements.to_string(),
         number(p.chi_square),
-        p.moves.as_ref().map_or_else(|| "-".into(), |m| format!("{} by {:+.1}", m.name, m.sigmas)),
+        p.moves.as_ref().map_or_else(|| "-".into(), |m| format!("{} by {:+.1} sigma", m.name, m.sigmas)),
         if p.loses.is_empty() { "-".into() } else { p.loses.join(", ") },
     ]
 }
@@ -188,12 +195,49 @@ fn assumed(c: &Calibration) -> Vec<String> {
         format!("white drift {} deg/sqrt(h)", number(a.drift_noise_deg_sqrt_h)),
         format!("samples within {} s are one measurement: the value of a line at their middle", a.bin_s),
         format!("one g is {} m/s^2", a.gravity_m_s2),
-        "what nothing determines is held within ten times the prior of the scheme: attitudes far from the computed ones bend a little of that into combinations (column prior)".into(),
         format!("psi is that of the start of a record; full attitudes; seed {}", a.seed),
     ];
     if !a.known.is_empty() {
         out.push(format!("known from a calibration before: {}", a.known.join(", ")));
+        if !a.known_differs.is_empty() {
+            out.push(format!(
+                "that calibration has {}: its estimates hold what other terms would explain",
+                a.known_differs.join(", ")
+            ));
+        }
     }
+    out
+}
+
+/// What nothing determines, and which sigmas that is in.
+fn held(c: &Calibration) -> Vec<String> {
+    let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
+    let all: Vec<&Estimated> = c.unknowns.iter().chain(&c.combinations).filter(shows).collect();
+    if c.assumed.held.is_empty() {
+        return Vec::new();
+    }
+    let widths: Vec<String> = c
+        .assumed
+        .held
+        .iter()
+        .map(|(name, width, unit)| format!("{name} {} {unit}", number(*width)))
+        .collect();
+    let mut out = vec![format!(
+        "what nothing determines is held within ten times its prior about its first estimate: {}",
+        widths.join(", ")
+    )];
+    out.push(if all.is_empty() {
+        format!("were it known, no sigma would be smaller by more than {:.0} %", 100.0 * (HELD - 1.0))
+    } else {
+        let each: Vec<String> = all
+            .iter()
+            .map(|e| format!("{} {} times", e.name, number(e.held_factor.unwrap_or(1.0))))
+            .collect();
+        format!(
+            "of the linear model it is in no estimate; where attitudes are off by degrees the nonlinear terms take it into some, and their sigmas are larger than were it known: {}. A smaller prior of what is held ([simulation.priors]) or more positions make them smaller",
+            each.join(", ")
+        )
+    });
     out
 }
 
@@ -202,18 +246,33 @@ fn rounding(x: f64) -> String {
     if x < 1e-9 { "1e-9".into() } else { number(x) }
 }
 
+fn is_whole(x: f64) -> bool {
+    (x - x.round()).abs() < 0.05
+}
+
+/// Degrees of freedom: parts where there are some.
+fn degrees(x: f64) -> String {
+    if is_whole(x) { format!("{x:.0}") } else { format!("{x:.1}") }
+}
+
 fn fit(c: &Calibration) -> Vec<String> {
     let f = &c.fit;
     let per = f.factor * f.factor;
     let mut out = vec![
         format!(
-            "chi-square {} on {:.1} degrees of freedom: {:.4} each (band of 99.9 % {:.4} to {:.4}); rescaled sigmas are times {:.3}, where that is above one",
+            "chi-square {} on {} degrees of freedom{}: {} each (band of 99.9 % {:.4} to {:.4}); rescaled sigmas are times {:.3}{}",
             number(f.chi_square),
-            f.degrees_of_freedom,
-            per,
+            degrees(f.degrees_of_freedom),
+            if is_whole(f.degrees_of_freedom) {
+                ""
+            } else {
+                " (measurements less what the estimate takes of them, where random drift takes parts)"
+            },
+            number(per),
             f.band.0,
             f.band.1,
-            f.factor.max(1.0)
+            f.factor.max(1.0),
+            if c.assumed.known.is_empty() { "" } else { ", but for what was known before" }
         ),
         format!("{} linearisations along the whole run", f.passes),
         format!(
@@ -253,7 +312,7 @@ impl Answer for Calibration {
             left("verdict"),
         ];
         let mut blocks = vec![Block::table(
-            "Estimates (degree: exact verdict; predicted: sigma of the scheme as planned; prior: what that of the scheme would do, in sigma and to sigma)",
+            "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the scheme would do, in sigma and to sigma)",
             columns,
             self.unknowns.iter().map(row),
         )];
@@ -265,6 +324,10 @@ impl Answer for Calibration {
                 rows,
             ));
         }
+        let held = held(self);
+        if !held.is_empty() {
+            blocks.push(Block::list("Held", held));
+        }
         blocks.push(Block::list("Fit", fit(self)));
         let each = self.positions.len() / self.records.len().max(1);
         let columns = [
@@ -273,11 +336,11 @@ impl Answer for Calibration {
             right("to [s]"),
             right("measured"),
             right("chi-square"),
-            left("without it moves most [sigma]"),
+            left("without it moves most"),
             left("without it not determined"),
         ];
         blocks.push(Block::table(
-            "Positions (chi-square per degree of freedom)",
+            "Positions (times of the record; chi-square per degree of freedom)",
             columns,
             self.positions
                 .iter()

@@ -95,9 +95,10 @@ impl Answer for SystemCalibration {
         }
         let per = self.factor * self.factor;
         let mut fit = vec![format!(
-            "chi-square {} on {} degrees of freedom: {per:.4} each (band of 99.9 % {:.4} to {:.4})",
+            "chi-square {} on {} degrees of freedom: {} each (band of 99.9 % {:.4} to {:.4})",
             number(self.chi_square),
             self.degrees_of_freedom,
+            number(per),
             self.band.0,
             self.band.1
         )];
@@ -166,6 +167,9 @@ impl Answer for SystemCalibration {
         ));
         if !self.ignored.is_empty() {
             read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
+        }
+        if self.shared {
+            read.push("the calibration before rests on the same record, by another model: what both models take of it counts twice".into());
         }
         blocks.push(Block::list("Read", read));
         Document { title: format!("Calibration: {}", self.name), lead, blocks }

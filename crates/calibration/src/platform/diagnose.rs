@@ -4,45 +4,29 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{AZIMUTH, Scheme};
-use obsdeg_ekf::allan::overlapping_deviation;
-use obsdeg_ekf::consistency::{autocorrelation, chi_square_band, chi_square_tail, ljung_box};
+use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
-use obsdeg_evidence::simulation::{
-    Conditions, Plan, latitude_of, shown_unit, si_per_shown, sigmas_without_prior,
-};
+use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
-use super::estimate::{Estimate, Problem, WEAK};
+use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
 use super::observe::{By, channel_name};
 use super::run::Key;
 use super::{CalibrationError, Options};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, CovarianceTable, Estimated, Finding, Fit, Moved, Outlier, PositionFit,
-    PositionsBy, RecordReport, Repeatability, Residual, ResidualSeries, SCHEMA, SecondPath, Warmth,
+    Assumed, Calibration, ChannelFit, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
+    PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
+use crate::setup::{Basis, Setup};
 
 /// How many times wider than the prior that of the filter is.
 const WIDE: f64 = 100.0;
 /// The probability with which a right record is in its bands.
-const STRICT: f64 = 0.999;
-/// Fewest residuals of which a correlation is told.
-const FEWEST: usize = 40;
-/// Fewest residuals of a position whose correlation with the temperature is told.
-const FEWEST_WARM: usize = 10;
-/// Most points of a series.
-const POINTS: usize = 1000;
-/// Lags of the correlation.
-const LAGS: usize = 20;
-/// The paths agree to this, in sigma.
-const AGREE: f64 = 1e-6;
+pub(super) const STRICT: f64 = 0.999;
 /// A pull ten times as weak leaves the sigma of what is determined.
 const DETERMINED: f64 = 1.05;
-/// A position that fits this many times worse than the others in the middle is named by itself.
-const APART: f64 = 2.0;
-/// The specific force may be off one g by this where nothing unknown explains it.
-const FORCE: f64 = 3e-4;
 /// Without a position sigma of what it alone determines grows by this at least.
 const LOST: f64 = 1e3;
 
@@ -189,6 +173,7 @@ pub(crate) struct Parts<'a> {
     pub found: &'a Diagnosed,
     pub too_many: Option<usize>,
     pub known: Vec<String>,
+    pub rests_on: Vec<Basis>,
     pub interrupted: bool,
 }
 
@@ -202,58 +187,52 @@ struct Asked {
     determined: bool,
     /// On the unknowns, in SI.
     terms: Vec<(usize, f64)>,
-    /// The same in local coordinates at the estimate.
+    /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the scheme.
     local: Vec<(usize, f64)>,
-    /// What the scheme promised, in SI.
-    predicted: Option<f64>,
+    planned: Vec<(usize, f64)>,
 }
 
 impl Parts<'_> {
     /// The functionals: unknowns, then combinations, those with psi once per record.
-    fn asked(&self, weaker: &Solution) -> (Vec<Asked>, Vec<Asked>) {
+    fn asked(&self, weaker: &Solution, at_rest: &[PlatformState]) -> (Vec<Asked>, Vec<Asked>) {
         let (names, units) = (self.planned.platform.names(), self.planned.platform.units());
         let psi = self.planned.unknowns() - self.planned.platform.coefficients();
         let runs = self.problem.runs.len();
-        let predicted = sigmas_without_prior(self.scheme, self.conditions, 1.0).ok();
-        let make =
-            |name: &str, verdict: (Status, Option<usize>, bool), terms: &[(usize, f64)], at_start: bool| {
-                let of_psi = terms.iter().any(|(i, _)| *i < psi);
-                let single = at_start && terms.len() == 1 && !of_psi;
-                let predicted = predicted.as_ref().filter(|_| single).map(|p| p[terms[0].0]);
-                let many = runs > 1 && of_psi;
-                (0..if many { runs } else { 1 })
-                    .map(|r| {
-                        let index = &self.problem.unknowns.index[r];
-                        let on =
-                            |c: &[(usize, f64)]| c.iter().map(|&(s, k)| (index[s], k)).collect::<Vec<_>>();
-                        let local = on(&self.estimate.at.x[r].functional(terms));
-                        let (narrow, wide) = (self.estimate.solution.sigma(&local), weaker.sigma(&local));
-                        Asked {
-                            name: if many { format!("{name} (record {})", r + 1) } else { name.into() },
-                            unit: units[terms[0].0],
-                            status: verdict.0,
-                            degree: verdict.1,
-                            determined: verdict.2 && wide <= DETERMINED * narrow,
-                            terms: on(terms),
-                            local,
-                            predicted,
-                        }
-                    })
-                    .collect::<Vec<_>>()
-            };
+        let make = |name: &str, verdict: (Status, Option<usize>, bool), terms: &[(usize, f64)]| {
+            let of_psi = terms.iter().any(|(i, _)| *i < psi);
+            let many = runs > 1 && of_psi;
+            (0..if many { runs } else { 1 })
+                .map(|r| {
+                    let index = &self.problem.unknowns.index[r];
+                    let on = |c: &[(usize, f64)]| c.iter().map(|&(s, k)| (index[s], k)).collect::<Vec<_>>();
+                    let local = on(&self.estimate.at.x[r].functional(terms));
+                    let (narrow, wide) = (self.estimate.solution.sigma(&local), weaker.sigma(&local));
+                    Asked {
+                        name: if many { format!("{name} (record {})", r + 1) } else { name.into() },
+                        unit: units[terms[0].0],
+                        status: verdict.0,
+                        degree: verdict.1,
+                        determined: verdict.2 && wide <= DETERMINED * narrow,
+                        terms: on(terms),
+                        local,
+                        planned: on(&at_rest[r].functional(terms)),
+                    }
+                })
+                .collect::<Vec<_>>()
+        };
         let unknowns = self
             .prediction
             .unknowns
             .iter()
             .enumerate()
-            .flat_map(|(c, u)| make(&names[c], (u.status, u.degree, u.determined), &[(c, 1.0)], true));
+            .flat_map(|(c, u)| make(&names[c], (u.status, u.degree, u.determined), &[(c, 1.0)]));
         // what is made of determined unknowns alone says nothing new
         let open = |c: &&PredictedCombination| {
             c.requested || c.terms.iter().any(|&(i, _)| !self.prediction.unknowns[i].determined)
         };
         let combinations = self.prediction.combinations.iter().filter(open).flat_map(|c| {
             let determined = c.status == Status::Observable || c.accuracy_order.is_some();
-            make(&c.expression, (c.status, c.degree, determined), &c.terms, false)
+            make(&c.expression, (c.status, c.degree, determined), &c.terms)
         });
         (unknowns.collect(), combinations.collect())
     }
@@ -265,7 +244,8 @@ impl Parts<'_> {
 
     pub(crate) fn answer(self) -> Result<Calibration, CalibrationError> {
         let weaker = self.problem.step(&self.estimate.at, 10.0 * WEAK)?;
-        let (unknowns, combinations) = self.asked(&weaker);
+        let at_rest = self.problem.at_rest();
+        let (unknowns, combinations) = self.asked(&weaker, &at_rest);
         let determined: Vec<&Asked> = unknowns.iter().chain(&combinations).filter(|a| a.determined).collect();
         if determined.is_empty() {
             return Err(CalibrationError::Nothing);
@@ -274,6 +254,16 @@ impl Parts<'_> {
         let with_prior = self.with_prior()?;
         let values = self.problem.values(&self.estimate.at.x);
         let solution = &self.estimate.solution;
+        let tight = self.problem.step_held(&self.estimate.at, TIGHT)?;
+        let planned: At = self.problem.at(at_rest, 1.0)?;
+        let planned = self.problem.step(&planned, WEAK)?;
+        let none = DMatrix::zeros(0, self.problem.unknowns.n);
+        let known = self.problem.known.as_ref().map_or(&none, |(rows, _)| rows);
+        let between = |a: &Asked, b: &Asked| {
+            let factor = fit.factor.max(1.0);
+            let covariance = solution.covariance_with(&a.local, &b.local, factor, known);
+            covariance / si_per_shown(a.unit) / si_per_shown(b.unit)
+        };
         let estimated = |a: &Asked| {
             let scale = si_per_shown(a.unit);
             let there = |x: f64| a.determined.then_some(x);
@@ -287,8 +277,9 @@ impl Parts<'_> {
                 determined: a.determined,
                 estimate: there(a.terms.iter().map(|&(i, k)| k * values[i]).sum::<f64>() / scale),
                 sigma: there(sigma / scale),
-                sigma_rescaled: there(sigma * fit.factor.max(1.0) / scale),
-                predicted_sigma: a.predicted.filter(|_| a.determined).map(|p| p / scale),
+                sigma_rescaled: there(between(a, a).max(0.0).sqrt()),
+                predicted_sigma: there(planned.sigma(&a.planned) / scale),
+                held_factor: there(sigma / tight.sigma(&a.local)),
                 prior_shift: there(moved / sigma),
                 prior_factor: there(with_prior.sigma(&a.local) / sigma),
             }
@@ -310,6 +301,7 @@ impl Parts<'_> {
             units: free.iter().map(|a| shown_unit(a.unit).into()).collect(),
             estimates: free.iter().filter_map(|a| estimated(a).estimate).collect(),
             covariance: of.iter().map(|a| of.iter().map(|b| a.dot(b)).collect()).collect(),
+            rescaled: free.iter().map(|a| free.iter().map(|b| between(a, b)).collect()).collect(),
         };
         let positions = self.positions(&determined)?;
         let channels = self.channels();
@@ -332,7 +324,9 @@ impl Parts<'_> {
             second_path: self.found.second.clone(),
             repeatability,
             records,
-            assumed: self.assumed(),
+            assumed: self.assumed(&unknowns),
+            setup: Setup::of(self.scheme),
+            rests_on: self.rests_on.clone(),
             series: self.series(),
             residuals: self.residuals(),
         };
@@ -380,8 +374,8 @@ impl Parts<'_> {
                 out.push(PositionFit {
                     record: run.reading.name.clone(),
                     position: position.name.clone(),
-                    start_s,
-                    end_s,
+                    start_s: run.reading.origin + start_s,
+                    end_s: run.reading.origin + end_s,
                     measurements,
                     chi_square: chi / free.max(f64::MIN_POSITIVE),
                     degrees_of_freedom: free,
@@ -445,34 +439,6 @@ impl Parts<'_> {
         self.planned.components.iter().enumerate().map(of).collect()
     }
 
-    /// Probability that independent residuals are correlated as these are.
-    fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
-        let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
-        let series: Vec<f64> = own.map(|l| l.normalised).collect();
-        let lags = LAGS.min(series.len() / 4);
-        (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
-    }
-
-    /// How the residuals of a channel go with the temperature, position by position: what is fixed to the platform changes its sign in n.
-    fn warmth(&self, run: usize, channel: usize) -> Option<Warmth> {
-        let reading = &self.problem.runs[run].reading;
-        let places: Vec<(usize, usize)> = self.problem.runs[run].bins.iter().flatten().copied().collect();
-        let mut pairs = vec![Vec::new(); reading.bins.len()];
-        for l in self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel) {
-            let (position, i) = places[l.key.bin];
-            pairs[position].extend(reading.bins[position][i].temperature.map(|t| (t, l.normalised)));
-        }
-        // of independent ones artanh r is normal, with variance 1/(n - 3)
-        let all = pairs.iter().filter(|p| p.len() >= FEWEST_WARM).filter_map(|p| {
-            let r = correlation(p)?;
-            Some((r, r.clamp(-1.0, 1.0).atanh() * (p.len() as f64 - 3.0).sqrt()))
-        });
-        let all: Vec<(f64, f64)> = all.collect();
-        let strongest = all.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        let chi: f64 = all.iter().map(|(_, z)| z * z).sum();
-        Some(Warmth { correlation: strongest.0, probability: chi_square_tail(all.len() as f64, chi) })
-    }
-
     fn records(&self) -> Vec<RecordReport> {
         let of = |run: &super::run::Run| RecordReport {
             name: run.reading.name.clone(),
@@ -516,7 +482,7 @@ impl Parts<'_> {
                 out.push(Outlier {
                     record: run.reading.name.clone(),
                     lines: (s.line, s.line),
-                    t_s: s.t,
+                    t_s: run.reading.origin + s.t,
                     channel: channel(s.channel),
                     sigmas: s.sigmas,
                 });
@@ -527,7 +493,7 @@ impl Parts<'_> {
                 out.push(Outlier {
                     record: run.reading.name.clone(),
                     lines: bin.lines,
-                    t_s: bin.t,
+                    t_s: run.reading.origin + bin.t,
                     channel: channel(key.channel),
                     sigmas: self.off(run, &key, mean.value) / own,
                 });
@@ -550,8 +516,13 @@ impl Parts<'_> {
         }
     }
 
-    fn assumed(&self) -> Assumed {
+    fn assumed(&self, unknowns: &[Asked]) -> Assumed {
         let c = self.conditions;
+        let open = unknowns.iter().filter(|a| !a.determined);
+        let held = open.map(|a| {
+            let width = LOOSE * self.problem.unknowns.prior[a.terms[0].0] / si_per_shown(a.unit);
+            (a.name.clone(), width, shown_unit(a.unit).to_string())
+        });
         Assumed {
             latitude_deg: latitude_of(self.scheme).map_or(0.0, |l| l.degrees()),
             latitude_by_default: self.scheme.latitude.is_none(),
@@ -562,186 +533,19 @@ impl Parts<'_> {
             drift_noise_deg_sqrt_h: c.drift_noise.density_deg_sqrt_h(c.drift_noise_step_s),
             gate: self.options.gate,
             known: self.known.clone(),
+            known_differs: self.options.prior.as_ref().map_or_else(Vec::new, |before| {
+                let own = Setup::of(self.scheme);
+                let differs = if before.of.terms == own.terms { None } else { Some(before.of.terms.clone()) };
+                differs.map(|terms| format!("terms {terms} instead of {}", own.terms)).into_iter().collect()
+            }),
+            held: held.collect(),
             seed: self.options.seed,
         }
     }
-
-    fn residuals(&self) -> Vec<Residual> {
-        let runs = self.problem.runs;
-        let times: Vec<Vec<f64>> = runs
-            .iter()
-            .map(|run| run.bins.iter().flatten().map(|&(p, i)| run.reading.bins[p][i].t).collect())
-            .collect();
-        let of = |l: &Left| Residual {
-            record: l.run,
-            position: l.key.position,
-            channel: l.key.channel,
-            t_s: times[l.run][l.key.bin],
-            residual: l.residual,
-            sigma: l.r.sqrt(),
-            normalised: l.normalised,
-        };
-        self.found.all.iter().map(of).collect()
-    }
-
-    /// What is left over time.
-    fn series(&self) -> Vec<ResidualSeries> {
-        let all = self.residuals();
-        let mut out = Vec::new();
-        for (r, run) in self.problem.runs.iter().enumerate() {
-            for (c, &component) in self.planned.components.iter().enumerate() {
-                let own: Vec<&Residual> = all.iter().filter(|l| l.record == r && l.channel == c).collect();
-                if own.is_empty() {
-                    continue;
-                }
-                let n = own.len();
-                let values: Vec<f64> = own.iter().map(|l| l.residual).collect();
-                let normalised: Vec<f64> = own.iter().map(|l| l.normalised).collect();
-                let mut steps: Vec<f64> = own.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
-                steps.sort_by(f64::total_cmp);
-                let step = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-                let sigma = (own.iter().map(|l| l.sigma * l.sigma).sum::<f64>() / n as f64).sqrt();
-                let clusters = std::iter::successors(Some(1), |m| Some(2 * m)).take_while(|m| 3 * m <= n);
-                let allan = clusters.filter_map(|m| {
-                    let found = overlapping_deviation(&values, m).ok()?;
-                    Some((m as f64 * step, found, sigma / (m as f64).sqrt()))
-                });
-                out.push(ResidualSeries {
-                    record: run.reading.name.clone(),
-                    channel: channel_name(component),
-                    unit: if component == AZIMUTH { "rad".into() } else { "g".into() },
-                    allan: allan.collect(),
-                    points: own
-                        .iter()
-                        .step_by(n.div_ceil(POINTS))
-                        .map(|l| (l.t_s, l.residual, l.sigma))
-                        .collect(),
-                    autocorrelation: autocorrelation(&normalised, LAGS.min(n / 4)),
-                    count: n,
-                });
-            }
-        }
-        out
-    }
-
-    /// What speaks against all of it.
-    fn findings(&self, c: &Calibration) -> Vec<Finding> {
-        let mut out = Vec::new();
-        if self.interrupted {
-            out.push(Finding::Interrupted);
-        } else if !self.estimate.converged {
-            out.push(Finding::NotSettled);
-        }
-        if !self.planned.platform.observed().accelerometers {
-            for record in &c.records {
-                if let Some(length_g) = record.force_g.filter(|f| (f - 1.0).abs() > FORCE) {
-                    out.push(Finding::Force { record: record.name.clone(), length_g });
-                }
-            }
-        }
-        out.extend(self.fits(c));
-        for (r, record) in c.records.iter().enumerate() {
-            let tests = (c.records.len() * c.channels.len()) as f64;
-            for (k, channel) in c.channels.iter().enumerate() {
-                if let Some(probability) =
-                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < 1.0 - STRICT)
-                {
-                    let (record, channel) = (record.name.clone(), channel.channel.clone());
-                    out.push(Finding::Correlated { record, channel, probability });
-                }
-                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < 1.0 - STRICT) {
-                    out.push(Finding::Temperature {
-                        record: record.name.clone(),
-                        channel: channel.channel.clone(),
-                        correlation: w.correlation,
-                        probability: w.probability,
-                    });
-                }
-            }
-        }
-        out.extend(self.too_many.map(|count| Finding::Outliers { count, of: self.found.all.len() }));
-        if let Some(r) = c.repeatability.as_ref().filter(|r| r.chi_square > r.band.1) {
-            out.push(Finding::Repeatability { chi_square: r.chi_square });
-        }
-        if let Some(chi_square) = self.known_misfit() {
-            out.push(Finding::Known { chi_square });
-        }
-        let difference = c.second_path.difference.max(c.second_path.sigma_difference);
-        if difference.is_nan() || difference > AGREE {
-            out.push(Finding::SecondPath { difference });
-        }
-        out
-    }
-
-    /// Positions, or noise, or components.
-    fn fits(&self, c: &Calibration) -> Vec<Finding> {
-        let limits = |dof: f64, tests: usize| {
-            let strict = 1.0 - (1.0 - STRICT) / tests.max(1) as f64;
-            chi_square_band(dof.max(1e-3), 1.0, strict).map_both(|x| x / dof.max(1e-3))
-        };
-        let all: Vec<&PositionFit> = c.positions.iter().filter(|p| p.degrees_of_freedom > 0.5).collect();
-        let mut chi: Vec<f64> = all.iter().map(|p| p.chi_square).collect();
-        chi.sort_by(f64::total_cmp);
-        let usual = chi.get(chi.len().saturating_sub(1) / 2).copied().unwrap_or(1.0);
-        let mut apart: Vec<&&PositionFit> = all
-            .iter()
-            .filter(|p| p.chi_square > limits(p.degrees_of_freedom, all.len()).1)
-            .filter(|p| p.chi_square > APART * usual.min(c.fit.band.1.max(1.0)))
-            .collect();
-        apart.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
-        let named = apart.iter().map(|p| Finding::Position {
-            record: p.record.clone(),
-            position: p.position.clone(),
-            chi_square: p.chi_square,
-            factor: p.chi_square.sqrt(),
-        });
-        let mut out: Vec<Finding> = if usual > APART && apart.iter().all(|p| p.chi_square < APART * usual) {
-            Vec::new()
-        } else {
-            named.collect()
-        };
-        if !out.is_empty() {
-            return out;
-        }
-        let total = c.fit.factor * c.fit.factor;
-        if !(c.fit.band.0..=c.fit.band.1).contains(&total) {
-            out.push(Finding::Noise { chi_square: total, factor: c.fit.factor });
-            return out;
-        }
-        for channel in &c.channels {
-            let band = limits(channel.degrees_of_freedom, c.channels.len());
-            if !(band.0..=band.1).contains(&channel.chi_square) {
-                out.push(Finding::Channel {
-                    channel: channel.channel.clone(),
-                    chi_square: channel.chi_square,
-                    factor: channel.chi_square.sqrt(),
-                });
-            }
-        }
-        out
-    }
-
-    /// Chi-square of what was known before against the estimate, where it is beyond its band.
-    fn known_misfit(&self) -> Option<f64> {
-        let (rows, values) = self.problem.known.as_ref()?;
-        let dof = values.len() as f64;
-        let left = values - rows * self.problem.values(&self.estimate.at.x);
-        let chi = left.norm_squared() / dof;
-        (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
-    }
-}
-
-/// The coefficient of correlation; `None` where one of the two is constant.
-fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
-    let n = pairs.len() as f64;
-    let (x, y) = pairs.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let sum = |of: fn(f64, f64) -> f64| pairs.iter().map(|p| of(p.0 - x, p.1 - y)).sum::<f64>();
-    let r = sum(|x, y| x * y) / (sum(|x, _| x * x) * sum(|_, y| y * y)).sqrt();
-    r.is_finite().then_some(r)
 }
 
 /// Both ends of a band.
-trait MapBoth {
+pub(super) trait MapBoth {
     fn map_both(self, f: impl Fn(f64) -> f64) -> Self;
 }
 

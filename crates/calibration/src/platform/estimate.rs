@@ -25,7 +25,9 @@ const NEARLY: f64 = 0.02;
 /// Halvings of a step that leads away.
 const HALVINGS: usize = 12;
 /// How much wider than the prior what nobody can know is held.
-const LOOSE: f64 = 10.0;
+pub(crate) const LOOSE: f64 = 10.0;
+/// The same where it is taken as known.
+pub(crate) const TIGHT: f64 = 1e-5;
 /// No coefficient is tried that is further from its first estimate, in prior standard deviations: what is held so weakly may go anywhere, and such a
 /// platform turns so fast that to follow it takes minutes.
 const FAR: f64 = 100.0;
@@ -94,13 +96,13 @@ impl Unknowns {
         Self { index, n, prior: all, first: start, loose, biases, coefficients: runs * own..n }
     }
 
-    /// Rows that hold the loose directions, the least information that does with the prior as its measure, and biases.
-    fn holding(&self) -> DMatrix<f64> {
+    /// Rows that hold the loose directions within `width` times the prior, the least information that does with the prior as its measure, and biases.
+    fn holding(&self, width: f64) -> DMatrix<f64> {
         let weighted =
-            DMatrix::from_fn(self.n, self.loose.ncols(), |i, j| self.loose[(i, j)] / (LOOSE * self.prior[i]));
+            DMatrix::from_fn(self.n, self.loose.ncols(), |i, j| self.loose[(i, j)] / self.prior[i]);
         let q = if weighted.ncols() == 0 { weighted } else { weighted.qr().q() };
         let m = q.ncols();
-        let mut rows = DMatrix::from_fn(m, self.n, |j, i| q[(i, j)] / (LOOSE * self.prior[i]));
+        let mut rows = DMatrix::from_fn(m, self.n, |j, i| q[(i, j)] / (width * self.prior[i]));
         // random biases have a prior that is theirs
         rows = rows.resize_vertically(m + self.biases.len(), 0.0);
         self.biases.iter().enumerate().for_each(|(k, &i)| rows[(m + k, i)] = 1.0 / self.prior[i]);
@@ -163,7 +165,7 @@ pub(crate) struct Estimate {
 
 impl Problem<'_> {
     /// Linearises all runs at `x`, of each the first `part` of its bins.
-    fn at(&self, x: Vec<PlatformState>, part: f64) -> Result<At, CalibrationError> {
+    pub(crate) fn at(&self, x: Vec<PlatformState>, part: f64) -> Result<At, CalibrationError> {
         self.passes.set(self.passes.get() + 1);
         if !(self.going)(Going::Passes(self.passes.get())) {
             self.stopped.set(true);
@@ -175,11 +177,19 @@ impl Problem<'_> {
         let information =
             runs.iter().map(|(run, _)| Information::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
         let mut cost: f64 = information.iter().map(Information::at_zero).sum();
-        cost += (self.unknowns.holding() * self.unknowns.to_first(&x)).norm_squared();
+        cost += (self.unknowns.holding(LOOSE) * self.unknowns.to_first(&x)).norm_squared();
         if let Some((rows, values)) = &self.known {
             cost += (values - rows * self.values(&x)).norm_squared();
         }
         Ok(At { x, runs, information, cost })
+    }
+
+    /// Every run where all unknowns are zero: the platform at the attitudes of the scheme.
+    pub(crate) fn at_rest(&self) -> Vec<PlatformState> {
+        let of = |(run, index): (&Run, &Vec<usize>)| {
+            PlatformState::of_unknowns(&vec![0.0; index.len()], run.plan.constants())
+        };
+        self.runs.iter().zip(&self.unknowns.index).map(of).collect()
     }
 
     /// The unknowns at `x`.
@@ -196,6 +206,11 @@ impl Problem<'_> {
         self.step_with(at, weak, None)
     }
 
+    /// The same with what nothing determines held within `width` times its prior.
+    pub(crate) fn step_held(&self, at: &At, width: f64) -> Result<Solution, EkfError> {
+        self.pulled(self.said(at, None, width), WEAK)
+    }
+
     /// The same with another information of one run.
     pub(crate) fn step_with(
         &self,
@@ -203,7 +218,10 @@ impl Problem<'_> {
         weak: f64,
         instead: Option<(usize, &Information)>,
     ) -> Result<Solution, EkfError> {
-        let mut rows = self.said(at, instead);
+        self.pulled(self.said(at, instead, LOOSE), weak)
+    }
+
+    fn pulled(&self, mut rows: Rows, weak: f64) -> Result<Solution, EkfError> {
         let pull = self.unknowns.prior.iter().map(|s| 1.0 / (weak * s));
         let n = self.unknowns.n;
         rows.add(&DMatrix::from_diagonal(&DVector::from_iterator(n, pull)), &DVector::zeros(n));
@@ -212,7 +230,7 @@ impl Problem<'_> {
 
     /// The step from `at` with the prior of everything about the first estimates.
     pub(crate) fn step_with_prior(&self, at: &At) -> Result<Solution, EkfError> {
-        let mut rows = self.said(at, None);
+        let mut rows = self.said(at, None, LOOSE);
         let weights = DVector::from_iterator(self.unknowns.n, self.unknowns.prior.iter().map(|s| 1.0 / s));
         let to = self.unknowns.to_first(&at.x).component_mul(&weights);
         rows.add(&DMatrix::from_diagonal(&weights), &to);
@@ -220,7 +238,7 @@ impl Problem<'_> {
     }
 
     /// What the records say, and what is held or known.
-    fn said(&self, at: &At, instead: Option<(usize, &Information)>) -> Rows {
+    fn said(&self, at: &At, instead: Option<(usize, &Information)>, width: f64) -> Rows {
         let n = self.unknowns.n;
         let mut rows = Rows::new(n);
         for (r, (information, index)) in at.information.iter().zip(&self.unknowns.index).enumerate() {
@@ -231,7 +249,7 @@ impl Problem<'_> {
             }
             rows.add(&wide, &information.right);
         }
-        let holding = self.unknowns.holding();
+        let holding = self.unknowns.holding(width);
         rows.add(&holding, &(&holding * self.unknowns.to_first(&at.x)));
         if let Some((known, values)) = &self.known {
             rows.add(known, &(values - known * self.values(&at.x)));

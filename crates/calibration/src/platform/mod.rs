@@ -2,7 +2,10 @@
 
 mod diagnose;
 mod estimate;
+mod findings;
+mod force;
 mod observe;
+mod residuals;
 mod run;
 
 use std::cell::Cell;
@@ -18,9 +21,12 @@ use obsdeg_evidence::simulation::{
 use crate::Going;
 use crate::answer::{Calibration, CovarianceTable};
 use crate::record::{Record, RecordError};
+use crate::setup::{Basis, Before, Setup};
 use diagnose::Diagnosed;
 use estimate::{Problem, Unknowns};
 use run::Run;
+
+pub use force::Mistaken;
 
 /// Why a scheme cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -78,6 +84,9 @@ pub enum CalibrationError {
         /// Positions that it fits.
         like: String,
     },
+    /// A record that is not what it says it is.
+    #[error(transparent)]
+    Mistaken(Box<Mistaken>),
     /// Other intervals at rest than positions.
     #[error(
         "{record}: {found} intervals at rest; expected {expected}, one for each position of the scheme{spans} (record.static says how they are found; a column `position` says what is where)"
@@ -146,6 +155,22 @@ pub enum CalibrationError {
     /// Nothing to estimate.
     #[error("nothing is determined by these records: no unknown and no combination")]
     Nothing,
+    /// A record that counts already.
+    #[error(
+        "{record} has the same numbers as {other}; expected records of different runs, since what is the same says nothing twice"
+    )]
+    SameRecord {
+        /// The record.
+        record: String,
+        /// The one that it is.
+        other: String,
+    },
+    /// A calibration of sensors that are mounted otherwise.
+    #[error("the prior calibration is of a platform with {what}; expected one of this platform")]
+    OtherPlatform {
+        /// What is different.
+        what: String,
+    },
     /// A calibration that is none of this platform.
     #[error("the prior calibration says nothing of this scheme: it has {found}")]
     Prior {
@@ -155,6 +180,12 @@ pub enum CalibrationError {
     /// The scheme or its conditions.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+}
+
+impl From<Box<Mistaken>> for CalibrationError {
+    fn from(e: Box<Mistaken>) -> Self {
+        Self::Mistaken(e)
+    }
 }
 
 impl From<EkfError> for CalibrationError {
@@ -179,7 +210,7 @@ pub struct Options {
     /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out.
     pub gate: f64,
     /// A calibration before.
-    pub prior: Option<CovarianceTable>,
+    pub prior: Option<Before<Setup>>,
     /// Seed of the exact verdicts.
     pub seed: u64,
 }
@@ -216,6 +247,13 @@ pub fn calibrate(
     let planned = Plan::new(scheme, &own)?;
     let mut sigmas: Vec<f64> = planned.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
     let mut runs = Vec::with_capacity(records.len());
+    let before = options.prior.as_ref();
+    if before.is_some_and(|b| b.of.geometry != scheme.geometry) {
+        return Err(CalibrationError::OtherPlatform {
+            what: "another mounting of the sensors (geometry)".into(),
+        });
+    }
+    let mut rests_on: Vec<Basis> = Vec::new();
     for record in records {
         let reading = observe::observe(
             record,
@@ -225,8 +263,18 @@ pub fn calibrate(
             sigmas.clone(),
             going,
         )?;
+        let basis = Basis { record: reading.name.clone(), digest: reading.digest.clone() };
+        let same = |other: String| CalibrationError::SameRecord { record: basis.record.clone(), other };
+        if let Some(other) = basis.among(&rests_on) {
+            return Err(same(other.record.clone()));
+        }
+        if let Some(other) = before.and_then(|b| basis.among(&b.rests_on)) {
+            return Err(same(format!("{}, which the calibration before rests on", other.record)));
+        }
+        rests_on.push(basis);
         runs.push(Run::new(reading, scheme, &planned, &own)?);
     }
+    rests_on.extend(before.iter().flat_map(|b| b.rests_on.iter().cloned()));
     let prediction = predict(&planned, options.seed)?;
     let start = RunStart::new(&planned, &own)?;
     let (n, coefficients, biases) =
@@ -238,7 +286,7 @@ pub fn calibrate(
         &start.estimate,
         &prediction.null_space,
     );
-    let known = options.prior.as_ref().map(|p| known(p, &planned, &prediction, &unknowns)).transpose()?;
+    let known = before.map(|b| known(&b.estimates, &planned, &prediction, &unknowns)).transpose()?;
     let (known, known_names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
     let mut x: Vec<PlatformState> =
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
@@ -281,6 +329,7 @@ pub fn calibrate(
                 found: &found,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
+                rests_on,
                 interrupted,
             };
             return parts.answer();

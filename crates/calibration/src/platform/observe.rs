@@ -5,6 +5,7 @@ use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
+use super::force::{ForceColumn, Forces, Mistaken};
 use crate::Going;
 use crate::bins::{Bin, Binner, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
@@ -24,8 +25,6 @@ const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
 pub(crate) const TIMES: [(&str, f64); 5] =
     [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0), ("h", 3600.0)];
-/// The specific force of a position of the scheme is no further from the vertical than this, in deg.
-const TILT_DEG: f64 = 20.0;
 /// What the gimbals read is no further from the attitude of the scheme than this, in deg.
 const GIMBALS_DEG: f64 = 5.0;
 
@@ -63,6 +62,8 @@ pub(crate) struct Reading {
     pub by: By,
     /// Bins of every position, times in s from the first sample (labels) or from the start of the scheme.
     pub bins: Vec<Vec<Bin>>,
+    /// The time of the record, in s, that is 0 there.
+    pub origin: f64,
     /// First and last sample of every position, in s alike.
     pub stays: Vec<(f64, f64)>,
     pub spikes: Vec<Spike>,
@@ -77,11 +78,17 @@ pub(crate) struct Reading {
     pub force: Option<f64>,
     /// How far the gimbals are off at most, in deg, where the record has their angles.
     pub gimbals: Option<f64>,
+    /// The digest of its numbers.
+    pub digest: String,
 }
 
 /// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations of the three, gimbal angles, temperature.
 struct Layout {
     observed: Observed,
+    /// The columns of the force, where these are what is observed.
+    forces: Option<[ForceColumn; 3]>,
+    /// That of the time: as it is written, and what one of its numbers is in s.
+    time: (String, f64),
     wanted: Vec<Wanted>,
     azimuth: bool,
     sigmas: bool,
@@ -121,6 +128,13 @@ impl Layout {
             }
         }
         wanted.extend(own.iter().map(|(_, w)| *w));
+        let own_forces = (observed == Observed::Force).then(|| {
+            std::array::from_fn(|i| ForceColumn {
+                text: record.columns()[own[i].1.column].text.clone(),
+                scale: own[i].1.scale,
+            })
+        });
+        let time = (record.columns()[time].text.clone(), wanted[0].scale);
         let azimuth = plan.components.contains(&AZIMUTH);
         if azimuth {
             let column =
@@ -158,7 +172,18 @@ impl Layout {
         let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
         let ignored = record.columns().iter().enumerate().filter(|(i, _)| !used(*i));
         let ignored = ignored.map(|(_, c): (usize, &Column)| c.text.clone()).collect();
-        Ok(Self { observed, wanted, azimuth, sigmas, gimbals, temperature, label, ignored })
+        Ok(Self {
+            observed,
+            forces: own_forces,
+            time,
+            wanted,
+            azimuth,
+            sigmas,
+            gimbals,
+            temperature,
+            label,
+            ignored,
+        })
     }
 
     /// Components 1, 2, 3 of Z in n, and the azimuth, of a row taken where `C_c^n` is `c`.
@@ -228,9 +253,9 @@ struct Taking<'a> {
     begin: f64,
     /// Whether every label is what the timeline of the scheme has there.
     agrees: bool,
-    /// Per position: the sum of what is Z in n (1, 2, 3), its samples, and the line of the first.
-    sums: Vec<([f64; 3], usize, u64)>,
-    length: f64,
+    /// The forces, and the sum of their lengths with their number.
+    forces: Forces,
+    length: (f64, usize),
     /// Finds the positions, where the file says how.
     detector: Option<Detector<Kept>>,
     told: Vec<Told<Kept>>,
@@ -354,14 +379,13 @@ impl Taking<'_> {
             self.gimbals = Some((p, off, line));
         }
         let in_n = self.layout.in_n(numbers, c);
-        if let [Some(x), Some(y), Some(z), _] = in_n {
-            let (sum, count, first) = &mut self.sums[p];
-            if *count == 0 {
-                *first = line;
-            }
-            *count += 1;
-            [x, y, z].iter().zip(sum).for_each(|(x, s)| *s += x);
-            self.length += (x * x + (y + 1.0) * (y + 1.0) + z * z).sqrt();
+        // Z2 may not be there
+        if let ([Some(x), Some(y), Some(z), _], true) = (in_n, self.layout.observed != Observed::Geographic) {
+            let f = [x, y + 1.0, z];
+            let own = std::array::from_fn(|j| (0..3).map(|i| c[i][j] * f[i]).sum());
+            self.forces.push(p, line, time, own);
+            self.length.0 += (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt();
+            self.length.1 += 1;
         }
         let z = self.plan.components.iter().map(|&k| if k == AZIMUTH { in_n[3] } else { in_n[k - 1] });
         let z: Vec<Option<f64>> = z.collect();
@@ -392,36 +416,29 @@ impl Taking<'_> {
             self.out.bins[p].push(bin);
         }
     }
+}
 
-    /// Refuses positions whose force is far from where the scheme has it.
-    fn check_attitudes(&self) -> Result<(), CalibrationError> {
-        let positions = &self.plan.platform.scheme().positions;
-        let tilt = |c: &Matrix3<f64>, force: &[f64; 3]| {
-            let f = apply(c, force);
-            let length = f.iter().map(|x| x * x).sum::<f64>().sqrt();
-            (f[1] / length).clamp(-1.0, 1.0).acos().to_degrees()
-        };
-        for (p, &(sum, count, line)) in self.sums.iter().enumerate().filter(|(_, s)| s.1 > 0) {
-            // in n, of the position that the scheme has; then in platform axes
-            let mean = [sum[0] / count as f64, sum[1] / count as f64 + 1.0, sum[2] / count as f64];
-            let c = &self.plan.attitudes[p];
-            let force: [f64; 3] = std::array::from_fn(|j| (0..3).map(|i| c[i][j] * mean[i]).sum());
-            let off = tilt(c, &force);
-            if off <= TILT_DEG {
-                continue;
-            }
-            let near = |q: &usize| tilt(&self.plan.attitudes[*q], &force) <= TILT_DEG;
-            let like: Vec<&str> =
-                (0..positions.len()).filter(near).map(|q| positions[q].name.as_str()).collect();
-            return Err(CalibrationError::Attitude {
-                record: self.out.name.clone(),
-                line,
-                position: positions[p].name.clone(),
-                off_deg: format!("{off:.1}"),
-                like: if like.is_empty() { "no position of the scheme".into() } else { like.join(" or ") },
-            });
-        }
-        Ok(())
+/// Refuses times in another unit than that of the header: all positions then last so many times as long as the scheme has them.
+fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) -> Result<(), Box<Mistaken>> {
+    let dwell = |p: usize| -> f64 {
+        let of = plan.segments.iter().filter(|s| s.position == p && !matches!(s.kind, SegmentKind::Slew(_)));
+        of.map(|s| s.dt * s.steps as f64).sum()
+    };
+    let lasts: Vec<f64> = reading.stays.iter().map(|(from, to)| to - from).collect();
+    let ratio = |unit: f64| scale / unit;
+    let like = |unit: f64| {
+        let mut each = lasts.iter().enumerate().map(|(p, lasts)| lasts / dwell(p) / ratio(unit));
+        (ratio(unit).ln().abs() > 1.0) && each.all(|x| (x - 1.0).abs() < 0.1)
+    };
+    match TIMES.iter().find(|(_, unit)| !lasts.is_empty() && like(*unit)) {
+        Some((unit, _)) => Err(Box::new(Mistaken::TimeUnit {
+            record: reading.name.clone(),
+            column: column.clone(),
+            found: format!("{:.6}", lasts[0]),
+            expected: format!("{:.6}", dwell(0)),
+            unit,
+        })),
+        None => Ok(()),
     }
 }
 
@@ -455,6 +472,7 @@ pub(crate) fn observe(
         name: record.name().into(),
         by,
         bins: vec![Vec::new(); positions],
+        origin: 0.0,
         stays: Vec::new(),
         spikes: Vec::new(),
         samples: 0,
@@ -463,8 +481,8 @@ pub(crate) fn observe(
         ignored: layout.ignored.clone(),
         force: None,
         gimbals: None,
+        digest: String::new(),
     };
-    let sums = vec![([0.0; 3], 0, 0); positions];
     let binner = Binner::new(bin_s, sigmas);
     let mut taking = Taking {
         layout: &layout,
@@ -474,15 +492,15 @@ pub(crate) fn observe(
         now: None,
         begin: 0.0,
         agrees: true,
-        sums,
-        length: 0.0,
+        forces: Forces::new(positions, bin_s),
+        length: (0.0, 0),
         detector: still.map(Detector::new),
         told: Vec::new(),
         rests: Vec::new(),
         gimbals: None,
     };
     let (name, mut rows) = (record.name().to_string(), 0_usize);
-    record.read(&layout.wanted, layout.label, false, |row| {
+    let digest = record.read(&layout.wanted, layout.label, false, |row| {
         rows += 1;
         if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
             return Err(CalibrationError::Interrupted);
@@ -504,10 +522,16 @@ pub(crate) fn observe(
         }
     }
     taking.end();
-    let all = layout.observed != Observed::Geographic;
-    if all {
-        taking.check_attitudes()?;
+    taking.forces.end();
+    let names: Vec<&str> =
+        plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
+    let units = FORCES.map(|(u, g)| (u, g.unwrap_or(1.0 / gravity)));
+    taking.forces.check_units(&taking.out.name, &names, layout.forces.as_ref(), &units)?;
+    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes)?;
+    if matches!(by, By::Label | By::Static) {
+        check_times(&taking.out, plan, &layout.time)?;
     }
+    taking.forces.check_ends(&taking.out.name, &names, &plan.attitudes)?;
     if let Some((p, off, line)) = taking.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
         return Err(CalibrationError::Gimbals {
             record: taking.out.name.clone(),
@@ -516,13 +540,15 @@ pub(crate) fn observe(
             off_deg: format!("{off:.1}"),
         });
     }
-    let count: usize = taking.sums.iter().map(|s| s.1).sum();
-    let force = (layout.observed == Observed::Force && count > 0).then(|| taking.length / count as f64);
+    let (length, count) = taking.length;
+    let force = (layout.observed == Observed::Force && count > 0).then(|| length / count as f64);
     let (agrees, begin) = (taking.agrees, taking.begin);
     let gimbals = taking.gimbals.map(|(_, off, _)| off);
     let mut out = taking.out;
-    (out.force, out.gimbals) = (force, gimbals);
+    (out.force, out.gimbals, out.digest) = (force, gimbals, digest);
+    out.origin = if matches!(by, By::Label | By::Static) { begin } else { 0.0 };
     if out.by == By::Label && agrees {
+        out.origin = 0.0;
         // which says when each position begins and ends, where samples only say what is between
         out.by = By::Both;
         out.bins.iter_mut().flatten().for_each(|b| b.t += begin);

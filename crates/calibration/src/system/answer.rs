@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::answer::CovarianceTable;
 use crate::record::{MOST, RecordError};
+use crate::setup::Basis;
 
 /// A calibration of a system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -52,6 +53,12 @@ pub struct SystemCalibration {
     pub rows: usize,
     /// Columns that nothing was made of.
     pub ignored: Vec<String>,
+    /// The digest of the model.
+    pub model: String,
+    /// The records that the estimates rest on, those of the calibration before too.
+    pub rests_on: Vec<Basis>,
+    /// Whether the calibration before rests on the same record, by another model.
+    pub shared: bool,
     /// Steps of integration between two rows, at most.
     pub substeps: usize,
     /// Seed of starts and verdicts.
@@ -112,7 +119,7 @@ pub struct SystemEstimated {
     pub estimate: Option<f64>,
     /// Its standard deviation by the noise.
     pub sigma: Option<f64>,
-    /// The same times the root of chi-square per degree of freedom, where that is above one.
+    /// The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known before stays as it is.
     pub sigma_rescaled: Option<f64>,
 }
 
@@ -226,6 +233,16 @@ pub enum SystemCalibrationError {
     /// Interrupted before there was anything.
     #[error("interrupted before anything was estimated")]
     Interrupted,
+    /// A record that counts already.
+    #[error(
+        "{record} has the same numbers as {other}; expected another record, since what is the same says nothing twice"
+    )]
+    SameRecord {
+        /// The record.
+        record: String,
+        /// The one that it is.
+        other: String,
+    },
     /// A calibration of another system.
     #[error("the prior calibration says nothing of this model: it has {found}")]
     Prior {

@@ -34,6 +34,9 @@ pub(super) struct Read {
     pub(super) rows: Vec<Data>,
     /// Known inputs that have values in every row.
     pub(super) inputs: Vec<usize>,
+    /// The record and the digest of its numbers.
+    pub(super) name: String,
+    pub(super) digest: String,
     pub(super) ignored: Vec<String>,
     pub(super) samples: usize,
     /// Intervals at rest, where they are sought.
@@ -190,7 +193,7 @@ pub(super) fn read(
         });
         Ok(())
     };
-    record.read(&columns.wanted, columns.label, true, take)?;
+    let digest = record.read(&columns.wanted, columns.label, true, take)?;
     let (samples, mut intervals) = (rows.len(), None);
     if let Some(still) = still {
         let place =
@@ -198,7 +201,7 @@ pub(super) fn read(
         let by: Vec<usize> = still.by.iter().filter_map(place).collect();
         let found = at_rest(&rows, &by, still);
         if found.len() < 2 {
-            return Err(SystemCalibrationError::NoRest { record: name, found: found.len() });
+            return Err(SystemCalibrationError::NoRest { record: name.clone(), found: found.len() });
         }
         intervals = Some(found.len());
         rows = if model.states.is_empty() {
@@ -211,7 +214,7 @@ pub(super) fn read(
         rows.sort_by_key(|r| r.experiment);
     }
     let inputs = columns.inputs.iter().map(|(k, _)| *k).collect();
-    Ok(Read { rows, inputs, ignored: columns.ignored, samples, intervals })
+    Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, intervals })
 }
 
 /// The intervals at rest, by the inputs `by`.

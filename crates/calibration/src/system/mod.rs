@@ -21,6 +21,7 @@ use crate::Going;
 use crate::answer::CovarianceTable;
 use crate::least_squares::{Rows, Solution};
 use crate::record::Record;
+use crate::setup::{Basis, Before};
 use data::{Data, Read, read};
 
 /// Name and version of the JSON layout.
@@ -56,7 +57,7 @@ pub struct SystemOptions {
     /// Unknowns of which a profile is wanted.
     pub profiles: Vec<String>,
     /// A calibration before: what it says of unknowns of the same names.
-    pub prior: Option<CovarianceTable>,
+    pub prior: Option<Before<String>>,
     /// Seed.
     pub seed: u64,
 }
@@ -311,8 +312,20 @@ pub fn calibrate_system(
     }
     let compiled = model.compile()?;
     let data = read(record, model, going)?;
+    let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
+    let own = digest(model);
+    let again = options.prior.as_ref().and_then(|b| Some((b, basis.among(&b.rests_on)?)));
+    if let Some((_, other)) = again.filter(|(b, _)| b.of == own) {
+        let other = format!("{}, which the calibration before rests on, of the same model", other.record);
+        return Err(SystemCalibrationError::SameRecord { record: basis.record, other });
+    }
     let numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
     Calibrating::new(model, &compiled, numeric, &data, options, going)?.run()
+}
+
+/// The digest of a model: of what its verdicts depend on.
+fn digest(model: &SystemModel) -> String {
+    format!("{:016x}", model.random(0, "calibration").next_u64())
 }
 
 /// Rows and values of what a calibration before says of the unknowns `names`, with unit errors.
@@ -402,7 +415,7 @@ impl<'a> Calibrating<'a> {
         let longest = nominal.step.unwrap_or(f64::INFINITY).min(if last > 0.0 { last / 50.0 } else { 1.0 });
         let names: Vec<&str> = free.iter().map(|&i| numeric.names[i].as_str()).collect();
         let known = match &options.prior {
-            Some(table) => said_before(table, &names)?,
+            Some(before) => said_before(&before.estimates, &names)?,
             None => (DMatrix::zeros(0, free.len()), DVector::zeros(0)),
         };
         let problem =
@@ -504,33 +517,29 @@ impl<'a> Calibrating<'a> {
         let degrees_of_freedom = measured - rank;
         let mean = at.cost() / degrees_of_freedom as f64;
         let rescale = mean.sqrt().max(1.0);
-        let estimate = |name: &str, unit: &str, status, degree, determined: bool, value: f64, sigma: f64| {
-            let there = |x: f64| determined.then_some(x);
-            SystemEstimated {
-                name: name.into(),
-                unit: unit.into(),
-                status,
-                degree,
-                determined,
-                estimate: there(value),
-                sigma: there(sigma),
-                sigma_rescaled: there(sigma * rescale),
-            }
-        };
+        let known = &self.problem.known.0;
+        let between = |a: &[(usize, f64)], b: &[(usize, f64)]| solution.covariance_with(a, b, rescale, known);
+        let estimate =
+            |name: &str, unit: &str, status, degree, determined: bool, value: f64, terms: &[(usize, f64)]| {
+                let sigma = solution.sigma(terms);
+                let there = |x: f64| determined.then_some(x);
+                SystemEstimated {
+                    name: name.into(),
+                    unit: unit.into(),
+                    status,
+                    degree,
+                    determined,
+                    estimate: there(value),
+                    sigma: there(sigma),
+                    sigma_rescaled: there(between(terms, terms).max(0.0).sqrt()),
+                }
+            };
         let unknowns: Vec<SystemEstimated> = (0..names.len())
             .map(|j| {
                 let v = verdict(j);
                 let unit = self.unit(self.problem.free[j]);
                 let (status, degree) = (v.map(|v| v.status), v.and_then(|v| v.degree));
-                estimate(
-                    &names[j],
-                    &unit,
-                    status,
-                    degree,
-                    determined[j],
-                    best.x[j],
-                    solution.sigma(&[(j, 1.0)]),
-                )
+                estimate(&names[j], &unit, status, degree, determined[j], best.x[j], &[(j, 1.0)])
             })
             .collect();
         let all = self.problem.all(&self.base, &best.x);
@@ -541,7 +550,7 @@ impl<'a> Calibrating<'a> {
                 let terms: Vec<(usize, f64)> = by_free.row(i).iter().copied().enumerate().collect();
                 let (sigma, wide) = (solution.sigma(&terms), weaker.sigma(&terms));
                 let determined = v.status == Status::Observable && wide <= DETERMINED * sigma;
-                estimate(&c.text, "", Some(v.status), v.degree, determined, values[i], sigma)
+                estimate(&c.text, "", Some(v.status), v.degree, determined, values[i], &terms)
             });
         let combinations = combinations.collect();
         let own: Vec<usize> = (0..names.len()).filter(|&j| determined[j]).collect();
@@ -551,6 +560,10 @@ impl<'a> Calibrating<'a> {
             units: own.iter().map(|&j| self.unit(self.problem.free[j])).collect(),
             estimates: own.iter().map(|&j| best.x[j]).collect(),
             covariance: own.iter().map(|&i| own.iter().map(|&j| p[(i, j)]).collect()).collect(),
+            rescaled: own
+                .iter()
+                .map(|&i| own.iter().map(|&j| between(&[(i, 1.0)], &[(j, 1.0)])).collect())
+                .collect(),
         };
         let residuals = self.residuals(&at, &solution);
         let outputs = self.outputs(&residuals, &at, &solution);
@@ -601,10 +614,27 @@ impl<'a> Calibrating<'a> {
             intervals: self.data.intervals,
             rows: self.data.rows.len(),
             ignored: self.data.ignored.clone(),
+            model: digest(self.model),
+            rests_on: self.rests_on(),
+            shared: self.shared(),
             substeps: finer,
             seed: self.options.seed,
             residuals,
         })
+    }
+
+    /// The records that the estimates rest on.
+    fn rests_on(&self) -> Vec<Basis> {
+        let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
+        let before = self.options.prior.iter().flat_map(|b| b.rests_on.iter());
+        let before = before.filter(|b| own.among(std::slice::from_ref(b)).is_none());
+        std::iter::once(own.clone()).chain(before.cloned()).collect()
+    }
+
+    /// Whether the calibration before rests on the same record.
+    fn shared(&self) -> bool {
+        let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
+        self.options.prior.as_ref().is_some_and(|b| own.among(&b.rests_on).is_some())
     }
 
     fn unit(&self, state: usize) -> String {

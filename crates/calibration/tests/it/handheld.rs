@@ -1,7 +1,7 @@
 //! A unit in the hand, whose record is written from its equations: are its errors found, and are the sigmas right?
 
 use obsdeg_calibration::record::Record;
-use obsdeg_calibration::{SystemCalibration, SystemOptions, calibrate_system};
+use obsdeg_calibration::{Before, SystemCalibration, SystemOptions, calibrate_system};
 use obsdeg_core::system::model_file;
 use obsdeg_exact::SplitMix64;
 
@@ -126,7 +126,8 @@ fn errors_of_a_unit_in_the_hand() {
         "{:?}",
         first.findings
     );
-    let prior = Some(first.covariance.clone());
+    let (estimates, rests_on) = (first.covariance.clone(), first.rests_on.clone());
+    let prior = Some(Before { estimates, rests_on, of: first.model.clone() });
     let second = calibrated("gyros.toml", &text, &SystemOptions { prior, ..options });
     assert_eq!(second.consistent, Some(true), "{:?}", second.findings);
     for c in [&first, &second] {

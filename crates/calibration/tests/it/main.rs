@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod faults;
 mod handheld;
 mod round_trip;
 mod simulator;

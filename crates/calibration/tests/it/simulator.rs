@@ -5,7 +5,7 @@ use obsdeg_exact::SplitMix64;
 
 pub(crate) type Vector = [f64; 3];
 /// (w, x, y, z), from platform axes to n.
-type Quaternion = [f64; 4];
+pub(crate) type Quaternion = [f64; 4];
 
 const EARTH_RATE: f64 = 7.292115e-5;
 const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
@@ -98,13 +98,13 @@ fn conjugate(q: &Quaternion) -> Quaternion {
 }
 
 /// A vector of platform axes in n.
-fn turned(q: &Quaternion, v: &Vector) -> Vector {
+pub(crate) fn turned(q: &Quaternion, v: &Vector) -> Vector {
     let out = multiply(&multiply(q, &[0.0, v[0], v[1], v[2]]), &conjugate(q));
     [out[1], out[2], out[3]]
 }
 
 /// The passive turns Mx(alpha) My(beta) Mz(gamma) as one quaternion from c to n: a passive turn by an angle is an active one by its negative.
-fn attitude(angles_deg: &Vector) -> Quaternion {
+pub(crate) fn attitude(angles_deg: &Vector) -> Quaternion {
     let [a, b, c] = angles_deg.map(f64::to_radians);
     let about = |axis: usize, angle: f64| {
         let mut v = [0.0; 3];

@@ -1,0 +1,121 @@
+//! What speaks against a model and its sigmas, the gravest first.
+
+use obsdeg_ekf::consistency::chi_square_band;
+
+use super::diagnose::{MapBoth, Parts, STRICT};
+use crate::answer::{Calibration, Finding, PositionFit};
+
+/// The paths agree to this, in sigma.
+const AGREE: f64 = 1e-6;
+/// A position that fits this many times worse than the others in the middle is named by itself.
+const APART: f64 = 2.0;
+/// The specific force may be off one g by this where nothing unknown explains it.
+const FORCE: f64 = 3e-4;
+
+impl Parts<'_> {
+    /// What speaks against all of it.
+    pub(super) fn findings(&self, c: &Calibration) -> Vec<Finding> {
+        let mut out = Vec::new();
+        if self.interrupted {
+            out.push(Finding::Interrupted);
+        } else if !self.estimate.converged {
+            out.push(Finding::NotSettled);
+        }
+        if !self.planned.platform.observed().accelerometers {
+            for record in &c.records {
+                if let Some(length_g) = record.force_g.filter(|f| (f - 1.0).abs() > FORCE) {
+                    out.push(Finding::Force { record: record.name.clone(), length_g });
+                }
+            }
+        }
+        out.extend(self.fits(c));
+        for (r, record) in c.records.iter().enumerate() {
+            let tests = (c.records.len() * c.channels.len()) as f64;
+            for (k, channel) in c.channels.iter().enumerate() {
+                if let Some(probability) =
+                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < 1.0 - STRICT)
+                {
+                    let (record, channel) = (record.name.clone(), channel.channel.clone());
+                    out.push(Finding::Correlated { record, channel, probability });
+                }
+                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < 1.0 - STRICT) {
+                    out.push(Finding::Temperature {
+                        record: record.name.clone(),
+                        channel: channel.channel.clone(),
+                        correlation: w.correlation,
+                        probability: w.probability,
+                    });
+                }
+            }
+        }
+        out.extend(self.too_many.map(|count| Finding::Outliers { count, of: self.found.all.len() }));
+        if let Some(r) = c.repeatability.as_ref().filter(|r| r.chi_square > r.band.1) {
+            out.push(Finding::Repeatability { chi_square: r.chi_square });
+        }
+        if let Some(chi_square) = self.known_misfit() {
+            out.push(Finding::Known { chi_square });
+        }
+        let difference = c.second_path.difference.max(c.second_path.sigma_difference);
+        if difference.is_nan() || difference > AGREE {
+            out.push(Finding::SecondPath { difference });
+        }
+        out
+    }
+
+    /// Positions, or noise, or components.
+    fn fits(&self, c: &Calibration) -> Vec<Finding> {
+        let limits = |dof: f64, tests: usize| {
+            let strict = 1.0 - (1.0 - STRICT) / tests.max(1) as f64;
+            chi_square_band(dof.max(1e-3), 1.0, strict).map_both(|x| x / dof.max(1e-3))
+        };
+        let all: Vec<&PositionFit> = c.positions.iter().filter(|p| p.degrees_of_freedom > 0.5).collect();
+        let mut chi: Vec<f64> = all.iter().map(|p| p.chi_square).collect();
+        chi.sort_by(f64::total_cmp);
+        let usual = chi.get(chi.len().saturating_sub(1) / 2).copied().unwrap_or(1.0);
+        let mut apart: Vec<&&PositionFit> = all
+            .iter()
+            .filter(|p| p.chi_square > limits(p.degrees_of_freedom, all.len()).1)
+            .filter(|p| p.chi_square > APART * usual.min(c.fit.band.1.max(1.0)))
+            .collect();
+        apart.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
+        let named = apart.iter().map(|p| Finding::Position {
+            record: p.record.clone(),
+            position: p.position.clone(),
+            chi_square: p.chi_square,
+            factor: p.chi_square.sqrt(),
+        });
+        let mut out: Vec<Finding> = if usual > APART && apart.iter().all(|p| p.chi_square < APART * usual) {
+            Vec::new()
+        } else {
+            named.collect()
+        };
+        if !out.is_empty() {
+            return out;
+        }
+        let total = c.fit.factor * c.fit.factor;
+        if !(c.fit.band.0..=c.fit.band.1).contains(&total) {
+            out.push(Finding::Noise { chi_square: total, factor: c.fit.factor });
+            return out;
+        }
+        for channel in &c.channels {
+            let band = limits(channel.degrees_of_freedom, c.channels.len());
+            if !(band.0..=band.1).contains(&channel.chi_square) {
+                out.push(Finding::Channel {
+                    channel: channel.channel.clone(),
+                    chi_square: channel.chi_square,
+                    factor: channel.chi_square.sqrt(),
+                });
+            }
+        }
+        out
+    }
+
+    /// Chi-square of what was known before against the estimate, where it is beyond its band.
+    fn known_misfit(&self) -> Option<f64> {
+        let (rows, values) = self.problem.known.as_ref()?;
+        let dof = values.len() as f64;
+        let left = values - rows * self.problem.values(&self.estimate.at.x);
+        let chi = left.norm_squared() / dof;
+        (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
+    }
+}

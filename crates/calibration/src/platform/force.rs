@@ -1,0 +1,377 @@
+//! What the specific force says of a record before anything is estimated: whether its numbers are of the units in the header, whether it points at every position where
+//! the scheme has it, and where a position begins and ends.
+
+use obsdeg_core::model::Matrix3;
+use obsdeg_core::model::slew::apply;
+
+use super::CalibrationError;
+
+/// The specific force of a position of the scheme is no further from the vertical than this, in deg.
+const TILT_DEG: f64 = 20.0;
+/// The force is within this of one g where its units are right.
+const UNIT: f64 = 0.1;
+/// With the right unit it is within this.
+const CLOSE: f64 = 0.05;
+/// Further off one g, as a part, is no scale error.
+const GROSS: f64 = 0.2;
+/// Most samples of a piece.
+const MOST: usize = 50;
+/// So many samples at the beginning of a position are pieces of their own, as are the last ones.
+const ALONE: usize = 8;
+/// Fewest pieces of a position in which a turn is sought.
+const FEWEST: usize = 20;
+/// From a piece to the next a platform that is held moves by no more than this, in deg, so much more in deg/s (a hundred deg/h), and so many times what noise makes of it.
+const HELD_DEG: f64 = 0.3;
+const DRIFTS_DEG_S: f64 = 0.03;
+const NOISE: f64 = 8.0;
+
+/// A record that is not what it says it is.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Mistaken {
+    /// Numbers of another unit.
+    #[error(
+        "{record}: line {line}, columns {columns}: at {position} the specific force is {length_g} g long by what the header says, expected about 1; with the numbers as {units} it is"
+    )]
+    ForceUnit {
+        /// The record.
+        record: String,
+        /// The first line of the position.
+        line: u64,
+        /// The columns.
+        columns: String,
+        /// Where it is furthest from 1 g.
+        position: String,
+        /// What it is there.
+        length_g: String,
+        /// The units that the numbers are as of.
+        units: String,
+    },
+    /// A force that is none of gravity.
+    #[error(
+        "{record}: line {line}: at {position} the specific force is {length_g} g long; expected about 1, and no unit of forces makes it that"
+    )]
+    ForceLength {
+        /// The record.
+        record: String,
+        /// The first line of the position.
+        line: u64,
+        /// Where it is furthest from 1 g.
+        position: String,
+        /// What it is there.
+        length_g: String,
+    },
+    /// Times of another unit.
+    #[error(
+        "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the scheme {expected} s, and all others alike; with the numbers as [{unit}] they agree"
+    )]
+    TimeUnit {
+        /// The record.
+        record: String,
+        /// The column.
+        column: String,
+        /// How long the first position lasts, in s.
+        found: String,
+        /// How long it does in the scheme.
+        expected: String,
+        /// The unit that the numbers are as of.
+        unit: &'static str,
+    },
+    /// The platform leaves a position while samples are still said to be of it, or comes later.
+    #[error(
+        "{record}: between lines {from} and {to} the platform {what} {position}: the samples of {position} {side} that are up to {off_deg} deg from the others, as at {like}; expected positions (by label or by time) that begin and end where the platform does"
+    )]
+    Shifted {
+        /// The record.
+        record: String,
+        /// It happens after this line.
+        from: u64,
+        /// And before this one.
+        to: u64,
+        /// The position.
+        position: String,
+        /// What happens.
+        what: &'static str,
+        /// Which samples are not of it.
+        side: &'static str,
+        /// How far the first or the last of them is from the others.
+        off_deg: String,
+        /// What position has such a force.
+        like: String,
+    },
+}
+
+/// The force of some samples in a row, in platform axes: the median of each component.
+#[derive(Debug, Clone)]
+struct Piece {
+    /// First and last line of the record.
+    lines: (u64, u64),
+    /// The time of its first sample, in s.
+    t: f64,
+    samples: usize,
+    /// In g.
+    force: [f64; 3],
+}
+
+/// The forces of a record, by position.
+#[derive(Debug, Clone)]
+pub(crate) struct Forces {
+    /// Longest piece, in s.
+    longest: f64,
+    now: Vec<(u64, f64, [f64; 3])>,
+    /// The position of these, and how many of its samples there were.
+    position: usize,
+    seen: usize,
+    pieces: Vec<Vec<Piece>>,
+}
+
+/// A column of the force: as it is written, and what one of its numbers was taken for, in g.
+#[derive(Debug, Clone)]
+pub(crate) struct ForceColumn {
+    pub text: String,
+    pub scale: f64,
+}
+
+/// The median of some numbers; zero of none.
+fn median(of: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = of.collect();
+    if all.is_empty() {
+        return 0.0;
+    }
+    let middle = all.len() / 2;
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn length(f: &[f64; 3]) -> f64 {
+    f.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The angle between two directions, in deg.
+fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+    (dot / (length(a) * length(b))).clamp(-1.0, 1.0).acos().to_degrees()
+}
+
+/// How far a force in platform axes is from the vertical where `C_c^n` is `c`, in deg.
+fn tilt(c: &Matrix3<f64>, force: &[f64; 3]) -> f64 {
+    angle(&apply(c, force), &[0.0, 1.0, 0.0])
+}
+
+impl Forces {
+    /// Of a record of so many positions, in pieces of at most `longest` s.
+    pub(crate) fn new(positions: usize, longest: f64) -> Self {
+        Self { longest, now: Vec::new(), position: 0, seen: 0, pieces: vec![Vec::new(); positions] }
+    }
+
+    /// Takes a sample of a position.
+    pub(crate) fn push(&mut self, position: usize, line: u64, t: f64, force: [f64; 3]) {
+        if position != self.position {
+            self.end();
+        }
+        self.position = position;
+        let first = self.now.first().map(|(_, t, _)| *t);
+        if self.now.len() == MOST || first.is_some_and(|first| t - first >= self.longest) {
+            let now = std::mem::take(&mut self.now);
+            self.piece(&now);
+        }
+        self.now.push((line, t, force));
+        self.seen += 1;
+        if self.seen <= ALONE {
+            let now = std::mem::take(&mut self.now);
+            self.piece(&now);
+        }
+    }
+
+    /// The position, or the record, is over.
+    pub(crate) fn end(&mut self) {
+        for sample in std::mem::take(&mut self.now) {
+            self.piece(&[sample]);
+        }
+        self.seen = 0;
+    }
+
+    fn piece(&mut self, of: &[(u64, f64, [f64; 3])]) {
+        let (Some(first), Some(last)) = (of.first(), of.last()) else { return };
+        self.pieces[self.position].push(Piece {
+            lines: (first.0, last.0),
+            t: first.1,
+            samples: of.len(),
+            force: std::array::from_fn(|i| median(of.iter().map(|s| s.2[i]))),
+        });
+    }
+
+    /// Of every position that has samples: its first line and its force.
+    fn usual(&self) -> impl Iterator<Item = (usize, u64, [f64; 3])> + '_ {
+        let of = |(p, pieces): (usize, &Vec<Piece>)| {
+            let line = pieces.first()?.lines.0;
+            Some((p, line, std::array::from_fn(|i| median(pieces.iter().map(|x| x.force[i])))))
+        };
+        self.pieces.iter().enumerate().filter_map(of)
+    }
+
+    /// Refuses numbers that are of other units than the header has: `units` with what one of each is in g.
+    pub(crate) fn check_units(
+        &self,
+        record: &str,
+        names: &[&str],
+        columns: Option<&[ForceColumn; 3]>,
+        units: &[(&str, f64)],
+    ) -> Result<(), Box<Mistaken>> {
+        let all: Vec<(usize, u64, [f64; 3])> = self.usual().collect();
+        let off = |f: &[f64; 3]| (length(f) - 1.0).abs();
+        let Some(&(p, line, worst)) = all.iter().max_by(|a, b| off(&a.2).total_cmp(&off(&b.2))) else {
+            return Ok(());
+        };
+        if off(&worst) <= UNIT {
+            return Ok(());
+        }
+        let length_g = format!("{:.4}", length(&worst));
+        let (record, position) = (record.to_string(), names[p].to_string());
+        if let Some((columns, units)) = columns.and_then(|own| other_units(&all, own, units)) {
+            return Err(Box::new(Mistaken::ForceUnit { record, line, columns, position, length_g, units }));
+        }
+        if off(&worst) <= GROSS {
+            return Ok(());
+        }
+        Err(Box::new(Mistaken::ForceLength { record, line, position, length_g }))
+    }
+
+    /// Refuses positions whose force is far from where the scheme has it.
+    pub(crate) fn check_attitudes(
+        &self,
+        record: &str,
+        names: &[&str],
+        attitudes: &[Matrix3<f64>],
+    ) -> Result<(), CalibrationError> {
+        for (p, line, force) in self.usual() {
+            let off = tilt(&attitudes[p], &force);
+            if off <= TILT_DEG {
+                continue;
+            }
+            let near = |q: &usize| tilt(&attitudes[*q], &force) <= TILT_DEG;
+            let like: Vec<&str> = (0..names.len()).filter(near).map(|q| names[q]).collect();
+            return Err(CalibrationError::Attitude {
+                record: record.into(),
+                line,
+                position: names[p].into(),
+                off_deg: format!("{off:.1}"),
+                like: if like.is_empty() { "no position of the scheme".into() } else { like.join(" or ") },
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses positions at whose beginning or end the platform is not there yet, or no longer. One sample is an outlier where bins have so many that it is left out of
+    /// them, unless other positions have one too.
+    pub(crate) fn check_ends(
+        &self,
+        record: &str,
+        names: &[&str],
+        attitudes: &[Matrix3<f64>],
+    ) -> Result<(), Box<Mistaken>> {
+        let all: Vec<(usize, [f64; 3], [usize; 2])> =
+            self.usual().map(|(p, _, force)| (p, force, away(&self.pieces[p], &force))).collect();
+        for (side, begins) in [true, false].into_iter().enumerate() {
+            let outer = |p: usize, count: usize| {
+                let pieces = &self.pieces[p];
+                if begins { &pieces[..count] } else { &pieces[pieces.len() - count..] }
+            };
+            let some: Vec<_> = all.iter().filter(|(_, _, away)| away[side] > 0).collect();
+            let samples = |p: usize, count: usize| outer(p, count).iter().map(|x| x.samples).sum::<usize>();
+            let Some(&&(p, force, away)) = some.iter().max_by_key(|(p, _, away)| samples(*p, away[side]))
+            else {
+                continue;
+            };
+            let dense =
+                self.pieces[p].iter().filter(|x| x.samples > 1).all(|x| x.samples >= crate::bins::FEWEST);
+            if dense && some.len() < 2 && samples(p, away[side]) < 2 {
+                continue;
+            }
+            // the sample furthest from the position, and the lines between which the platform comes or goes
+            let (pieces, count) = (&self.pieces[p], away[side]);
+            let first = pieces.len() - count;
+            let (outer, from, to) = match begins {
+                true => (&pieces[0], pieces[count - 1].lines.0, pieces[count].lines.1),
+                false => (&pieces[pieces.len() - 1], pieces[first - 1].lines.0, pieces[first].lines.1),
+            };
+            let tilts = attitudes.iter().map(|c| tilt(c, &outer.force)).enumerate();
+            let like =
+                tilts.filter(|(q, off)| *q != p && *off <= TILT_DEG).min_by(|a, b| a.1.total_cmp(&b.1));
+            return Err(Box::new(Mistaken::Shifted {
+                record: record.into(),
+                from,
+                to,
+                position: names[p].into(),
+                what: if begins { "comes to rest at" } else { "leaves" },
+                side: if begins { "before" } else { "after" },
+                off_deg: format!("{:.1}", angle(&outer.force, &force)),
+                like: like.map_or_else(|| "no position (it turns)".into(), |(q, _)| names[q].into()),
+            }));
+        }
+        Ok(())
+    }
+}
+
+/// How many pieces at the beginning and at the end are away from where the position goes on steadily from the piece that is nearest to its usual `force`.
+fn away(pieces: &[Piece], force: &[f64; 3]) -> [usize; 2] {
+    let off = |x: &Piece| angle(&x.force, force);
+    let nearest = (0..pieces.len()).min_by(|a, b| off(&pieces[*a]).total_cmp(&off(&pieces[*b])));
+    let Some(start) = nearest.filter(|_| pieces.len() >= FEWEST) else { return [0, 0] };
+    // what noise makes of the direction of a sample, from pieces of any size
+    let spread = |w: &[Piece]| {
+        let of = |x: &Piece| 1.0 / x.samples as f64;
+        angle(&w[0].force, &w[1].force) / (of(&w[0]) + of(&w[1])).sqrt()
+    };
+    let noise = median(pieces.windows(2).map(spread));
+    let run = |list: &mut dyn Iterator<Item = &Piece>| {
+        let (mut good, mut count) = (&pieces[start], 0);
+        for x in list {
+            let most = HELD_DEG
+                + DRIFTS_DEG_S * (x.t - good.t).abs()
+                + NOISE * noise * (1.0 / x.samples as f64 + 1.0 / good.samples as f64).sqrt();
+            if angle(&x.force, &good.force) > most {
+                count += 1;
+            } else {
+                (good, count) = (x, 0);
+            }
+        }
+        count
+    };
+    [run(&mut pieces[..start].iter().rev()), run(&mut pieces[start + 1..].iter())]
+}
+
+/// The columns whose numbers are of another unit, and that: with it the force is one g long at all positions. Of several ways that with the fewest columns.
+fn other_units(
+    all: &[(usize, u64, [f64; 3])],
+    own: &[ForceColumn; 3],
+    units: &[(&str, f64)],
+) -> Option<(String, String)> {
+    // of every column its own unit, or another
+    let choices: Vec<Option<usize>> = std::iter::once(None).chain((0..units.len()).map(Some)).collect();
+    let mut found: Option<(usize, f64, [Option<usize>; 3])> = None;
+    for code in 0..choices.len().pow(3) {
+        let n = choices.len();
+        let of = [choices[code % n], choices[code / n % n], choices[code / n / n]];
+        let same = |j: usize| of[j].is_some_and(|u| (units[u].1 / own[j].scale - 1.0).abs() < 0.5);
+        if (0..3).any(same) {
+            continue;
+        }
+        let scaled = |f: &[f64; 3]| {
+            let x: [f64; 3] =
+                std::array::from_fn(|j| of[j].map_or(f[j], |u| f[j] * units[u].1 / own[j].scale));
+            (length(&x) - 1.0).abs()
+        };
+        let off = all.iter().map(|(_, _, f)| scaled(f)).fold(0.0, f64::max);
+        let changed = of.iter().flatten().count();
+        let better = found.as_ref().is_none_or(|(c, o, _)| (changed, off) < (*c, *o));
+        if off <= CLOSE && better {
+            found = Some((changed, off, of));
+        }
+    }
+    let (_, _, of) = found?;
+    let there = |j: &usize| of[*j].is_some();
+    let columns: Vec<String> = (0..3).filter(there).map(|j| format!("`{}`", own[j].text)).collect();
+    let mut names: Vec<&str> = of.iter().flatten().map(|u| units[*u].0).collect();
+    names.dedup();
+    let list = names.iter().map(|n| format!("[{n}]")).collect::<Vec<_>>();
+    Some((columns.join(", "), list.join(", ")))
+}

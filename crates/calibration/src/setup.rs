@@ -1,0 +1,95 @@
+//! What a calibration is of, and what it rests on: so that numbers are not taken for those of another platform, and no record counts twice.
+
+use obsdeg_core::model::{Carry, Geometry, Scheme};
+use obsdeg_evidence::simulation::latitude_of;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::answer::CovarianceTable;
+
+/// What of a scheme says what its coefficients mean, and which records are of its runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Setup {
+    /// The terms, as in `--terms`.
+    pub terms: String,
+    /// How gyros and accelerometers are mounted.
+    pub geometry: Geometry,
+    /// What is carried between positions.
+    pub carry: Carry,
+    /// In deg, by default that of the paper.
+    pub latitude_deg: f64,
+    /// Whether psi_y is measured.
+    pub measured_azimuth: bool,
+    /// Names and Euler angles in deg of the positions.
+    pub positions: Vec<(String, String)>,
+}
+
+impl Setup {
+    /// Of a scheme.
+    pub fn of(scheme: &Scheme) -> Self {
+        let angles = |p: &obsdeg_core::model::Position| {
+            p.angles.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")
+        };
+        Self {
+            terms: scheme.unknowns.to_string(),
+            geometry: scheme.geometry,
+            carry: scheme.carry,
+            latitude_deg: latitude_of(scheme).map_or(0.0, |l| l.degrees()),
+            measured_azimuth: scheme.measured_azimuth,
+            positions: scheme.positions.iter().map(|p| (p.name.clone(), angles(p))).collect(),
+        }
+    }
+
+    /// What is different there from what is here, in words: nothing where one is a run of the other.
+    pub fn differences(&self, there: &Self) -> Vec<String> {
+        let mut out = Vec::new();
+        let mut say = |what: &str, here: &str, there: &str| {
+            if here != there {
+                out.push(format!("{what} {there} instead of {here}"));
+            }
+        };
+        say("terms", &self.terms, &there.terms);
+        say("carry", &self.carry.to_string(), &there.carry.to_string());
+        say("latitude", &self.latitude_deg.to_string(), &there.latitude_deg.to_string());
+        let azimuth = |s: &Self| if s.measured_azimuth { "measured" } else { "not measured" };
+        say("azimuth", azimuth(self), azimuth(there));
+        let count = |s: &Self| s.positions.len().to_string();
+        say("number of positions", &count(self), &count(there));
+        if self.positions.len() == there.positions.len() {
+            for ((name, here), (_, other)) in self.positions.iter().zip(&there.positions) {
+                say(&format!("angles of {name}"), here, other);
+            }
+        }
+        if self.geometry != there.geometry {
+            out.push("another mounting of the sensors (geometry)".into());
+        }
+        out
+    }
+}
+
+/// A record that estimates rest on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Basis {
+    /// What it was called.
+    pub record: String,
+    /// The digest of its numbers.
+    pub digest: String,
+}
+
+impl Basis {
+    /// The one among `others` that has the same numbers.
+    pub(crate) fn among<'a>(&self, others: &'a [Self]) -> Option<&'a Self> {
+        others.iter().find(|o| o.digest == self.digest)
+    }
+}
+
+/// A calibration before, of what `S` says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Before<S> {
+    /// Its estimates; the covariance is the one that counts.
+    pub estimates: CovarianceTable,
+    /// The records that it rests on, those of its own prior too.
+    pub rests_on: Vec<Basis>,
+    /// What it is of.
+    pub of: S,
+}
