@@ -186,6 +186,17 @@ pub struct CovarianceTable {
     pub rescaled: Vec<Vec<f64>>,
 }
 
+/// A calibration before, of what `S` says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Before<S> {
+    /// Its estimates; the covariance is the one that counts.
+    pub estimates: CovarianceTable,
+    /// The records that it rests on, those of its own prior too.
+    pub rests_on: Vec<Basis>,
+    /// What it is of.
+    pub of: S,
+}
+
 /// How well everything fits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {

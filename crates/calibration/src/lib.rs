@@ -26,7 +26,7 @@ pub enum Going<'a> {
     Passes(usize),
 }
 
-pub use answer::Calibration;
+pub use answer::{Before, Calibration};
 pub use platform::{CalibrationError, Options, calibrate};
-pub use setup::{Basis, Before, Setup};
+pub use setup::{Basis, Setup};
 pub use system::{SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system};

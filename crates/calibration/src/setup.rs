@@ -5,8 +5,6 @@ use obsdeg_evidence::simulation::latitude_of;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::answer::CovarianceTable;
-
 /// What of a scheme says what its coefficients mean, and which records are of its runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setup {
@@ -81,15 +79,4 @@ impl Basis {
     pub(crate) fn among<'a>(&self, others: &'a [Self]) -> Option<&'a Self> {
         others.iter().find(|o| o.digest == self.digest)
     }
-}
-
-/// A calibration before, of what `S` says.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Before<S> {
-    /// Its estimates; the covariance is the one that counts.
-    pub estimates: CovarianceTable,
-    /// The records that it rests on, those of its own prior too.
-    pub rests_on: Vec<Basis>,
-    /// What it is of.
-    pub of: S,
 }

@@ -19,9 +19,9 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::Going;
-use crate::answer::{Calibration, CovarianceTable};
+use crate::answer::{Before, Calibration, CovarianceTable};
 use crate::record::{Record, RecordError};
-use crate::setup::{Basis, Before, Setup};
+use crate::setup::{Basis, Setup};
 use diagnose::Diagnosed;
 use estimate::{Problem, Unknowns};
 use run::Run;

@@ -18,10 +18,10 @@ pub use answer::{
 };
 
 use crate::Going;
-use crate::answer::CovarianceTable;
+use crate::answer::{Before, CovarianceTable};
 use crate::least_squares::{Rows, Solution};
 use crate::record::Record;
-use crate::setup::{Basis, Before};
+use crate::setup::Basis;
 use data::{Data, Read, read};
 
 /// Name and version of the JSON layout.
