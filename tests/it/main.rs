@@ -21,6 +21,7 @@ mod models;
 mod program;
 mod reference_verdicts;
 mod report;
+mod report_page;
 mod rotation;
 mod scheme_schema;
 mod schemes;

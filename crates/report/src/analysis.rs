@@ -49,7 +49,7 @@ fn verdicts(a: &Analysis) -> [Block; 2] {
         [first, &[left("verdict"), right("degree")], dwell.as_slice(), &[left(last)]].concat()
     };
     let row = |first: Vec<Cell>, status: Status, degree, order, last: Cell| {
-        let dwell = dwell.map(|_| words::with_dwell(a, degree, order).into());
+        let dwell = dwell.is_some().then(|| words::with_dwell(a, degree, order).into());
         [
             first,
             vec![status.to_string().into(), words::degree(degree).into()],

@@ -313,7 +313,7 @@ impl Answer for Calibration {
         ];
         let mut blocks = vec![Block::table(
             "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the scheme would do, in sigma and to sigma)",
-            columns,
+            columns.clone(),
             self.unknowns.iter().map(row),
         )];
         if !self.combinations.is_empty() {
@@ -660,5 +660,6 @@ pub(crate) fn status(c: &Calibration, title: String) -> Status {
                 ),
             ),
         ],
+        actions: Vec::new(),
     }
 }

@@ -35,7 +35,7 @@ pub(crate) fn document(d: &Document) -> Result<String, ReportError> {
         _ => None,
     });
     let Some((columns, rows)) = first else { return Ok(String::new()) };
-    let header = columns.iter().map(|c| c.name.into()).collect();
+    let header = columns.iter().map(|c| c.name.clone().into_owned()).collect();
     let rows = rows.iter().map(|r| r.iter().map(|c| c.text.clone()).collect());
     write(std::iter::once(header).chain(rows))
 }

@@ -1,6 +1,8 @@
 //! What a result says, in no format: headings, tables, lists, formulas, pictures. Text from files is escaped where it
 //! is written.
 
+use std::borrow::Cow;
+
 use serde_json::{Value, json};
 
 use crate::figure::Figure;
@@ -22,6 +24,8 @@ pub(crate) enum Block {
     Picture(Picture),
     /// What a reader must know first, a box for each scheme or model.
     Status(Vec<Status>),
+    /// A part (level 1) that may be folded away; no other holds one.
+    Fold { title: String, blocks: Vec<Block> },
 }
 
 impl Block {
@@ -54,21 +58,21 @@ impl Block {
 }
 
 /// A column of a table.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Column {
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     /// Numbers are set flush right.
     pub(crate) number: bool,
 }
 
 /// A column of text.
-pub(crate) fn left(name: &'static str) -> Column {
-    Column { name, number: false }
+pub(crate) fn left(name: impl Into<Cow<'static, str>>) -> Column {
+    Column { name: name.into(), number: false }
 }
 
 /// A column of numbers.
-pub(crate) fn right(name: &'static str) -> Column {
-    Column { name, number: true }
+pub(crate) fn right(name: impl Into<Cow<'static, str>>) -> Column {
+    Column { name: name.into(), number: true }
 }
 
 /// A cell of a table.
@@ -77,27 +81,34 @@ pub(crate) struct Cell {
     pub(crate) text: String,
     /// The same as LaTeX, if it is a formula.
     pub(crate) latex: Option<String>,
+    /// What it means, if that is graded; the text says it too.
+    pub(crate) grade: Option<Grade>,
 }
 
 impl Cell {
     pub(crate) fn formula(text: impl Into<String>, latex: String) -> Self {
-        Self { text: text.into(), latex: Some(latex) }
+        Self { text: text.into(), latex: Some(latex), grade: None }
+    }
+
+    pub(crate) fn graded(text: impl Into<String>, grade: Grade) -> Self {
+        Self { text: text.into(), latex: None, grade: Some(grade) }
     }
 }
 
 impl<T: Into<String>> From<T> for Cell {
     fn from(text: T) -> Self {
-        Self { text: text.into(), latex: None }
+        Self { text: text.into(), latex: None, grade: None }
     }
 }
 
 /// A table for the templates of pages.
 pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>]) -> Value {
-    let texts = |row: &Vec<Cell>| row.iter().map(|c| c.text.clone()).collect::<Vec<_>>();
+    let cell = |c: &Cell| json!({ "text": c.text, "grade": c.grade.map(Grade::name) });
+    let texts = |row: &Vec<Cell>| row.iter().map(cell).collect::<Vec<_>>();
     json!({
         "kind": "table",
         "heading": heading,
-        "header": columns.iter().map(|c| c.name).collect::<Vec<_>>(),
+        "header": columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
         "numbers": columns.iter().map(|c| c.number).collect::<Vec<_>>(),
         "rows": rows.iter().map(texts).collect::<Vec<_>>(),
     })
@@ -109,6 +120,8 @@ pub(crate) struct Status {
     pub(crate) title: String,
     /// A row per question.
     pub(crate) rows: Vec<Finding>,
+    /// What to do about it.
+    pub(crate) actions: Vec<String>,
 }
 
 /// The answer to one question.
@@ -132,6 +145,16 @@ pub(crate) enum Grade {
 }
 
 impl Grade {
+    /// Its name on pages.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Limited => "limited",
+            Self::Missed => "missed",
+            Self::Open => "open",
+        }
+    }
+
     pub(crate) fn mark(self) -> &'static str {
         match self {
             Self::Good => "ok",
@@ -146,8 +169,10 @@ impl Status {
     /// The box as a table, for formats that have no boxes.
     fn table(&self) -> Block {
         let row = |f: &Finding| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
+        let action = |text: &String| ["Recommended action", "", text].map(String::from).to_vec();
         let columns = [left("question"), left("status"), left("finding")];
-        Block::table(format!("Status: {}", self.title), columns, self.rows.iter().map(row))
+        let rows = self.rows.iter().map(row).chain(self.actions.iter().map(action));
+        Block::table(format!("Status: {}", self.title), columns, rows)
     }
 }
 
@@ -226,28 +251,32 @@ pub(crate) enum Part<'a> {
     Pictures(Vec<&'a Picture>),
 }
 
+/// Blocks, with pictures that follow each other taken together.
+pub(crate) fn parts(blocks: &[Block]) -> Vec<Part<'_>> {
+    let mut out: Vec<Part<'_>> = Vec::new();
+    for block in blocks {
+        match (block, out.last_mut()) {
+            (Block::Picture(p), Some(Part::Pictures(list))) => list.push(p),
+            (Block::Picture(p), _) => out.push(Part::Pictures(vec![p])),
+            (block, _) => out.push(Part::Block(block)),
+        }
+    }
+    out
+}
+
 impl Document {
-    /// The same with status boxes as tables.
+    /// The same with status boxes as tables and nothing folded.
     pub(crate) fn plain(mut self) -> Self {
         let tables = |b: Block| match b {
             Block::Status(boxes) => boxes.iter().map(Status::table).collect(),
+            Block::Fold { title, mut blocks } => {
+                blocks.insert(0, Block::Section { level: 1, title });
+                blocks
+            }
             other => vec![other],
         };
         self.blocks = self.blocks.into_iter().flat_map(tables).collect();
         self
-    }
-
-    /// The blocks, with pictures that follow each other taken together.
-    pub(crate) fn parts(&self) -> Vec<Part<'_>> {
-        let mut out: Vec<Part<'_>> = Vec::new();
-        for block in &self.blocks {
-            match (block, out.last_mut()) {
-                (Block::Picture(p), Some(Part::Pictures(list))) => list.push(p),
-                (Block::Picture(p), _) => out.push(Part::Pictures(vec![p])),
-                (block, _) => out.push(Part::Block(block)),
-            }
-        }
-        out
     }
 
     /// The same with all pictures in `folder`.

@@ -76,6 +76,8 @@ pub(crate) struct Figure {
     pub(crate) log: bool,
     /// The vertical axis logarithmic.
     pub(crate) log_y: bool,
+    /// Both axes are those of whole numbers.
+    pub(crate) orders: bool,
 }
 
 /// Width and height of one figure.
@@ -148,6 +150,13 @@ impl Figure {
         }
         if let Some((low, high)) = self.y_range {
             layout = layout.with_y_axis_min(low).with_y_axis_max(high);
+        }
+        if self.orders {
+            let step = |range: Option<(f64, f64)>| {
+                range.map_or(1.0, |(low, high)| ((high - low) / 8.0).ceil().max(1.0))
+            };
+            layout = layout.with_x_tick_step(step(self.x_range)).with_y_tick_step(step(self.y_range));
+            layout = layout.with_tick_format(TickFormat::Integer);
         }
         for &x in &self.marks {
             layout = layout.with_reference_line(

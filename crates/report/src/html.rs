@@ -10,7 +10,7 @@ use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
 use crate::document::{
-    Block, Document, Drawing, Finding, Grade, Part, Picture, Status, Typeset, table_of_page,
+    Block, Document, Drawing, Finding, Part, Picture, Status, Typeset, parts, table_of_page,
 };
 use crate::figure::{Figure, Line, Stroke};
 use crate::{ReportError, visible};
@@ -24,7 +24,11 @@ const FONT: &[u8] = include_bytes!("../assets/math.woff2");
 
 /// The document as a page.
 pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
-    let blocks: Vec<Json> = d.parts().iter().enumerate().map(|(i, part)| block(i, part)).collect();
+    // what stands before the first part
+    let first = d.blocks.iter().position(|b| matches!(b, Block::Section { .. } | Block::Fold { .. }));
+    let (front, rest) = d.blocks.split_at(first.unwrap_or(d.blocks.len()));
+    let mut ids = 0;
+    let [front, blocks] = [front, rest].map(|b| listed(b, &mut ids));
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     environment.set_formatter(|out, state, value| match value.as_str() {
@@ -32,11 +36,11 @@ pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
         _ => escape_formatter(out, state, value),
     });
     environment.add_template("page", TEMPLATE)?;
-    let interactive =
-        d.blocks.iter().any(|b| matches!(b, Block::Picture(Picture { drawing: Drawing::Curves(_), .. })));
+    let interactive = has_curves(&d.blocks);
     let page = environment.get_template("page")?.render(context! {
         title => d.title.clone(),
         lead => d.lead.clone(),
+        front => Value::from(Serde(&front)),
         blocks => Value::from(Serde(&blocks)),
         version => version,
         interactive => interactive,
@@ -47,6 +51,30 @@ pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
         font => STANDARD.encode(FONT),
     })?;
     Ok(page)
+}
+
+fn has_curves(blocks: &[Block]) -> bool {
+    blocks.iter().any(|b| match b {
+        Block::Picture(p) => matches!(p.drawing, Drawing::Curves(_)),
+        Block::Fold { blocks, .. } => has_curves(blocks),
+        _ => false,
+    })
+}
+
+/// What the template needs of blocks; a fold is its beginning, what it holds, and its end. `ids` counts what links lead to.
+fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
+    let mut out = Vec::new();
+    for part in parts(blocks) {
+        *ids += 1;
+        if let Part::Block(Block::Fold { title, blocks }) = &part {
+            out.push(json!({ "kind": "fold", "level": 1, "title": title, "id": format!("section-{ids}") }));
+            out.extend(listed(blocks, ids));
+            out.push(json!({ "kind": "end" }));
+        } else {
+            out.push(block(*ids, &part));
+        }
+    }
+    out
 }
 
 /// What the template needs of a block.
@@ -69,19 +97,14 @@ fn block(i: usize, part: &Part<'_>) -> Json {
             let lines: Vec<Json> = lines.iter().map(formula).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
-        Block::Picture(_) => Json::Null, // in groups
+        // in groups, and in parts
+        Block::Picture(_) | Block::Fold { .. } => Json::Null,
         Block::Status(boxes) => {
-            let row = |f: &Finding| {
-                let grade = match f.grade {
-                    Grade::Good => "good",
-                    Grade::Limited => "limited",
-                    Grade::Missed => "missed",
-                    Grade::Open => "open",
-                };
-                json!({ "what": f.what, "grade": grade, "mark": f.grade.mark(), "text": f.text })
+            let row = |f: &Finding| json!({ "what": f.what, "grade": f.grade.name(), "mark": f.grade.mark(), "text": f.text });
+            let of = |s: &Status| {
+                let rows: Vec<Json> = s.rows.iter().map(row).collect();
+                json!({ "title": s.title, "rows": rows, "actions": s.actions })
             };
-            let of =
-                |s: &Status| json!({ "title": s.title, "rows": s.rows.iter().map(row).collect::<Vec<_>>() });
             json!({ "kind": "status", "boxes": boxes.iter().map(of).collect::<Vec<_>>() })
         }
     }
@@ -151,7 +174,11 @@ fn inlined(p: &Picture) -> String {
     let size = attribute("width").zip(attribute("height"));
     let view = size.map_or_else(String::new, |(w, h)| format!(" viewBox=\"0 0 {w} {h}\""));
     let svg = svg
-        .replacen("<svg ", &format!("<svg class=\"still\" role=\"img\" aria-label=\"{}\"{view} ", p.name), 1)
+        .replacen(
+            "<svg ",
+            &format!("<svg class=\"still\" role=\"img\" aria-labelledby=\"{}-caption\"{view} ", p.name),
+            1,
+        )
         .replace("kuva-clip", &format!("{}-clip", p.name))
         .replacen("<rect width=\"100%\" height=\"100%\" fill=\"white\" />", "", 1);
     in_page_colors(&svg)
@@ -209,7 +236,7 @@ fn curves(f: &Figure) -> Json {
     }
     json!({
         "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label), "log_x": f.log, "log_y": f.log || f.log_y,
-        "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
+        "orders": f.orders, "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
         "series": series, "tables": tables, "bands": bands,
     })
 }

@@ -70,7 +70,7 @@ fn table(columns: &[Column], rows: &[Vec<Cell>]) -> String {
     format!(
         "\\begin{{longtable}}{{{}}}\n\\toprule\n{}\\midrule\n\\endhead\n{}\\bottomrule\n\\end{{longtable}}\n",
         spec.collect::<String>(),
-        line(columns.iter().map(|c| escape(c.name)).collect()),
+        line(columns.iter().map(|c| escape(&c.name)).collect()),
         rows.iter().map(|row| line(row.iter().map(cell).collect())).collect::<String>()
     )
 }
@@ -107,7 +107,7 @@ fn body(d: &Document) -> String {
                 p.name,
                 escape(&p.caption)
             )),
-            Block::Status(_) => {}
+            Block::Status(_) | Block::Fold { .. } => {}
         }
     }
     out

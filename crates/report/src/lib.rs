@@ -17,6 +17,7 @@ mod markdown;
 mod pdf;
 mod poses;
 mod review;
+mod rows;
 mod series;
 mod simulation;
 mod system;

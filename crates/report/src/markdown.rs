@@ -41,38 +41,39 @@ pub(crate) fn document(d: &Document) -> String {
     for line in &d.lead {
         out.push_str(&format!("{}\n\n", escape(line)));
     }
-    let sections = d.blocks.iter().any(|b| matches!(b, Block::Section { .. }));
-    let hashes = if sections { "####" } else { "##" };
-    let heading = |text: &str| match text {
+    // headings follow each other without a gap: below the title, then below the last section
+    let mut above = 1;
+    let heading = |above: usize, text: &str| match text {
         "" => String::new(),
-        text => format!("{hashes} {}\n\n", escape(text)),
+        text => format!("{} {}\n\n", "#".repeat(above + 1), escape(text)),
     };
     for (i, block) in d.blocks.iter().enumerate() {
-        if matches!(block, Block::Status(_)) {
+        if matches!(block, Block::Status(_) | Block::Fold { .. }) {
             continue;
         }
         out.push_str(if i == 0 { "" } else { "\n" });
         match block {
             Block::Table { heading: title, columns, rows } => {
-                out.push_str(&heading(title));
-                out.push_str(&row(columns.iter().map(|c| escape(c.name))));
+                out.push_str(&heading(above, title));
+                out.push_str(&row(columns.iter().map(|c| escape(&c.name))));
                 out.push_str(&format!("|{}\n", " --- |".repeat(columns.len())));
                 out.extend(rows.iter().map(|cells| row(cells.iter().map(cell))));
             }
             Block::List { heading: title, lines } => {
-                out.push_str(&heading(title));
+                out.push_str(&heading(above, title));
                 out.extend(lines.iter().map(|line| format!("- {}\n", escape(line))));
             }
             Block::Section { level, title } => {
-                out.push_str(&format!("{} {}\n", "#".repeat(level + 1), escape(title)));
+                above = level + 1;
+                out.push_str(&format!("{} {}\n", "#".repeat(above), escape(title)));
             }
             Block::Text(text) => out.push_str(&format!("{}\n", escape(text))),
             Block::Formulas { heading: title, lines } => {
-                out.push_str(&heading(title));
+                out.push_str(&heading(above, title));
                 out.extend(lines.iter().map(|line| format!("- ${}$\n", line.latex)));
             }
             Block::Picture(p) => out.push_str(&format!("![{}]({}.svg)\n", escape(&p.caption), p.name)),
-            Block::Status(_) => {}
+            Block::Status(_) | Block::Fold { .. } => {}
         }
     }
     out

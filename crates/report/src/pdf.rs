@@ -17,7 +17,7 @@ use typst::{Library, LibraryExt, World};
 use typst_layout::PagedDocument;
 use typst_pdf::PdfOptions;
 
-use crate::document::{Block, Document, Part, table_of_page};
+use crate::document::{Block, Document, Part, parts, table_of_page};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
@@ -106,7 +106,7 @@ fn source(d: &Document) -> Result<String, ReportError> {
     environment.set_auto_escape_callback(|_| AutoEscape::None);
     environment.add_filter("quoted", |text: String| quoted(&text));
     environment.add_template("pages", TEMPLATE)?;
-    let parts: Vec<Json> = d.parts().into_iter().map(part).collect();
+    let parts: Vec<Json> = parts(&d.blocks).into_iter().map(part).collect();
     Ok(environment.get_template("pages")?.render(context! {
         title => d.title.clone(),
         lead => d.lead.clone(),
@@ -132,7 +132,7 @@ fn part(part: Part<'_>) -> Json {
             let lines: Vec<String> = lines.iter().map(|l| math::typst(&l.latex)).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
-        // pictures are in groups, a status is a table by now
-        Block::Picture(_) | Block::Status(_) => Json::Null,
+        // pictures are in groups, a status is a table by now, and nothing is folded
+        Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => Json::Null,
     }
 }

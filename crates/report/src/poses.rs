@@ -21,7 +21,7 @@ const ELEVATION_DEG: f64 = 20.0;
 const WIDTH: f64 = 220.0;
 const GAP: f64 = 8.0;
 /// Height of a panel without its lines of text, and of one of these.
-const HEIGHT: f64 = 214.0;
+const HEIGHT: f64 = 232.0;
 const LINE: f64 = 14.0;
 /// One, in pixels.
 const UNIT: f64 = 70.0;
@@ -210,7 +210,7 @@ fn body(pose: &Pose, texts: &[String], latitude_deg: f64, top: f64) -> String {
             escaped(text)
         );
     }
-    let _ = write!(out, "<g transform=\"translate({} {})\">", WIDTH / 2.0 - 8.0, top + 98.0);
+    let _ = write!(out, "<g transform=\"translate({} {})\">", WIDTH / 2.0 - 8.0, top + 114.0);
     geographic(&mut out);
     let latitude = latitude_deg.to_radians();
     arrow(&mut out, "g", [0.0, -1.0, 0.0], BLACK, true);

@@ -1,59 +1,91 @@
 //! The design review: its sections in the order in which a review asks for them.
 
+mod first;
+mod generic;
 mod model;
+mod notation;
 mod pictures;
 mod verdict;
 
 use obsdeg_calibration::Calibration;
 use obsdeg_core::analysis::Analysis;
+use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::{DesignReview, PositionReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::crosscheck::CrossCheck;
+use obsdeg_evidence::simulation::Outcome;
 
 use crate::analysis::null_vector;
 use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
 use crate::{Answer, calibration, compare, latex, simulation, words};
 
-/// A review as one document.
+/// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections; of several the comparison first, and
+/// every part folded below it.
 pub(crate) fn document(r: &DesignReview, calibrations: &[(String, Calibration)]) -> Document {
-    let schemes = r.schemes.iter().zip(&r.comparison.schemes).map(|(s, review)| verdict::status(s, review));
-    let run = calibrations.iter().map(|(name, c)| calibration::status(c, format!("Calibration {name}")));
-    let all = schemes.chain(r.models.iter().map(model::status)).chain(run).collect();
-    let mut blocks = vec![Block::Status(all)];
-    let alone = r.schemes.len() + r.models.len() == 1;
+    let alone = r.schemes.len() + r.generic.len() + r.models.len() == 1;
     let level = if alone { 1 } else { 2 };
-    for (i, (s, review)) in r.schemes.iter().zip(&r.comparison.schemes).enumerate() {
-        if !alone {
-            blocks.push(section(1, format!("Scheme {}", s.name)));
-        }
-        scheme(&mut blocks, s, review, level, &format!("s{}", i + 1));
+    let reviewed = || r.schemes.iter().zip(&r.comparison.schemes);
+    let mut blocks = Vec::new();
+    if r.schemes.len() > 1 {
+        first::comparison(&mut blocks, r);
+    }
+    let run = calibrations.iter().map(|(name, c)| calibration::status(c, format!("Calibration {name}")));
+    let all = (reviewed().map(|(s, review)| verdict::status(s, review)))
+        .chain(r.generic.iter().map(generic::status))
+        .chain(r.models.iter().map(model::status))
+        .chain(run);
+    blocks.push(Block::Status(all.collect()));
+    if alone {
+        blocks.extend(reviewed().map(|(s, review)| first::margins(s, review, "s1")));
+        blocks.extend(r.generic.iter().map(|g| first::generic_degrees(g, "g1")));
+        blocks.extend(r.models.iter().map(|m| first::model_degrees(&m.analysis, "m1")));
     }
     if r.schemes.len() > 1 {
         blocks.push(section(1, "Comparison of the schemes"));
         let comparison = r.comparison.document();
-        blocks.extend(comparison.lead.into_iter().map(Block::Text));
         blocks.extend(comparison.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
         blocks.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
     }
-    for (i, m) in r.models.iter().enumerate() {
+    let mut part = |title: String, own: Vec<Block>| match alone {
+        true => blocks.extend(own),
+        false => blocks.push(Block::Fold { title, blocks: own }),
+    };
+    for (i, (s, review)) in reviewed().enumerate() {
+        let (mut own, id) = (Vec::new(), format!("s{}", i + 1));
         if !alone {
-            blocks.push(section(1, format!("Model {}", m.analysis.name)));
+            own.push(first::margins(s, review, &id));
         }
-        model::part(&mut blocks, m, level, &format!("m{}", i + 1));
+        scheme(&mut own, s, review, level, &id);
+        part(format!("Scheme {}", s.name), own);
+    }
+    for (i, g) in r.generic.iter().enumerate() {
+        let (mut own, id) = (Vec::new(), format!("g{}", i + 1));
+        if !alone {
+            own.push(first::generic_degrees(g, &id));
+        }
+        generic::part(&mut own, g, level, &id);
+        part(format!("Scheme {}", g.name), own);
+    }
+    for (i, m) in r.models.iter().enumerate() {
+        let (mut own, id) = (Vec::new(), format!("m{}", i + 1));
+        if !alone {
+            own.push(first::model_degrees(&m.analysis, &id));
+        }
+        model::part(&mut own, m, level, &id);
+        part(format!("Model {}", m.analysis.name), own);
     }
     for (i, (name, c)) in calibrations.iter().enumerate() {
         blocks.push(section(1, format!("Calibration {name}")));
         blocks.extend(calibration::section(c, &format!("c{}", i + 1)));
     }
+    blocks.push(section(1, "Notation"));
+    blocks.push(notation::notation(r));
     blocks.push(section(1, "About this report"));
     blocks.push(Block::list(
         "",
         vec![
             format!("obsdeg {}; seed {}; {} Monte Carlo runs", r.version, r.seed, r.runs),
-            "degree: order of the output's derivatives that solves an unknown (J. NUDT 39(1) 2017); sigma ~ T^-(order + 1/2) with the \
-             accuracy order"
-                .into(),
             format!(
                 "verdicts are exact ranks in prime fields; predicted {}; the filter's runs have both prior and drift noise, psi at the end",
                 words::PREDICTED
@@ -61,6 +93,7 @@ pub(crate) fn document(r: &DesignReview, calibrations: &[(String, Calibration)])
         ],
     ));
     let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
+        .chain(r.generic.iter().map(|g| g.name.as_str()))
         .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
         .collect();
     Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
@@ -322,6 +355,23 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedSchem
     blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
 }
 
+/// How few cardinal attitudes observe every coefficient.
+fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
+    let all = s.alternatives.all.as_ref()?;
+    Some(match (all.positions, all.never.is_empty()) {
+        (Some(k), _) => format!(
+            "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
+            review.carry,
+            all.witness.join(", ")
+        ),
+        (None, false) => format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", ")),
+        (None, true) => format!(
+            "no {} cardinal attitudes determine every coefficient",
+            all.none_of.last().map_or_else(|| "few".into(), |n| n[0].to_string())
+        ),
+    })
+}
+
 fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id: &str) {
     let mut lines = Vec::new();
     let alternatives = &s.alternatives;
@@ -339,22 +389,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
             None => "too many sets of positions to look for the fewest".into(),
         });
     }
-    if let Some(all) = &alternatives.all {
-        lines.push(match (all.positions, all.never.is_empty()) {
-            (Some(k), _) => format!(
-                "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
-                review.carry,
-                all.witness.join(", ")
-            ),
-            (None, false) => {
-                format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", "))
-            }
-            (None, true) => format!(
-                "no {} cardinal attitudes determine every coefficient",
-                all.none_of.last().map_or_else(|| "few".into(), |n| n[0].to_string())
-            ),
-        });
-    }
+    lines.extend(fewest_of_all(s, review));
     if let (Some(c), Some(best)) = (
         &alternatives.certificate,
         alternatives.front.iter().find(|f| s.positions.first().is_some_and(|p| p.dwell_s == f.dwell_s)),
@@ -431,7 +466,11 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
             && !is_list(b, "Validity of the small-angle model")
     };
     blocks.extend(run.blocks.into_iter().filter(kept));
-    blocks.extend(pictures::errors(&s.traces, id));
+    let flat: Vec<&str> = (s.simulation.quantities.iter())
+        .filter(|q| q.status == Exact::NotExcited && q.verdict == Outcome::PriorOnly)
+        .map(|q| q.name.as_str())
+        .collect();
+    blocks.extend(pictures::errors(&s.traces, &flat, id));
 }
 
 fn checks(blocks: &mut Vec<Block>, c: &CrossCheck, id: &str) {

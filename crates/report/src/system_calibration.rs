@@ -83,7 +83,7 @@ impl Answer for SystemCalibration {
         ];
         let mut blocks = vec![Block::table(
             "Estimates (degree: exact verdict; states: at the start)",
-            columns,
+            columns.clone(),
             self.unknowns.iter().map(row),
         )];
         if !self.combinations.is_empty() {

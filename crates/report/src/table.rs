@@ -47,7 +47,7 @@ fn paragraph(out: &mut String, text: &str, layout: Layout) {
 
 fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell>], layout: Layout) {
     let mut table = Table::new();
-    table.load_style(STYLE).set_header(columns.iter().map(|c| c.name));
+    table.load_style(STYLE).set_header(columns.iter().map(|c| &c.name));
     if let Some(width) = layout.width {
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     }
@@ -84,7 +84,7 @@ pub(crate) fn document(d: &Document, layout: Layout) -> String {
                 lines.iter().for_each(|line| paragraph(&mut out, &line.text, layout));
             }
             // a status is a table by now
-            Block::Picture(_) | Block::Status(_) => {}
+            Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => {}
         }
     }
     out

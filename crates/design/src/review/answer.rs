@@ -19,6 +19,8 @@ pub struct DesignReview {
     pub version: String,
     /// The schemes, in the order given.
     pub schemes: Vec<SchemeReview>,
+    /// Schemes with generic angles, in the order given.
+    pub generic: Vec<GenericReview>,
     /// The models, in the order given.
     pub models: Vec<ModelReview>,
     /// Predicted sigmas, drop-one and sensitivity of all schemes.
@@ -56,6 +58,23 @@ pub struct SchemeReview {
     pub dwells: Sweep,
     /// Smaller and other schemes.
     pub alternatives: Alternatives,
+}
+
+/// A scheme whose angles have no numbers: exact verdicts, without predictions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GenericReview {
+    /// Its name.
+    pub name: String,
+    /// What it is for.
+    pub description: String,
+    /// The exact verdicts.
+    pub analysis: Analysis,
+    /// The platform at each of its positions, as far as these have numbers.
+    pub poses: Vec<Pose>,
+    /// The generic angles.
+    pub angles: Vec<String>,
+    /// The latitude at which the earth rate is drawn, in degrees.
+    pub latitude_deg: f64,
 }
 
 /// One position in numbers.

@@ -4,13 +4,13 @@ pub(crate) mod answer;
 
 pub use answer::*;
 
-use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
+use obsdeg_core::analysis::{Analysis, AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::{Carry, Dwell, Pose, Scheme};
+use obsdeg_core::model::{Carry, Dwell, Latitude, Pose, Scheme};
 use obsdeg_core::system::{ModelError, SystemModel, SystemOptions, analyze_system};
 use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
-use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, SimulationError, simulate};
+use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, SimulationError, latitude_of, simulate};
 use obsdeg_evidence::system::{RunError, crosscheck_system, simulate_system};
 use obsdeg_symbolic::Worker;
 use rayon::prelude::*;
@@ -89,10 +89,15 @@ pub fn review(
     for Entry { name, scheme, .. } in entries {
         comparable(scheme).map_err(|error| ReviewError::Simulation { name: name.clone(), error })?;
     }
-    let mut schemes = Vec::new();
+    let (mut schemes, mut generic) = (Vec::new(), Vec::new());
     for (i, entry) in entries.iter().enumerate() {
         let step = |share: f64, what: &str| step(i, share, &format!("{}: {what}", entry.name));
-        schemes.push(scheme(entry, options, worker.as_deref_mut(), &step)?);
+        if entry.scheme.generic_names().is_empty() {
+            schemes.push(scheme(entry, options, worker.as_deref_mut(), &step)?);
+        } else {
+            step(0.0, "verdicts")?;
+            generic.push(self::generic(entry, options, worker.as_deref_mut())?);
+        }
     }
     let mut out = Vec::new();
     for (i, model) in models.iter().enumerate() {
@@ -100,11 +105,14 @@ pub fn review(
         let part = self::model(model, options.seed, worker.as_deref_mut());
         out.push(part.map_err(|error| ReviewError::Model { model: i, error })?);
     }
+    let numeric: Vec<Entry> =
+        entries.iter().filter(|e| e.scheme.generic_names().is_empty()).cloned().collect();
     let comparison =
-        compare(entries, options.seed).map_err(|(name, error)| ReviewError::Simulation { name, error })?;
+        compare(&numeric, options.seed).map_err(|(name, error)| ReviewError::Simulation { name, error })?;
     Ok(DesignReview {
         version: env!("CARGO_PKG_VERSION").into(),
         schemes,
+        generic,
         models: out,
         comparison,
         runs: options.runs,
@@ -115,18 +123,15 @@ pub fn review(
 fn scheme(
     entry: &Entry,
     options: ReviewOptions,
-    mut worker: Option<&mut Worker>,
+    worker: Option<&mut Worker>,
     step: &dyn Fn(f64, &str) -> Result<(), ReviewError>,
 ) -> Result<SchemeReview, ReviewError> {
     let Entry { name, scheme, conditions } = entry;
     let failed = |error: SimulationError| ReviewError::Simulation { name: name.clone(), error };
-    // what needs numbers refuses generic angles before anything is computed
+    // what cannot be run is refused before anything is computed
     let plan = Plan::new(scheme, conditions).map_err(failed)?;
     step(0.0, "verdicts")?;
-    let verdicts = AnalysisOptions { seed: options.seed, ..AnalysisOptions::default() };
-    let analysis = analyze(scheme, verdicts, worker.as_deref_mut())
-        .map_err(|error| ReviewError::Analysis { name: name.clone(), error })?;
-    rest(worker);
+    let analysis = verdicts(entry, options, worker)?;
     step(0.2, "a run of the filter")?;
     let (simulation, record) = simulate(scheme, conditions, options.seed).map_err(failed)?;
     step(0.3, "evidence")?;
@@ -155,6 +160,35 @@ fn scheme(
         latitudes,
         dwells,
         alternatives,
+    })
+}
+
+/// The exact verdicts.
+fn verdicts(
+    entry: &Entry,
+    options: ReviewOptions,
+    mut worker: Option<&mut Worker>,
+) -> Result<Analysis, ReviewError> {
+    let wanted = AnalysisOptions { seed: options.seed, ..AnalysisOptions::default() };
+    let analysis = analyze(&entry.scheme, wanted, worker.as_deref_mut())
+        .map_err(|error| ReviewError::Analysis { name: entry.name.clone(), error })?;
+    rest(worker);
+    Ok(analysis)
+}
+
+/// A scheme without numbers to predict anything for.
+fn generic(
+    entry: &Entry,
+    options: ReviewOptions,
+    worker: Option<&mut Worker>,
+) -> Result<GenericReview, ReviewError> {
+    Ok(GenericReview {
+        name: entry.name.clone(),
+        description: entry.scheme.description.clone(),
+        analysis: verdicts(entry, options, worker)?,
+        poses: poses(&entry.scheme, &entry.conditions),
+        angles: entry.scheme.generic_names(),
+        latitude_deg: latitude_of(&entry.scheme).map_or(0.0, Latitude::degrees),
     })
 }
 
@@ -252,12 +286,7 @@ fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, 
 }
 
 /// The least that keeps what is seen, the least that sees all, and the front of schemes out of the cardinal attitudes.
-fn alternatives(
-    scheme: &Scheme,
-    conditions: &Conditions,
-    analysis: &obsdeg_core::analysis::Analysis,
-    seed: u64,
-) -> Alternatives {
+fn alternatives(scheme: &Scheme, conditions: &Conditions, analysis: &Analysis, seed: u64) -> Alternatives {
     let mut out = Alternatives::default();
     // beside predictions, which have no prior and white noise of Z
     let conditions = &Conditions {

@@ -128,7 +128,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
     if !prior.is_empty() {
         rows.push(row("Resting on the prior", (Grade::Limited, words::names(prior))));
     }
-    Status { title: a.name.clone(), rows }
+    Status { title: a.name.clone(), rows, actions: Vec::new() }
 }
 
 /// Verdict, unknowns, equations and evidence.
@@ -152,6 +152,10 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
     if let Some((run, traces)) = &m.run {
         let document = run.document();
         blocks.extend(document.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
-        blocks.extend(pictures::errors(traces, id));
+        let flat: Vec<&str> = (run.estimates.iter())
+            .filter(|e| e.status == Some(Exact::NotExcited) && e.verdict == Outcome::PriorOnly)
+            .map(|e| e.name.as_str())
+            .collect();
+        blocks.extend(pictures::errors(traces, &flat, id));
     }
 }

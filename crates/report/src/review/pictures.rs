@@ -24,7 +24,7 @@ fn curves(name: &str, caption: impl Into<String>, figure: Figure) -> Block {
     Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing })
 }
 
-fn still(name: &str, caption: impl Into<String>, svg: String) -> Block {
+pub(super) fn still(name: &str, caption: impl Into<String>, svg: String) -> Block {
     Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing: Drawing::Still(svg) })
 }
 
@@ -50,6 +50,7 @@ fn stairs(profile: &[usize], unknowns: usize) -> Figure {
         ],
         x_range: Some((0.0, last)),
         y_range: Some((0.0, unknowns as f64 + 1.0)),
+        orders: true,
         ..Figure::default()
     }
 }
@@ -242,7 +243,8 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
 }
 
 /// Errors of the estimate with the band of three sigma, a picture each.
-pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
+/// What is `flat` is not drawn: nothing moves it.
+pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<Block> {
     let beside = traces.linear.as_ref().map_or("", |_| ", and of the linear filter on the same measurements");
     let of = |i: usize| {
         let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
@@ -252,7 +254,15 @@ pub(super) fn errors(traces: &Traces, id: &str) -> Vec<Block> {
         );
         curves(&name, caption, error_figure(traces, i, POINTS))
     };
-    (0..traces.names.len().min(ERRORS)).map(of).collect()
+    let moves = (0..traces.names.len()).filter(|&i| !flat.contains(&traces.names[i].as_str()));
+    let mut out: Vec<Block> = moves.take(ERRORS).map(of).collect();
+    if !flat.is_empty() {
+        out.push(Block::Text(format!(
+            "Not drawn, not excited and known from the prior only: {}.",
+            flat.join(", ")
+        )));
+    }
+    out
 }
 
 pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {

@@ -1,0 +1,375 @@
+//! What a review begins with: every unknown in one picture, what to do, and of several schemes the comparison and the one to take.
+
+use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::system::SystemAnalysis;
+use obsdeg_design::review::{DesignReview, GenericReview, SchemeReview};
+use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::requirements::Miss;
+
+use super::pictures::still;
+use super::{fewest_of_all, joined, seconds};
+use crate::document::{Block, Cell, Finding, Grade, Status, left, number};
+use crate::rows::{Chart, Row};
+use crate::{compare, words};
+
+/// At most so many rows of a chart, which fit a page.
+const ROWS: usize = 48;
+
+/// What becomes of one requirement, in words.
+fn margin(q: &Quantity) -> (String, Grade) {
+    match (q.requirement, q.margin, q.sigma) {
+        (Some(required), Some(m), Some(sigma)) if sigma <= required => {
+            (format!("{} met", number(m)), Grade::Good)
+        }
+        (Some(_), Some(m), _) => (format!("{} MISSED", number(m)), Grade::Missed),
+        (_, _, None) => {
+            ("not determined".into(), if q.requirement.is_some() { Grade::Missed } else { Grade::Open })
+        }
+        (None, _, Some(_)) => ("nothing required".into(), Grade::Open),
+        (Some(_), None, Some(_)) => ("no number".into(), Grade::Missed),
+    }
+}
+
+/// A chart, and which of all rows it has.
+fn chart(name: &str, caption: String, chart: Chart, all: usize) -> Block {
+    let part = if all > ROWS { format!(" (the first {ROWS} of {all})") } else { String::new() };
+    still(name, format!("{caption}{part}"), chart.svg())
+}
+
+/// Degree and margin of every unknown of a scheme, best first.
+pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Block {
+    let row = |q: &obsdeg_core::analysis::Quantity| {
+        let predicted = review.quantities.iter().find(|p| p.name == q.name);
+        let (text, grade) = predicted.map_or_else(|| ("-".into(), Grade::Open), margin);
+        Row {
+            name: q.name.clone(),
+            remark: words::degree(q.degree),
+            marks: vec![predicted.and_then(|p| p.margin)],
+            limit: None,
+            text,
+            grade,
+        }
+    };
+    let picture = Chart {
+        remark: "degree",
+        label: "margin: required over predicted sigma".into(),
+        orders: false,
+        threshold: Some(1.0),
+        series: Vec::new(),
+        rows: s.analysis.quantities.iter().take(ROWS).map(row).collect(),
+    };
+    let caption = "Every unknown, with its degree and its margin: to the right of 1 its requirement is met by prediction, and a ring is missed".to_string();
+    chart(&format!("{id}_margins"), caption, picture, s.analysis.quantities.len())
+}
+
+/// Degrees, where there is nothing else to show.
+fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count: usize, id: &str) -> Block {
+    let row = |(name, status, degree): (&str, Exact, Option<usize>)| Row {
+        name: name.into(),
+        remark: words::degree(degree),
+        marks: vec![degree.map(|k| k as f64)],
+        limit: None,
+        text: status.to_string(),
+        grade: if degree.is_some() { Grade::Good } else { Grade::Limited },
+    };
+    let picture = Chart {
+        remark: "degree",
+        label: "degree: order of derivatives".into(),
+        orders: true,
+        threshold: None,
+        series: Vec::new(),
+        rows: all.take(ROWS).map(row).collect(),
+    };
+    let caption =
+        "Every unknown with its degree, the order of derivatives that its solution needs".to_string();
+    chart(&format!("{id}_degrees"), caption, picture, count)
+}
+
+pub(super) fn model_degrees(a: &SystemAnalysis, id: &str) -> Block {
+    degrees(a.quantities.iter().map(|q| (q.name.as_str(), q.status, q.degree)), a.quantities.len(), id)
+}
+
+pub(super) fn generic_degrees(g: &GenericReview, id: &str) -> Block {
+    let all = &g.analysis.quantities;
+    degrees(all.iter().map(|q| (q.name.as_str(), q.status, q.degree)), all.len(), id)
+}
+
+/// What follows from what was found, the gravest first.
+pub(super) fn actions(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
+    let mut out = Vec::new();
+    let missed = |why: Miss| -> Vec<&str> {
+        review.requirements.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).collect()
+    };
+    let unseen = missed(Miss::NotObservable);
+    if !unseen.is_empty() {
+        let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
+        out.push(format!("other positions: these do not determine {}{fewest}", words::names(unseen)));
+    }
+    let large = missed(Miss::TooLarge);
+    if !large.is_empty() {
+        out.push(longer(s, review, &large));
+    }
+    let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
+    let in_run = s.simulation.requirements.missed.iter().map(|m| m.name.as_str());
+    let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
+    if !only_there.is_empty() {
+        out.push(format!(
+            "a look at the run, which misses {} although the prediction does not: it has drift noise, the prior, and psi at the end",
+            words::names(only_there)
+        ));
+    }
+    if !s.simulation.validity.holds {
+        out.push(
+            "known drifts compensated before the run, or a filter with full attitudes (`obsdeg simulate --truth exact` shows what that gives): \
+             at these drifts the small-angle model does not hold"
+                .into(),
+        );
+    }
+    if !s.simulation.consistency.consistent {
+        out.push(
+            "no use of the filter's sigmas as they are: its run is not consistent with its truth".into(),
+        );
+    }
+    match &s.evidence {
+        Ok(e) if !e.passed => out
+            .push("the checks of the filter that fail to be understood first (Evidence by a filter)".into()),
+        _ => {}
+    }
+    if out.is_empty() {
+        out.push(match review.requirements.stated {
+            0 => "requirements to be stated: nothing says yet what is good enough".into(),
+            _ => "none: every requirement is met by prediction and in the run, and no check fails".into(),
+        });
+    }
+    out
+}
+
+/// Whether longer dwells meet what is too large.
+fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
+    let required = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.requirement);
+    let meets = |row: &[Option<f64>], name: &str| {
+        let sigma = s.dwells.names.iter().position(|n| n == name).and_then(|c| row[c]);
+        sigma.zip(required(name)).is_some_and(|(sigma, required)| sigma <= required)
+    };
+    let longer = || s.dwells.x.iter().zip(&s.dwells.sigmas).filter(|(x, _)| **x > 1.0);
+    let names = words::names(large.iter().copied());
+    match longer().find(|(_, row)| large.iter().all(|name| meets(row, name))) {
+        Some((factor, _)) => {
+            format!(
+                "dwells {} times as long: by prediction they meet the requirement of {names}",
+                number(*factor)
+            )
+        }
+        None => {
+            let most = s.dwells.x.last().copied().unwrap_or(1.0);
+            format!(
+                "other positions, less noise of Z or other requirements: dwells up to {} times as long do not meet those of {names}",
+                number(most)
+            )
+        }
+    }
+}
+
+/// Whether schemes are held against each other under the same conditions.
+fn like_with_like(r: &DesignReview) -> Finding {
+    let totals = || r.comparison.schemes.iter().map(|s| s.total_s);
+    let (least, most) = totals().fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
+    let time = match least == most {
+        true => format!("all take {} s", seconds(least)),
+        false => format!("they take {} to {} s", seconds(least), seconds(most)),
+    };
+    let (grade, text) = match r.comparison.differ.is_empty() {
+        true => (Grade::Good, format!("same conditions, unknowns and requirements; {time}")),
+        false => {
+            (Grade::Limited, format!("the schemes differ in {}; {time}", r.comparison.differ.join(", ")))
+        }
+    };
+    Finding { what: "Like with like", grade, text }
+}
+
+/// The scheme to take, and why.
+fn recommended(r: &DesignReview) -> Finding {
+    let (grade, text) = choice(r);
+    Finding { what: "Recommended", grade, text }
+}
+
+fn choice(r: &DesignReview) -> (Grade, String) {
+    let schemes = &r.comparison.schemes;
+    if !r.comparison.differ.is_empty() {
+        let differ = r.comparison.differ.join(", ");
+        return (
+            Grade::Open,
+            format!("none: schemes that differ in {differ} are answers to different questions"),
+        );
+    }
+    if schemes.iter().any(|s| s.requirements.stated == 0) {
+        return (Grade::Open, "none: no requirement says what is good enough".into());
+    }
+    let worst = |s: &ComparedScheme| s.requirements.worst.as_ref().map_or(0.0, |w| w.margin);
+    let own = if schemes.iter().any(|s| s.requirements.by_default) { " (the program's own)" } else { "" };
+    let meeting: Vec<usize> = (0..schemes.len()).filter(|&i| schemes[i].requirements.all_met()).collect();
+    let best = meeting.iter().copied().min_by(|&i, &k| {
+        let (a, b) = (&schemes[i], &schemes[k]);
+        a.total_s.total_cmp(&b.total_s).then(worst(b).total_cmp(&worst(a)))
+    });
+    if let Some(best) = best {
+        let s = &schemes[best];
+        let as_short = meeting.iter().filter(|&&i| schemes[i].total_s == s.total_s).count();
+        let why = match (meeting.len(), as_short) {
+            (1, _) => format!("the only one that meets every requirement{own} by prediction"),
+            (n, 1) => format!(
+                "the shortest of {n} that meet every requirement{own} by prediction, {} s",
+                seconds(s.total_s)
+            ),
+            (n, k) => format!(
+                "of {n} that meet every requirement{own} by prediction, {k} of them equally short, the one with the largest worst margin"
+            ),
+        };
+        let doubts = doubts(&r.schemes[best]);
+        let grade = if doubts.is_empty() { Grade::Good } else { Grade::Limited };
+        let doubts = if doubts.is_empty() { doubts } else { format!("; but {doubts}") };
+        return (grade, format!("{}: {why}{doubts}", s.name));
+    }
+    let missed = |s: &ComparedScheme| s.requirements.missed.len();
+    let fewest = schemes.iter().map(missed).min().unwrap_or(0);
+    let nearest = schemes.iter().filter(|s| missed(s) == fewest);
+    let names = joined(nearest.map(|s| s.name.as_str()));
+    (
+        Grade::Missed,
+        format!(
+            "none: no scheme meets every requirement{own} by prediction; fewest are missed by {names} ({fewest})"
+        ),
+    )
+}
+
+/// What speaks against a scheme that meets its requirements by prediction.
+fn doubts(s: &SchemeReview) -> String {
+    let run = &s.simulation;
+    let found = [
+        (!run.requirements.all_met(), "its run misses some"),
+        (!run.validity.holds, "the small-angle model does not hold at its drifts"),
+        (!run.consistency.consistent, "its run is not consistent with its truth"),
+        (s.evidence.as_ref().is_ok_and(|e| !e.passed), "checks of the filter fail"),
+    ];
+    joined(found.into_iter().filter(|f| f.0).map(|f| f.1))
+}
+
+/// The comparison on one page: what to take, schemes as columns, sigmas as a picture.
+pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview) {
+    let title = format!("Comparison of {} schemes", r.schemes.len());
+    blocks.push(Block::Status(vec![Status {
+        title,
+        rows: vec![recommended(r), like_with_like(r)],
+        actions: vec![],
+    }]));
+    blocks.push(matrix(&r.comparison.schemes));
+    blocks.push(sigmas(&r.comparison.schemes));
+}
+
+/// The unknowns of all schemes in the order of the first that has them.
+fn unknowns(schemes: &[ComparedScheme]) -> Vec<&Quantity> {
+    let mut out: Vec<&Quantity> = Vec::new();
+    for q in schemes.iter().flat_map(|s| &s.quantities) {
+        if !out.iter().any(|o| o.name == q.name) {
+            out.push(q);
+        }
+    }
+    out
+}
+
+/// Schemes as columns: what they take, and the margin of every unknown.
+fn matrix(schemes: &[ComparedScheme]) -> Block {
+    let mut columns = vec![left("")];
+    columns.extend(schemes.iter().map(|s| left(s.name.clone())));
+    let line = |name: &str, cell: &dyn Fn(&ComparedScheme) -> Cell| -> Vec<Cell> {
+        std::iter::once(name.into()).chain(schemes.iter().map(cell)).collect()
+    };
+    let mut rows = vec![
+        line("carry", &|s| s.carry.to_string().into()),
+        line("positions", &|s| s.positions.len().to_string().into()),
+        line("total time", &|s| format!("{} s", seconds(s.total_s)).into()),
+        line("rank with dwell", &|s| {
+            let grade = if s.rank[0] == s.rank[1] { Grade::Good } else { Grade::Limited };
+            Cell::graded(compare::rank(s.rank, s.has_accuracy_orders), grade)
+        }),
+        line("requirements", &|s| {
+            let grade = match (s.requirements.stated, s.requirements.all_met()) {
+                (0, _) => Grade::Open,
+                (_, true) => Grade::Good,
+                (_, false) => Grade::Missed,
+            };
+            Cell::graded(compare::requirements(&s.requirements), grade)
+        }),
+    ];
+    for of in unknowns(schemes) {
+        rows.push(line(&of.name, &|s| match s.quantities.iter().find(|q| q.name == of.name) {
+            None => "no unknown".into(),
+            Some(q) => {
+                let (text, grade) = margin(q);
+                Cell::graded(text, grade)
+            }
+        }));
+    }
+    Block::table("Margins (required over predicted sigma: 1 or more is met)", columns, rows)
+}
+
+/// The sigma of every unknown in every scheme, with what is required where all require the same.
+fn sigmas(schemes: &[ComparedScheme]) -> Block {
+    let all = unknowns(schemes);
+    let of = |s: &ComparedScheme, name: &str| s.quantities.iter().find(|q| q.name == name).cloned();
+    let row = |q: &&Quantity| {
+        let required = || schemes.iter().filter_map(|s| of(s, &q.name)).map(|q| q.requirement);
+        let same = required().all(|r| r == q.requirement);
+        Row {
+            name: q.name.clone(),
+            remark: q.unit.clone(),
+            marks: schemes.iter().map(|s| of(s, &q.name).and_then(|q| q.sigma)).collect(),
+            limit: q.requirement.filter(|_| same),
+            text: String::new(),
+            grade: Grade::Open,
+        }
+    };
+    let picture = Chart {
+        remark: "unit",
+        label: "predicted sigma".into(),
+        orders: false,
+        threshold: None,
+        series: schemes.iter().map(|s| s.name.clone()).collect(),
+        rows: all.iter().take(ROWS).map(row).collect(),
+    };
+    let caption = "Predicted sigma of every unknown in each scheme; a stroke: what is required; no mark: not determined".to_string();
+    chart("comparison_sigmas", caption, picture, all.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_margin_is_met_or_missed_by_what_decides_requirements() {
+        let q = |requirement: Option<f64>, sigma: Option<f64>| Quantity {
+            name: "D_FX".into(),
+            unit: "deg/h".into(),
+            status: Exact::Observable,
+            degree: Some(1),
+            accuracy_order: Some(1),
+            sigma,
+            sigma_extended: None,
+            requirement,
+            margin: requirement.zip(sigma).map(|(r, s)| r / s),
+            excitation: Vec::new(),
+            carried_by: Vec::new(),
+        };
+        for (requirement, sigma, expected, grade) in [
+            (Some(0.1), Some(0.05), "2.000 met", Grade::Good),
+            (Some(0.1), Some(0.1), "1.000 met", Grade::Good),
+            (Some(0.1), Some(0.2), "0.5000 MISSED", Grade::Missed),
+            (Some(0.1), None, "not determined", Grade::Missed),
+            (None, None, "not determined", Grade::Open),
+            (None, Some(0.1), "nothing required", Grade::Open),
+        ] {
+            let (text, found) = margin(&q(requirement, sigma));
+            assert!(text == expected && found == grade, "{text}");
+        }
+    }
+}

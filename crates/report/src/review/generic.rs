@@ -1,0 +1,63 @@
+//! The part of a scheme with generic angles: what holds for almost all of them, and nothing that needs numbers.
+
+use obsdeg_core::degree::Status as Exact;
+use obsdeg_design::review::GenericReview;
+
+use super::{derivatives, pictures, section};
+use crate::document::{Block, Finding, Grade, Status};
+use crate::{Answer, words};
+
+/// `any alpha and gamma`.
+fn any(g: &GenericReview) -> String {
+    format!("any {}", g.angles.join(" and "))
+}
+
+/// The verdict: what is observable at almost all angles.
+fn verdict(g: &GenericReview) -> String {
+    let a = &g.analysis;
+    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
+    let worst = seen.iter().filter_map(|q| q.degree).max();
+    let how = worst.map_or_else(String::new, |k| {
+        format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
+    });
+    format!(
+        "{} of {} unknowns are observable for {}{how}, but for angles on which verdicts change: those that were found are below. Without numbers for \
+         the angles there are no predicted sigmas, no requirements and no evidence by a filter.",
+        seen.len(),
+        a.quantities.len(),
+        any(g)
+    )
+}
+
+/// The box of such a scheme.
+pub(super) fn status(g: &GenericReview) -> Status {
+    let a = &g.analysis;
+    let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
+    let grade = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
+    let row = |what, grade, text| Finding { what, grade, text };
+    Status {
+        title: g.name.clone(),
+        rows: vec![
+            row("Observable", grade, format!("{seen} of {} unknowns, for {}", a.quantities.len(), any(g))),
+            row("Requirements", Grade::Open, "nothing is predicted: generic angles have no numbers".into()),
+            row("Filter and exact verdicts", Grade::Open, "not taken: generic angles have no numbers".into()),
+        ],
+        actions: vec![format!(
+            "numbers for {}: then accuracy, requirements and evidence are reviewed as well",
+            g.angles.join(" and ")
+        )],
+    }
+}
+
+/// Verdict, unknowns, positions.
+pub(super) fn part(blocks: &mut Vec<Block>, g: &GenericReview, level: usize, id: &str) {
+    let document = g.analysis.document();
+    blocks.push(section(level, "Verdict"));
+    blocks.extend((!g.description.is_empty()).then(|| Block::Text(g.description.clone())));
+    blocks.push(Block::Text(verdict(g)));
+    blocks.push(Block::Text(words::rank(&g.analysis)));
+    blocks.push(pictures::staircase(&g.analysis, &format!("{id}_staircase")));
+    blocks.push(section(level, "Positions and unknowns"));
+    blocks.extend(pictures::poses(&g.poses, g.latitude_deg, g.analysis.latitude_deg.is_none(), id));
+    blocks.extend(document.blocks);
+}

@@ -1,0 +1,252 @@
+//! Charts of rows: a name, a remark, marks on an axis that all rows share, and a text that says the same.
+
+use std::fmt::Write;
+
+use crate::document::Grade;
+use crate::figure::{AMBER, BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE, SKY};
+use crate::visible;
+
+/// One row.
+pub(crate) struct Row {
+    pub(crate) name: String,
+    pub(crate) remark: String,
+    /// Where its marks are, one of each series; `None`: nowhere.
+    pub(crate) marks: Vec<Option<f64>>,
+    /// Where its own line is, if it has one.
+    pub(crate) limit: Option<f64>,
+    /// What its marks mean, in words.
+    pub(crate) text: String,
+    pub(crate) grade: Grade,
+}
+
+/// A chart.
+pub(crate) struct Chart {
+    /// Above the remarks.
+    pub(crate) remark: &'static str,
+    /// Along the axis.
+    pub(crate) label: String,
+    /// Whether the axis is that of orders, 0, 1, 2; logarithmic otherwise.
+    pub(crate) orders: bool,
+    /// A line through all rows: better is to the right of it.
+    pub(crate) threshold: Option<f64>,
+    /// Names of the series where there are several.
+    pub(crate) series: Vec<String>,
+    pub(crate) rows: Vec<Row>,
+}
+
+/// Left of the axis: names and remarks; the axis; texts. In pixels.
+const NAMES: f64 = 96.0;
+const REMARKS: f64 = 52.0;
+const AXIS: f64 = 200.0;
+const TEXTS: f64 = 122.0;
+const ROW: f64 = 19.0;
+/// Between the marks of two series in a row.
+const APART: f64 = 7.0;
+
+/// Colours of series, each with a shape of its own.
+const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER];
+
+impl Chart {
+    /// The lowest and the highest value of the axis: exponents of ten, or orders.
+    fn range(&self) -> [f64; 2] {
+        let marks = self.rows.iter().flat_map(|r| r.marks.iter().copied().chain([r.limit])).flatten();
+        let all: Vec<f64> =
+            marks.chain(self.threshold).filter(|x| x.is_finite() && (self.orders || *x > 0.0)).collect();
+        let (low, high) = all.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+        match (all.is_empty(), self.orders) {
+            (true, _) => [0.0, 1.0],
+            (false, true) => [0.0, high.max(1.0)],
+            (false, false) => {
+                let [low, high] = [low.log10().floor(), high.log10().ceil()];
+                [low, if high > low { high } else { low + 1.0 }]
+            }
+        }
+    }
+
+    /// How a mark is drawn: a disc where there is one series, else a shape of the series.
+    fn mark(&self, out: &mut String, series: usize, x: f64, y: f64, grade: Grade) {
+        if self.series.is_empty() {
+            // hollow where it is missed: not by colour alone
+            let (fill, stroke) = match grade {
+                Grade::Good => (BLUE, BLUE),
+                Grade::Missed => ("none", ORANGE),
+                Grade::Limited | Grade::Open => (GREY, GREY),
+            };
+            let _ = write!(
+                out,
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"2\" />"
+            );
+            return;
+        }
+        let color = COLORS[series % COLORS.len()];
+        let shape = match series % 4 {
+            0 => format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.6\" fill=\"{color}\" />"),
+            1 => format!("<path d=\"M{:.1} {:.1}h7v7h-7Z\" fill=\"{color}\" />", x - 3.5, y - 3.5),
+            2 => format!("<path d=\"M{x:.1} {:.1}l4.4 7.6h-8.8Z\" fill=\"{color}\" />", y - 4.6),
+            _ => {
+                format!("<path d=\"M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6Z\" fill=\"{color}\" />", y - 4.6)
+            }
+        };
+        out.push_str(&shape);
+    }
+
+    /// The chart as SVG.
+    pub(crate) fn svg(&self) -> String {
+        let count = self.series.len().max(1);
+        let height = ROW.max(APART * (count as f64 + 1.0));
+        // names are cut by the width of the text column where no row has a text
+        let texts = if self.rows.iter().all(|r| r.text.is_empty()) { 16.0 } else { TEXTS };
+        let left = NAMES + REMARKS;
+        let legend = self.series.iter().filter(|s| !s.is_empty()).count() as f64 * 16.0;
+        let top = 40.0 + legend;
+        let (width, bottom) = (left + AXIS + texts, top + height * self.rows.len() as f64);
+        let [low, high] = self.range();
+        let at = |x: f64| {
+            let share = if self.orders { x } else { x.log10() };
+            left + AXIS * ((share - low) / (high - low)).clamp(0.0, 1.0)
+        };
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{0}\" font-family=\"{FONT}\" font-size=\"11\">\
+             <rect width=\"100%\" height=\"100%\" fill=\"white\" />",
+            bottom + 6.0
+        );
+        for (i, name) in self.series.iter().enumerate() {
+            let y = 9.0 + 16.0 * i as f64;
+            self.mark(&mut out, i, left + 5.0, y, Grade::Good);
+            text(&mut out, left + 14.0, y + 4.0, "start", name);
+        }
+        text(&mut out, left + AXIS / 2.0, legend + 14.0, "middle", &self.label);
+        text(&mut out, NAMES + REMARKS / 2.0 - 4.0, legend + 30.0, "middle", self.remark);
+        let every = ((high - low) / 8.0).ceil().max(1.0);
+        let ticks = (0..).map(|k| low + f64::from(k) * every).take_while(|t| *t <= high);
+        for tick in ticks {
+            let x = at(if self.orders { tick } else { 10f64.powf(tick) });
+            let _ = write!(
+                out,
+                "<line x1=\"{x:.1}\" y1=\"{:.1}\" x2=\"{x:.1}\" y2=\"{bottom:.1}\" stroke=\"{GREY}\" stroke-width=\"0.5\" />",
+                top - 4.0
+            );
+            text(&mut out, x, top - 10.0, "middle", &power(tick, self.orders));
+        }
+        for (i, row) in self.rows.iter().enumerate() {
+            let y = top + height * (i as f64 + 0.5);
+            text(&mut out, 4.0, y + 4.0, "start", &row.name);
+            text(&mut out, NAMES + REMARKS / 2.0 - 4.0, y + 4.0, "middle", &row.remark);
+            text(&mut out, left + AXIS + 10.0, y + 4.0, "start", &row.text);
+            if let Some(limit) = row.limit {
+                let _ = write!(
+                    out,
+                    "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" stroke-width=\"2\" />",
+                    at(limit),
+                    y - height / 2.0 + 2.0,
+                    y + height / 2.0 - 2.0
+                );
+            }
+            for (k, x) in row.marks.iter().enumerate().filter_map(|(k, x)| Some((k, (*x)?))) {
+                let y = y + APART * (k as f64 - (count as f64 - 1.0) / 2.0);
+                if let Some(threshold) = self.threshold {
+                    let _ = write!(
+                        out,
+                        "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" stroke-width=\"2\" />",
+                        at(threshold),
+                        at(x)
+                    );
+                }
+                self.mark(&mut out, k, at(x), y, row.grade);
+            }
+        }
+        if let Some(threshold) = self.threshold {
+            let _ = write!(
+                out,
+                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" stroke-width=\"1.5\" />",
+                at(threshold),
+                top - 4.0
+            );
+        }
+        out.push_str("</svg>\n");
+        out
+    }
+}
+
+/// `0.01`, `1`, `1e5`; an order as it is.
+fn power(x: f64, order: bool) -> String {
+    match (order, x as i32) {
+        (true, k) => k.to_string(),
+        (false, k @ -3..=-1) => format!("{:.*}", -k as usize, 10f64.powi(k)),
+        (false, k @ 0..=3) => format!("{}", 10i32.pow(k as u32)),
+        (false, k) => format!("1e{k}"),
+    }
+}
+
+fn text(out: &mut String, x: f64, y: f64, anchor: &str, text: &str) {
+    // what is longer than its place is said in full in the tables
+    let short: String = if text.chars().count() > 44 {
+        text.chars().take(43).chain(['\u{2026}']).collect()
+    } else {
+        text.into()
+    };
+    let short = visible(&short).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let _ = write!(
+        out,
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"{BLACK}\">{short}</text>"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(mark: Option<f64>, grade: Grade) -> Row {
+        Row {
+            name: "D_<X>".into(),
+            remark: "1".into(),
+            marks: vec![mark],
+            limit: None,
+            text: "so".into(),
+            grade,
+        }
+    }
+
+    fn chart(orders: bool, rows: Vec<Row>) -> Chart {
+        Chart {
+            remark: "degree",
+            label: "margin".into(),
+            orders,
+            threshold: (!orders).then_some(1.0),
+            series: vec![],
+            rows,
+        }
+    }
+
+    fn discs(svg: &str) -> Vec<f64> {
+        let ends = svg.split("<circle cx=\"").skip(1).filter_map(|t| t.split('"').next());
+        ends.map(|x| x.parse().expect("a number")).collect()
+    }
+
+    #[test]
+    fn marks_are_where_their_values_are() {
+        let rows = vec![
+            row(Some(10.0), Grade::Good),
+            row(Some(0.1), Grade::Missed),
+            row(None, Grade::Missed),
+            row(Some(1.0), Grade::Good),
+        ];
+        let svg = chart(false, rows).svg();
+        let (left, right) = (NAMES + REMARKS, NAMES + REMARKS + AXIS);
+        assert_eq!(discs(&svg), [right, left, (left + right) / 2.0]);
+        assert!(svg.contains("D_&lt;X&gt;") && svg.matches("fill=\"none\"").count() == 1, "{svg}");
+        let svg = chart(true, vec![row(Some(0.0), Grade::Good), row(Some(2.0), Grade::Good)]).svg();
+        assert_eq!(discs(&svg), [left, right]);
+        assert!(svg.contains(">2</text>") && !svg.contains(">0.5</text>"));
+        // nothing to draw is an axis
+        assert!(chart(false, vec![row(None, Grade::Open)]).svg().contains(">10</text>"));
+    }
+
+    #[test]
+    fn powers_of_ten() {
+        assert_eq!(
+            [-4.0, -2.0, 0.0, 3.0, 4.0].map(|x| power(x, false)),
+            ["1e-4", "0.01", "1", "1000", "1e4"]
+        );
+    }
+}

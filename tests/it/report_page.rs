@@ -1,0 +1,226 @@
+//! The page of a review: what it begins with, and how it works in a real browser where there is one.
+
+use scraper::Html;
+use serde_json::json;
+
+use crate::browser::Browser;
+use crate::program::run;
+use crate::report::{MODEL, PAPER, assert_unique_ids, hostile, report, statuses, table, texts};
+
+/// The front of a review of several schemes, or of one.
+fn findings(page: &Html, title: &str) -> Vec<[String; 2]> {
+    let all = statuses(page);
+    let titles = texts(page, ".front > .statuses > .status > .heading:first-child");
+    let k = titles.iter().position(|t| t == title).unwrap_or_else(|| panic!("no {title}: {titles:?}"));
+    all[k].iter().map(|[what, grade, text]| [what.clone(), format!("{grade}: {text}")]).collect()
+}
+
+/// What is recommended holds by the numbers of the same page, and nothing is where schemes are not like with like.
+#[test]
+fn several_schemes_are_compared_first() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, dwell: u32, attitudes: &[&str], more: &str| -> String {
+        let mut text = format!(
+            "name = '{name}'\nterms = ['F', 'S']\ncarry = 'inertial'\nlatitude_deg = 48\n{more}\n[simulation]\ndwell_s = {dwell}\n\
+             drift_scale = 1e-4\npriors = {{ D = 1e5, psi = 10 }}\n[requirements]\nD = 0.05\npsi = 1\n"
+        );
+        attitudes.iter().for_each(|a| text.push_str(&format!("[[position]]\nattitude = '{a}'\n")));
+        let path = folder.path().join(format!("{name}.toml"));
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let four = ["NUE", "UEN", "DNE", "ENU"];
+    let long = write("long", 900, &four, "");
+    let short = write("short", 600, &four, "");
+    let one = write("one", 600, &["NUE", "NDW"], "");
+    let page_of = |name: &str, inputs: &[&str]| Html::parse_document(&report(folder.path(), name, inputs).1);
+    let page = page_of("three.html", &[&long, &short, &one]);
+    let [recommended, alike] = &findings(&page, "Comparison of 3 schemes")[..] else { panic!("two rows") };
+    assert_eq!(recommended[0], "Recommended");
+    assert!(
+        recommended[1].contains("short: the shortest of 2 that meet every requirement by prediction, 2400 s"),
+        "{recommended:?}"
+    );
+    assert_eq!(alike[1], "good: ok same conditions, unknowns and requirements; they take 1200 to 3600 s");
+    // schemes are columns, and a margin says whether it is met as what it is held against says
+    let matrix = table(&page, "Margins (required over predicted sigma");
+    assert_eq!(texts(&page, ".front thead th"), ["long", "short", "one"]);
+    let side = table(&page, "By unknown");
+    for row in matrix.iter().skip(5) {
+        for (cell, scheme) in row[1..].iter().zip(["long", "short", "one"]) {
+            let of = side.iter().find(|r| r[0] == row[0] && r[1] == scheme).expect("a row");
+            match (of[4].parse::<f64>(), of[6].parse::<f64>()) {
+                (Ok(sigma), Ok(required)) => {
+                    assert_eq!(cell.ends_with(" met"), sigma <= required, "{row:?} {of:?}")
+                }
+                _ => assert_eq!(cell, "not determined", "{of:?}"),
+            }
+        }
+    }
+    assert_eq!(texts(&page, ".front .graded.missed").iter().filter(|t| *t == "not determined").count(), {
+        matrix.iter().skip(5).flatten().filter(|c| *c == "not determined").count()
+    });
+    // other carries are other questions
+    let other = write("other", 600, &four, "measured_azimuth = true");
+    let text = std::fs::read_to_string(&other).expect("a file").replace("'inertial'", "'platform'");
+    std::fs::write(&other, text).expect("written");
+    let page = page_of("unlike.html", &[&short, &other]);
+    let found = findings(&page, "Comparison of 2 schemes");
+    assert!(found[0][1].starts_with("open: open none: schemes that differ in carry"), "{found:?}");
+    assert!(found[1][1].starts_with("limited: LIMITED the schemes differ in carry"), "{found:?}");
+    // where none meets its requirements none is recommended
+    let page = page_of("none.html", &[&one, &one]);
+    let found = findings(&page, "Comparison of 2 schemes");
+    assert!(
+        found[0][1].starts_with("missed: NOT MET none: no scheme meets every requirement by prediction; "),
+        "{found:?}"
+    );
+}
+
+/// Angles without numbers have verdicts and no predictions, alone and beside others.
+#[test]
+fn generic_angles_are_reported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let generic = "examples/generic-angles/scheme.toml";
+    let page = Html::parse_document(&report(folder.path(), "generic.html", &[generic]).1);
+    assert!(page.errors.is_empty(), "{:?}", page.errors);
+    assert_unique_ids(&page);
+    let answer = run(&["analyze", "--scheme", generic, "--solutions", "off", "--format", "json"]);
+    let answer: serde_json::Value = serde_json::from_slice(&answer.stdout).expect("JSON");
+    let all = answer["quantities"].as_array().expect("unknowns");
+    let seen = all.iter().filter(|q| q["status"] == "observable").count();
+    let status = &statuses(&page)[0];
+    assert!(status[0][2].contains(&format!("{seen} of {} unknowns, for any ", all.len())), "{status:?}");
+    let unknowns = table(&page, "Unknowns");
+    for q in all {
+        let row = unknowns
+            .iter()
+            .find(|r| q["name"] == r[0].as_str())
+            .unwrap_or_else(|| panic!("no {}", q["name"]));
+        assert_eq!(row[3], q["degree"].as_u64().map_or("-".into(), |k| k.to_string()), "{row:?}");
+    }
+    assert!(!texts(&page, "th").iter().any(|h| h.contains("sigma")));
+    let page = Html::parse_document(&report(folder.path(), "both.html", &[generic, PAPER]).1);
+    assert_eq!(texts(&page, "summary > h2").len(), 2);
+}
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn a_browser_shows_it() {
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("skipped: no Chromium on this machine");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (paper, _) = report(folder.path(), "paper.html", &[PAPER]);
+    let scheme = hostile(folder.path(), 12).display().to_string();
+    let (long, _) = report(folder.path(), "twelve.html", &[&scheme]);
+    // formulas of dozens of terms are not cut at the edge of a sheet
+    let (formulas, _) = report(folder.path(), "five.html", &["examples/five-positions/scheme.toml"]);
+    browser.open(&formulas, 700, 900);
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+    browser.settle();
+    let cut = browser.value(
+        "(() => { const all = [...document.querySelectorAll('.formulas math')], w = document.documentElement.clientWidth; \
+         return [all.length, all.filter(e => e.getBoundingClientRect().right > w + 1).length]; })()",
+    );
+    assert!(cut[0].as_u64() > Some(200) && cut[1] == json!(0), "{cut}");
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    // what is folded is on paper all the same
+    let (several, _) = report(folder.path(), "several.html", &[PAPER, MODEL]);
+    browser.open(&several, 1280, 900);
+    let visible = "[...document.querySelectorAll('details .wide > table')].map(e => e.checkVisibility({ contentVisibilityAuto: true }))";
+    let seen = |browser: &mut Browser, all: bool| {
+        let shown = browser.value(visible);
+        let shown = shown.as_array().expect("a list");
+        assert!(shown.len() > 5 && shown.iter().all(|v| *v == json!(all)), "{shown:?}");
+    };
+    seen(&mut browser, false);
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+    browser.settle();
+    seen(&mut browser, true);
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    // a rule that is broken for readers of screens or keys, in the light and in the dark
+    let axe = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/axe/axe.min.js"));
+    let axe = axe.expect("tests/data/axe/axe.min.js");
+    for file in [&several, &paper] {
+        for scheme in ["light", "dark"] {
+            let wanted = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
+            browser.call("Emulation.setEmulatedMedia", wanted);
+            browser.open(file, 1280, 900);
+            browser.value("document.querySelectorAll('details').forEach(d => { d.open = true; })");
+            browser.value(&format!("{axe};1"));
+            let found = browser.value(
+                "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + v.nodes[0].html.slice(0, 200))])",
+            );
+            assert!(found[0].as_u64() > Some(15) && found[1] == json!([]), "{scheme}: {found}");
+        }
+    }
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    // D_FY: two positions need Z'', twelve do not
+    for (file, degree_of_d_fy) in [(&paper, "2"), (&long, "1")] {
+        browser.events.clear();
+        browser.open(file, 1280, 900);
+        // every figure with curves has a drawing of its own, and the still one is out of the way
+        let counts = browser.value(
+            "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves canvas').length, \
+             [...document.querySelectorAll('figure.curves > .still')].filter(e => e.checkVisibility()).length]",
+        );
+        assert!(counts[0].as_u64() > Some(10) && counts[0] == counts[1] && counts[2] == json!(0), "{counts}");
+        for width in [1280, 400] {
+            browser.size(width, 900);
+            browser.settle();
+            let beyond = browser.value(
+                "(() => { const w = document.documentElement.clientWidth; \
+                 const out = [...document.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || e.classList.contains('wide')) \
+                 .filter(e => e.getBoundingClientRect().right > w + 1 && !e.closest('svg, .u-wrap')) \
+                 .map(e => e.tagName + '.' + e.className); \
+                 return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
+            );
+            assert_eq!(beyond, json!([]), "at {width} px");
+        }
+        browser.size(1280, 900);
+        browser.settle();
+        // a curve is switched off and on, a value is read under the pointer
+        let series = "#s1_attitude .u-legend .u-series:nth-child(2)";
+        let off = format!("document.querySelector({series:?}).classList.contains('u-off')");
+        assert_eq!(browser.value(&off), json!(false));
+        browser.mouse(&format!("{series} .u-label"), true);
+        assert_eq!(browser.value(&off), json!(true));
+        browser.mouse(&format!("{series} .u-label"), true);
+        assert_eq!(browser.value(&off), json!(false));
+        browser.mouse("#s1_attitude .u-over", false);
+        let shown = browser
+            .value(&format!("document.querySelector({series:?}).querySelector('.u-value').textContent"));
+        assert!(shown.as_str().is_some_and(|v| v.parse::<f64>().is_ok()), "{shown}");
+        let degree = browser.value(
+            "[...document.querySelectorAll('td')].find(c => c.textContent == 'D_FY').parentElement.children[3].textContent",
+        );
+        assert_eq!(degree, json!(degree_of_d_fy));
+        // dark
+        let paper = browser.value("getComputedStyle(document.body).backgroundColor");
+        let dark = json!({ "features": [{ "name": "prefers-color-scheme", "value": "dark" }] });
+        browser.call("Emulation.setEmulatedMedia", dark);
+        browser.settle();
+        assert_ne!(browser.value("getComputedStyle(document.body).backgroundColor"), paper);
+        browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+        browser.settle();
+        let printed = browser.value(
+            "[...document.querySelectorAll('figure .still')].every(e => e.checkVisibility()) \
+             && ![...document.querySelectorAll('.plot')].some(e => e.checkVisibility())",
+        );
+        assert_eq!(printed, json!(true), "on paper the still pictures");
+        browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+        // no error, no request but for the page itself
+        for event in &browser.events {
+            let (method, of) = (event["method"].as_str().unwrap_or_default(), &event["params"]);
+            assert_ne!(method, "Runtime.exceptionThrown", "{of}");
+            assert_ne!(method, "Log.entryAdded", "{of}");
+            assert_ne!(method, "Runtime.consoleAPICalled", "{of}");
+            if method == "Network.requestWillBeSent" {
+                let url = of["request"]["url"].as_str().unwrap_or_default();
+                assert!(url.starts_with("data:") || url.ends_with(".html"), "{url}");
+            }
+        }
+    }
+}
