@@ -181,7 +181,31 @@ impl MeasurementArguments {
         &self,
         schemes: impl Iterator<Item = &'a Scheme> + Clone,
     ) -> Result<(), Failure> {
+        // without such noise of its own or of a scheme the time is of nothing
+        let states = |s: &Scheme| s.simulation.accelerometer_bias_instability_ug.is_some();
+        if self.accelerometer_correlation_time.is_some()
+            && self.accelerometer_instability.is_none()
+            && !schemes.clone().any(states)
+        {
+            return Err(Failure::input(
+                "--accelerometer-correlation-time does nothing here: expected --accelerometer-instability with it".into(),
+            ));
+        }
         concern_some("--requirement", &self.requirement, schemes)
+    }
+
+    /// The options that are given.
+    pub(crate) fn given(&self) -> impl Iterator<Item = &'static str> {
+        let all = [
+            ("--dwell", self.dwell.is_some()),
+            ("--step", self.step.is_some()),
+            ("--noise", self.noise.is_some()),
+            ("--accelerometer-instability", self.accelerometer_instability.is_some()),
+            ("--accelerometer-correlation-time", self.accelerometer_correlation_time.is_some()),
+            ("--azimuth-noise", self.azimuth_noise.is_some()),
+            ("--requirement", !self.requirement.is_empty()),
+        ];
+        all.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
     /// The paper's conditions, with what the scheme and the options say.

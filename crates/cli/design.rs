@@ -7,7 +7,7 @@ use clap::{Arg, Args};
 use obsdeg_core::model::ranges::{PRIOR, SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::{Scheme, parse_decimal};
+use obsdeg_core::model::{Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
     Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions,
     design, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
@@ -57,7 +57,7 @@ const CRITERIA: [(&str, CriterionName); 5] = [
 ];
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(words), mut_args(to_a_folder))]
+#[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
     /// Find the best scheme of so many positions
     #[arg(long, value_name = "K", required_unless_present = "minimum")]
@@ -73,9 +73,10 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WHAT", default_value = "cardinal")]
     candidates: String,
 
-    /// With --candidates free: angles are rounded to multiples of so many degrees
-    #[arg(long, value_name = "DEG", default_value = "5")]
-    round: String,
+    /// With --candidates free: angles are rounded to multiples of so many degrees, and schemes evaluated as they are rounded; the cardinal
+    /// attitudes may be chosen too (default: 5)
+    #[arg(long, value_name = "DEG")]
+    round: Option<String>,
 
     #[command(flatten)]
     assumptions: Assumptions,
@@ -88,19 +89,19 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEG", value_parser = within(TURN_DEG))]
     max_turn: Option<f64>,
 
-    /// How many schemes are listed
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    keep: u16,
+    /// How many schemes are listed (default: 10)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    keep: Option<u16>,
 
-    /// Restarts of the exchange
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    restarts: u64,
+    /// Restarts of the exchange (default: 200)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    restarts: Option<u64>,
 
     /// Under reset carry, where many sequences would have to be searched: a scheme found by exchange is enough when it is within so many percent
     /// of what is possible at all. 0: all sequences are searched, however long that takes, under any carry (beyond
-    /// 5 million sets of candidates: exchange)
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.01, value_parser = percent)]
-    within: f64,
+    /// 5 million sets of candidates: exchange; default: 0.01)
+    #[arg(long, value_name = "PERCENT", value_parser = percent)]
+    within: Option<f64>,
 
     /// Move the angles of the best scheme continuously, to hundredths of a degree
     #[arg(long)]
@@ -114,8 +115,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "K", value_delimiter = ',')]
     front: Vec<usize>,
 
-    /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o; an interrupted part goes on
-    /// when the same command is given again
+    /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
+    /// interrupted part goes on when the same command is given again
     #[arg(long, value_name = "I/N", value_parser = part, requires = "output", conflicts_with_all = ["minimum", "merge"])]
     part: Option<[usize; 2]>,
 
@@ -155,9 +156,9 @@ struct WantedArguments {
     max_degree: Vec<(Option<String>, usize)>,
 
     /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement, as for --meet);
-    /// a smaller worst degree comes before it
-    #[arg(long, value_name = "HOW", default_value = "worst", hide_possible_values = true, value_parser = one_of(CRITERIA))]
-    criterion: CriterionName,
+    /// a smaller worst degree comes before it. psi is estimated with the coefficients but counts in margin and --meet only (default: worst)
+    #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = one_of(CRITERIA))]
+    criterion: Option<CriterionName>,
 
     /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
     /// coefficients; by prediction: no prior but --prior, no drift noise, psi at the start (`simulate` the winner for the rest)
@@ -168,8 +169,8 @@ struct WantedArguments {
     #[arg(long, value_name = "S")]
     max_time: Option<f64>,
 
-    /// Longest slew between successive positions, in s
-    #[arg(long, value_name = "S", requires = "slew_rate")]
+    /// Longest slew between successive positions, in s (with a slew rate)
+    #[arg(long, value_name = "S")]
     max_slew: Option<f64>,
 
     /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous; 0.001 to 10000 deg/s)
@@ -221,9 +222,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut conditions = a.measurement.conditions(&base);
     conditions.priors.extend(general_first(a.prior.clone()));
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
-    let round = parse_decimal(a.round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
-    let round = round.ok_or_else(|| {
-        Failure::input(format!("--round {}: expected degrees above 0 and up to 90, as in 5", a.round))
+    idle(a, &base, &conditions)?;
+    let round = a.round.as_deref().unwrap_or("5");
+    let step = parse_decimal(round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
+    let step = step.ok_or_else(|| {
+        Failure::input(format!("--round {round}: expected degrees above 0 and up to 90, as in 5"))
     })?;
     let options = DesignOptions {
         candidates,
@@ -233,15 +236,15 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         meet: a.wanted.meet,
         total_s: a.wanted.max_time,
         slew_s: a.wanted.max_slew,
-        criterion: a.wanted.criterion,
-        keep: a.keep.into(),
-        restarts: a.restarts,
+        criterion: a.wanted.criterion.unwrap_or_default(),
+        keep: a.keep.unwrap_or(10).into(),
+        restarts: a.restarts.unwrap_or(200),
         refine: a.refine,
         divide: a.divide,
         front: a.front.clone(),
-        within: a.within / 100.0,
+        within: a.within.unwrap_or(0.01) / 100.0,
         everywhere: true,
-        free: (a.candidates == "free").then_some(round),
+        free: (a.candidates == "free").then_some(step),
         seed: a.seed,
     };
     if a.max_turn.is_some() && !(a.minimum && is_walk(&base)) {
@@ -277,6 +280,64 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.output.write_folder(&found, "design.json", more)
 }
 
+/// Refuses options that would do nothing, each with what it needs.
+fn idle(a: &Arguments, base: &Scheme, conditions: &Conditions) -> Result<(), Failure> {
+    let (w, free) = (&a.wanted, a.candidates == "free");
+    if a.minimum {
+        let of_positions = [
+            ("--keep", a.keep.is_some()),
+            ("--restarts", a.restarts.is_some()),
+            ("--within", a.within.is_some()),
+            ("--refine", a.refine),
+            ("--divide", a.divide),
+            ("--front", !a.front.is_empty()),
+            ("--round", a.round.is_some()),
+            ("--max-degree", !w.max_degree.is_empty()),
+            ("--criterion", w.criterion.is_some()),
+            ("--meet", w.meet),
+            ("--max-time", w.max_time.is_some()),
+            ("--max-slew", w.max_slew.is_some()),
+            ("--slew-rate", w.slew_rate.is_some()),
+            ("--prior", !a.prior.is_empty()),
+        ];
+        let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
+        if let Some(option) = given.chain(a.measurement.given()).next() {
+            return Err(Failure::input(format!(
+                "{option} does nothing with --minimum, which asks what positions determine at all, with any noise; it is for --positions"
+            )));
+        }
+    }
+    let others = [
+        ("--round", a.round.is_some() && !free, "--candidates free with it"),
+        (
+            "--within",
+            a.within.is_some_and(|within| within > 0.0) && base.carry != Carry::Reset,
+            "--carry reset with it, or --within 0, by which all sequences are searched",
+        ),
+        (
+            "--within",
+            a.within.is_some() && free,
+            "given candidates with it; free attitudes are never all searched",
+        ),
+        (
+            "--max-slew",
+            w.max_slew.is_some() && conditions.slew_rate_deg_s.is_none(),
+            "slews that take time, by --slew-rate or the file of --candidates",
+        ),
+        (
+            "--azimuth-noise",
+            a.measurement.given().any(|option| option == "--azimuth-noise") && !base.measured_azimuth,
+            "a measured azimuth, by --measured-azimuth or the file of --candidates",
+        ),
+    ];
+    match others.into_iter().find(|(_, idle, _)| *idle) {
+        Some((option, _, needed)) => {
+            Err(Failure::input(format!("{option} does nothing here: expected {needed}")))
+        }
+        None => Ok(()),
+    }
+}
+
 /// A part of a search from its file.
 fn read_part(path: &Path) -> Result<Part, Failure> {
     let source = Source::read(path, "part")?;
@@ -302,19 +363,9 @@ fn write_part(part: &Part, output: &Output) -> Result<(), Failure> {
 
 /// The fewest positions where the way between them counts.
 fn fewest_of_walks(a: &Arguments, base: &Scheme, options: DesignOptions) -> Result<(), Failure> {
-    let w = &a.wanted;
-    let given = [
-        ("--max-degree", !w.max_degree.is_empty()),
-        ("--meet", w.meet),
-        ("--max-time", w.max_time.is_some()),
-        ("--max-slew", w.max_slew.is_some()),
-        ("--gimbal", !base.gimbals.are_free()),
-    ];
-    if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
-        let text = format!(
-            "{option} is not taken where torquer errors make a scheme a walk; expected --max-turn, --observable"
-        );
-        return Err(Failure::input(text));
+    if !base.gimbals.are_free() {
+        let text = "--gimbal is not taken where torquer errors make a scheme a walk; expected --max-turn, --observable";
+        return Err(Failure::input(text.into()));
     }
     let options = WalkOptions {
         candidates: options.candidates,
@@ -337,7 +388,13 @@ fn fewest_of_walks(a: &Arguments, base: &Scheme, options: DesignOptions) -> Resu
 
 /// What a shared option says here.
 fn words(arg: Arg) -> Arg {
-    if arg.get_id() == "latitude" { arg.help("Latitude in degrees (default: 28.2)") } else { arg }
+    match arg.get_id().as_str() {
+        "latitude" => arg.help("Latitude in degrees (default: 28.2)"),
+        "output" => arg
+            .value_name("DIR")
+            .help("Write summary, series and figures to a folder; with --part the part to a file"),
+        _ => arg,
+    }
 }
 
 /// What to choose from, and the scheme whose assumptions hold.

@@ -12,13 +12,19 @@ use crate::{Answer, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
-        "A" => "A: root of the mean variance of the coefficients",
-        "D" => "D: geometric mean of the principal sigmas of the coefficients",
-        "E" => "E: largest principal sigma of the coefficients",
+        "A" => {
+            "A: root of the mean variance of the coefficients (psi is estimated with them and does not count)"
+        }
+        "D" => {
+            "D: geometric mean of the principal sigmas of the coefficients (psi is estimated with them and does not count)"
+        }
+        "E" => {
+            "E: largest principal sigma of the coefficients (psi is estimated with them and does not count)"
+        }
         "margin" => {
             "margin: largest sigma over what is required, of psi too where every coefficient is asked for; up to 1 all requirements are met"
         }
-        _ => "worst: largest sigma of a coefficient",
+        _ => "worst: largest sigma of a coefficient (psi is estimated with them and does not count)",
     }
 }
 
@@ -77,9 +83,10 @@ fn searched(d: &Design) -> &'static str {
 
 fn table(heading: &str, found: &[Found]) -> Block {
     let row = |(i, f): (usize, &Found)| {
+        let image = f.image_of.map_or_else(String::new, |of| format!(" (image of {of})"));
         vec![
             (i + 1).to_string(),
-            format!("{}{}{}", route(f), if f.refined { " (refined)" } else { "" }, dwells(f)),
+            format!("{}{}{}{image}", route(f), if f.refined { " (refined)" } else { "" }, dwells(f)),
             number(f.total_s),
             f.worst_degree.to_string(),
             f.worst_accuracy_order.map_or_else(|| "-".into(), |o| o.to_string()),
@@ -127,8 +134,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     let mut out = vec![if s.proven {
         let unrefined = searched(d);
         format!(
-            "{unrefined} is proven to be the best: of all sequences of {} of the candidates within the constraints none has a smaller worst \
-             degree, or the same and a smaller criterion ({evaluated})",
+            "{unrefined} is proven to be the best of these {} candidates, by {}: of all sequences of {} of them within the constraints none has a \
+             smaller worst degree, or the same and a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left open",
+            d.candidates.len(),
+            if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
             s.positions
         )
     } else if s.ties.is_some() {
@@ -138,18 +147,29 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         )
     } else if s.interrupted {
         let known = s.certificate.as_ref().map_or_else(String::new, |c| {
-            format!(", within {} of the best possible of these candidates", percent(c.within_percent))
+            format!(", at most {} above the best of these candidates, by a bound", percent(c.within_percent))
         });
         format!("interrupted after {} sequences: the best so far{known}", s.examined)
     } else {
         let known = s.certificate.as_ref().map_or_else(String::new, |c| {
-            format!("; within {} of the best possible of these candidates", percent(c.within_percent))
+            format!("; at most {} above the best of these candidates, by a bound", percent(c.within_percent))
         });
-        format!(
-            "not proven: coordinate exchange from random starts, {} sequences examined{known}",
-            s.examined
-        )
+        let rounded =
+            s.certificate.as_ref().and_then(|c| c.everywhere.as_ref()).is_some_and(|e| e.rounded.is_some());
+        let by = match rounded {
+            true => {
+                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on the grid of rounded angles"
+            }
+            false => "coordinate exchange from random starts",
+        };
+        format!("not proven: {by}, {} sequences examined{known}", s.examined)
     }];
+    if d.found.iter().any(|f| f.image_of.is_some()) {
+        out.push(
+            "images of a scheme listed before them are that scheme in other platform axes (coefficients renamed): what is true of one is true of all"
+                .into(),
+        );
+    }
     if s.ties.is_some() && s.interrupted {
         out.push("interrupted before the front was complete".into());
     }
@@ -242,49 +262,64 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         return vec![why];
     };
     let first = searched(d);
+    let beyond = match s.proven {
+        true => format!("{} above that bound", percent(c.within_percent)),
+        false => format!("at most {} above the best of them", percent(c.within_percent)),
+    };
     let mut out = vec![
         format!(
-            "{first} is within {} of the best possible of these candidates: no scheme of {} of them in equal dwells, of whatever degrees, has a \
-             criterion below {} ({} {:.6} at least)",
-            percent(c.within_percent),
+            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of whatever degrees, has a criterion below {}; \
+             {first} is {beyond} ({} {:.6} at least)",
             s.positions,
             number(c.best_possible),
             if s.criterion == "D" { "D-efficiency" } else { "efficiency, the square of the ratio," },
             (c.efficiency * 1e6).floor() / 1e6
         ),
         format!(
-            "by optimal weights of the candidates (approximate design theory), as if positions could be divided: they would reach {}, and this way \
-             of bounding gives no more",
+            "the bound is by optimal weights of the candidates (approximate design theory), as if positions could be divided: those listed would \
+             reach {}, and this way of bounding gives no more",
             number(c.attained)
         ),
     ];
-    out.push(format!("weights: {}", weights(&c.weights)));
+    out.push(format!("weights, as parts of their sum: {}", weights(&c.weights)));
     let Some(every) = &c.everywhere else {
         out.push("of all attitudes: no bound was computed".into());
         return out;
     };
     out.push(format!(
-        "of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}: {first} is within {} of that (attitudes \
-         that add most are sought on a net; between its points what they add is bounded as a trigonometric polynomial, and a part of \
-         1e-8 is assumed for rounding)",
+        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}; {first} is {} above that, \
+         and what lies between is left open: so few positions may not reach the bound (attitudes that add most are sought on a net; between \
+         its points what they add is bounded as a trigonometric polynomial, and a part of 1e-8 is assumed for rounding)",
         s.positions,
         number(every.best_possible),
         if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
         percent(every.within_percent)
     ));
     out.push(format!(
-        "weights on {} attitudes close to these would reach {} (angles are rounded here; exactly there it may be more): {}",
+        "weights on these {} attitudes, as parts of their sum, would reach {}: {}",
         every.weights.len(),
         number(every.attained),
         weights(&every.weights)
     ));
     let ratio = c.best_possible / every.attained;
-    match every.rounded_deg {
-        Some(step) => out.push(format!(
-            "the candidates are these attitudes with angles rounded to {step} deg: with weights they would reach {}, {} more",
-            number(c.attained),
-            percent(100.0 * (c.attained / every.attained - 1.0).max(0.0))
-        )),
+    match &every.rounded {
+        Some(rounded) => {
+            let value = d.found.iter().find(|f| !f.refined && f.dwells_s.is_empty()).map_or(f64::NAN, |f| f.value);
+            out.push(format!(
+                "the candidates are the cardinal attitudes, and those of weights and of schemes near them with angles rounded to {} deg; every \
+                 criterion listed is that of the angles as they are listed",
+                rounded.step_deg
+            ));
+            out.push(match &rounded.finer {
+                Some(finer) => format!(
+                    "rounding costs {}: with angles in hundredths of a degree a criterion of {} was found, at {}",
+                    percent(100.0 * (value / finer.value - 1.0)),
+                    number(finer.value),
+                    finer.angles.join(" ")
+                ),
+                None => "rounding costs nothing that was found: no better scheme with angles in hundredths of a degree".into(),
+            });
+        }
         None if ratio > FAR => out.push(format!(
             "these candidates cost: weights on other attitudes, as if positions could be divided, would reach a criterion {ratio:.2} times smaller than any scheme of these has \
              (--candidates free or --refine look for them; so few positions may not come near it)"
@@ -294,12 +329,16 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     out
 }
 
-/// `NUE 0.5000 NDW 0.5000`, largest first.
+/// `0.25 each of NUE NDW; 0.1 of WUN`: equal weights together, largest first.
 fn weights(list: &[Weight]) -> String {
     let mut sorted: Vec<_> = list.iter().collect();
     sorted.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-    let listed: Vec<String> = sorted.iter().map(|w| format!("{} {:.4}", w.candidate, w.weight)).collect();
-    shortened(&listed)
+    let groups = sorted.chunk_by(|a, b| a.weight == b.weight);
+    let group = |of: &[&Weight]| {
+        let names: Vec<String> = of.iter().map(|w| w.candidate.clone()).collect();
+        format!("{}{} {}", of[0].weight, if of.len() > 1 { " each of" } else { " of" }, shortened(&names))
+    };
+    groups.map(group).collect::<Vec<_>>().join("; ")
 }
 
 /// Candidates whose best is so many times worse than what other attitudes could do are said to cost.
@@ -322,7 +361,13 @@ fn minimum(d: &Design) -> Vec<String> {
     };
     out.extend((m.positions.is_some() && !m.proven).then_some(chance));
     if m.counting_bound > 1 {
-        out.push(format!("fewer than {} cannot do: too few derivative rows", m.counting_bound));
+        out.push(format!(
+            "fewer than {} cannot do: a position adds at most {} independent derivative rows{}, and {} coefficients are required",
+            m.counting_bound,
+            m.rows_per_position,
+            if d.carry == Carry::Reset { " besides those that its own psi takes" } else { "" },
+            d.required.len()
+        ));
     }
     let images = if d.symmetry > 1 { ", up to turns of the platform axes" } else { "" };
     for [size, sets] in &m.none_of {

@@ -9,9 +9,10 @@ use crate::words::reasons;
 /// What was examined, and what that says.
 fn examined(w: &Walks) -> Vec<String> {
     let mut out = vec![format!(
-        "a position adds so many rows that fewer than {} are never enough for {} required coefficients",
-        w.counting_bound,
-        w.required.len()
+        "a position adds at most {} independent rows, and {} coefficients are required: fewer than {} are never enough",
+        w.rows_per_position,
+        w.required.len(),
+        w.counting_bound
     )];
     out.extend(
         w.none_of.iter().map(|[positions, walks]| {

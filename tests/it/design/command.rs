@@ -240,3 +240,57 @@ fn parts_are_files() {
         assert!(stderr(&output).contains(expected), "{arguments:?}: {}", stderr(&output));
     }
 }
+
+/// Options that would do nothing are refused, with what they need.
+#[test]
+fn options_that_do_nothing_are_refused() {
+    let minimum = "does nothing with --minimum";
+    let with_minimum = [
+        &["--keep", "3"][..],
+        &["--restarts", "3"],
+        &["--within", "1"],
+        &["--refine"],
+        &["--divide"],
+        &["--front", "4"],
+        &["--round", "5"],
+        &["--max-degree", "1"],
+        &["--criterion", "d"],
+        &["--meet"],
+        &["--max-time", "1e4"],
+        &["--max-slew", "100"],
+        &["--slew-rate", "1"],
+        &["--prior", "D=1"],
+        &["--dwell", "100"],
+        &["--step", "1"],
+        &["--noise", "1e-4"],
+        &["--accelerometer-instability", "1"],
+        &["--azimuth-noise", "0.1"],
+        &["--requirement", "D=1"],
+    ];
+    for options in with_minimum {
+        for carry in ["inertial", "reset"] {
+            let output = run(&[&["design", "--minimum", "--carry", carry], options].concat());
+            let said = stderr(&output);
+            assert!(output.status.code() == Some(2), "{options:?}: {said}");
+            assert!(said.contains(options[0]) && said.contains(minimum), "{options:?}: {said}");
+        }
+    }
+    for (arguments, expected) in [
+        (
+            &["--carry", "reset", "--round", "7"][..],
+            "--round does nothing here: expected --candidates free with it",
+        ),
+        (&["--carry", "inertial", "--within", "1"], "--within does nothing here: expected --carry reset"),
+        (&["--carry", "inertial", "--max-slew", "10"], "--max-slew does nothing here: expected slews"),
+        (&["--azimuth-noise", "0.1"], "--azimuth-noise does nothing here: expected a measured azimuth"),
+        (&["--accelerometer-correlation-time", "100"], "expected --accelerometer-instability with it"),
+        (
+            &["--carry", "reset", "--candidates", "free", "--within", "0"],
+            "--within does nothing here: expected given candidates",
+        ),
+    ] {
+        let output = run(&[&["design", "--positions", "3"], arguments].concat());
+        let said = stderr(&output);
+        assert!(output.status.code() == Some(2) && said.contains(expected), "{arguments:?}: {said}");
+    }
+}

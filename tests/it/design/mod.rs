@@ -5,6 +5,7 @@ mod certificate;
 mod command;
 mod correlated;
 mod divide;
+mod free;
 mod orders;
 mod parts;
 mod prior;

@@ -135,18 +135,43 @@ fn what_does_not_belong_is_refused_by_name() {
     let other = part(1, 2);
     let message = refused(&[("a", &one), ("b", &other), ("c", &three)]);
     assert_eq!(message, "b: it is part 1 of 2; expected a part of 3");
-    // of other inputs, whatever differs
+    // of other inputs: what differs is named
     let others = [
-        (base.clone(), Conditions { dwell_s: 999.0, ..conditions.clone() }, options.clone()),
-        (base.clone(), conditions.clone(), DesignOptions { keep: 11, ..options.clone() }),
-        (base.clone(), conditions.clone(), DesignOptions { criterion: CriterionName::E, ..options.clone() }),
-        (Scheme { latitude: "30".parse().ok(), ..base.clone() }, conditions.clone(), options.clone()),
+        (
+            base.clone(),
+            Conditions { dwell_s: 999.0, ..conditions.clone() },
+            options.clone(),
+            "dwell is 999.0, here 1000.0",
+        ),
+        (
+            base.clone(),
+            conditions.clone(),
+            DesignOptions { keep: 11, ..options.clone() },
+            "keep is 11, here 12",
+        ),
+        (
+            base.clone(),
+            conditions.clone(),
+            DesignOptions { criterion: CriterionName::E, seed: 3, ..options.clone() },
+            "criterion is E, here Worst; seed is 3, here 1",
+        ),
+        (
+            Scheme { latitude: "30".parse().ok(), ..base.clone() },
+            conditions.clone(),
+            options.clone(),
+            "latitude differ",
+        ),
     ];
-    for (base, conditions, options) in others {
+    for (base, conditions, options, why) in others {
         let foreign = design_part(&base, &conditions, &options, [2, 3], None, &on).expect("a part");
         let message = refused(&[("a", &one), ("b", &foreign), ("c", &three)]);
-        assert!(message.starts_with("b: it is a part of another search: the digest"), "{message}");
+        let expected = format!("b: it is a part of another search: {why}");
+        assert!(message.starts_with(expected.trim_end_matches("differ")), "{message}");
     }
+    // a digest that is not of the inputs
+    let tampered = Part { digest: two.digest.replace(|c: char| c.is_ascii_digit(), "0"), ..two.clone() };
+    let message = refused(&[("a", &one), ("b", &tampered), ("c", &three)]);
+    assert_eq!(message, "b: it is a part of another search: its inputs are not those of its digest");
     // and what was tampered with
     let tampered = Part { starts: [one.starts[0], one.starts[1] + 1, one.starts[2]], ..one.clone() };
     assert!(refused(&[("a", &tampered), ("b", &two), ("c", &three)]).starts_with("a: it has the starts"));
@@ -172,4 +197,22 @@ fn what_does_not_belong_is_refused_by_name() {
     let going_on = design_part(base, conditions, options, [1, 3], Some(two), &on).expect_err("another part");
     let why = PartError::Number { found: [2, 3], expected: [1, 3] };
     assert_eq!(going_on, DesignError::Part { name: "the part to go on with".into(), why });
+}
+
+/// Parts have about as much to do as each other, also where most sequences begin with the first starts.
+#[test]
+fn parts_share_the_work() {
+    let all = DesignOptions { criterion: CriterionName::D, keep: 1, ..options(Some(6)) };
+    let tasks = [
+        (base(Carry::Reset), DesignOptions { required: vec!["D_F".into()], ..all.clone() }),
+        (base(Carry::Inertial), DesignOptions { positions: Some(4), required: vec!["D_F".into()], ..all }),
+    ];
+    for (base, options) in tasks {
+        let examined = [1, 2, 3].map(|number| {
+            let part = design_part(&base, &quiet(), &options, [number, 3], None, &on).expect("a part");
+            part.levels.iter().map(|level| level.best.examined).sum::<u64>()
+        });
+        let (least, most) = (examined.iter().min(), examined.iter().max());
+        assert!(most.zip(least).is_some_and(|(most, least)| *most < 2 * least), "{examined:?}");
+    }
 }

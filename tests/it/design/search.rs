@@ -23,6 +23,8 @@ fn fewest_positions_with_a_witness() {
         // what has fewer was excluded by counting or one by one
         let excluded = minimum.none_of.iter().map(|[size, _]| *size as usize);
         assert_eq!(excluded.collect::<Vec<_>>(), (minimum.counting_bound..fewest).collect::<Vec<_>>());
+        // two rows of each of order 0 and 1 and one of order 2; three of them are of a psi of its own
+        assert_eq!(minimum.rows_per_position, if carry == Carry::Reset { 2 } else { 5 });
         let no_solutions = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
         let a = analyze(&scheme_of(&minimum.witness, carry), no_solutions, None).expect("analysed");
         let drifts = a.quantities.iter().filter(|q| q.name.starts_with("D_"));
@@ -172,7 +174,7 @@ fn turned_schemes_are_equally_good() {
         };
         search.exhaust(symmetry, 5)
     };
-    let orbits = Symmetry { order: 4, orbit: (0..24).map(|i| i / 4).collect() };
+    let orbits = Symmetry { order: 4, orbit: (0..24).map(|i| i / 4).collect(), maps: Vec::new() };
     let (one, six) = (of(&rows.symmetry(&|_, _| true)), of(&orbits));
     assert_eq!(one.examined * 6, six.examined);
     assert_eq!(one.ties.total(24), six.ties.total(4));

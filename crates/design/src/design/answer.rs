@@ -59,8 +59,10 @@ pub struct Minimum {
     pub positions: Option<usize>,
     /// A set that does.
     pub witness: Vec<String>,
-    /// No fewer can do: that many rows are needed.
+    /// No fewer can do: the required coefficients over the rows of a position, rounded up (0 where torquer errors act in every turn).
     pub counting_bound: usize,
+    /// The most independent rows on the unknowns that a candidate adds, under reset carry without those that its psi takes.
+    pub rows_per_position: usize,
     /// `[size, number of sets]`: none of these does, by exhaustion.
     pub none_of: Vec<[u64; 2]>,
     /// Coefficients that all candidates together leave unobservable.
@@ -124,9 +126,10 @@ pub struct Certificate {
     pub within_percent: f64,
     /// The square of the bound over that criterion: how much of the information that the best could have it has at least (for D the D-efficiency).
     pub efficiency: f64,
-    /// The criterion that the weights would have as a scheme; the bound cannot be larger.
+    /// The criterion that the weights would have as a scheme, exactly as they are listed; the bound cannot be larger.
     pub attained: f64,
-    /// How the weights divide the time among the candidates; those below 0.0001 are left out.
+    /// How the weights divide the time among the candidates: parts of their sum, rounded to two digits, or to as many as lose no
+    /// more than a thousandth of the variance; those below 1e-7 are left out.
     pub weights: Vec<Weight>,
     /// The same for all attitudes; null where it was not asked for.
     pub everywhere: Option<EverywhereReport>,
@@ -144,12 +147,31 @@ pub struct EverywhereReport {
     pub best_possible: f64,
     /// The criterion of the first scheme that is not refined is at most so much above, in percent of the bound.
     pub within_percent: f64,
-    /// The criterion that the weights would have as a scheme.
+    /// The criterion that the weights would have as a scheme, exactly as they and their angles are listed.
     pub attained: f64,
-    /// The attitudes with weights, Euler angles in degrees; weights below 0.001 are left out.
+    /// The attitudes with weights, Euler angles in degrees: parts of their sum, rounded to two digits, or to as many as lose no more
+    /// than a thousandth of the variance; those below 1e-7 are left out.
     pub weights: Vec<Weight>,
-    /// The candidates are these attitudes with angles rounded to multiples of so many degrees; null: they are others.
-    pub rounded_deg: Option<f64>,
+    /// Where attitudes were free: how their angles were rounded, and what that costs; null where candidates were given.
+    pub rounded: Option<Rounded>,
+}
+
+/// Free attitudes with rounded angles: every scheme is evaluated at the angles as they are rounded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rounded {
+    /// Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too.
+    pub step_deg: f64,
+    /// A better scheme, by the same search with angles in hundredths of a degree; null where none was found.
+    pub finer: Option<Finer>,
+}
+
+/// A scheme that rounding leaves out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Finer {
+    /// Its criterion.
+    pub value: f64,
+    /// Euler angles of its positions in degrees.
+    pub angles: Vec<String>,
 }
 
 /// A candidate and its weight.
@@ -157,7 +179,7 @@ pub struct EverywhereReport {
 pub struct Weight {
     /// The candidate.
     pub candidate: String,
-    /// Its part of all positions.
+    /// Its part of all positions, before it is divided by the sum of all.
     pub weight: f64,
 }
 
@@ -175,6 +197,9 @@ pub struct TiesReport {
 pub struct Found {
     /// Its positions in order.
     pub positions: Vec<String>,
+    /// Which of those listed before it, counted from 1, a turn of the platform axes turns into it (coefficients renamed): the same scheme in
+    /// other axes; null: none.
+    pub image_of: Option<usize>,
     /// Their Euler angles in degrees.
     pub angles: Vec<String>,
     /// The half turns between them, each with its direction: the other one is another scheme.

@@ -3,13 +3,12 @@
 use obsdeg_core::model::Euler;
 use rayon::prelude::*;
 
-use super::answer::{Certificate, EverywhereReport, Weight};
+use super::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
 use super::certificate::{Bound, Everywhere};
 use super::information::Evaluator;
+use super::rounding::Moved;
 use super::task::{DWELLS, Task};
 
-/// Weights below are not listed.
-const LISTED: f64 = 1e-4;
 /// Rounding of a criterion as the search computes it, as a part of it.
 const ROUNDING: f64 = 1e-10;
 
@@ -19,7 +18,11 @@ pub(super) fn excess(value: f64, bound: f64) -> f64 {
 }
 
 /// The bound over all attitudes in the light of the best scheme found, of this criterion.
-pub(super) fn everywhere(found: &Everywhere, value: f64, rounded: Option<i64>) -> EverywhereReport {
+pub(super) fn everywhere(
+    found: &Everywhere,
+    value: f64,
+    rounded: Option<(i64, Option<&Moved>)>,
+) -> EverywhereReport {
     let weight = |(euler, weight): &(Euler, f64)| Weight {
         candidate: euler.each_ref().map(ToString::to_string).join(","),
         weight: *weight,
@@ -29,7 +32,13 @@ pub(super) fn everywhere(found: &Everywhere, value: f64, rounded: Option<i64>) -
         within_percent: 100.0 * excess(value, found.value),
         attained: found.attained,
         weights: found.support.iter().map(weight).collect(),
-        rounded_deg: rounded.map(|step| step as f64 / 1e9),
+        rounded: rounded.map(|(step, finer)| Rounded {
+            step_deg: step as f64 / 1e9,
+            finer: finer.filter(|f| f.value < value).map(|f| Finer {
+                value: f.value,
+                angles: f.scheme.iter().map(|e| e.each_ref().map(ToString::to_string).join(",")).collect(),
+            }),
+        }),
     }
 }
 
@@ -42,12 +51,12 @@ impl Task<'_> {
     /// The bound in the light of the best scheme found, of this criterion.
     pub(super) fn certificate(&self, bound: &Bound, value: f64) -> Certificate {
         let excess = excess(value, bound.value);
-        let weights = self.candidates.names.iter().zip(&bound.weights).filter(|(_, w)| **w >= LISTED);
+        let weights = self.candidates.names.iter().zip(&bound.listed.0).filter(|(_, w)| **w > 0.0);
         Certificate {
             best_possible: bound.value,
             within_percent: 100.0 * excess,
             efficiency: (1.0 + excess).powi(-2),
-            attained: bound.attained,
+            attained: bound.listed.1,
             weights: weights.map(|(name, &weight)| Weight { candidate: name.clone(), weight }).collect(),
             everywhere: None,
             front: Vec::new(),

@@ -6,17 +6,21 @@
 //! (`information`), up to turns of the platform axes (`symmetry`).
 
 pub(crate) mod answer;
+mod best;
 pub(crate) mod candidates;
 mod certificate;
 mod certify;
 mod correlated;
 pub(crate) mod criterion;
 mod divide;
+mod error;
+mod exchange;
 pub(crate) mod information;
 pub(crate) mod observability;
 mod part;
 mod psi;
 mod refine;
+mod rounding;
 mod screen;
 pub(crate) mod search;
 pub(crate) mod symmetry;
@@ -27,30 +31,29 @@ pub(crate) mod ways;
 mod winner;
 
 pub use answer::*;
+pub use best::{Best, Scored, Worth};
 pub use candidates::Candidates;
 pub use certificate::{Bound, Everywhere};
 pub use criterion::{Criterion, Limits};
+pub use error::DesignError;
 pub use information::{Evaluator, State};
 pub use observability::{Patience, Rows};
 pub use part::{Level, PART_SCHEMA, Part, PartError, design_merged, design_part, design_starts};
 pub(crate) use search::Pruning;
-pub use search::{Best, Constraints, Progress, Scored, Search, Worth};
+pub use search::{Constraints, Progress, Search};
 pub use symmetry::Symmetry;
 pub use ways::Stop;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use obsdeg_ekf::EkfError;
-
 pub use ties::Ties;
 pub use walks::{WalkOptions, Walks, is_walk, scheme_of_walk, walks};
 pub use winner::scheme as scheme_found;
 
-use candidates::MAX_CANDIDATES;
 use certify::excess;
-use obsdeg_core::degree::EnsembleError;
-use obsdeg_core::model::{Angle, Carry, Euler, Path, Scheme, SchemeError, c_n_f64, format_decimal};
-use obsdeg_evidence::simulation::{Conditions, MeasurementReport, SimulationError, latitude_of};
+use obsdeg_core::model::{Euler, Path, Scheme, c_n_f64};
+use obsdeg_evidence::simulation::{Conditions, MeasurementReport, latitude_of};
+use rounding::Free;
 use task::Task;
 use ties::TIE;
 
@@ -62,200 +65,6 @@ const MANY: u64 = 1_000_000;
 const QUICK: u64 = 2_000_000;
 /// What may be wrong with a larger probability is not proven.
 const PROOF: f64 = 1e-12;
-
-/// Why no scheme is found.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DesignError {
-    /// Nothing to choose from, or too much.
-    #[error("{found} candidates; expected at least one and at most {MAX_CANDIDATES}")]
-    Candidates {
-        /// Their number.
-        found: usize,
-    },
-    /// Too many turns between candidates.
-    #[error("{found} candidates with slews; expected at most {}", ways::MAX_TURNING)]
-    Pairs {
-        /// Their number.
-        found: usize,
-    },
-    /// Steps that do not fit.
-    #[error("a grid of {found} degrees; expected a step that divides 90 degrees, as in grid:45")]
-    Grid {
-        /// The step.
-        found: String,
-    },
-    /// A number of positions that cannot be.
-    #[error("{found} positions; expected 1 to 100")]
-    Positions {
-        /// The number asked for.
-        found: usize,
-    },
-    /// The drift itself is constant at one position only.
-    #[error("a design needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
-    Drift,
-    /// A rotating segment has no place among candidates.
-    #[error("a design chooses among positions; found the rotating segment `{name}`")]
-    Rotation {
-        /// The segment.
-        name: String,
-    },
-    /// A generic angle has no sigma.
-    #[error("the angle `{name}` is generic; expected numbers for a design")]
-    GenericAngle {
-        /// Its name.
-        name: String,
-    },
-    /// A name that is no coefficient.
-    #[error("`{found}` is no coefficient of this scheme; expected some of {known}, or families such as D_F")]
-    UnknownName {
-        /// The name found.
-        found: String,
-        /// The coefficients.
-        known: String,
-    },
-    /// A requirement that cannot be.
-    #[error("the requirement for {name} is {found}; expected a sigma above 0")]
-    Requirement {
-        /// The coefficient.
-        name: String,
-        /// The number found.
-        found: f64,
-    },
-    /// Positions are what is searched for.
-    #[error(
-        "the {what} for `{found}` is that of one position; expected psi, psi_x, psi_y or psi_z, for every position"
-    )]
-    OnePosition {
-        /// A requirement or a prior.
-        what: &'static str,
-        /// The name found.
-        found: String,
-    },
-    /// A limit that cannot be.
-    #[error("{what} of {found} s; expected more than 0")]
-    Limit {
-        /// What is limited.
-        what: &'static str,
-        /// The number found.
-        found: f64,
-    },
-    /// Too many coefficients.
-    #[error("{found} unknowns; expected at most {}", information::MAX)]
-    TooManyUnknowns {
-        /// Number of unknowns.
-        found: usize,
-    },
-    /// No sequence of that many candidates is what is wanted.
-    #[error("no scheme of {positions} of these candidates {wanted}: {why}")]
-    Impossible {
-        /// The number of positions.
-        positions: usize,
-        /// What is wanted, with all limits.
-        wanted: String,
-        /// What is missed, or how that is known.
-        why: String,
-    },
-    /// Of those that were looked at, no sequence is what is wanted.
-    #[error(
-        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were looked at {wanted}; there are too many to look at all"
-    )]
-    NotFound {
-        /// The number of positions.
-        positions: usize,
-        /// What is wanted, with all limits.
-        wanted: String,
-        /// How many were looked at.
-        examined: u64,
-    },
-    /// Parts of no exhaustive search.
-    #[error("parts are of a search for so many positions of given candidates; expected these")]
-    Parts,
-    /// A part that is none.
-    #[error("part {} of {}; expected 1 of 1 or more, as in 2/7", .found[0], .found[1])]
-    PartNumber {
-        /// Which of how many.
-        found: [usize; 2],
-    },
-    /// A part that is not taken.
-    #[error("{name}: {why}")]
-    Part {
-        /// Its name.
-        name: String,
-        /// Why.
-        why: PartError,
-    },
-    /// Parts that are not there.
-    #[error("missing of {of} parts: {}", listed(.missing))]
-    MissingParts {
-        /// Their numbers.
-        missing: Vec<usize>,
-        /// How many there are.
-        of: usize,
-    },
-    /// More sequences than an exhaustive search takes, in parts or not.
-    #[error(
-        "all sequences of {positions} of {candidates} candidates are too many for an exhaustive search, in parts too"
-    )]
-    TooMany {
-        /// The number of positions.
-        positions: usize,
-        /// The number of candidates.
-        candidates: usize,
-    },
-    /// Attitudes chosen freely where nothing says which.
-    #[error(
-        "free attitudes are chosen for a number of positions under reset carry, where information adds; found {found}"
-    )]
-    Free {
-        /// What was found.
-        found: String,
-    },
-    /// Stopped before anything was found.
-    #[error("interrupted before anything was found")]
-    Interrupted,
-    /// The scheme.
-    #[error(transparent)]
-    Scheme(#[from] SchemeError),
-    /// Conditions that do not go together.
-    #[error(transparent)]
-    Conditions(#[from] SimulationError),
-    /// No verdict.
-    #[error(transparent)]
-    Verdict(#[from] EnsembleError),
-    /// No turn, or too many, between candidates whose way counts.
-    #[error(
-        "{found} turns between candidates; expected 1 to {most}: take a larger or smaller --max-turn, or other candidates"
-    )]
-    Turns {
-        /// Their number.
-        found: usize,
-        /// The most.
-        most: usize,
-    },
-    /// What is searched over sets only.
-    #[error(
-        "torquer errors act on the way between positions, so schemes are walks: found {found}; expected slews that take time (--slew-rate), about one \
-         axis, between cardinal attitudes, by exchange (no --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
-    )]
-    Walks {
-        /// What is not of walks.
-        found: String,
-    },
-    /// No sigma is the largest of several units.
-    #[error(
-        "{criterion} compares sigmas in one unit, but {units} are required; expected criterion margin (over requirements), or D (their geometric mean), or \
-         --observable with coefficients of one unit: the others are estimated with them"
-    )]
-    Units {
-        /// The criterion.
-        criterion: &'static str,
-        /// An example of every unit.
-        units: String,
-    },
-    /// A number is not finite.
-    #[error(transparent)]
-    Filter(#[from] EkfError),
-}
 
 /// What is to be found.
 #[derive(Debug, Clone, PartialEq)]
@@ -449,6 +258,32 @@ impl<'a> Prepared<'a> {
         (sequences >= MANY).then(|| search.pruning(&self.task.symmetry, k, self.task.options.seed))?
     }
 
+    /// The best sequences: all are searched, with the number of sets and sequences, unless they are too many or `bound` shows that those
+    /// an exchange finds are good enough.
+    fn searched(&self, search: &Search<'_>, k: usize, bound: Option<&Bound>) -> (Best, Option<(u64, u64)>) {
+        let (task, options) = (&self.task, self.task.options);
+        let most = if options.within > 0.0 { EXHAUSTIVE } else { u64::MAX };
+        let exhaustive = task.space(k, &self.evaluator).filter(|space| space.1 <= most);
+        let exchanged = || search.exchange(k, &[], options.restarts, options.seed);
+        if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, bound)
+            && options.within > 0.0
+        {
+            let exchanged = exchanged();
+            let enough = |f: &Scored| {
+                f.worth.degree == search.floor && excess(f.worth.value, bound.value) < options.within
+            };
+            if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
+                return (exchanged, None);
+            }
+        }
+        let best = match exhaustive {
+            Some((_, MANY..)) => search.exhaust_pruned(&task.symmetry, k, options.seed),
+            Some(_) => search.exhaust(&task.symmetry, k),
+            None => exchanged(),
+        };
+        (best, exhaustive)
+    }
+
     /// The number of sets and of sequences of an exhaustive search.
     fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
         if self.task.walks {
@@ -478,41 +313,6 @@ fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) 
     }
 }
 
-/// The best attitudes of all for a task, and as candidates with rounded angles.
-fn freely(
-    base: &Scheme,
-    conditions: &Conditions,
-    options: &DesignOptions,
-    step: i64,
-    going: &(dyn Fn() -> bool + Sync),
-) -> Result<(Everywhere, Candidates), DesignError> {
-    let wrong = |found: String| DesignError::Free { found };
-    let k = options.positions.ok_or_else(|| wrong("no number of positions".into()))?;
-    if base.carry != Carry::Reset {
-        return Err(wrong(format!("{} carry", base.carry)));
-    }
-    if step <= 0 {
-        return Err(wrong(format!("angles rounded to {} degrees", format_decimal(step))));
-    }
-    let prepared = Prepared::new(base, conditions, options, going)?;
-    prepared.check(k)?;
-    if prepared.evaluator.bias.is_some() {
-        return Err(wrong("noise of Z that is correlated from position to position".into()));
-    }
-    if !prepared.evaluator.prior.is_alike() {
-        return Err(wrong("priors of psi that differ by axis".into()));
-    }
-    let found = prepared.evaluator.everywhere(&prepared.task.criterion, k, going);
-    let found = found.ok_or(DesignError::Interrupted)?;
-    let rounded =
-        |angle: &Angle| Angle::from_nanodeg((angle.nanodeg() as f64 / step as f64).round() as i64 * step);
-    let mut candidates = Candidates::default();
-    for (euler, _) in &found.support {
-        candidates.add(euler.each_ref().map(rounded));
-    }
-    Ok((found, candidates))
-}
-
 /// What an exhaustive search found elsewhere.
 type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<Best, DesignError>;
 
@@ -526,13 +326,11 @@ fn answered(
 ) -> Result<Design, DesignError> {
     watched(progress, |progress, stopped| {
         let going = || progress(NOTHING_YET);
-        let mut every = None;
-        let mut chosen = options.clone();
-        if let Some(step) = options.free {
-            let (found, candidates) = freely(base, conditions, options, step, &going)?;
-            (every, chosen.candidates) = (Some(found), candidates);
-        }
-        let options = &chosen;
+        let free =
+            options.free.map(|step| Free::new(base, conditions, options, step, progress)).transpose()?;
+        let chosen =
+            free.as_ref().map(|f| DesignOptions { candidates: f.candidates.clone(), ..options.clone() });
+        let options = chosen.as_ref().unwrap_or(options);
         let prepared = Prepared::new(base, conditions, options, &going)?;
         let task = &prepared.task;
         let minimum = task.minimum(&prepared.degrees, &going)?;
@@ -563,29 +361,10 @@ fn answered(
         let evaluator = &prepared.evaluator;
         let search = prepared.search(progress);
         let bound = task.bound(evaluator, k, &going);
-        let mut exhaustive = task.space(k, evaluator);
-        let best = if let Some(elsewhere) = elsewhere {
-            elsewhere(&prepared, k)?
-        } else {
-            let most = if options.within > 0.0 { EXHAUSTIVE } else { u64::MAX };
-            exhaustive = exhaustive.filter(|space| space.1 <= most);
-            let mut tried = None;
-            if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, &bound)
-                && options.within > 0.0
-            {
-                let exchanged = search.exchange(k, &[], options.restarts, options.seed);
-                let enough = |f: &Scored| {
-                    f.worth.degree == search.floor && excess(f.worth.value, bound.value) < options.within
-                };
-                if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
-                    (tried, exhaustive) = (Some(exchanged), None);
-                }
-            }
-            tried.unwrap_or_else(|| match exhaustive {
-                Some((_, MANY..)) => search.exhaust_pruned(&task.symmetry, k, options.seed),
-                Some(_) => search.exhaust(&task.symmetry, k),
-                None => search.exchange(k, &[], options.restarts, options.seed),
-            })
+        let (best, exhaustive) = match (elsewhere, &free) {
+            (Some(elsewhere), _) => (elsewhere(&prepared, k)?, task.space(k, evaluator)),
+            (None, Some(free)) => free.searched(&prepared, &search, k)?,
+            (None, None) => prepared.searched(&search, k, bound.as_ref()),
         };
         if let Some((more, _)) = exhaustive {
             sets += more as f64;
@@ -593,6 +372,7 @@ fn answered(
         }
         let all = exhaustive.is_some() && best.complete;
         out.found = task.all_found(evaluator, &best.found)?;
+        task.mark_images(&mut out.found, evaluator.ordered());
         let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
             let (positions, wanted) = (k, task.wanted());
             return Err(match (best.complete, exhaustive) {
@@ -609,7 +389,7 @@ fn answered(
         let mut certificate = bound.map(|bound| task.certificate(&bound, first.worth.value));
         if best.complete {
             let of = (k, conditions.dwell_s);
-            let wanted = certificate.is_some() && options.everywhere && every.is_none();
+            let wanted = certificate.is_some() && options.everywhere && free.is_none();
             let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();
             let line = || certificate.is_some().then(|| task.front_bound(evaluator, of, &going));
             let (front, (found, line)) =
@@ -617,20 +397,23 @@ fn answered(
             out.front.extend(front?);
             if let (Some(certificate), Some(line)) = (&mut certificate, line) {
                 let value = first.worth.value;
-                let every = every.or(found);
-                certificate.everywhere = every.map(|every| certify::everywhere(&every, value, options.free));
+                let every = free.as_ref().map(|f| &f.every).or(found.as_ref());
+                certificate.everywhere = every.map(|every| {
+                    let rounded = options.free.zip(free.as_ref()).map(|(step, f)| (step, f.finer.as_ref()));
+                    certify::everywhere(every, value, rounded)
+                });
                 certificate.front = line;
             }
         }
         if options.refine && going() {
             let refined = task.refined(evaluator, first, &going)?;
             out.front.extend(refined.iter().cloned());
-            out.found.splice(0..0, refined);
+            put_first(&mut out.found, refined);
         }
         if options.divide && going() {
             let divided = task.divided(evaluator, first, &going)?;
             out.front.extend(divided.iter().cloned());
-            out.found.splice(0..0, divided);
+            put_first(&mut out.found, divided);
         }
         out.front = pareto(std::mem::take(&mut out.front));
         out.search = Some(SearchReport {
@@ -666,15 +449,6 @@ fn prior_in_words(conditions: &Conditions) -> Option<String> {
     (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
 }
 
-/// `2, 5`: at most twenty numbers.
-fn listed(numbers: &[usize]) -> String {
-    const SHOWN: usize = 20;
-    let shown: Vec<String> = numbers.iter().take(SHOWN).map(ToString::to_string).collect();
-    let more = numbers.len().saturating_sub(SHOWN);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{}{more}", shown.join(", "))
-}
-
 /// Why an exhaustive search found nothing.
 fn examined(lost: u64, slews: bool) -> String {
     let with = if slews { " with the slews" } else { "" };
@@ -685,6 +459,13 @@ fn examined(lost: u64, slews: bool) -> String {
              tells"
         ),
     }
+}
+
+/// Puts a scheme before others, if there is one.
+fn put_first(found: &mut Vec<Found>, first: Option<Found>) {
+    let moved = usize::from(first.is_some());
+    found.iter_mut().flat_map(|f| &mut f.image_of).for_each(|of| *of += moved);
+    found.splice(0..0, first);
 }
 
 /// Those that none beats in both total time and criterion, by time.

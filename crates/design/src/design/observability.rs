@@ -189,8 +189,12 @@ impl Rows {
 
     /// The least number of positions that could do, by counting rows.
     pub fn counting_bound(&self) -> usize {
-        let most = self.fields.iter().map(|here| here.most).max().unwrap_or(0).max(1);
-        self.required.len().div_ceil(most)
+        self.required.len().div_ceil(self.most().max(1))
+    }
+
+    /// The most rows that a candidate adds.
+    pub fn most(&self) -> usize {
+        self.fields.iter().map(|here| here.most).max().unwrap_or(0)
     }
 
     /// Highest order of a derivative that adds anything.

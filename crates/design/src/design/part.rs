@@ -1,6 +1,7 @@
 //! Exhaustive searches in parts: ranges of the ordered starts, each searched where and when one likes, put together
 //! again to what the whole gives.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use obsdeg_core::model::Scheme;
@@ -9,7 +10,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::search::{Best, Progress};
+use super::best::Best;
+use super::search::Progress;
 use super::{Design, DesignError, DesignOptions, NOTHING_YET, Prepared, answered, watched};
 
 /// Name and version of the JSON layout.
@@ -26,6 +28,8 @@ pub struct Part {
     pub version: String,
     /// SHA-256 of all inputs: the parts of one search have the same.
     pub digest: String,
+    /// The inputs by name, as the library writes them: which differ, where digests do.
+    pub inputs: BTreeMap<String, String>,
     /// Which part, counted from 1, of how many.
     pub part: [usize; 2],
     /// The starts that are its own, counted from 0: the first, the one behind the last, and how many there are in all.
@@ -55,12 +59,10 @@ pub enum PartError {
         why: String,
     },
     /// Of other inputs.
-    #[error("it is a part of another search: the digest of its inputs is {found}, that of these {expected}")]
+    #[error("it is a part of another search: {why}")]
     Foreign {
-        /// Its digest.
-        found: String,
-        /// That of the inputs.
-        expected: String,
+        /// Which inputs differ.
+        why: String,
     },
     /// Divided otherwise.
     #[error("it is part {} of {}; expected a part of {expected}", .found[0], .found[1])]
@@ -104,15 +106,155 @@ pub enum PartError {
     },
 }
 
-/// `SHA-256` of everything that a search depends on.
-fn digest(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> String {
-    let text = format!("{}\n{base:?}\n{conditions:?}\n{options:?}", env!("CARGO_PKG_VERSION"));
+/// Everything that a search of parts depends on, by name; what is not listed here is told by the compiler.
+fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BTreeMap<String, String> {
+    let Scheme {
+        // what a design takes of a scheme are its assumptions
+        name: _,
+        description: _,
+        positions: _,
+        combinations: _,
+        recording: _,
+        carry,
+        latitude,
+        geometry,
+        unknowns,
+        measured_azimuth,
+        simulation,
+        requirements,
+        gimbals,
+        path,
+    } = base;
+    let DesignOptions {
+        // a part searches all
+        within: _,
+        everywhere: _,
+        candidates,
+        positions,
+        required,
+        degree_caps,
+        meet,
+        total_s,
+        slew_s,
+        criterion,
+        keep,
+        restarts,
+        refine,
+        divide,
+        front,
+        free,
+        seed,
+    } = options;
+    let Conditions {
+        truth,
+        filter,
+        step_s,
+        dwell_s,
+        slew_rate_deg_s,
+        slews,
+        accelerometer_noise_g,
+        accelerometer_instability_ug,
+        accelerometer_correlation_s,
+        azimuth_noise_deg,
+        drift_noise,
+        drift_noise_step_s,
+        gyro_noise,
+        propagation,
+        values,
+        drift_scale,
+        estimates,
+        priors,
+        requirements: required_sigmas,
+    } = conditions;
+    let of: [(&str, &dyn std::fmt::Debug); 45] = [
+        ("version", &env!("CARGO_PKG_VERSION")),
+        ("carry", carry),
+        ("latitude", latitude),
+        ("geometry", geometry),
+        ("terms", unknowns),
+        ("measured azimuth", measured_azimuth),
+        ("settings of the scheme", simulation),
+        ("requirements of the scheme", requirements),
+        ("gimbals", gimbals),
+        ("path", path),
+        ("candidates", &candidates.names),
+        ("angles of candidates", &candidates.attitudes),
+        ("positions", positions),
+        ("observable", required),
+        ("max-degree", degree_caps),
+        ("meet", meet),
+        ("max-time", total_s),
+        ("max-slew", slew_s),
+        ("criterion", criterion),
+        ("keep", keep),
+        ("restarts", restarts),
+        ("refine", refine),
+        ("divide", divide),
+        ("front", front),
+        ("free", free),
+        ("seed", seed),
+        ("truth", truth),
+        ("filter", filter),
+        ("step", step_s),
+        ("dwell", dwell_s),
+        ("slew-rate", slew_rate_deg_s),
+        ("slews", slews),
+        ("noise", accelerometer_noise_g),
+        ("accelerometer-instability", accelerometer_instability_ug),
+        ("accelerometer-correlation-time", accelerometer_correlation_s),
+        ("azimuth-noise", azimuth_noise_deg),
+        ("drift noise", drift_noise),
+        ("step of drift noise", drift_noise_step_s),
+        ("noise of gyros", gyro_noise),
+        ("propagation", propagation),
+        ("values", values),
+        ("drift scale", drift_scale),
+        ("estimates", estimates),
+        ("prior", priors),
+        ("requirement", required_sigmas),
+    ];
+    of.into_iter().map(|(name, value)| (name.into(), format!("{value:?}"))).collect()
+}
+
+/// `SHA-256` of the inputs.
+fn digest(inputs: &BTreeMap<String, String>) -> String {
+    let text: String = inputs.iter().map(|(name, value)| format!("{name}\n{value}\n")).collect();
     Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The starts of part `number` of `of`, counted from 1.
-fn range(starts: usize, [number, of]: [usize; 2]) -> Range<usize> {
-    let to = |part: usize| (starts as u128 * part as u128 / of as u128) as usize;
+/// `dwell is 999.0, here 1000.0`: what differs; long values are left out.
+fn differing(found: &BTreeMap<String, String>, expected: &BTreeMap<String, String>) -> String {
+    const LONGEST: usize = 60;
+    let value = |of: &BTreeMap<String, String>, name: &String| {
+        of.get(name).cloned().unwrap_or_else(|| "missing".into())
+    };
+    let mut names: Vec<&String> = expected.keys().chain(found.keys()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let differs = names.into_iter().filter_map(|name| {
+        let (there, here) = (value(found, name), value(expected, name));
+        let short = there.len().max(here.len()) <= LONGEST;
+        (there != here)
+            .then(|| if short { format!("{name} is {there}, here {here}") } else { format!("{name} differ") })
+    });
+    let listed: Vec<String> = differs.collect();
+    if listed.is_empty() { "its inputs are not those of its digest".into() } else { listed.join("; ") }
+}
+
+/// The starts of part `number` of `of`, counted from 1: each part has about as many sequences behind its starts as any other.
+fn range(work: &[f64], [number, of]: [usize; 2]) -> Range<usize> {
+    let total: f64 = work.iter().sum();
+    // where the middle of a start is
+    let mut behind = 0.0;
+    let middles: Vec<f64> = work
+        .iter()
+        .map(|work| {
+            behind += work;
+            (behind - work / 2.0) / total * of as f64
+        })
+        .collect();
+    let to =
+        |part: usize| if part == of { work.len() } else { middles.partition_point(|m| *m < part as f64) };
     to(number - 1)..to(number)
 }
 
@@ -148,12 +290,13 @@ pub fn design_part(
     if !(1..=part[1]).contains(&part[0]) {
         return Err(DesignError::PartNumber { found: part });
     }
-    let digest = digest(base, conditions, options);
+    let inputs = inputs(base, conditions, options);
+    let digest = digest(&inputs);
     if let Some(resumed) = &resumed {
         let number = (resumed.part != part)
             .then_some(PartError::Number { found: resumed.part, expected: part })
             .map_or(Ok(()), Err);
-        let why = resumed.check(&digest).and(number);
+        let why = resumed.check(&digest, &inputs).and(number);
         why.map_err(|why| DesignError::Part { name: "the part to go on with".into(), why })?;
         if resumed.complete {
             return Ok(resumed.clone());
@@ -166,12 +309,13 @@ pub fn design_part(
         prepared.exhaustible(k)?;
         let search = prepared.search(progress);
         let starts = search.starts(&prepared.task.symmetry, k);
-        let own = range(starts.len(), part);
+        let own = range(&search.work(&starts, k), part);
         let expected = [own.start, own.end, starts.len()];
         let mut out = resumed.unwrap_or_else(|| Part {
             schema: PART_SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             digest,
+            inputs,
             part,
             starts: expected,
             levels: Vec::new(),
@@ -223,7 +367,8 @@ pub fn design_merged(
     parts: &[(String, Part)],
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Design, DesignError> {
-    let digest = digest(base, conditions, options);
+    let inputs = inputs(base, conditions, options);
+    let digest = digest(&inputs);
     let Some((_, first)) = parts.first().filter(|_| options.free.is_none()) else {
         return Err(DesignError::Parts);
     };
@@ -232,7 +377,7 @@ pub fn design_merged(
     for named in parts {
         let (name, part) = named;
         let named_error = |why: PartError| DesignError::Part { name: name.clone(), why };
-        part.check(&digest).map_err(named_error)?;
+        part.check(&digest, &inputs).map_err(named_error)?;
         if part.part[1] != of {
             return Err(named_error(PartError::Division { found: part.part, expected: of }));
         }
@@ -253,10 +398,11 @@ pub fn design_merged(
     let sorted: Vec<&(String, Part)> = sorted.into_iter().flatten().collect();
     let together = |prepared: &Prepared<'_>, k: usize| {
         prepared.exhaustible(k)?;
-        let starts = prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len();
+        let search = prepared.search(&|_| true);
+        let work = search.work(&search.starts(&prepared.task.symmetry, k), k);
         for (name, part) in &sorted {
-            let own = range(starts, part.part);
-            let expected = [own.start, own.end, starts];
+            let own = range(&work, part.part);
+            let expected = [own.start, own.end, work.len()];
             let wrong = |why| Err(DesignError::Part { name: name.clone(), why });
             if part.starts != expected {
                 return wrong(PartError::Starts { found: part.starts, expected, part: part.part });
@@ -292,14 +438,14 @@ const MOST_PARTS: usize = 1_000_000;
 
 impl Part {
     /// Whether it belongs to a search of these inputs.
-    fn check(&self, digest: &str) -> Result<(), PartError> {
+    fn check(&self, digest: &str, inputs: &BTreeMap<String, String>) -> Result<(), PartError> {
         let [number, of] = self.part;
         let why = if self.schema != PART_SCHEMA {
             format!("schema {}; expected {PART_SCHEMA}", self.schema)
         } else if !(1..=of).contains(&number) {
             format!("part {number} of {of}")
         } else if self.digest != digest {
-            return Err(PartError::Foreign { found: self.digest.clone(), expected: digest.into() });
+            return Err(PartError::Foreign { why: differing(&self.inputs, inputs) });
         } else {
             return Ok(());
         };

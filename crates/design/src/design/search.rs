@@ -1,72 +1,24 @@
-//! The search for good sequences: exhaustion, and coordinate exchange where the space is too large.
+//! The search for good sequences, and exhaustion.
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use obsdeg_evidence::requirements::meets;
-use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
+use super::best::{Best, Scored, Worth};
 use super::criterion::{Criterion, Limits};
 use super::information::{Evaluator, State};
 use super::observability::{Patience, Rows};
 use super::screen::{Scratch, Screen};
 use super::symmetry::Symmetry;
-use super::ties::{TIE, Ties};
 use super::ways::Stop;
 
-/// Rounds of one exchange before it is given up.
-const ROUNDS: usize = 50;
 /// Restarts of the exchange that finds what an exhaustive search is pruned by.
 const KNOWN_RESTARTS: u64 = 24;
 /// Sequences between two questions whether to go on.
-const PATIENCE: u64 = 256;
-
-/// What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
-pub struct Worth {
-    /// How far time limits, requirements and degree caps are missed; 0 when kept.
-    pub violation: f64,
-    /// The largest degree of a required coefficient.
-    pub degree: usize,
-    /// The criterion.
-    pub value: f64,
-}
-
-impl Worth {
-    const NONE: Self = Self { violation: f64::INFINITY, degree: usize::MAX, value: f64::INFINITY };
-
-    fn key(&self) -> (f64, usize, f64) {
-        (self.violation, self.degree, self.value)
-    }
-
-    fn order(&self, other: &Self) -> std::cmp::Ordering {
-        let ((a, b, c), (x, y, z)) = (self.key(), other.key());
-        a.total_cmp(&x).then(b.cmp(&y)).then(c.total_cmp(&z))
-    }
-
-    pub(super) fn better_than(&self, other: &Self) -> bool {
-        self.order(other).is_lt()
-    }
-
-    fn is_valid(&self) -> bool {
-        self.violation == 0.0 && self.value.is_finite()
-    }
-}
-
-/// A sequence with its worth.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Scored {
-    /// What it is worth.
-    pub worth: Worth,
-    /// Dwells and turns, in s.
-    pub seconds: f64,
-    /// The candidates in order, with the ways there.
-    pub sequence: Vec<Stop>,
-}
+pub(super) const PATIENCE: u64 = 256;
 
 /// How far a search is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,7 +53,13 @@ impl Constraints {
     }
 
     /// How far times and sigmas of a sequence, with `state` behind it, are beyond the limits; 0 when they are kept.
-    fn violation(&self, evaluator: &Evaluator, sequence: &[Stop], state: &State, root: &mut Vec<f64>) -> f64 {
+    pub(super) fn violation(
+        &self,
+        evaluator: &Evaluator,
+        sequence: &[Stop],
+        state: &State,
+        root: &mut Vec<f64>,
+    ) -> f64 {
         let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);
         let slews = sequence.windows(2).map(|w| beyond(slew(w), self.slew_s)).sum::<f64>();
         let margin = |limits: &Limits| {
@@ -121,103 +79,6 @@ impl Constraints {
 /// How far a limit is passed, as a part of it; 0 for what rounding may do.
 fn beyond(found: f64, limit: Option<f64>) -> f64 {
     limit.map(|l| found / l - 1.0).filter(|over| *over > 1e-9).unwrap_or(0.0)
-}
-
-/// The best sequences, best first, and the front of time against the criterion.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Best {
-    /// At most as many as are kept.
-    pub found: Vec<Scored>,
-    /// Sequences of the smallest worst degree that none of these beats in both time and criterion, by time.
-    pub front: Vec<Scored>,
-    /// Those that are as good as the best.
-    pub ties: Ties,
-    /// Whether everything was searched.
-    pub complete: bool,
-    /// Sequences whose sigma was computed.
-    pub examined: u64,
-    /// Sequences, observable or not, that a bound left out: they are worse than those kept.
-    pub excluded: u64,
-    /// Of those examined, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what
-    /// is required, as far as double precision tells.
-    pub lost: u64,
-}
-
-impl Best {
-    /// Whether a sequence would be kept.
-    fn wants(&self, keep: usize, worth: &Worth, seconds: f64) -> bool {
-        worth.is_valid()
-            && (self.found.len() < keep
-                || self.found.last().is_some_and(|last| !last.worth.better_than(worth))
-                || self.is_on_front(worth, seconds))
-    }
-
-    fn is_on_front(&self, worth: &Worth, seconds: f64) -> bool {
-        let degree = self.front.first().map_or(usize::MAX, |f| f.worth.degree);
-        worth.degree < degree
-            || worth.degree == degree
-                && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
-    }
-
-    /// Whether an equal one of the front comes later in lexicographic order: then the new one takes its place, so that the
-    /// front does not depend on the order in which sequences come.
-    fn is_before_its_equal(&self, new: &Scored) -> bool {
-        let equal = |f: &&Scored| {
-            f.worth.degree == new.worth.degree && f.seconds == new.seconds && f.worth.value == new.worth.value
-        };
-        self.front.iter().find(equal).is_some_and(|f| new.sequence < f.sequence)
-    }
-
-    fn add(&mut self, keep: usize, new: Scored) {
-        if !new.worth.is_valid() {
-            return;
-        }
-        self.add_to_front(&new);
-        let place = self.found.partition_point(|b| before(b, &new));
-        if place < keep && self.found.get(place).is_none_or(|b| b.sequence != new.sequence) {
-            self.found.insert(place, new);
-            self.found.truncate(keep);
-        }
-    }
-
-    /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion; drops what
-    /// it beats.
-    fn add_to_front(&mut self, new: &Scored) {
-        if self.is_on_front(&new.worth, new.seconds) || self.is_before_its_equal(new) {
-            let beaten = |f: &Scored| {
-                f.worth.degree > new.worth.degree
-                    || f.seconds >= new.seconds && f.worth.value >= new.worth.value
-            };
-            self.front.retain(|f| !beaten(f));
-            let place = self.front.partition_point(|f| f.seconds < new.seconds);
-            self.front.insert(place, new.clone());
-        }
-    }
-
-    /// The largest criterion that may still count where all sequences take the same time: among the best `keep`, or as a tie of
-    /// the first. `known` were found before, of the same worst degree.
-    fn limit(&self, keep: usize, known: &Self) -> f64 {
-        let value = |of: &Self, place: usize| of.found.get(place).map_or(f64::INFINITY, |s| s.worth.value);
-        let least = |place: usize| value(self, place).min(value(known, place));
-        least(keep - 1).max(least(0) * (1.0 + TIE))
-    }
-
-    /// Takes over what another found.
-    pub(super) fn merge(&mut self, keep: usize, other: Self) {
-        for s in other.found.into_iter().chain(other.front) {
-            self.add(keep, s);
-        }
-        self.ties.merge(other.ties);
-        self.complete &= other.complete;
-        self.examined += other.examined;
-        self.excluded += other.excluded;
-        self.lost += other.lost;
-    }
-}
-
-/// Ties in lexicographic order.
-fn before(a: &Scored, b: &Scored) -> bool {
-    a.worth.order(&b.worth).then_with(|| a.sequence.cmp(&b.sequence)).is_lt()
 }
 
 /// What every search shares.
@@ -264,7 +125,7 @@ struct Pruned<'a> {
 }
 
 /// What the workers of a search report to.
-struct Meter<'a> {
+pub(super) struct Meter<'a> {
     progress: &'a (dyn Fn(Progress) -> bool + Sync),
     stopped: AtomicBool,
     done: AtomicU64,
@@ -274,7 +135,7 @@ struct Meter<'a> {
 }
 
 impl<'a> Meter<'a> {
-    fn new(search: &Search<'a>, total: usize) -> Self {
+    pub(super) fn new(search: &Search<'a>, total: usize) -> Self {
         Self {
             progress: search.progress,
             stopped: AtomicBool::new(false),
@@ -286,7 +147,7 @@ impl<'a> Meter<'a> {
     }
 
     /// So much more is done; whether to go on.
-    fn report(&self, parts: u64, examined: u64, best: Option<&Scored>) -> bool {
+    pub(super) fn report(&self, parts: u64, examined: u64, best: Option<&Scored>) -> bool {
         let value = best.map_or(f64::INFINITY, |b| b.worth.value);
         // a poisoned lock comes of a panic that is reported already
         let best = self.best.lock().map_or(value, |mut b| {
@@ -306,7 +167,7 @@ impl<'a> Meter<'a> {
     }
 
     /// Runs one part, unless the search was stopped.
-    fn part(&self, work: impl FnOnce() -> Best) -> Best {
+    pub(super) fn part(&self, work: impl FnOnce() -> Best) -> Best {
         if self.stopped.load(Ordering::Relaxed) {
             return Best::default();
         }
@@ -316,7 +177,7 @@ impl<'a> Meter<'a> {
     }
 
     /// All parts, in their order.
-    fn gather(&self, keep: usize, parts: Vec<Best>) -> Best {
+    pub(super) fn gather(&self, keep: usize, parts: Vec<Best>) -> Best {
         let mut out = Best { complete: true, ..Best::default() };
         for part in parts {
             out.merge(keep, part);
@@ -561,6 +422,21 @@ impl Search<'_> {
         }
     }
 
+    /// How many sequences are behind every start, or in proportion to that.
+    pub(super) fn work(&self, starts: &[Vec<Stop>], k: usize) -> Vec<f64> {
+        let n = self.rows.candidates();
+        let behind = |start: &Vec<Stop>| {
+            let left = k - start.len();
+            let choices = start.last().map_or(n, |last| n - last.candidate);
+            match self.evaluator.ordered() {
+                true => 1.0,
+                // multisets of so many
+                false => (0..left).map(|i| (choices + i) as f64 / (i + 1) as f64).product(),
+            }
+        };
+        starts.iter().map(behind).collect()
+    }
+
     /// What is searched one after the other, by worst degree; `None` when the search was stopped.
     pub(super) fn levels_of(&self, k: usize) -> Option<Vec<SearchLevel>> {
         if !self.evaluator.ordered() {
@@ -659,7 +535,7 @@ impl Search<'_> {
     }
 
     /// What a sequence is worth, with its time. Its degrees are those of one field.
-    fn worth(&self, sequence: &[Stop]) -> Scored {
+    pub(super) fn worth(&self, sequence: &[Stop]) -> Scored {
         let state = self.evaluator.state_of(sequence);
         let mut root = Vec::new();
         let value = self.evaluator.value(&state, self.criterion, &mut root);
@@ -675,108 +551,13 @@ impl Search<'_> {
 
     /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at
     /// once, does not.
-    fn judged(&self, mut scored: Scored) -> Scored {
+    pub(super) fn judged(&self, mut scored: Scored) -> Scored {
         if self.walks {
             return scored;
         }
         let degrees = self.rows.likely_degrees(&candidates(&scored.sequence));
         scored.worth.violation += degrees.iter().filter(|d| d.is_none()).count() as f64;
         scored
-    }
-
-    /// What may stand at a place, with the ways there and from there.
-    fn choices(&self, now: &[Stop], place: usize) -> Vec<(Stop, Option<Stop>)> {
-        let last = place.checked_sub(1).map(|p| now[p].candidate);
-        let next = now.get(place + 1).map(|next| next.candidate);
-        let ways = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
-            let Some(next) = next else { return vec![(stop, None)] };
-            self.evaluator.stops(Some(stop.candidate), next).map(|next| (stop, Some(next))).collect()
-        };
-        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
-    }
-
-    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of
-    /// half turns, then any two change places, until none helps. From the sequences given, then from random ones.
-    pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
-        self.exchange_from(k, given, restarts, seed, None)
-    }
-
-    /// The same; with `firsts` the sequences begin with one of them, and what is tried on the way is kept too.
-    fn exchange_from(
-        &self,
-        k: usize,
-        given: &[Vec<Stop>],
-        restarts: u64,
-        seed: u64,
-        firsts: Option<&[usize]>,
-    ) -> Best {
-        let candidates = self.rows.candidates();
-        let total = given.len() + restarts as usize;
-        let meter = Meter::new(self, total);
-        let from = |start: u64| {
-            let mut rng = SplitMix64::new(seed ^ start.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-            let mut draw = |n: usize| rng.below(n as u64) as usize;
-            let random = || {
-                let place = |place: usize| match firsts {
-                    Some(firsts) if place == 0 => firsts[draw(firsts.len())],
-                    _ => draw(candidates),
-                };
-                (0..k).map(place).map(Stop::from).collect()
-            };
-            let mut now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
-            let mut best = Best::default();
-            let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
-            // takes what is better; false when the search is stopped
-            let mut try_out = |now: &[Stop], held: &mut Scored| {
-                best.examined += 1;
-                let other = self.worth(now);
-                if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {
-                    let mut other = self.judged(other.clone());
-                    self.evaluator.tidy(&mut other.sequence);
-                    best.add(self.keep, other);
-                }
-                if other.worth.better_than(&held.worth) {
-                    let other = self.judged(other);
-                    if other.worth.better_than(&held.worth) {
-                        *held = other;
-                    }
-                }
-                !best.examined.is_multiple_of(PATIENCE)
-                    || meter.report(0, PATIENCE, Some(&*held).filter(|h| h.worth.is_valid()))
-            };
-            'rounds: for _ in 0..ROUNDS {
-                let round = held.worth;
-                for place in 0..k {
-                    let first = |stop: Stop| place > 0 || firsts.is_none_or(|f| f.contains(&stop.candidate));
-                    for (stop, next) in self.choices(&now, place).into_iter().filter(|c| first(c.0)) {
-                        now[place] = stop;
-                        next.into_iter().for_each(|next| now[place + 1] = next);
-                        if !try_out(&now, &mut held) {
-                            break 'rounds;
-                        }
-                    }
-                    now.copy_from_slice(&held.sequence);
-                }
-                for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
-                    let first = b > 0 || firsts.is_none_or(|f| f.contains(&now[a].candidate));
-                    if first && self.evaluator.ordered() && now[a].candidate != now[b].candidate {
-                        now.swap(a, b);
-                        if !try_out(&now, &mut held) {
-                            break 'rounds;
-                        }
-                        now.copy_from_slice(&held.sequence);
-                    }
-                }
-                if !held.worth.better_than(&round) {
-                    break;
-                }
-            }
-            self.evaluator.tidy(&mut held.sequence);
-            best.add(self.keep, held);
-            best
-        };
-        let parts = (0..total as u64).into_par_iter().map(|start| meter.part(|| from(start))).collect();
-        meter.gather(self.keep, parts)
     }
 }
 

@@ -18,6 +18,8 @@ pub struct Symmetry {
     pub order: usize,
     /// The orbit of every candidate, counted from 0.
     pub orbit: Vec<usize>,
+    /// Where every one of these rotations takes every candidate; the identity where there is no other.
+    pub maps: Vec<Vec<usize>>,
 }
 
 impl Symmetry {
@@ -58,12 +60,13 @@ impl Symmetry {
                 orbits += 1;
             }
         }
-        Self { order: maps.len().max(1), orbit }
+        let maps = if maps.is_empty() { vec![(0..candidates).collect()] } else { maps };
+        Self { order: maps.len(), orbit, maps }
     }
 
     /// No symmetry.
     pub fn none(candidates: usize) -> Self {
-        Self { order: 1, orbit: (0..candidates).collect() }
+        Self { order: 1, orbit: (0..candidates).collect(), maps: vec![(0..candidates).collect()] }
     }
 
     /// How many schemes a searched one stands for, as a fraction: it has `order` images (counted once for every turn of

@@ -1,5 +1,7 @@
 //! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
 
+use std::collections::HashMap;
+
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::concerns;
@@ -9,11 +11,12 @@ use obsdeg_evidence::simulation::{Conditions, PRIOR, latitude_of, resolve};
 use rayon::prelude::*;
 
 use super::answer::{Found, HalfTurn, Minimum};
+use super::best::{Best, Scored};
 use super::candidates::{Candidates, MAX_CANDIDATES};
 use super::criterion::{Criterion, Limits};
 use super::information::Evaluator;
 use super::observability::Rows;
-use super::search::{Best, Constraints, Scored, Search};
+use super::search::{Constraints, Search};
 use super::symmetry::Symmetry;
 use super::walks::is_walk;
 use super::ways::Stop;
@@ -227,6 +230,7 @@ impl<'a> Task<'a> {
             positions: None,
             witness: Vec::new(),
             counting_bound: self.rows.counting_bound(),
+            rows_per_position: self.rows.most(),
             none_of: Vec::new(),
             never: if self.walks { Vec::new() } else { self.never(best_degrees).map(Into::into).collect() },
             proven: true,
@@ -296,6 +300,35 @@ impl<'a> Task<'a> {
         Ok(found.into_iter().flatten().collect())
     }
 
+    /// Says of those of `found` that turns of the platform axes make of others listed before them.
+    pub(super) fn mark_images(&self, found: &mut [Found], ordered: bool) {
+        // candidates in order, and half turns with their axes
+        type Way = (Vec<usize>, Vec<(usize, [i64; 3])>);
+        let names: HashMap<&str, usize> = self.candidates.names.iter().map(String::as_str).zip(0..).collect();
+        let arranged = |mut sequence: Vec<usize>| {
+            if !ordered {
+                sequence.sort_unstable();
+            }
+            sequence
+        };
+        // every image of those that are none themselves
+        let mut known: HashMap<Way, usize> = HashMap::new();
+        for (i, f) in found.iter_mut().enumerate() {
+            let sequence: Option<Vec<usize>> =
+                f.positions.iter().map(|p| names.get(p.as_str()).copied()).collect();
+            let Some(sequence) = sequence else { continue };
+            let turns: Vec<_> =
+                f.half_turns.iter().map(|t| (t.to, t.about.map(|x| (x * 1e9).round() as i64))).collect();
+            f.image_of = known.get(&(arranged(sequence.clone()), turns.clone())).copied();
+            if f.image_of.is_none() {
+                for map in &self.symmetry.maps {
+                    let image = arranged(sequence.iter().map(|&c| map[c]).collect());
+                    known.entry((image, turns.clone())).or_insert(i + 1);
+                }
+            }
+        }
+    }
+
     fn judged(
         &self,
         evaluator: &Evaluator,
@@ -363,6 +396,7 @@ impl<'a> Task<'a> {
         }
         Ok(Some(Found {
             positions,
+            image_of: None,
             angles,
             half_turns: half_turns
                 .into_iter()
@@ -417,7 +451,7 @@ impl<'a> Task<'a> {
     }
 
     /// The attitudes of a sequence, and the way through them where they are the candidates.
-    fn placed(&self, of: &Scored) -> (Vec<Euler>, Vec<Stop>) {
+    pub(super) fn placed(&self, of: &Scored) -> (Vec<Euler>, Vec<Stop>) {
         let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
         let path = of.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s });
         (of.sequence.iter().map(attitude).collect(), path.collect())

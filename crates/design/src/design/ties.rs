@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::search::Worth;
+use super::best::Worth;
 
 /// Sequences tie when their worst degrees are equal and their criteria differ by less than this part.
 pub(crate) const TIE: f64 = 1e-6;

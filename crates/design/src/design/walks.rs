@@ -78,8 +78,10 @@ pub struct Walks {
     pub latitude_deg: Option<f64>,
     /// Coefficients that even the tour of all turns leaves unobservable; no walk is sought then.
     pub never: Vec<String>,
-    /// No fewer can do: that many rows are needed.
+    /// No fewer can do: the required coefficients over the rows of a position, rounded up.
     pub counting_bound: usize,
+    /// The most independent rows that a position adds.
+    pub rows_per_position: usize,
     /// `[positions, walks]`: none of these does, by exhaustion.
     pub none_of: Vec<[u64; 2]>,
     /// Whether `positions` is the fewest of these candidates and turns: nothing smaller was left out, and the bound on the probability of an
@@ -374,6 +376,7 @@ pub fn walks(
         latitude_deg: base.latitude.map(|l| l.degrees()),
         never,
         counting_bound,
+        rows_per_position: most,
         none_of: Vec::new(),
         proven: false,
         interrupted: false,

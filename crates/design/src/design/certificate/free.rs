@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::super::criterion::{Criterion, Limits};
 use super::super::information::Evaluator;
-use super::weights::{Weighed, weigh};
+use super::weights::{Weighed, listed, weigh};
 
 /// Step of the net of Euler angles on which attitudes are looked for, in degrees.
 const COARSE: usize = 9;
@@ -25,7 +25,7 @@ const ROUNDS: usize = 25;
 /// What adds less than this part more is not taken up.
 const GAIN: f64 = 1e-5;
 /// Weights below are no support.
-const SUPPORT: f64 = 1e-3;
+const SUPPORT: f64 = 1e-7;
 /// The information of a position is evaluated in two ways that differ by rounding: assumed, not derived.
 const ROUNDING: f64 = 1e-8;
 
@@ -34,9 +34,9 @@ const ROUNDING: f64 = 1e-8;
 pub struct Everywhere {
     /// No scheme of attitudes whatever has a smaller criterion.
     pub value: f64,
-    /// The criterion of the weights.
+    /// The criterion of the weights at these attitudes, as they are.
     pub attained: f64,
-    /// The attitudes with weights, to hundredths of a degree.
+    /// The attitudes, to hundredths of a degree, with weights: rounded, to be divided by their sum.
     pub support: Vec<(Euler, f64)>,
 }
 
@@ -94,8 +94,16 @@ impl Evaluator {
         let most = (2.0 * on_net / (1.0 + (n * h).cos())).max(known) * (1.0 + ROUNDING);
         let value = problem.lower_bound_over(&found.dual, most).sqrt();
         let support = eulers.iter().zip(&here.candidates).zip(&found.weights).filter(|(_, w)| **w > SUPPORT);
-        let support = support.map(|((e, c), w)| (e.clone().unwrap_or_else(|| angles(&c.c)), *w)).collect();
-        going().then(|| Everywhere { value, attained: found.attained.sqrt(), support })
+        let (support, weights): (Vec<Euler>, Vec<f64>) =
+            support.map(|((e, c), w)| (e.clone().unwrap_or_else(|| angles(&c.c)), *w)).unzip();
+        // what is told of the weights is what these attitudes and numbers give
+        here.stand_at(&support.iter().map(c_n_f64).collect::<Vec<_>>());
+        let problem = here.additive(problem.aim, k);
+        let exact = || (weights.clone(), found.attained);
+        let (weights, attained) = listed(&problem, &weights).unwrap_or_else(exact);
+        let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0).collect();
+        let attained = attained.sqrt().max(value);
+        going().then_some(Everywhere { value, attained, support })
     }
 
     /// `d(C)` for one position, X in units of deg/h.

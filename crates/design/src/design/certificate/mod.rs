@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::criterion::{Criterion, Limits};
 use super::information::Evaluator;
 use bound::{Additive, Aim};
-use weights::weigh;
+use weights::{listed, weigh};
 
 /// Most positions whose psi is looked at one by one, for requirements on psi.
 const MOST_PSI: usize = 48;
@@ -26,6 +26,8 @@ pub struct Bound {
     pub attained: f64,
     /// The weight of every candidate, sum 1.
     pub weights: Vec<f64>,
+    /// The same rounded, to be divided by their sum, and the criterion of these.
+    pub listed: (Vec<f64>, f64),
 }
 
 impl Evaluator {
@@ -114,8 +116,18 @@ impl Evaluator {
 
     /// The weights of least aim.
     fn weighed(&self, aim: Aim, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
-        let found = weigh(&self.additive(aim, k), going)?;
-        Some(Bound { value: found.bound.sqrt(), attained: found.attained.sqrt(), weights: found.weights })
+        let problem = self.additive(aim, k);
+        let found = weigh(&problem, going)?;
+        let exact = || (found.weights.clone(), found.attained);
+        let (weights, attained) = listed(&problem, &found.weights).unwrap_or_else(exact);
+        // that of exact weights may rest on rounding
+        let listed = (weights, attained.max(found.bound).sqrt());
+        Some(Bound {
+            value: found.bound.sqrt(),
+            attained: found.attained.sqrt(),
+            weights: found.weights,
+            listed,
+        })
     }
 
     /// The information of the candidates, k times; numbers are in deg/h (per g).

@@ -26,6 +26,10 @@ const ACTIVE: usize = 160;
 const ROUNDS: usize = 60;
 /// A bound so much above what the weights reach shows that the latter rests on the ridge.
 const SINGULAR: f64 = 1e-6;
+/// Digits of weights that are listed, those that are not, and how much worse than exact ones they may be.
+const DIGITS: [i32; 3] = [2, 3, 4];
+const FAINT: f64 = 1e-7;
+const COARSE: f64 = 1e-3;
 /// Makes what nothing determines regular: a part of the mean information.
 const RIDGE: f64 = 1e-13;
 
@@ -85,6 +89,41 @@ pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weig
         let singular = found.bound > found.attained * (1.0 + SINGULAR);
         (!singular).then(|| Weighed { attained: found.attained.max(found.bound), ..found })
     })
+}
+
+/// Weights as they are listed: of two digits, or of more where those are worse by more than [`COARSE`]; divided by their sum they
+/// have this aim. `None` where rounded weights do not determine what counts.
+pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let of = |weights: &[f64]| {
+        let active: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
+        let sum: f64 = weights.iter().sum();
+        let parts: Vec<f64> = active.iter().map(|&i| weights[i] / sum).collect();
+        Weighing::new(problem, active, 0.0).aim(&parts)
+    };
+    let least = of(weights)?;
+    let found = DIGITS.iter().filter_map(|&digits| {
+        let weights: Vec<f64> = weights.iter().map(|&w| rounded(w, digits)).collect();
+        let aim = of(&weights)?;
+        Some((weights, aim))
+    });
+    let mut last = None;
+    for (weights, aim) in found {
+        let near = aim <= least * (1.0 + COARSE);
+        last = Some((weights, aim));
+        if near {
+            break;
+        }
+    }
+    last
+}
+
+/// To so many digits; 0 below [`FAINT`].
+fn rounded(weight: f64, digits: i32) -> f64 {
+    if weight < FAINT {
+        return 0.0;
+    }
+    let unit = 10f64.powi(digits - 1 - weight.log10().floor() as i32);
+    (weight * unit).round() / unit
 }
 
 /// The same, column by column.
