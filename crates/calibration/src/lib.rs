@@ -2,6 +2,25 @@
 //!
 //! A record ([`record`]) is taken together into bins ([`bins`]) and laid beside the timeline of its scheme ([`platform`]); the estimate is that of least
 //! squares without a prior ([`least_squares`]), of what the exact verdict calls determined; a filter is the second path to it.
+//!
+//! A record of any system: x decays, and is measured.
+//!
+//! ```
+//! use obsdeg_calibration::record::Record;
+//! use obsdeg_calibration::{SystemOptions, calibrate_system};
+//! use obsdeg_core::system::model_file;
+//!
+//! let model = "name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }\n\
+//!     [simulation]\nvalues = { x = 1, p = 1 }\nnoise = { z = 0.001 }";
+//! let rows: String = (0..20).map(|k| 0.1 * f64::from(k)).map(|t| format!("{t},{}\n", 2.0 * (-0.5 * t).exp())).collect();
+//! let record = Record::csv("decay.csv", Box::new(std::io::Cursor::new(format!("t,z\n{rows}"))))?;
+//! let model = model_file::read(model)?;
+//! let options = SystemOptions { starts: 4, profiles: vec![], prior: None, seed: 1 };
+//! let found = calibrate_system(&model, record, &options, &|_| true)?;
+//! let p = found.unknowns.iter().find(|u| u.name == "p").and_then(|u| u.estimate).expect("it is determined");
+//! assert!((p - 0.5).abs() < 1e-4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod answer;
 pub mod bins;

@@ -1,4 +1,16 @@
 //! Results as text: tables, JSON, Markdown, CSV, LaTeX. Pure formatting: nothing is computed here.
+//!
+//! ```
+//! use obsdeg_core::analysis::{AnalysisOptions, analyze};
+//! use obsdeg_core::model::{Angle, Scheme};
+//! use obsdeg_report::{Format, Layout, written};
+//!
+//! let positions = [[0, 0, 0], [180, 0, 0]].map(|p| p.map(Angle::from_degrees));
+//! let answer = analyze(&Scheme::of_angles(positions), AnalysisOptions::default(), None)?;
+//! let text = written(&answer, Format::Markdown, Layout::default())?;
+//! assert!(text.starts_with("# Observable degrees"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod analysis;
 mod audit;

@@ -6,6 +6,21 @@
 //! until it ends, and ends with whoever started it. [`client::Worker`] starts it and turns a refusal, a
 //! crash, work beyond its limit or nonsense into an error that the caller prints in place of the
 //! solution. This is the only crate that names Symbolica, and no thread but the worker's touches it.
+//!
+//! ```
+//! use obsdeg_symbolic::{Dynamics, Job, Request, Worker, WorkerConfig, WorkerError};
+//!
+//! let oscillator = Dynamics {
+//!     states: vec!["x".into(), "v".into()],
+//!     equations: vec!["v".into(), "-w^2*x".into()],
+//!     outputs: vec!["x".into()],
+//! };
+//! let job = Job::Derive { dynamics: oscillator, order: 2 };
+//! let request = Request { symbols: vec!["w".into()], generators: vec![], angles: vec![], job };
+//! // a program that is not there costs an answer, nothing else
+//! let config = WorkerConfig { program: "no/such/program".into(), arguments: vec![], limit: 1, waiting: || {} };
+//! assert!(matches!(Worker::new(config).ask(&request), Err(WorkerError::Start { .. })));
+//! ```
 
 pub mod client;
 pub mod lock;
