@@ -629,30 +629,3 @@ fn slews_of_a_file_are_not_part_of_the_verdict() {
         assert_eq!(a["notes"].to_string().contains("of repositioning at once"), said);
     }
 }
-
-/// What the README shows is what the program prints, line by line, where the README does not cut it; its scheme file is one.
-#[test]
-fn the_readme_shows_what_is_printed() {
-    let readme = std::fs::read_to_string("README.md").expect("readable");
-    let blocks: Vec<&str> = readme.split("```").skip(1).step_by(2).collect();
-    let file = blocks.iter().find_map(|b| b.strip_prefix("toml\n")).expect("a scheme");
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("s.toml").display().to_string();
-    std::fs::write(&path, file).expect("written");
-    assert!(run(&["analyze", "--scheme", &path, "--solutions", "off"]).status.success());
-    let shown = |begin: &str, arguments: &[&str]| {
-        let block = blocks.iter().find(|b| b.trim_start().starts_with(begin)).expect("a block");
-        let printed = stdout(&run(arguments));
-        for line in block.lines().filter(|l| !l.contains("...") && !l.contains('─')) {
-            assert!(
-                printed.lines().any(|l| l.trim_end() == line.trim_end()),
-                "{line:?} is not in\n{printed}"
-            );
-        }
-    };
-    if cfg!(feature = "symbolica") {
-        shown("Observable degrees: 2", &P1P2);
-        // with the expressions that are seen below
-        shown("unknown   kind", &["analyze", "--model", "examples/lotka-volterra/model.toml"]);
-    }
-}

@@ -1,6 +1,8 @@
 //! Everything that is tested from outside, in one binary: compiled once, linked once, its tests side by side. The tests of the
 //! symbolic worker are apart: they hold the lock for which others would wait.
 
+#[cfg(unix)]
+mod book;
 mod browser;
 mod calibrate;
 mod cli;
@@ -20,6 +22,7 @@ mod laws;
 mod models;
 mod program;
 mod reference_verdicts;
+mod release;
 mod report;
 mod report_page;
 mod rotation;

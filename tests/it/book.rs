@@ -1,0 +1,304 @@
+//! The book and the README do what they say: every command in them runs, and prints what is shown.
+//!
+//! A block of `console` shows commands (`$ ...`) and what they print on stdout, a line `...` stands for any lines; a block of `sh` is a
+//! script that must succeed. Before a block `<!-- file NAME -->` makes it a file of that name, `<!-- exit code N -->` says that its commands
+//! end so, and their errors are shown behind what they print. Commands run one after the other, in a folder of their own with the examples in
+//! it. `UPDATE_BOOK=1` writes into the texts what is printed: between two `...` the lines that are most like those that are there.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A block between fences: what stands behind the first fence, the comment before it, the first of its lines (counted from 0), and these.
+#[derive(Debug, Default)]
+struct Block<'a> {
+    info: &'a str,
+    comment: &'a str,
+    start: usize,
+    lines: Vec<&'a str>,
+}
+
+fn blocks(text: &str) -> Vec<Block<'_>> {
+    let mut out: Vec<Block<'_>> = Vec::new();
+    let (mut open, mut before) = (false, "");
+    for (n, line) in text.lines().enumerate() {
+        match line.strip_prefix("```") {
+            Some(_) if open => open = false,
+            Some(info) => {
+                let comment = before.strip_prefix("<!-- ").and_then(|c| c.strip_suffix(" -->")).unwrap_or("");
+                out.push(Block { info, comment, start: n + 1, lines: Vec::new() });
+                open = true;
+            }
+            None if open => out.last_mut().expect("a block").lines.push(line),
+            None => {}
+        }
+        before = line;
+    }
+    assert!(!open, "a block has no end");
+    out
+}
+
+fn same(shown: &str, printed: &str) -> bool {
+    let rule = |line: &str| !line.is_empty() && line.chars().all(|c| c == '─');
+    shown.trim_end() == printed.trim_end() || rule(shown) && rule(printed)
+}
+
+/// Whether what is shown is what was printed; `...` stands for any lines.
+fn agree(shown: &[&str], printed: &[&str]) -> bool {
+    match shown.split_first() {
+        None => printed.is_empty(),
+        Some((&"...", rest)) => (0..=printed.len()).any(|n| agree(rest, &printed[n..])),
+        Some((line, rest)) => {
+            printed.split_first().is_some_and(|(first, others)| same(line, first) && agree(rest, others))
+        }
+    }
+}
+
+/// How much of two lines is the same, word by word: 0 to 1.
+fn likeness(a: &str, b: &str) -> f64 {
+    let (mut ours, theirs): (Vec<&str>, Vec<&str>) =
+        (a.split_whitespace().collect(), b.split_whitespace().collect());
+    let (all, mut common) = (ours.len().max(theirs.len()), 0);
+    for word in theirs {
+        if let Some(at) = ours.iter().position(|w| *w == word) {
+            ours.swap_remove(at);
+            common += 1;
+        }
+    }
+    if same(a, b) || all == 0 { 1.0 } else { f64::from(common) / all as f64 }
+}
+
+/// What is shown, renewed: of every run of lines that is shown the run of as many printed lines that is most like it, in their order.
+fn renewed(shown: &[&str], printed: &[&str]) -> Vec<String> {
+    if !shown.contains(&"...") {
+        return printed.iter().map(|l| l.trim_end().to_string()).collect();
+    }
+    let runs = shown.split(|l| *l == "...").filter(|run| !run.is_empty());
+    let (mut out, mut from) = (Vec::new(), 0);
+    for run in runs {
+        let score = |at: usize| -> f64 { run.iter().zip(&printed[at..]).map(|(a, b)| likeness(a, b)).sum() };
+        let places = from..=printed.len().saturating_sub(run.len()).max(from);
+        let best = places.max_by(|&a, &b| score(a).total_cmp(&score(b)).then(b.cmp(&a))).unwrap_or(from);
+        if best > from {
+            out.push("...".to_string());
+        }
+        from = (best + run.len()).min(printed.len());
+        out.extend(printed[best..from].iter().map(|l| l.trim_end().to_string()));
+    }
+    if from < printed.len() {
+        out.push("...".to_string());
+    }
+    out
+}
+
+#[test]
+fn what_is_shown_is_renewed_line_by_line() {
+    let printed = ["head", "", "name verdict", "a 1", "b 2", "", "end"];
+    let shown = ["...", "name status", "a 1", "...", "end of it"];
+    assert_eq!(renewed(&shown, &printed), ["...", "name verdict", "a 1", "...", "end"]);
+    assert_eq!(renewed(&["head", "...", "b 3", "..."], &printed), ["head", "...", "b 2", "..."]);
+    assert_eq!(renewed(&["old"], &printed[..2]), ["head", ""]);
+}
+
+#[test]
+fn what_is_left_out_is_any_lines_and_nothing_else() {
+    let printed = ["a", "b", "───", "c "];
+    for shown in [&["a", "...", "c"][..], &["...", "b", "─", "c"], &["a", "b", "...", "───", "c", "..."]]
+    {
+        assert!(agree(shown, &printed), "{shown:?}");
+    }
+    for shown in [&["a", "...", "b"][..], &["a", "b"], &["b", "..."], &["a", "...", "d", "..."], &[]] {
+        assert!(!agree(shown, &printed), "{shown:?}");
+    }
+}
+
+/// The folder in which the commands of one text run.
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        symlink(root().join("examples"), folder.path().join("examples")).expect("a link");
+        Self { folder }
+    }
+
+    /// What a command prints, its errors behind that where `code` is not 0.
+    fn run(&self, script: &str, code: i32) -> Result<String, String> {
+        let program = Path::new(env!("CARGO_BIN_EXE_obsdeg")).parent().expect("a folder");
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let places = std::iter::once(PathBuf::from(program)).chain(std::env::split_paths(&path));
+        let output = Command::new("sh")
+            .args(["-e", "-c", script])
+            .current_dir(self.folder.path())
+            .env("PATH", std::env::join_paths(places).expect("a path"))
+            .env("HOME", self.folder.path())
+            .envs([("LC_ALL", "C.UTF-8"), ("TERM", "xterm"), ("NO_COLOR", "1")])
+            .env_remove("COLUMNS")
+            .stdin(Stdio::null())
+            .output()
+            .expect("a shell");
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("UTF-8");
+        let (printed, errors) = (text(&output.stdout), text(&output.stderr));
+        if output.status.code() != Some(code) {
+            return Err(format!(
+                "ends with {}, not with exit code {code}:\n{printed}{errors}",
+                output.status
+            ));
+        }
+        Ok(if code == 0 { printed } else { format!("{printed}{errors}") })
+    }
+}
+
+/// A command as it is run here: the program is built, and what only builds is not run.
+fn as_run(command: &str) -> Option<String> {
+    match command.strip_prefix("cargo run --release -- ") {
+        Some(rest) => Some(format!("obsdeg {rest}")),
+        None => (!command.starts_with("cargo ")).then(|| command.to_string()),
+    }
+}
+
+/// Runs the commands of a text; what does not agree, and the text as it would.
+fn held(name: &str, text: &str) -> (Vec<String>, String) {
+    let desk = Desk::new();
+    let mut wrong = Vec::new();
+    let mut lines: Vec<String> = text.lines().map(String::from).collect();
+    // from the last, so that places hold
+    let mut exchanges: Vec<(usize, usize, Vec<String>)> = Vec::new();
+    for block in blocks(text) {
+        let place = |n: usize| format!("{name}:{}", block.start + n + 1);
+        if let Some(file) = block.comment.strip_prefix("file ") {
+            fs::write(desk.folder.path().join(file), block.lines.join("\n") + "\n").expect("written");
+        }
+        let code = block.comment.strip_prefix("exit code ").map_or(0, |n| n.parse().expect("a number"));
+        match block.info {
+            "console" => {
+                let starts: Vec<usize> =
+                    (0..block.lines.len()).filter(|&n| block.lines[n].starts_with("$ ")).collect();
+                assert_eq!(starts.first(), Some(&0), "{}: no command", place(0));
+                for (i, &n) in starts.iter().enumerate() {
+                    let end = starts.get(i + 1).copied().unwrap_or(block.lines.len());
+                    let (command, shown) = (&block.lines[n][2..], &block.lines[n + 1..end]);
+                    let Some(script) = as_run(command) else { continue };
+                    match desk.run(&script, code) {
+                        Err(reason) => wrong.push(format!("{}: `{command}` {reason}", place(n))),
+                        Ok(printed) => {
+                            let found: Vec<&str> = printed.trim_end().lines().collect();
+                            if agree(shown, &found) {
+                                continue;
+                            }
+                            exchanges.push((block.start + n + 1, block.start + end, renewed(shown, &found)));
+                            wrong.push(format!("{}: `{command}` prints\n{printed}", place(n)));
+                        }
+                    }
+                }
+            }
+            "sh" => {
+                let script: Vec<String> = block.lines.iter().filter_map(|l| as_run(l)).collect();
+                if let Err(reason) = desk.run(&script.join("\n"), 0) {
+                    wrong.push(format!("{}: {reason}", place(0)));
+                }
+            }
+            other => {
+                let known = ["toml", "text", "math"].contains(&other);
+                let hidden = block.lines.iter().any(|l| l.trim_start().starts_with("obsdeg "));
+                assert!(known && !hidden, "{}: a block of {other:?} is not run", place(0));
+            }
+        }
+    }
+    for (from, to, new) in exchanges.into_iter().rev() {
+        lines.splice(from..to, new);
+    }
+    (wrong, lines.join("\n") + "\n")
+}
+
+fn chapters() -> Vec<PathBuf> {
+    let folder = root().join("book/src");
+    let mut out: Vec<PathBuf> =
+        fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path()).collect();
+    out.retain(|path| path.extension().is_some_and(|e| e == "md"));
+    out.sort();
+    out
+}
+
+/// With the symbolic engine, whose expressions are shown.
+#[cfg(feature = "symbolica")]
+#[test]
+fn every_command_runs_and_prints_what_is_shown() {
+    let texts: Vec<PathBuf> = std::iter::once(root().join("README.md")).chain(chapters()).collect();
+    let wrong: Vec<String> = std::thread::scope(|scope| {
+        let threads: Vec<_> = texts
+            .iter()
+            .map(|path| {
+                scope.spawn(move || {
+                    let text = fs::read_to_string(path).expect("readable");
+                    let name = path.strip_prefix(root()).expect("of the repository").display().to_string();
+                    let (wrong, new) = held(&name, &text);
+                    if std::env::var_os("UPDATE_BOOK").is_some() && new != text {
+                        fs::write(path, new).expect("written");
+                    }
+                    wrong
+                })
+            })
+            .collect();
+        threads.into_iter().flat_map(|t| t.join().expect("no panic")).collect()
+    });
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// What is wrong on purpose is seen, and mended where that can be done.
+#[test]
+fn a_text_that_is_wrong_is_told() {
+    let of = |text: &str| held("here", text);
+    let shown = |lines: &str| format!("```console\n$ printf 'a\\nb\\nc\\n'\n{lines}```\n");
+    assert!(of(&shown("a\nb\nc\n")).0.is_empty() && of(&shown("a\n...\n")).0.is_empty());
+    let (wrong, new) = of(&shown("a\nc\n"));
+    assert!(wrong[0].starts_with("here:2: `printf") && new == shown("a\nb\nc\n"), "{wrong:?} {new}");
+    let (wrong, new) = of(&shown("...\nd\n"));
+    assert!(wrong.len() == 1 && new == shown("a\n...\n"), "{new}");
+    let file = "<!-- file x.toml -->\n```toml\nx = 1\n```\n\n<!-- exit code 2 -->\n```console\n";
+    let refused = format!("{file}$ obsdeg analyze --scheme x.toml\n```\n");
+    assert!(
+        of(&refused).0[0].contains("unknown field `x`") || of(&refused).0[0].contains("`x`"),
+        "{:?}",
+        of(&refused)
+    );
+    assert!(of("```console\n$ obsdeg nothing\n```\n").0[0].contains("not with exit code 0"));
+    assert!(of("```sh\nobsdeg --version\nfalse\ntrue\n```\n").0.len() == 1);
+}
+
+/// The picture of the first page is the one that its command draws.
+#[test]
+fn the_picture_is_the_one_that_is_drawn() {
+    let desk = Desk::new();
+    desk.run("obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 -o drawn", 0).expect("drawn");
+    let drawn = fs::read_to_string(desk.folder.path().join("drawn/slopes.svg")).expect("readable");
+    let shown = root().join("book/src/slopes.svg");
+    if std::env::var_os("UPDATE_BOOK").is_some() {
+        fs::write(&shown, &drawn).expect("written");
+    }
+    // no dump of a picture
+    assert!(fs::read_to_string(&shown).expect("readable") == drawn, "UPDATE_BOOK=1 draws it again");
+}
+
+/// Every chapter stands in the summary, once, and only chapters do.
+#[test]
+fn the_summary_lists_the_chapters() {
+    let summary = fs::read_to_string(root().join("book/src/SUMMARY.md")).expect("readable");
+    let mut listed: Vec<&str> =
+        summary.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(file, _)| file).collect();
+    let count = listed.len();
+    listed.sort_unstable();
+    listed.dedup();
+    assert_eq!(count, listed.len());
+    let names = chapters().into_iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
+    let there: BTreeSet<String> = names.filter(|n| n != "SUMMARY.md").collect();
+    assert_eq!(there, listed.into_iter().map(String::from).collect());
+}

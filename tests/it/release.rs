@@ -1,0 +1,149 @@
+//! What a release needs besides a program that works: texts whose links lead somewhere, crates that can be packaged, one version.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use regex::Regex;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    let path = root().join(path);
+    fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// The folders of all crates, that of the program first.
+fn crates() -> Vec<PathBuf> {
+    let manifest: toml::Table = read("Cargo.toml").parse().expect("TOML");
+    let members = manifest["workspace"]["members"].as_array().expect("a list").iter();
+    std::iter::once(PathBuf::new()).chain(members.map(|m| m.as_str().expect("a folder").into())).collect()
+}
+
+/// Texts for readers, beside code.
+fn texts(folder: &Path) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if path.is_dir() && !name.starts_with('.') && name != "target" && name != "snapshots" {
+            out.extend(texts(&path));
+        } else if name.ends_with(".md") && name != "Symbolica-License.md" {
+            out.push(path);
+        }
+    }
+    out
+}
+
+/// Text without blocks of code and code in lines.
+fn prose(text: &str) -> String {
+    let outside: Vec<&str> = text.split("\n```").step_by(2).collect();
+    Regex::new(r"`[^`\n]*`").expect("a pattern").replace_all(&outside.join("\n"), "code").into_owned()
+}
+
+/// The anchors of a text's headings.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let headings = text.split("\n```").step_by(2).flat_map(str::lines).filter(|l| l.starts_with('#'));
+    let anchor = |line: &str| {
+        let words = line.trim_start_matches('#').trim().to_lowercase();
+        words
+            .chars()
+            .filter(|c| c.is_alphanumeric() || " -_".contains(*c))
+            .collect::<String>()
+            .replace(' ', "-")
+    };
+    headings.map(anchor).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let link = Regex::new(r"\]\(([^)\s]+)\)").expect("a pattern");
+    let mut count = 0;
+    for path in texts(root()) {
+        let text = read(&path);
+        for found in link.captures_iter(&prose(&text)) {
+            let target = &found[1];
+            if target.starts_with("https://") {
+                continue;
+            }
+            count += 1;
+            let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let leads = if file.is_empty() { path.clone() } else { path.with_file_name("").join(file) };
+            let told = format!("{}: {target}", path.display());
+            assert!(leads.exists(), "{told} leads nowhere");
+            assert!(anchor.is_empty() || anchors(&read(&leads)).contains(anchor), "{told}: no such heading");
+            // what a book links to outside is not in it
+            let book = root().join("book/src");
+            assert!(
+                !path.starts_with(&book) || file.is_empty() || !file.contains('/'),
+                "{told} leaves the book"
+            );
+        }
+    }
+    assert!(count > 50, "only {count} links were seen");
+    assert_eq!(
+        anchors("# A b-c, d: (e)\n\n```sh\n# no heading\n```\n"),
+        BTreeSet::from(["a-b-c-d-e".to_string()])
+    );
+}
+
+#[test]
+fn crates_can_be_packaged() {
+    for folder in crates() {
+        let manifest: toml::Table = read(folder.join("Cargo.toml")).parse().expect("TOML");
+        let package = manifest["package"].as_table().expect("a package");
+        let of = |key: &str| package.get(key).unwrap_or_else(|| panic!("{}: no {key}", folder.display()));
+        let list = |key: &str| of(key).as_array().expect("a list").clone();
+        assert!(of("description").as_str().is_some_and(|d| d.len() > 20));
+        for key in ["version", "edition", "rust-version", "license"] {
+            assert_eq!(of(key)["workspace"].as_bool(), Some(true), "{}: {key}", folder.display());
+        }
+        let (keywords, categories) = (list("keywords"), list("categories"));
+        assert!(
+            (1..=5).contains(&keywords.len()) && (1..=5).contains(&categories.len()),
+            "{}",
+            folder.display()
+        );
+        assert!(keywords.iter().all(|k| k.as_str().is_some_and(|k| k.len() <= 20)), "{keywords:?}");
+        assert!(read(folder.join(of("readme").as_str().expect("a file"))).len() > 200);
+        for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            assert_eq!(read(folder.join(licence)), read(licence), "{}", folder.display());
+        }
+        // a library has examples of its own
+        let source = root().join(&folder).join("examples");
+        let examples = fs::read_dir(&source).unwrap_or_else(|e| panic!("{}: {e}", source.display()));
+        let programs =
+            examples.filter(|e| e.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "rs")));
+        assert!(programs.count() > 0, "{}", source.display());
+    }
+}
+
+#[test]
+fn there_is_one_version() {
+    let version = env!("CARGO_PKG_VERSION");
+    let manifest: toml::Table = read("Cargo.toml").parse().expect("TOML");
+    let dependencies = manifest["workspace"]["dependencies"].as_table().expect("a table");
+    let own = dependencies.iter().filter(|(name, _)| name.starts_with("obsdeg-"));
+    for (name, dependency) in own {
+        assert_eq!(dependency["version"].as_str(), Some(version), "{name}");
+    }
+    let changelog = read("CHANGELOG.md");
+    let newest = changelog.lines().find(|l| l.starts_with("## ")).expect("a version");
+    assert!(newest.starts_with(&format!("## [{version}] - ")), "{newest}");
+    assert!(read("CITATION.cff").lines().any(|l| l == format!("version: {version}")));
+}
+
+/// What a reader of the first page must find, on lines that fit a window.
+#[test]
+fn the_first_page() {
+    let readme = read("README.md");
+    for command in
+        ["cargo run --release -- analyze --angles 0,0,0 --angles 180,0,0", "cargo test --workspace"]
+    {
+        assert!(readme.lines().any(|l| l.trim().trim_start_matches("$ ") == command), "{command}");
+    }
+    let long: Vec<&str> = readme.lines().filter(|l| l.chars().count() > 100).collect();
+    assert!(long.is_empty(), "{long:#?}");
+}
