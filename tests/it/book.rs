@@ -89,7 +89,9 @@ fn renewed(shown: &[&str], printed: &[&str]) -> Vec<String> {
             out.push("...".to_string());
         }
         from = (best + run.len()).min(printed.len());
-        out.extend(printed[best..from].iter().map(|l| l.trim_end().to_string()));
+        // a rule is as long as it was
+        let lines = run.iter().zip(&printed[best..from]);
+        out.extend(lines.map(|(old, new)| if same(old, new) { *old } else { new.trim_end() }.to_string()));
     }
     if from < printed.len() {
         out.push("...".to_string());
@@ -104,6 +106,7 @@ fn what_is_shown_is_renewed_line_by_line() {
     assert_eq!(renewed(&shown, &printed), ["...", "name verdict", "a 1", "...", "end"]);
     assert_eq!(renewed(&["head", "...", "b 3", "..."], &printed), ["head", "...", "b 2", "..."]);
     assert_eq!(renewed(&["old"], &printed[..2]), ["head", ""]);
+    assert_eq!(renewed(&["──", "...", "a 2"], &["────", "b", "a 1"]), ["──", "...", "a 1"]);
 }
 
 #[test]
