@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
-    /// With --model: starts of the iteration, that of the file and others about it
+    /// With --model: starts of the iteration, that of the file and others about it; fewer are made where no other solution is to be expected
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     starts: u32,
 

@@ -10,6 +10,9 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use sha2::{Digest, Sha256};
 
+/// The standard acceleration of gravity, in m/s^2.
+pub const STANDARD_GRAVITY: f64 = 9.80665;
+
 /// Where something of a record is wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -363,18 +366,14 @@ impl Record {
         let own = &self.columns[column];
         let found = own.unit.as_ref().and_then(|u| units.iter().find(|(name, _)| name == u));
         found.map(|&(_, scale)| Wanted { column, scale: scale * own.count }).ok_or_else(|| {
-            RecordError::Unit {
-                place: self.at(1, column),
-                expected: format!(
-                    "a unit, {}",
-                    units
-                        .iter()
-                        .map(|(u, _)| format!("`{} [{u}]`", own.name))
-                        .collect::<Vec<_>>()
-                        .join(" or ")
-                ),
-            }
+            let each: Vec<String> = units.iter().map(|(u, _)| format!("`{} [{u}]`", own.name)).collect();
+            self.unit(column, format!("a unit, {}", each.join(" or ")))
         })
+    }
+
+    /// A column of another unit than is expected.
+    pub(crate) fn unit(&self, column: usize, expected: String) -> RecordError {
+        RecordError::Unit { place: self.at(1, column), expected }
     }
 
     /// A column that is not there.

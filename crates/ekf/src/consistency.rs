@@ -2,7 +2,7 @@
 //! (Bar-Shalom, Li, Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 5.4).
 
 use nalgebra::DMatrix;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use crate::covariance::{Covariance, Form};
 use crate::decomposition::singular_values;
@@ -28,6 +28,17 @@ pub fn chi_square_band(dof: f64, count: f64, confidence: f64) -> (f64, f64) {
 /// innovation. Infinite where `dof` is none.
 pub fn chi_square_quantile(dof: f64, confidence: f64) -> f64 {
     ChiSquared::new(dof).map_or(f64::INFINITY, |chi| chi.inverse_cdf(confidence))
+}
+
+/// What a unit normal over the root of an independent chi-square per degree of freedom (of `dof`) is below with probability `confidence`: the gate of a residual
+/// whose sigma is estimated from the others (Student 1908, doi:10.1093/biomet/6.1.1). Infinite where `dof` is none.
+///
+/// ```
+/// let gate = obsdeg_ekf::consistency::student_quantile(10.0, 0.975);
+/// assert!((gate - 2.228139).abs() < 1e-5);
+/// ```
+pub fn student_quantile(dof: f64, confidence: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |t| t.inverse_cdf(confidence))
 }
 
 /// The probability that a chi-square of `dof` degrees of freedom is above `x`.

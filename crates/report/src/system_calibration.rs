@@ -88,7 +88,7 @@ impl Answer for SystemCalibration {
         )];
         if !self.combinations.is_empty() {
             blocks.push(Block::table(
-                "Combinations that were asked for",
+                "Combinations of what is not told apart, and those asked for",
                 columns,
                 self.combinations.iter().map(row),
             ));
@@ -102,6 +102,12 @@ impl Answer for SystemCalibration {
             self.band.0,
             self.band.1
         )];
+        if self.starts.0 < self.starts_at_most {
+            fit.push(format!(
+                "{} of {} starts were made: no other solution was to be expected by then (Boender and Rinnooy Kan 1987)",
+                self.starts.0, self.starts_at_most
+            ));
+        }
         fit.push(match self.starts {
             (of, led) if self.others.is_empty() => {
                 format!(
@@ -122,6 +128,7 @@ impl Answer for SystemCalibration {
             right("rms left"),
             right("expected"),
             right("whiteness"),
+            right("outlier beyond"),
         ];
         let rows = self.outputs.iter().map(|o| {
             vec![
@@ -133,10 +140,11 @@ impl Answer for SystemCalibration {
                 number(o.rms),
                 number(o.expected_rms),
                 optional(o.whiteness_probability),
+                o.outlier_gate.map_or_else(|| "too few to tell".into(), number),
             ]
         });
         blocks.push(Block::table(
-            "Outputs (root mean squares of what is left, and of what sigmas let expect)",
+            "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as all others have it)",
             columns,
             rows,
         ));

@@ -20,6 +20,7 @@ use obsdeg_evidence::simulation::{
 
 use crate::Going;
 use crate::answer::{Before, Calibration, CovarianceTable};
+pub use crate::record::STANDARD_GRAVITY;
 use crate::record::{Record, RecordError};
 use crate::setup::{Basis, Setup};
 use diagnose::Diagnosed;
@@ -221,8 +222,6 @@ impl Default for Options {
     }
 }
 
-/// The standard acceleration of gravity, in m/s^2.
-pub const STANDARD_GRAVITY: f64 = 9.80665;
 /// Rounds in which outliers are looked for, or the noise is estimated.
 const ROUNDS: usize = 6;
 /// More than this part of all measurements are no outliers.

@@ -25,7 +25,7 @@ pub struct SystemCalibration {
     pub findings: Vec<SystemFinding>,
     /// States at the start of every experiment, parameters, and what is unknown of inputs.
     pub unknowns: Vec<SystemEstimated>,
-    /// The combinations that the model asks for.
+    /// The combinations that the model asks for, and products and sums of what is not determined alone that it determines.
     pub combinations: Vec<SystemEstimated>,
     /// Of all unknowns that are determined.
     pub covariance: CovarianceTable,
@@ -43,6 +43,8 @@ pub struct SystemCalibration {
     pub others: Vec<OtherSolution>,
     /// Starts that were tried, and how many led to the solution.
     pub starts: (usize, usize),
+    /// How many would have been tried at most: fewer are enough when no other solution is to be expected.
+    pub starts_at_most: usize,
     /// Profiles that were asked for.
     pub profiles: Vec<Profile>,
     /// Rows of the record.
@@ -97,7 +99,7 @@ pub enum SystemFinding {
         output: String,
         /// Its line in the record.
         line: u64,
-        /// By how much the others leave it off, in sigma as the fit has it.
+        /// By how much the others leave it off, in sigma as these have it (at least as it was given).
         sigmas: f64,
     },
 }
@@ -140,6 +142,10 @@ pub struct OutputFit {
     pub rms: f64,
     /// The same of what sigmas let expect.
     pub expected_rms: f64,
+    /// Measurements minus what they determine.
+    pub degrees_of_freedom: f64,
+    /// Further off than this, in sigma as the others have it, a measurement is named; null where too few others are left to say.
+    pub outlier_gate: Option<f64>,
     /// Probability that independent residuals are correlated as these are; null for few.
     pub whiteness_probability: Option<f64>,
 }

@@ -6,8 +6,9 @@ use obsdeg_core::model::Still;
 use obsdeg_core::system::{KnownInput, ModelError, SystemModel};
 
 use super::answer::SystemCalibrationError;
+use super::units;
 use crate::Going;
-use crate::record::{MOST, Record, Row, Wanted};
+use crate::record::{MOST, Record, RecordError, Row, Wanted};
 use crate::still::Detector;
 
 /// It is told that a record is read every so many samples.
@@ -66,11 +67,10 @@ struct Columns {
 impl Columns {
     fn of(record: &Record, model: &SystemModel) -> Result<Self, SystemCalibrationError> {
         let time = record.find("t").ok_or_else(|| record.missing("`t` (the time of the model)"))?;
-        // units of a model are its own
-        let mut wanted = vec![Wanted { column: time, scale: 1.0 }];
-        let mut want = |column: usize| {
-            wanted.push(Wanted { column, scale: 1.0 });
-            wanted.len() - 1
+        let mut wanted = vec![units::time(record, time, model)?];
+        let mut want = |column: usize, unit: &str| -> Result<usize, RecordError> {
+            wanted.push(units::wanted(record, column, unit)?);
+            Ok(wanted.len() - 1)
         };
         let mut inputs = Vec::new();
         let before = |name: &str| {
@@ -93,7 +93,9 @@ impl Columns {
                 }
                 (Some(column), _) => {
                     let sigma = record.find(&format!("sigma_{}", named.name));
-                    inputs.push((k, From::Column(want(column), sigma.map(&mut want))));
+                    let own = want(column, &named.unit)?;
+                    let sigma = sigma.map(|column| want(column, &named.unit)).transpose()?;
+                    inputs.push((k, From::Column(own, sigma)));
                 }
             }
         }
@@ -105,7 +107,9 @@ impl Columns {
                 continue;
             }
             let column = column.ok_or_else(|| record.missing(&format!("`{}` (an output)", named.name)))?;
-            outputs.push(Ok((want(column), record.find(&format!("sigma_{}", named.name)).map(&mut want))));
+            let own = want(column, &named.unit)?;
+            let sigma = record.find(&format!("sigma_{}", named.name));
+            outputs.push(Ok((own, sigma.map(|column| want(column, &named.unit)).transpose()?)));
         }
         let label = record.find("experiment");
         if label.is_none() && model.experiments > 1 {

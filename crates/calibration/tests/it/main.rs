@@ -4,5 +4,6 @@
 
 mod faults;
 mod handheld;
+mod models;
 mod round_trip;
 mod simulator;

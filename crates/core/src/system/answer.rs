@@ -332,7 +332,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             .collect(),
         unobservable_directions: judged.layout.unknowns.len() - findings.degrees.rank(),
         other_directions: named(&symmetries.unexplained, &name),
-        invariants: invariant_reports(symmetries, &name),
+        invariants: invariant_reports(model, judged, symmetries),
         symmetries: symmetry_reports(model, judged, symmetries),
         last_order: findings.degrees.rank_profile.len().saturating_sub(1),
         bound: judged.layout.bound,
@@ -456,7 +456,13 @@ fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
     groups.iter().map(join).collect::<Vec<_>>().join("; ")
 }
 
-fn invariant_reports(symmetries: &Symmetries, name: &dyn Fn(usize) -> String) -> Vec<SystemCombination> {
+/// Observable combinations of unobservable unknowns in words, in the order of `symmetries.invariants`.
+pub fn invariant_reports(
+    model: &SystemModel,
+    judged: &Judgement,
+    symmetries: &Symmetries,
+) -> Vec<SystemCombination> {
+    let name = |c: usize| name_of(model, judged, c);
     let product = |i: &Invariant| {
         let power = |&(c, m): &(usize, i64)| match m.abs() {
             1 => name(c),

@@ -1,0 +1,264 @@
+//! Least squares of a model on the rows of its data: Levenberg and Marquardt with the Jacobians of its graph.
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use obsdeg_ekf::integrate::runge_kutta;
+use obsdeg_ekf::{EkfError, Measurement};
+use obsdeg_evidence::system::Numeric;
+
+use super::data::{Data, Read};
+use crate::Going;
+use crate::least_squares::{Rows, Solution};
+
+/// Most iterations from a start.
+const PASSES: usize = 200;
+/// An iteration has settled when it moves by less than this, in standard deviations as the fit has them.
+const SETTLED: f64 = 1e-5;
+/// A pull is weak: so many times wider than an unknown is large.
+pub(super) const WEAK: f64 = 1e7;
+
+/// A model with its data.
+pub(super) struct Problem<'a> {
+    pub(super) numeric: Numeric<'a>,
+    pub(super) data: &'a Read,
+    /// Filter states that are estimated.
+    pub(super) free: Vec<usize>,
+    /// By output: the noise of the model's file, or as estimated; what a record says comes first.
+    pub(super) noise: Vec<f64>,
+    /// Longest step of integration.
+    pub(super) longest: f64,
+    /// Rows and values of what was known before of the free unknowns, with unit errors.
+    pub(super) known: (DMatrix<f64>, DVector<f64>),
+    /// Hears of every evaluation; where it says no, iterations end.
+    pub(super) going: &'a dyn Fn(Going<'_>) -> bool,
+    /// How many there were.
+    pub(super) passes: usize,
+    /// Whether it said no.
+    pub(super) stopped: bool,
+}
+
+/// Rows of the model at some unknowns: a row of derivatives by the free unknowns, what is left, and sigma.
+pub(super) struct At {
+    pub(super) rows: DMatrix<f64>,
+    pub(super) left: DVector<f64>,
+    pub(super) sigmas: Vec<f64>,
+    /// Row of the data and output.
+    pub(super) keys: Vec<(usize, usize)>,
+    /// The same of what was known before, with unit errors.
+    pub(super) known: (DMatrix<f64>, DVector<f64>),
+}
+
+impl At {
+    /// The sum of squares in sigma.
+    pub(super) fn cost(&self) -> f64 {
+        self.cost_by(&self.sigmas)
+    }
+
+    /// The same with other sigmas: those of errors of inputs are what they are at the unknowns of the moment.
+    pub(super) fn cost_by(&self, sigmas: &[f64]) -> f64 {
+        let measured: f64 = self.left.iter().zip(sigmas).map(|(e, s)| (e / s).powi(2)).sum();
+        measured + self.known.1.norm_squared()
+    }
+}
+
+impl Problem<'_> {
+    /// All filter states of free values `x`, known starts from the others.
+    pub(super) fn all(&self, base: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
+        let mut out = base.clone();
+        self.free.iter().zip(x.iter()).for_each(|(&i, v)| out[i] = *v);
+        self.numeric.set_known_starts(&mut out);
+        out
+    }
+
+    /// The derivatives of all filter states at the start by the free ones.
+    pub(super) fn of_free(&self, base: &DVector<f64>, x: &DVector<f64>) -> DMatrix<f64> {
+        let n = base.len();
+        let mut out = DMatrix::zeros(n, self.free.len());
+        for j in 0..self.free.len() {
+            let h = 1e-6 * x[j].abs().max(1e-6);
+            let at = |sign: f64| {
+                let mut moved = x.clone();
+                moved[j] += sign * h;
+                self.all(base, &moved)
+            };
+            out.set_column(j, &((at(1.0) - at(-1.0)) / (2.0 * h)));
+            out[(self.free[j], j)] = 1.0;
+        }
+        out
+    }
+
+    /// The model at free values `x`, in steps `1/finer` as long.
+    pub(super) fn at(&mut self, base: &DVector<f64>, x: &DVector<f64>, finer: usize) -> Result<At, EkfError> {
+        self.passes += 1;
+        self.stopped |= !(self.going)(Going::Passes(self.passes));
+        let start = self.all(base, x);
+        let to_start = self.of_free(base, x);
+        let segments = self.numeric.segments();
+        let mut out = At {
+            rows: DMatrix::zeros(0, 0),
+            left: DVector::zeros(0),
+            sigmas: Vec::new(),
+            keys: Vec::new(),
+            known: (self.known.0.clone(), &self.known.1 - &self.known.0 * x),
+        };
+        let (mut rows, mut left): (Vec<RowDVector<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
+        let data = self.data;
+        let ones = vec![1.0; self.noise.len()];
+        let mut now = (usize::MAX, 0.0, start.clone(), to_start.clone());
+        for (k, row) in data.rows.iter().enumerate() {
+            if now.0 != row.run {
+                now = (row.run, 0.0, start.clone(), to_start.clone());
+            }
+            let part = row.experiment * segments;
+            // what was held until here, then what is held from here on
+            if row.t > now.1 {
+                let process = self.numeric.process(part);
+                let steps = ((row.t - now.1) / self.longest).ceil().max(1.0) as usize * finer;
+                let next = runge_kutta(&process, now.1, &now.2, row.t - now.1, steps)?;
+                now = (row.run, row.t, next.x, next.phi * now.3);
+            }
+            for (&input, (value, _)) in data.inputs.iter().zip(&row.inputs) {
+                self.numeric.hold(input, *value);
+            }
+            if row.outputs.iter().all(Option::is_none) {
+                continue;
+            }
+            let h = self.numeric.measurement(part, &ones).h(row.t, &now.2);
+            let jacobian = Measurement::jacobian(&self.numeric.measurement(part, &ones), row.t, &now.2);
+            let by_inputs = self.by_inputs(part, row, &now.2, &ones);
+            for (j, measured) in row.outputs.iter().enumerate() {
+                let Some(measured) = measured else { continue };
+                let own = row.sigmas[j].unwrap_or(self.noise[j]);
+                out.sigmas.push((own * own + by_inputs[j]).sqrt());
+                rows.push(jacobian.row(j) * &now.3);
+                left.push(measured - h[j]);
+                out.keys.push((k, j));
+            }
+        }
+        let n = self.free.len();
+        out.rows = DMatrix::from_fn(rows.len(), n, |i, j| rows[i][j]);
+        out.left = DVector::from_vec(left);
+        let bad = out.left.iter().chain(out.rows.iter()).find(|x| !x.is_finite());
+        match bad {
+            Some(&value) => Err(EkfError::NotFinite { what: "the outputs", value, row: 0, column: 0 }),
+            None => Ok(out),
+        }
+    }
+
+    /// The variance that errors of the inputs of a row make of every output.
+    pub(super) fn by_inputs(&mut self, part: usize, row: &Data, x: &DVector<f64>, ones: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; ones.len()];
+        for (&input, &(value, sigma)) in self.data.inputs.iter().zip(&row.inputs) {
+            if sigma == 0.0 {
+                continue;
+            }
+            let mut at = |by: f64| {
+                self.numeric.hold(input, value + by);
+                self.numeric.measurement(part, ones).h(row.t, x)
+            };
+            let half = (at(sigma) - at(-sigma)) / 2.0;
+            self.numeric.hold(input, value);
+            out.iter_mut().zip(half.iter()).for_each(|(v, h)| *v += h * h);
+        }
+        out
+    }
+}
+
+/// How large an unknown is, for a pull.
+pub(super) fn size(x: f64) -> f64 {
+    x.abs().max(1e-3)
+}
+
+/// The step from `at`, pulled by `pull` per size of an unknown.
+pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, EkfError> {
+    let n = x.len();
+    let mut rows = Rows::new(n);
+    let weights = DVector::from_iterator(at.sigmas.len(), at.sigmas.iter().map(|s| 1.0 / s));
+    let whitened = DMatrix::from_fn(at.rows.nrows(), n, |i, j| at.rows[(i, j)] * weights[i]);
+    rows.add(&whitened, &at.left.component_mul(&weights));
+    rows.add(&at.known.0, &at.known.1);
+    let pulls = DVector::from_iterator(n, x.iter().map(|v| pull / size(*v)));
+    rows.add(&DMatrix::from_diagonal(&pulls), &DVector::zeros(n));
+    rows.solve()
+}
+
+/// Where an iteration ended.
+#[derive(Debug, Clone)]
+pub(super) struct Settled {
+    pub(super) x: DVector<f64>,
+    pub(super) cost: f64,
+    pub(super) converged: bool,
+}
+
+/// Levenberg and Marquardt from `x`; unknowns with `fixed` stay.
+pub(super) fn settle(
+    problem: &mut Problem<'_>,
+    base: &DVector<f64>,
+    mut x: DVector<f64>,
+    finer: usize,
+    fixed: Option<usize>,
+) -> Result<Settled, EkfError> {
+    let freeze = |at: &mut At| {
+        if let Some(j) = fixed {
+            at.rows.column_mut(j).fill(0.0);
+            at.known.0.column_mut(j).fill(0.0);
+        }
+    };
+    let mut at = problem.at(base, &x, finer)?;
+    freeze(&mut at);
+    let mut cost = at.cost();
+    // a pull as strong as the data say little at first
+    let mut pull = 1e-2 * (cost.max(1.0)).sqrt();
+    let mut converged = false;
+    for _ in 0..PASSES {
+        if problem.stopped {
+            break;
+        }
+        let solution = step(&at, &x, pull)?;
+        let moved = &x + &solution.x;
+        let next = problem.at(base, &moved, finer).ok();
+        let next = next.filter(|n| n.cost_by(&at.sigmas) <= cost * (1.0 + 1e-12));
+        let scale = (cost / at.sigmas.len() as f64).max(1.0).sqrt();
+        // how far it would go without the pull
+        let weak = step(&at, &x, 1.0 / WEAK)?;
+        let left = determined_part(&at, &weak);
+        if left <= SETTLED * scale {
+            converged = true;
+            break;
+        }
+        match next {
+            Some(mut n) => {
+                freeze(&mut n);
+                (x, cost, at) = (moved, n.cost(), n);
+                pull = (pull / 5.0).max(1.0 / WEAK);
+            }
+            None => {
+                pull *= 4.0;
+                if pull > 1e12 {
+                    break;
+                }
+            }
+        }
+    }
+    Ok(Settled { x, cost, converged })
+}
+
+/// How far a step moves the outputs, in sigma.
+pub(super) fn determined_part(at: &At, solution: &Solution) -> f64 {
+    let moved = &at.rows * &solution.x;
+    let measured: f64 = moved.iter().zip(&at.sigmas).map(|(m, s)| (m / s).powi(2)).sum();
+    (measured + (&at.known.0 * &solution.x).norm_squared()).sqrt()
+}
+
+/// The part of a measurement that follows it.
+pub(super) fn leverage(at: &At, solution: &Solution, i: usize) -> f64 {
+    let row = at.rows.row(i) * &solution.inverse_root;
+    (row.norm() / at.sigmas[i]).powi(2)
+}
+
+/// The number of combinations that the data determine: a pull is all there is of the others.
+pub(super) fn rank(solution: &Solution, x: &DVector<f64>) -> usize {
+    // of unknowns in units of their size the root has singular values of the pull, or far larger ones
+    let scaled = DMatrix::from_fn(x.len(), x.len(), |i, j| solution.root[(i, j)] * size(x[j]));
+    let values = obsdeg_ekf::decomposition::singular_values(&scaled).map(|(v, _)| v).unwrap_or_default();
+    values.iter().filter(|v| **v > 10.0 / WEAK).count()
+}

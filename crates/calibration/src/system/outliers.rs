@@ -1,0 +1,114 @@
+//! What is left of every measurement, by output, and which of them the others do not explain.
+
+use obsdeg_ekf::consistency::{autocorrelation, chi_square_quantile, ljung_box, student_quantile};
+
+use super::answer::{OutputFit, SystemFinding, SystemResidual};
+use super::fit::{At, leverage};
+use super::{Calibrating, STRICT};
+use crate::least_squares::Solution;
+
+/// Fewest residuals of which a correlation is told.
+const FEWEST: usize = 40;
+
+impl Calibrating<'_> {
+    pub(super) fn residuals(&self, at: &At, solution: &Solution) -> Vec<SystemResidual> {
+        let of = |(i, &(k, output)): (usize, &(usize, usize))| {
+            let row = &self.data.rows[k];
+            let free = (1.0 - leverage(at, solution, i)).max(1e-9);
+            SystemResidual {
+                output,
+                experiment: row.experiment,
+                line: row.line,
+                t: row.t,
+                measured: row.outputs[output].unwrap_or(f64::NAN),
+                residual: at.left[i],
+                sigma: at.sigmas[i],
+                normalised: at.left[i] / at.sigmas[i] / free.sqrt(),
+            }
+        };
+        at.keys.iter().enumerate().map(of).collect()
+    }
+
+    pub(super) fn outputs(
+        &self,
+        residuals: &[SystemResidual],
+        at: &At,
+        solution: &Solution,
+    ) -> Vec<OutputFit> {
+        let of = |j: usize| {
+            let own: Vec<&SystemResidual> = residuals.iter().filter(|r| r.output == j).collect();
+            let of_output = (0..at.keys.len()).filter(|&i| at.keys[i].1 == j);
+            let (free, variance) = of_output.fold((0.0, 0.0), |(sum, variance), i| {
+                let free = 1.0 - leverage(at, solution, i);
+                (sum + free, variance + free * at.sigmas[i] * at.sigmas[i])
+            });
+            let chi: f64 = own.iter().map(|r| (r.residual / r.sigma).powi(2)).sum();
+            let squares: f64 = own.iter().map(|r| r.residual * r.residual).sum();
+            let series: Vec<f64> = own.iter().map(|r| r.normalised).collect();
+            let lags = (series.len() / 4).min(20);
+            let sigma = own.first().map(|r| r.sigma).filter(|s| own.iter().all(|r| r.sigma == *s));
+            OutputFit {
+                output: self.model.outputs[j].0.name.clone(),
+                measurements: own.len(),
+                sigma,
+                estimated: self.estimated[j],
+                chi_square: if free > 1e-9 { chi / free } else { 0.0 },
+                rms: (squares / own.len().max(1) as f64).sqrt(),
+                degrees_of_freedom: free,
+                outlier_gate: None,
+                expected_rms: (f64::max(variance, 0.0) / own.len().max(1) as f64).sqrt(),
+                whiteness_probability: (series.len() >= FEWEST)
+                    .then(|| ljung_box(&autocorrelation(&series, lags), series.len())),
+            }
+        };
+        (0..self.model.outputs.len()).map(of).collect()
+    }
+
+    /// Measurements that the others do not explain: residuals studentised without the measurement itself (Cook, Weisberg 1982, 2.2.1), so that one that is far off
+    /// does not hide in the sigma that it makes. Where sigmas are given, only what is far off by these as well.
+    pub(super) fn outliers(&self, residuals: &[SystemResidual], outputs: &[OutputFit]) -> Vec<SystemFinding> {
+        let normal = student_gate(f64::INFINITY, residuals.len());
+        let of = |r: &SystemResidual| {
+            let output = &outputs[r.output];
+            let gate = output.outlier_gate?;
+            let (chi, free) = self.group(r.output, outputs);
+            let others = ((chi - r.normalised * r.normalised) / (free - 1.0)).max(0.0).sqrt();
+            let off = r.normalised / if output.estimated { others } else { others.max(1.0) };
+            let far = off.abs() > gate && (output.estimated || r.normalised.abs() > normal);
+            far.then(|| SystemFinding::Outlier { output: output.output.clone(), line: r.line, sigmas: off })
+        };
+        residuals.iter().filter_map(of).collect()
+    }
+
+    /// Chi-square and degrees of freedom of the measurements that say how large the noise of an output is: its own where that is estimated, else all whose noise is given.
+    fn group(&self, output: usize, outputs: &[OutputFit]) -> (f64, f64) {
+        let own = |j: &usize| if self.estimated[output] { *j == output } else { !self.estimated[*j] };
+        let some = (0..outputs.len()).filter(own);
+        some.fold((0.0, 0.0), |(chi, free), j| {
+            (
+                chi + outputs[j].chi_square * outputs[j].degrees_of_freedom,
+                free + outputs[j].degrees_of_freedom,
+            )
+        })
+    }
+
+    /// The same with the gates of all outputs.
+    pub(super) fn with_gates(&self, mut outputs: Vec<OutputFit>) -> Vec<OutputFit> {
+        let count = outputs.iter().map(|o| o.measurements).sum();
+        for j in 0..outputs.len() {
+            let free = self.group(j, &outputs).1 - 1.0;
+            // of one other no sigma is told
+            outputs[j].outlier_gate = (free >= 1.0).then(|| student_gate(free, count));
+        }
+        outputs
+    }
+}
+
+/// Beyond what no right residual of so many is, but with a probability of one in a thousand, where sigma is that of others with `free` degrees of freedom.
+fn student_gate(free: f64, of: usize) -> f64 {
+    let each = (1.0 - STRICT) / of.max(1) as f64;
+    match free.is_finite() {
+        true => student_quantile(free, 1.0 - each / 2.0),
+        false => chi_square_quantile(1.0, 1.0 - each).sqrt(),
+    }
+}

@@ -1,0 +1,135 @@
+//! Where iterations start, when there have been enough of them, and where they end.
+
+use nalgebra::DVector;
+use obsdeg_ekf::EkfError;
+use obsdeg_evidence::simulation::Noise;
+
+use super::Calibrating;
+use super::answer::OtherSolution;
+use super::fit::{Settled, settle, size};
+use crate::least_squares::Solution;
+
+/// Two solutions are one when all that is determined differs by less, in sigma.
+const SAME: f64 = 1e-2;
+/// A solution is listed beside the best when its sum of squares is not larger by more, in units of what is left per degree of freedom.
+const NEAR: f64 = 25.0;
+/// How far starts are from each other: standard deviation of their logarithm.
+const SPREAD: f64 = 1.5;
+/// Two ends of iterations are one solution when what is observable differs by less, as a part.
+const ALIKE: f64 = 1e-3;
+
+/// Ends that settled, one of each solution by what `counts`, with their number.
+fn apart<'a>(ends: &'a [Settled], counts: &dyn Fn(usize) -> bool) -> Vec<(&'a Settled, usize)> {
+    let mut out: Vec<(&Settled, usize)> = Vec::new();
+    for end in ends.iter().filter(|e| e.converged) {
+        let same = |of: &Settled| {
+            let near = |j: usize| (of.x[j] - end.x[j]).abs() <= ALIKE * size(of.x[j]);
+            (of.cost - end.cost).abs() <= ALIKE * of.cost.max(1.0)
+                && (0..end.x.len()).filter(|&j| counts(j)).all(near)
+        };
+        match out.iter_mut().find(|(of, _)| same(of)) {
+            Some((_, count)) => *count += 1,
+            None => out.push((end, 1)),
+        }
+    }
+    out
+}
+
+/// Whether no more solutions are expected than were found: with w of them from n starts, w (n - 1) / (n - w - 2) < w + 1/2 (C. G. E. Boender, A. H. G. Rinnooy Kan,
+/// Math. Programming 37, 1987, doi:10.1007/BF02591684).
+fn enough(found: usize, starts: usize) -> bool {
+    let (w, n) = (found as f64, starts as f64);
+    n > w + 2.0 && w * (n - 1.0) / (n - w - 2.0) < w + 0.5
+}
+
+impl Calibrating<'_> {
+    /// The starts: that of the file, then others about it.
+    pub(super) fn starts(&self) -> Vec<DVector<f64>> {
+        let mut noise = Noise::new(self.options.seed, 18);
+        let first: Vec<f64> = self.problem.free.iter().map(|&i| self.base[i]).collect();
+        (0..self.options.starts.max(1))
+            .map(|k| {
+                let of = |x: &f64| match (k, *x == 0.0) {
+                    (0, _) => *x,
+                    (_, true) => noise.normal(),
+                    (_, false) => x * (SPREAD * noise.normal()).exp(),
+                };
+                DVector::from_vec(first.iter().map(of).collect())
+            })
+            .collect()
+    }
+
+    /// Iterates from `starts` until there have been enough; `counts` says which unknowns tell solutions apart. Where they ended, how many there were, and why the first
+    /// failed that did.
+    pub(super) fn search(
+        &mut self,
+        starts: &[DVector<f64>],
+        counts: &dyn Fn(usize) -> bool,
+    ) -> (Vec<Settled>, usize, Option<EkfError>) {
+        let (mut ends, mut tried, mut first_error): (Vec<Settled>, usize, Option<EkfError>) =
+            (Vec::new(), 0, None);
+        for x in starts {
+            // what there is so far is the answer
+            if self.problem.stopped && !ends.is_empty() {
+                break;
+            }
+            tried += 1;
+            match settle(&mut self.problem, &self.base, x.clone(), 1, None) {
+                Ok(end) => ends.push(end),
+                Err(e) => drop(first_error.get_or_insert(e)),
+            }
+            let settled = ends.iter().filter(|e| e.converged).count();
+            if settled > 0 && enough(apart(&ends, counts).len(), settled) {
+                break;
+            }
+        }
+        ends.sort_by(|a, b| {
+            (!a.converged, a.cost).partial_cmp(&(!b.converged, b.cost)).unwrap_or(std::cmp::Ordering::Equal)
+        });
+        (ends, tried, first_error)
+    }
+
+    /// Solutions apart from the best that fit nearly as well, and how many starts led to the best.
+    pub(super) fn others(
+        &mut self,
+        ends: &[Settled],
+        best: &Settled,
+        determined: &[bool],
+        solution: &Solution,
+        mean: f64,
+        finer: usize,
+    ) -> (Vec<OtherSolution>, usize) {
+        let same = |a: &DVector<f64>, b: &DVector<f64>| {
+            (0..a.len()).filter(|&j| determined[j]).all(|j| {
+                (a[j] - b[j]).abs()
+                    <= SAME * solution.sigma(&[(j, 1.0)]) * mean.sqrt().max(1.0) + 1e-9 * size(b[j])
+            })
+        };
+        let (mut out, mut led): (Vec<OtherSolution>, usize) = (Vec::new(), 0);
+        for (end, count) in apart(ends, &|j| determined[j]) {
+            // with the noise and the steps of the solution
+            let Ok(end) = settle(&mut self.problem, &self.base, end.x.clone(), finer, None) else { continue };
+            if !end.converged {
+                continue;
+            }
+            if same(&end.x, &best.x) {
+                led += count;
+                continue;
+            }
+            if end.cost > best.cost + NEAR * mean.max(1e-300) {
+                continue;
+            }
+            let known = out.iter_mut().find(|o| same(&end.x, &DVector::from_column_slice(&o.values)));
+            match known {
+                Some(o) => o.starts += count,
+                None => out.push(OtherSolution {
+                    chi_square: end.cost,
+                    starts: count,
+                    values: end.x.iter().copied().collect(),
+                }),
+            }
+        }
+        out.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
+        (out, led)
+    }
+}

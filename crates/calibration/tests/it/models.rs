@@ -1,0 +1,157 @@
+//! Small models whose answer is known by other means: closed formulas of least squares, the same model without what cannot be told apart.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_calibration::record::Record;
+use obsdeg_calibration::system::{SystemEstimated, SystemFinding};
+use obsdeg_calibration::{
+    Before, SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system,
+};
+use obsdeg_core::system::model_file;
+use obsdeg_exact::SplitMix64;
+
+fn options() -> SystemOptions {
+    SystemOptions { starts: 16, profiles: vec![], prior: None, seed: 1 }
+}
+
+fn calibrated(
+    model: &str,
+    text: &str,
+    options: &SystemOptions,
+) -> Result<SystemCalibration, SystemCalibrationError> {
+    let record = Record::csv("data.csv", Box::new(std::io::Cursor::new(text.to_string())))?;
+    let model = format!("name = \"small\"\n{model}");
+    calibrate_system(&model_file::read(&model).expect("a model"), record, options, &|_| true)
+}
+
+/// Unit normals (Box and Muller).
+fn normals(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = SplitMix64::new(seed);
+    let mut uniform = move || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
+    move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+}
+
+fn found<'a>(list: &'a [SystemEstimated], name: &str) -> &'a SystemEstimated {
+    list.iter().find(|u| u.name == name).unwrap_or_else(|| panic!("{name}: {list:?}"))
+}
+
+const LINE: &str = "[known_inputs]\nx = \"generic\"\n[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a + b*x\"\n[simulation]\nvalues = { a = 1, b = 1 }\n";
+
+/// A straight line with a spike: named with what the line through the others, and their scatter, say of it.
+#[test]
+fn a_spike_does_not_hide_in_its_own_sigma() {
+    let mut normal = normals(5);
+    for (count, spike, noise) in
+        [(20, 20.0, None), (9, -30.0, None), (20, 12.0, Some(0.1)), (20, 15.0, Some(0.05))]
+    {
+        let mut points: Vec<(f64, f64)> =
+            (0..count).map(|k| f64::from(k)).map(|x| (x, 2.0 - 0.3 * x + 0.1 * normal())).collect();
+        let at = 6;
+        points[at].1 += 0.1 * spike;
+        let text: String = std::iter::once("t,x,y\n".to_string())
+            .chain(points.iter().enumerate().map(|(k, (x, y))| format!("{k},{x},{y}\n")))
+            .collect();
+        let model = noise.map_or(LINE.to_string(), |s: f64| format!("{LINE}noise = {{ y = {s} }}\n"));
+        let c = calibrated(&model, &text, &options()).expect("calibrated");
+        // the others alone
+        let others: Vec<(f64, f64)> =
+            points.iter().enumerate().filter(|(k, _)| *k != at).map(|(_, p)| *p).collect();
+        let a = DMatrix::from_fn(others.len(), 2, |i, j| if j == 0 { 1.0 } else { others[i].0 });
+        let y = DVector::from_iterator(others.len(), others.iter().map(|p| p.1));
+        let inverse = (a.transpose() * &a).try_inverse().expect("regular");
+        let x = &inverse * a.transpose() * &y;
+        let s = ((&y - &a * &x).norm_squared() / (others.len() - 2) as f64).sqrt();
+        let own = DVector::from_vec(vec![1.0, points[at].0]);
+        let s = noise.map_or(s, |given| s.max(given));
+        let t = (points[at].1 - own.dot(&x)) / s / (1.0 + own.dot(&(&inverse * &own))).sqrt();
+        let outliers: Vec<_> = c
+            .findings
+            .iter()
+            .filter_map(|f| match f {
+                SystemFinding::Outlier { line, sigmas, .. } => Some((*line, *sigmas)),
+                _ => None,
+            })
+            .collect();
+        let [(line, sigmas)] = outliers[..] else { panic!("{count} {spike}: {:?}", c.findings) };
+        assert_eq!(line, at as u64 + 2);
+        assert!((sigmas / t - 1.0).abs() < 1e-4 && t.abs() > 8.0, "{sigmas} {t}");
+        assert_eq!(c.consistent, Some(false));
+    }
+    // three points: one degree of freedom, none for the sigma of the others
+    let c = calibrated(LINE, "t,x,y\n0,0,1\n1,1,2\n2,2,9\n", &options()).expect("calibrated");
+    assert_eq!((c.outputs[0].outlier_gate, c.outputs[0].degrees_of_freedom.round()), (None, 1.0));
+}
+
+/// A scale and a start that are only told as a product: the product is what the start is where the scale is one.
+#[test]
+fn what_is_not_told_apart_has_its_product() {
+    let mut normal = normals(8);
+    let line = |k: i32| {
+        let t = 0.2 * f64::from(k);
+        format!("{t},{}\n", 6.0 * (-0.7 * t).exp() + 0.05 * normal())
+    };
+    let text: String = std::iter::once("t,y\n".to_string()).chain((0..30).map(line)).collect();
+    let model = "[states]\nx = \"-k*x\"\n[parameters]\nk = {}\ns = {}\n[outputs]\ny = \"s*x\"\n[simulation]\nvalues = { x = 2, k = 1, s = 2 }\nnoise = { y = 0.05 }\n";
+    let c = calibrated(model, &text, &options()).expect("calibrated");
+    let plain = model.replace("s = {}\n", "").replace("s*x", "x").replace(", s = 2", "");
+    let own = calibrated(&plain, &text, &options()).expect("calibrated");
+    for name in ["x", "s"] {
+        assert_eq!(found(&c.unknowns, name).estimate, None);
+    }
+    let (product, x) = (&c.combinations[0], found(&own.unknowns, "x"));
+    assert!(
+        ["x*s", "s*x"].contains(&product.name.as_str()) && c.combinations.len() == 1,
+        "{:?}",
+        c.combinations
+    );
+    let of = |e: &SystemEstimated| (e.estimate.expect("determined"), e.sigma.expect("determined"));
+    let ((a, s), (b, t)) = (of(product), of(x));
+    assert!((a - b).abs() < 1e-3 * t && (s / t - 1.0).abs() < 1e-3, "{a} {s} {b} {t}");
+    assert!((a - 6.0).abs() < 4.0 * s);
+    // one solution by what can be told: not all starts are needed
+    assert!(
+        own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16,
+        "{:?}",
+        own.starts
+    );
+}
+
+/// Times and columns in another unit than the model's are converted, or refused with both; what one model knows is no news to itself.
+#[test]
+fn units_of_models() {
+    let mut normal = normals(9);
+    let rows: Vec<(f64, f64)> =
+        (0..20).map(|k| f64::from(k) * 0.5).map(|t| (t, 3.0 * (-0.4 * t).exp() + 0.01 * normal())).collect();
+    let text = |unit: &str, by: f64, of: &str, scale: f64| -> String {
+        let line = |(t, y): &(f64, f64)| format!("{},{}\n", t * by, y * scale);
+        std::iter::once(format!("t{unit},y{of}\n")).chain(rows.iter().map(line)).collect()
+    };
+    let model = "[states]\nx = { equation = \"-k*x\", unit = \"m/s^2\" }\n[parameters]\nk = { unit = \"1/s\" }\n[outputs]\ny = { expression = \"x\", unit = \"m/s^2\" }\n[simulation]\nvalues = { x = 2, k = 1 }\nnoise = { y = 0.01 }\n";
+    let right = calibrated(model, &text("", 1.0, "", 1.0), &options()).expect("calibrated");
+    let k = |c: &SystemCalibration| found(&c.unknowns, "k").estimate.expect("determined");
+    for (unit, by, of, scale) in [
+        (" [s]", 1.0, " [m/s^2]", 1.0),
+        (" [min]", 1.0 / 60.0, "", 1.0),
+        (" [ms]", 1e3, " [mg]", 1e3 / 9.80665),
+    ] {
+        let c = calibrated(model, &text(unit, by, of, scale), &options()).expect("calibrated");
+        assert!((k(&c) - k(&right)).abs() < 1e-6 * k(&right), "{unit}{of}: {} {}", k(&c), k(&right));
+    }
+    for (unit, of, words) in [
+        (" [a]", "", "line 1, column `t [a]`: expected times in [s], as in the units of the model"),
+        ("", " [V]", "line 1, column `y [V]`: expected the unit of the model, [m/s^2], or one of its kind"),
+    ] {
+        let e = calibrated(model, &text(unit, 1.0, of, 1.0), &options()).expect_err("refused").to_string();
+        assert!(e.contains(words), "{e}");
+    }
+    let before = Before {
+        estimates: right.covariance.clone(),
+        rests_on: right.rests_on.clone(),
+        of: right.model.clone(),
+    };
+    let options = SystemOptions { prior: Some(before), ..options() };
+    let e = calibrated(model, &text("", 1.0, "", 1.0), &options).expect_err("known").to_string();
+    assert!(e.contains("which the calibration before rests on, of the same model"), "{e}");
+    // of another model it is said, and counts
+    let other = model.replace("-k*x", "-k*x*1");
+    assert!(calibrated(&other, &text("", 1.0, "", 1.0), &options).expect("calibrated").shared);
+}
