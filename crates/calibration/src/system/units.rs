@@ -67,7 +67,7 @@ pub(super) fn time(record: &Record, column: usize, model: &SystemModel) -> Resul
     let as_it_is = Wanted { column, scale: 1.0 };
     match (record.columns()[column].unit.as_deref(), &own[..]) {
         (None, _) | (_, []) => Ok(as_it_is),
-        (Some(found), _) if own.iter().any(|u| *u == found) => match own.len() {
+        (Some(found), _) if own.contains(&found) => match own.len() {
             1 => Ok(as_it_is),
             _ => Err(several(record, column, &own)),
         },

@@ -44,7 +44,7 @@ fn a_spike_does_not_hide_in_its_own_sigma() {
         [(20, 20.0, None), (9, -30.0, None), (20, 12.0, Some(0.1)), (20, 15.0, Some(0.05))]
     {
         let mut points: Vec<(f64, f64)> =
-            (0..count).map(|k| f64::from(k)).map(|x| (x, 2.0 - 0.3 * x + 0.1 * normal())).collect();
+            (0..count).map(f64::from).map(|x| (x, 2.0 - 0.3 * x + 0.1 * normal())).collect();
         let at = 6;
         points[at].1 += 0.1 * spike;
         let text: String = std::iter::once("t,x,y\n".to_string())
@@ -108,11 +108,7 @@ fn what_is_not_told_apart_has_its_product() {
     assert!((a - b).abs() < 1e-3 * t && (s / t - 1.0).abs() < 1e-3, "{a} {s} {b} {t}");
     assert!((a - 6.0).abs() < 4.0 * s);
     // one solution by what can be told: not all starts are needed
-    assert!(
-        own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16,
-        "{:?}",
-        own.starts
-    );
+    assert!(own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16, "{:?}", own.starts);
 }
 
 /// Times and columns in another unit than the model's are converted, or refused with both; what one model knows is no news to itself.
