@@ -16,6 +16,7 @@ mod input;
 mod interrupt;
 #[cfg(feature = "symbolica")]
 mod lock;
+mod origin;
 mod output;
 mod paper;
 mod progress;

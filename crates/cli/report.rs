@@ -15,6 +15,7 @@ use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
 use crate::input::{Input, ModelFile, Source};
 use crate::interrupt;
+use crate::origin::origin;
 use crate::output::Target;
 use crate::progress::Bar;
 
@@ -132,15 +133,22 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         ReviewError::Model { model, error } => files[model].wrong(&error),
         e @ (ReviewError::Analysis { .. } | ReviewError::Interrupted) => Failure::input(e.to_string()),
     })?;
+    let calibrated: Vec<PathBuf> = a.calibration.iter().map(|path| calibration_file(path)).collect();
+    let origin = origin(a.files.iter().chain(&calibrated))?;
     bar.says("writing");
-    let written = obsdeg_report::review(&reviewed, &calibrations, format, &folder)?;
+    let written = obsdeg_report::review(&reviewed, &calibrations, &origin, format, &folder)?;
     notice(worker.as_ref(), a.target.quiet);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))
 }
 
+/// Where a calibration is.
+fn calibration_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() }
+}
+
 /// A calibration of one of the schemes, and what it is called: its folder.
 fn calibration(path: &Path, entries: &[Entry]) -> Result<(String, Calibration), Failure> {
-    let file = if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() };
+    let file = calibration_file(path);
     let source = Source::read(&file, "calibration")?;
     let wrong = |found: &str| {
         let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";

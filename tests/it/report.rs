@@ -149,6 +149,14 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
     assert!(text.len() < 2_000_000, "{} bytes", text.len());
     let page = Html::parse_document(&text);
     assert!(page.errors.is_empty(), "{:?}", page.errors);
+    // by what it was made, without where it was written
+    let origin = texts(&page, "li");
+    assert!(origin.contains(&format!("obsdeg report --runs 20 {PAPER}")), "{origin:?}");
+    if let Ok(digest) = std::process::Command::new("sha256sum").arg(PAPER).output() {
+        let digest = String::from_utf8_lossy(&digest.stdout);
+        let digest = digest.split(' ').next().unwrap_or_default();
+        assert!(origin.contains(&format!("sha256 of {PAPER}: {digest}")), "{origin:?} {digest}");
+    }
     assert_eq!(
         texts(&page, "h2"),
         [
@@ -415,7 +423,7 @@ fn text_from_files_is_text_in_every_format() {
     assert_eq!(text.matches("\\end{document}").count(), 1);
     assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & LIMITED & "));
     assert!(text.contains("\\$a\\_b\\textasciicircum{}c\\$ \\#let \\textbackslash{}end\\{document\\}"));
-    assert!(file.with_file_name("review_figures").join("s1_staircase.png").is_file());
+    assert!(file.with_file_name("review_figures").join("s1_staircase.pdf").is_file());
 }
 
 #[test]

@@ -125,6 +125,19 @@ fn a_browser_shows_it() {
          return [all.length, all.filter(e => e.getBoundingClientRect().right > w + 1).length]; })()",
     );
     assert!(cut[0].as_u64() > Some(200) && cut[1] == json!(0), "{cut}");
+    // nor are tables, of positions with their slews neither
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    for file in [&formulas, &long] {
+        browser.open(file, 688, 900);
+        browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+        browser.settle();
+        let cut = browser.value(
+            "(() => { const w = document.documentElement.clientWidth; return [...document.querySelectorAll('.wide > table')] \
+             .filter(e => e.getBoundingClientRect().right > w + 1).map(e => e.innerText.slice(0, 80)); })()",
+        );
+        assert_eq!(cut, json!([]), "cut at the edge of a sheet");
+        browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    }
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
     // what is folded is on paper all the same
     let (several, _) = report(folder.path(), "several.html", &[PAPER, MODEL]);

@@ -251,15 +251,20 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
     FONTS.get_or_init(load).clone()
 }
 
+/// An SVG, read.
+pub(crate) fn tree(svg: &str) -> Result<usvg::Tree, FigureError> {
+    let options =
+        usvg::Options { fontdb: fonts(), font_family: "DejaVu Sans".into(), ..usvg::Options::default() };
+    usvg::Tree::from_str(svg, &options).map_err(|e| FigureError(e.to_string()))
+}
+
 /// The PNG of an SVG at twice its size.
 ///
 /// # Errors
 /// [`FigureError`] when the SVG cannot be read or the picture is too large.
 pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
     const SCALE: f32 = 2.0;
-    let options =
-        usvg::Options { fontdb: fonts(), font_family: "DejaVu Sans".into(), ..usvg::Options::default() };
-    let tree = usvg::Tree::from_str(svg, &options).map_err(|e| FigureError(e.to_string()))?;
+    let tree = tree(svg)?;
     let (width, height) = (tree.size().width() * SCALE, tree.size().height() * SCALE);
     let mut pixels = tiny_skia::Pixmap::new(width.ceil() as u32, height.ceil() as u32)
         .ok_or_else(|| FigureError(format!("{width} x {height} pixels")))?;

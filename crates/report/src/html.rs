@@ -114,14 +114,20 @@ fn picture(p: &Picture) -> Json {
     let plot = match &p.drawing {
         // `</script>` must not occur in a script
         Drawing::Curves(figure) => Json::from(curves(figure).to_string().replace('<', "\\u003c")),
-        Drawing::Still(_) | Drawing::Panels(_) => Json::Null,
+        Drawing::Still(_) | Drawing::Map(_) | Drawing::Panels(_) => Json::Null,
     };
     let panels: Option<Vec<String>> = match &p.drawing {
         Drawing::Panels(panels) => Some(panels.each().map(|svg| in_page_colors(&svg)).collect()),
-        Drawing::Still(_) | Drawing::Curves(_) => None,
+        Drawing::Still(_) | Drawing::Map(_) | Drawing::Curves(_) => None,
     };
     let svg = if panels.is_some() { String::new() } else { inlined(p) };
-    json!({ "name": p.name, "caption": p.caption, "svg": svg, "panels": panels, "plot": plot })
+    let class = match &p.drawing {
+        Drawing::Curves(_) => "curves",
+        Drawing::Still(_) => "drawing",
+        Drawing::Map(_) => "map",
+        Drawing::Panels(_) => "panels",
+    };
+    json!({ "name": p.name, "class": class, "caption": p.caption, "svg": svg, "panels": panels, "plot": plot })
 }
 
 /// MathML; program notation where the LaTeX is none.

@@ -51,20 +51,36 @@ fn cell(cell: &Cell) -> String {
     cell.latex.as_ref().map_or_else(|| escape(&cell.text), |formula| format!("${formula}$"))
 }
 
-/// A longtable; columns of sentences are wrapped, and share the line.
-fn table(columns: &[Column], rows: &[Vec<Cell>]) -> String {
-    const LONG: usize = 70;
-    let long = |k: usize| rows.iter().any(|r| r[k].text.chars().count() > LONG);
-    let long: Vec<bool> = (0..columns.len()).map(|k| !columns[k].number && long(k)).collect();
-    let width = match long.iter().filter(|&&l| l).count() {
-        0 | 1 => ".5",
-        2 => ".37",
-        _ => ".25",
+/// Characters on a line of a table, and those that the space between two columns takes.
+const LINE: usize = 112;
+const BETWEEN: usize = 3;
+/// What is shorter is never wrapped.
+const SHORT: usize = 12;
+
+/// How wide every column is at most, in characters: texts are wrapped until all fit the line.
+fn widths(columns: &[Column], rows: &[Vec<Cell>]) -> Vec<Option<usize>> {
+    let natural = |k: usize| {
+        let cells = rows.iter().map(|r| r[k].text.chars().count());
+        cells.chain([columns[k].name.chars().count()]).max().unwrap_or(0)
     };
-    let spec = columns.iter().zip(long).map(|(column, long)| match (column.number, long) {
+    let natural: Vec<usize> = (0..columns.len()).map(natural).collect();
+    let room = LINE.saturating_sub(BETWEEN * columns.len().saturating_sub(1));
+    let taken = |most: usize| -> usize {
+        natural.iter().zip(columns).map(|(w, c)| if c.number { *w } else { (*w).min(most) }).sum()
+    };
+    // the widest that the texts may be
+    let most = (SHORT..=LINE).rev().find(|&most| taken(most) <= room).unwrap_or(SHORT);
+    let wrapped = |(w, c): (usize, &Column)| (!c.number && w > most).then_some(most);
+    natural.into_iter().zip(columns).map(wrapped).collect()
+}
+
+/// A longtable; columns of texts are wrapped where the line is too short for them, and share it.
+fn table(columns: &[Column], rows: &[Vec<Cell>]) -> String {
+    let widths = widths(columns, rows);
+    let spec = columns.iter().zip(widths).map(|(column, width)| match (column.number, width) {
         (true, _) => "r".into(),
-        (false, true) => format!("p{{{width}\\linewidth}}"),
-        (false, false) => "l".to_string(),
+        (false, Some(width)) => format!("p{{{:.2}\\linewidth}}", width as f64 / LINE as f64),
+        (false, None) => "l".to_string(),
     });
     let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
     format!(
@@ -103,7 +119,7 @@ fn body(d: &Document) -> String {
                 out.push_str(&items(lines.iter().map(|l| format!("${}$", l.latex))));
             }
             Block::Picture(p) => out.push_str(&format!(
-                "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{}.png}}\\\\{}\\end{{center}}\n",
+                "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{}.pdf}}\\\\{}\\end{{center}}\n",
                 p.name,
                 escape(&p.caption)
             )),

@@ -35,6 +35,7 @@ mod simulation;
 mod system;
 mod system_calibration;
 mod table;
+mod vector;
 mod visible;
 mod walks;
 mod words;
@@ -204,6 +205,15 @@ pub fn picture_folder(stem: &str) -> String {
     format!("{}_figures", stem.chars().map(plain).collect::<String>())
 }
 
+/// What a report was made by and of.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Origin {
+    /// The command that gives the same answer.
+    pub command: String,
+    /// Every file that it read, with its digest.
+    pub inputs: Vec<String>,
+}
+
 /// The files of a design review, with calibrations by name: the text first, then the pictures that it refers to, in `folder` beside it.
 ///
 /// # Errors
@@ -211,10 +221,11 @@ pub fn picture_folder(stem: &str) -> String {
 pub fn review(
     r: &DesignReview,
     calibrations: &[(String, Calibration)],
+    origin: &Origin,
     format: ReviewFormat,
     folder: &str,
 ) -> Result<Vec<File>, ReportError> {
-    let boxes = review::document(r, calibrations);
+    let boxes = review::document(r, calibrations, origin);
     let document = if format == ReviewFormat::Html { boxes } else { boxes.plain() };
     match format {
         ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),
@@ -229,7 +240,7 @@ pub fn review(
             let document = document.with_pictures_in(folder);
             let mut files = vec![File::new("review.tex", latex::alone(&document))];
             for p in document.pictures() {
-                files.push(File::new(format!("{}.png", p.name), png(&p.svg())?));
+                files.push(File::new(format!("{}.pdf", p.name), vector::pdf(&p.svg())?));
             }
             Ok(files)
         }

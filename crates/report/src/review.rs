@@ -10,7 +10,7 @@ mod verdict;
 use obsdeg_calibration::Calibration;
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::degree::Status as Exact;
-use obsdeg_design::review::{DesignReview, PositionReview, SchemeReview};
+use obsdeg_design::review::{DesignReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::crosscheck::CrossCheck;
 use obsdeg_evidence::simulation::Outcome;
@@ -18,11 +18,15 @@ use obsdeg_evidence::simulation::Outcome;
 use crate::analysis::null_vector;
 use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
-use crate::{Answer, calibration, compare, latex, simulation, words};
+use crate::{Answer, Origin, calibration, compare, latex, simulation, words};
 
 /// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections; of several the comparison first, and
 /// every part folded below it.
-pub(crate) fn document(r: &DesignReview, calibrations: &[(String, Calibration)]) -> Document {
+pub(crate) fn document(
+    r: &DesignReview,
+    calibrations: &[(String, Calibration)],
+    origin: &Origin,
+) -> Document {
     let alone = r.schemes.len() + r.generic.len() + r.models.len() == 1;
     let level = if alone { 1 } else { 2 };
     let reviewed = || r.schemes.iter().zip(&r.comparison.schemes);
@@ -92,6 +96,11 @@ pub(crate) fn document(r: &DesignReview, calibrations: &[(String, Calibration)])
             ),
         ],
     ));
+    blocks.extend(Block::list_if_any(
+        "Command",
+        Vec::from_iter((!origin.command.is_empty()).then(|| origin.command.clone())),
+    ));
+    blocks.extend(Block::list_if_any("Files that were read", origin.inputs.clone()));
     let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
         .chain(r.generic.iter().map(|g| g.name.as_str()))
         .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
@@ -271,11 +280,6 @@ fn seconds(t: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), String::from)
 }
 
-/// ` by 180 deg about -N`.
-fn turn(numbers: &PositionReview) -> String {
-    numbers.turn.map_or_else(String::new, |turn| format!(" by {}", words::turn(&turn)))
-}
-
 fn positions(
     blocks: &mut Vec<Block>,
     s: &SchemeReview,
@@ -292,7 +296,8 @@ fn positions(
             p.attitude.clone().unwrap_or_else(|| "-".into()),
             seconds(numbers.start_s),
             seconds(numbers.dwell_s),
-            numbers.slew_s.map_or_else(|| "-".into(), |s| format!("{}{}", seconds(s), turn(numbers))),
+            numbers.slew_s.map_or_else(|| "-".into(), seconds),
+            numbers.turn.map_or_else(|| "-".into(), |turn| words::turn(&turn)),
             g(numbers.g[0]),
             g(numbers.g[1]),
             g(numbers.g[2]),
@@ -307,6 +312,7 @@ fn positions(
             right("start [s]"),
             right("dwell [s]"),
             right("slew to it [s]"),
+            left("turn"),
             right("gyro X: I O S"),
             right("gyro Y: I O S"),
             right("gyro Z: I O S"),

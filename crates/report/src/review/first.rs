@@ -4,7 +4,7 @@ use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::review::{DesignReview, GenericReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
-use obsdeg_evidence::requirements::Miss;
+use obsdeg_evidence::requirements::{Miss, Requirements};
 
 use super::pictures::still;
 use super::{fewest_of_all, joined, seconds};
@@ -135,10 +135,13 @@ pub(super) fn actions(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> 
             .push("the checks of the filter that fail to be understood first (Evidence by a filter)".into()),
         _ => {}
     }
+    let met = [&review.requirements, &s.simulation.requirements].iter().all(|r| r.all_met());
     if out.is_empty() {
-        out.push(match review.requirements.stated {
-            0 => "requirements to be stated: nothing says yet what is good enough".into(),
-            _ => "none: every requirement is met by prediction and in the run, and no check fails".into(),
+        out.push(match (review.requirements.stated, met, &s.evidence) {
+            (0, ..) => "requirements to be stated: nothing says yet what is good enough".into(),
+            (_, false, _) => "the unknowns without a number to be looked at (Unknowns, Evidence by a filter)".into(),
+            (_, _, Ok(_)) => "none: every requirement is met by prediction and in the run, and no check fails".into(),
+            (_, _, Err(_)) => "none from what was computed: every requirement is met by prediction and in the run; evidence by a filter is not taken".into(),
         });
     }
     out
@@ -277,6 +280,15 @@ fn unknowns(schemes: &[ComparedScheme]) -> Vec<&Quantity> {
     out
 }
 
+/// `15 of 15 met`, `3 of 15 MISSED`.
+fn kept(r: &Requirements) -> String {
+    match (r.stated, r.all_met()) {
+        (0, _) => "none".into(),
+        (n, true) => format!("{} of {n} met", r.met),
+        (n, false) => format!("{} of {n} MISSED", r.missed.len()),
+    }
+}
+
 /// Schemes as columns: what they take, and the margin of every unknown.
 fn matrix(schemes: &[ComparedScheme]) -> Block {
     let mut columns = vec![left("")];
@@ -298,7 +310,7 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
                 (_, true) => Grade::Good,
                 (_, false) => Grade::Missed,
             };
-            Cell::graded(compare::requirements(&s.requirements), grade)
+            Cell::graded(kept(&s.requirements), grade)
         }),
     ];
     for of in unknowns(schemes) {

@@ -32,6 +32,10 @@ fn line(label: &str, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)
     Line { label: label.into(), color, stroke, points }
 }
 
+fn map(name: &str, caption: impl Into<String>, svg: String) -> Block {
+    Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing: Drawing::Map(svg) })
+}
+
 /// The rank over the order of derivatives, as steps.
 fn stairs(profile: &[usize], unknowns: usize) -> Figure {
     let last = profile.len().max(1) as f64;
@@ -127,9 +131,9 @@ pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name:
     let values =
         coefficients.iter().map(|q| q.excitation.iter().map(|x| x.abs().min(1.0)).collect()).collect();
     let svg = heat("Excitation", &rows, positions, values, 0.0);
-    still(
+    map(
         name,
-        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 white, 1 blue; a torquer by the earth rate)",
+        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 blank, 1 blue; a torquer by the earth rate)",
         svg,
     )
 }
@@ -303,7 +307,7 @@ pub(super) fn consistency(c: &CrossCheck, id: &str) -> Vec<Block> {
 pub(super) fn correlation(c: &CrossCheck, name: &str) -> Block {
     let names = &c.correlation.names;
     let svg = heat("Correlation under a diffuse prior", names, names, c.correlation.values.clone(), -1.0);
-    still(
+    map(
         name,
         "Correlation of the estimates under a diffuse prior: +-1 (orange, blue) along directions that Z does not see",
         svg,
