@@ -287,7 +287,7 @@ fn positions(
     review: &ComparedScheme,
     id: &str,
 ) {
-    let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") };
+    let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.3}") };
     let g = |g: [f64; 3]| g.map(component).join(", ");
     let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
         vec![
