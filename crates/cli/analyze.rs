@@ -1,12 +1,14 @@
-//! `obsdeg analyze`: the degree table of one scheme.
+//! `obsdeg analyze`: the degree tables of schemes and models.
 
 use clap::{ArgAction, Args};
-use obsdeg_core::analysis::{AnalysisOptions, analyze};
+use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
 use obsdeg_core::solution::Frame;
-use obsdeg_core::system::{COUNT_LIMIT, SystemOptions, analyze_system};
+use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
+use obsdeg_report::{Answer, Document, Several};
+use serde::Serialize;
 
-use crate::arguments::{InputArguments, one_of};
-use crate::engine::EngineArguments;
+use crate::arguments::{Given, InputArguments, Word, one_of};
+use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
 use crate::input::Input;
 use crate::interrupt;
@@ -20,41 +22,43 @@ Examples:
   obsdeg analyze --angles -90,0,0 --latitude 28.2 --carry inertial
   obsdeg analyze --angles 0,0,0 --terms drift           eps^n of a single position
   obsdeg analyze --angles 0,0,0 --combination \"D_FZ - wN*psi_y\"
-  obsdeg analyze --scheme scheme.toml --format json -o verdicts.json
-  obsdeg analyze --model model.toml                     any system x' = f(x, u, p, t), z = h
+  obsdeg analyze scheme.toml -o verdicts.json           JSON by the ending; .csv, .md, .tex as well
+  obsdeg analyze model.toml                             any system x' = f(x, u, p, t), z = h
+  obsdeg analyze examples/*/scheme.toml -o all.csv      several, one after another
 
-Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in
-rad/s and Z in g. Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
+Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in rad/s and Z in g.
+
+Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
     #[command(flatten)]
     input: InputArguments,
 
     /// The highest order of derivatives to look at in a model that has no proven end
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(0..=1000))]
+    #[arg(long, value_name = "K", help_heading = "Models", value_parser = clap::value_parser!(u16).range(0..=1000))]
     order: Option<u16>,
 
     /// Limit of the work of counting the solutions of a model: millions of products at each of two points (30 ms each) [default: 3]
-    #[arg(long, value_name = "MILLIONS")]
+    #[arg(long, value_name = "MILLIONS", help_heading = "Models")]
     count_limit: Option<u64>,
 
-    /// Solving expressions and numbers of solutions; off never starts the symbolic engine
-    #[arg(long, value_name = "ON|OFF", default_value = "on", hide_possible_values = true, action = ArgAction::Set, value_parser = one_of([("on", true), ("off", false)]))]
+    /// Solving expressions and numbers of solutions
+    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(SOLUTIONS))]
     solutions: bool,
 
-    /// Axes of Z in solutions: n (North-Up-East, as in the paper) or platform
-    #[arg(long, value_name = "FRAME", default_value = "n", hide_possible_values = true, value_parser = one_of([("n", Frame::N), ("platform", Frame::Platform)]))]
+    /// Axes of Z in solutions
+    #[arg(long, value_name = "FRAME", help_heading = "Solutions", default_value = "n", value_parser = one_of(FRAMES))]
     frame: Frame,
 
     /// Print Z and its derivatives, and psi and eps at each position, as formulas
-    #[arg(long)]
+    #[arg(long, help_heading = "Solutions")]
     formulas: bool,
-
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 
     #[command(flatten)]
     engine: EngineArguments,
@@ -63,24 +67,66 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
+/// The words of `--solutions`.
+const SOLUTIONS: [Word<bool>; 2] =
+    [("on", "all that there are", true), ("off", "none; never starts the symbolic engine", false)];
+
+/// The words of `--frame`.
+const FRAMES: [Word<Frame>; 2] = [
+    ("n", "North-Up-East, as in the paper", Frame::N),
+    ("platform", "those of the platform", Frame::Platform),
+];
+
+/// The answer on a scheme or a model.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Judged {
+    Scheme(Box<Analysis>),
+    Model(Box<SystemAnalysis>),
+}
+
+impl Answer for Judged {
+    fn document(&self) -> Document {
+        match self {
+            Self::Scheme(a) => a.document(),
+            Self::Model(a) => a.document(),
+        }
+    }
+}
+
+pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     interrupt::ends()?;
-    a.output.target.check()?;
-    if a.order.is_some() && a.input.model.is_none() {
-        return Err(Failure::input("--order goes with --model: a scheme has a proven end".into()));
+    let target = &a.output.target;
+    a.output.check()?;
+    let mut banner = Vec::new();
+    let mut judged = Vec::new();
+    let read = a.input.read(given)?;
+    let several = read.len() > 1;
+    for (name, input) in read {
+        // what is wrong in a model is drawn in its file
+        let of_scheme = several && matches!(input, Input::Scheme(_));
+        let (answer, said) = judge(a, &input).map_err(|e| if of_scheme { e.in_file(&name) } else { e })?;
+        judged.push((name, answer));
+        banner = said;
     }
-    if a.count_limit.is_some() && a.input.model.is_none() {
-        return Err(Failure::input(
-            "--count-limit goes with --model: a scheme is linear, and its solutions are unique".into(),
-        ));
+    match judged.len() {
+        1 => judged.iter().try_for_each(|(_, one)| a.output.write(one))?,
+        _ => a.output.write(&Several(judged))?,
     }
+    notice(&banner, target.quiet);
+    Ok(())
+}
+
+/// The answer on one of them, and what the engine says of itself.
+fn judge(a: &Arguments, input: &Input) -> Result<(Judged, Vec<String>), Failure> {
     let (seed, solutions, quiet) = (a.seed, a.solutions, a.output.target.quiet);
-    match a.input.read()? {
+    match input {
         Input::Scheme(scheme) => {
             let options = AnalysisOptions { seed, solutions, formulas: a.formulas, frame: a.frame };
             let message = "solving symbolically (--solutions off leaves it out)";
-            let analysis = a.engine.lend(message, quiet, |worker| Ok(analyze(&scheme, options, worker)?))?;
-            a.output.write(&analysis)
+            a.engine.lend(message, quiet, |worker| {
+                Ok(Judged::Scheme(Box::new(analyze(scheme, options, worker)?)))
+            })
         }
         Input::Model(file) => {
             let options = SystemOptions {
@@ -89,10 +135,10 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
                 count_limit: a.count_limit.unwrap_or(COUNT_LIMIT),
                 order: a.order.map(Into::into),
             };
-            let analysis = a.engine.lend("judging the model", quiet, |worker| {
-                analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))
-            })?;
-            a.output.write(&analysis)
+            a.engine.lend("judging the model", quiet, |worker| {
+                let found = analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))?;
+                Ok(Judged::Model(Box::new(found)))
+            })
         }
     }
 }

@@ -2,45 +2,114 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Command, Id};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Args, Command};
 use obsdeg_core::model::{
     Carry, DefinedBy, Euler, Latitude, Path, Rotation, Scheme, TermError, Unknowns, parse_attitude,
 };
 
 use crate::failure::Failure;
-use crate::input::{Input, Source};
+use crate::input::{Input, Source, is_stdin};
 
-/// Options that a model takes as well as a scheme, or a model alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 14] = [
+/// Options that concern a model as well as a scheme.
+const OF_BOTH: [&str; 17] = [
     "files",
-    "starts",
-    "profile",
-    "before",
+    "scheme",
     "model",
-    "order",
-    "count_limit",
+    "before",
+    "calibration",
     "solutions",
     "symbolic_limit",
+    "monte_carlo",
     "seed",
     "format",
+    "table",
+    "ascii",
     "output",
     "force",
     "quiet",
+    "help",
+    "help_long",
 ];
 
-/// What is judged: a scheme, or a model.
+/// Options that concern models alone; all others of a command are about schemes.
+const OF_MODELS: [&str; 4] = ["order", "count_limit", "starts", "profile"];
+
+/// The options on the command line that concern one kind of file only, as they are written.
+#[derive(Debug, Default)]
+pub(crate) struct Given {
+    schemes: Vec<String>,
+    models: Vec<String>,
+}
+
+impl Given {
+    /// What was given to a command.
+    pub(crate) fn of(command: &Command, matches: &ArgMatches) -> Self {
+        let mut out = Self::default();
+        for arg in command.get_arguments() {
+            let (id, name) = (arg.get_id().as_str(), arg.get_long().unwrap_or_default());
+            let given = matches.value_source(id) == Some(ValueSource::CommandLine);
+            if !given || OF_BOTH.contains(&id) {
+                continue;
+            }
+            let of = if OF_MODELS.contains(&id) { &mut out.models } else { &mut out.schemes };
+            of.push(format!("--{name}"));
+        }
+        out
+    }
+
+    /// Refuses options that are about the other kind of file than all that was read: nothing would hear of them.
+    pub(crate) fn concern<'a>(&self, read: impl IntoIterator<Item = &'a Named>) -> Result<(), Failure> {
+        let (mut schemes, mut models) = (None, None);
+        for (name, input) in read {
+            let of = if matches!(input, Input::Model(_)) { &mut models } else { &mut schemes };
+            of.get_or_insert(name.as_str());
+        }
+        match (schemes, models) {
+            (None, Some(file)) if !self.schemes.is_empty() => Err(Failure::input(format!(
+                "{} is about schemes; {file} is a model file, which says all of a model",
+                self.schemes.join(", ")
+            ))),
+            (Some(file), None) if !self.models.is_empty() => Err(Failure::input(format!(
+                "{} is about models; {} is a scheme",
+                self.models.join(", "),
+                if file.is_empty() { "what --angles say" } else { file }
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What was read, with the name of its file (none for angles).
+pub(crate) type Named = (String, Input);
+
+/// What is judged: schemes and models, told apart by what they say.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "What is judged")]
 pub(crate) struct InputArguments {
+    /// Scheme files (TOML) and model files (TOML, or JSON): any system x' = f(x, u, p, t), z = h; - is stdin
+    #[arg(value_name = "FILE", display_order = 0, conflicts_with_all = ["angles", "scheme", "model"])]
+    files: Vec<PathBuf>,
+
     /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz); once per position.
     /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE). A,B,G@X_p:360 turns from there, at a constant
     /// rate for its dwell, about a platform axis (X_p, Y_p, Z_p) or a geographic one (N, U, E)
     #[arg(long, value_name = "A,B,G", allow_hyphen_values = true, value_parser = attitude, conflicts_with = "scheme")]
     angles: Vec<EulerArgument>,
 
-    /// Scheme file (TOML)
+    /// A scheme file, as without the option; it must be one
     #[arg(long, value_name = "FILE")]
     scheme: Option<PathBuf>,
+
+    /// A model file, as without the option; it must be one
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["angles", "scheme"])]
+    model: Option<PathBuf>,
+
+    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"; coefficients may have wN, wU, sqrt(2), sqrt(3), and
+    /// sines and cosines of the scheme's angles ("sin(20 deg)", "cos(alpha)")
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
+    combination: Vec<String>,
 
     #[command(flatten)]
     assumptions: Assumptions,
@@ -48,30 +117,41 @@ pub(crate) struct InputArguments {
     #[command(flatten)]
     terms: TermArguments,
 
-    /// How the platform is turned from one position to the next: one-axis (the shortest way) or gimbals (alpha, beta, gamma). Torquer
-    /// errors (GS, GM, GM3) act on the way under inertial carry
-    #[arg(long, value_name = "PATH")]
+    /// How the platform is turned from one position to the next. Torquer errors (GS, GM, GM3) act on the way under inertial carry
+    #[arg(long, value_name = "PATH", help_heading = "Assumptions", value_parser = one_of(PATHS))]
     path: Option<Path>,
 
     /// The azimuth psi_y^n is measured too
-    #[arg(long)]
+    #[arg(long, help_heading = "Assumptions")]
     measured_azimuth: bool,
-
-    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"; coefficients may have wN, wU, sqrt(2), sqrt(3), and
-    /// sines and cosines of the scheme's angles ("sin(20 deg)", "cos(alpha)")
-    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
-    combination: Vec<String>,
-
-    /// Any other system: a model file (TOML, or JSON)
-    #[arg(long, value_name = "FILE")]
-    pub(crate) model: Option<PathBuf>,
 }
+
+/// The words of `--path`.
+const PATHS: [Word<Path>; 2] = [
+    ("one-axis", "the shortest way", Path::OneAxis),
+    ("gimbals", "alpha, beta, gamma, one after another", Path::Gimbals),
+];
+
+/// The words of `--carry`.
+pub(crate) const CARRIES: [Word<Carry>; 3] = [
+    ("platform", "psi goes on in platform axes, as in the paper", Carry::Platform),
+    ("inertial", "psi goes on in geographic axes: real torqued slews", Carry::Inertial),
+    ("reset", "every position has a psi of its own", Carry::Reset),
+];
+
+/// The words of `--axes`.
+const AXES: [Word<DefinedBy>; 3] = [
+    ("accelerometers", "families have GM and M3", DefinedBy::Accelerometers),
+    ("gyros", "families have GM3 and M6", DefinedBy::Gyros),
+    ("body", "families have GM and M6, of which a rotation is not observable", DefinedBy::Body),
+];
 
 /// What holds of schemes, whatever their files say.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Assumptions")]
 pub(crate) struct Assumptions {
-    /// What is carried between positions: platform (the paper), inertial or reset
-    #[arg(long, value_name = "CARRY")]
+    /// What is carried between positions
+    #[arg(long, value_name = "CARRY", value_parser = one_of(CARRIES))]
     carry: Option<Carry>,
 
     /// Latitude in degrees, exact; left out: generic
@@ -81,6 +161,7 @@ pub(crate) struct Assumptions {
 
 /// What is unknown.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Assumptions")]
 pub(crate) struct TermArguments {
     /// Unknown terms, separated by commas; or drift for eps^n of one position. Gyros: F,I,O,S,II,OO,SS,IO,IS,OS (drifts), GS (torquer
     /// scale factor), GM (misalignment of the input axes; GM3: its lower triangle). Accelerometers: K0 (bias), K1 (scale factor), M6
@@ -89,9 +170,8 @@ pub(crate) struct TermArguments {
     #[arg(long, value_name = "TERMS", value_parser = listed)]
     terms: Option<String>,
 
-    /// What defines the platform axes, and so which misalignments the families have: accelerometers (default; GM and M3), gyros (GM3 and M6)
-    /// or body (GM and M6, of which a rotation is not observable); `frame` in a scheme file
-    #[arg(long, value_name = "SENSORS", requires = "terms")]
+    /// What defines the platform axes, and so which misalignments the families have (default: accelerometers); `frame` in a scheme file
+    #[arg(long, value_name = "SENSORS", requires = "terms", value_parser = one_of(AXES))]
     axes: Option<DefinedBy>,
 }
 
@@ -116,21 +196,17 @@ impl Assumptions {
     }
 }
 
-/// A command with `--model` refuses every option beside it that is about schemes.
-pub(crate) fn scheme_or_model(command: Command) -> Command {
-    let of_schemes = |id: &&Id| !OF_MODELS.contains(&id.as_str());
-    let of_schemes: Vec<Id> =
-        command.get_arguments().map(|a| a.get_id()).filter(of_schemes).cloned().collect();
-    command.mut_args(|a| if a.get_id() == "model" { a.conflicts_with_all(&of_schemes) } else { a })
-}
+/// A word of an option, what it means and what it stands for.
+pub(crate) type Word<T> = (&'static str, &'static str, T);
 
-/// Reads one of several words, as what it stands for.
+/// Reads one of several words, as what it stands for; the help and the completions list them.
 pub(crate) fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
-    words: [(&'static str, T); N],
+    words: [Word<T>; N],
 ) -> impl TypedValueParser<Value = T> {
-    let read = PossibleValuesParser::new(words.iter().map(|(word, _)| *word).collect::<Vec<_>>());
+    let listed = words.iter().map(|(word, help, _)| PossibleValue::new(*word).help(*help));
+    let read = PossibleValuesParser::new(listed.collect::<Vec<_>>());
     let meant = move |word: String| {
-        words.iter().find(|(w, _)| *w == word).map(|(_, t)| t.clone()).ok_or("expected one of the words")
+        words.iter().find(|(w, ..)| *w == word).map(|(.., t)| t.clone()).ok_or("expected one of the words")
     };
     read.try_map(meant)
 }
@@ -155,33 +231,68 @@ fn attitude(text: &str) -> Result<EulerArgument, String> {
 }
 
 impl InputArguments {
-    /// The model, or the scheme: from the file or the angles, with whatever options override.
-    pub(crate) fn read(&self) -> Result<Input, Failure> {
-        if let Some(path) = &self.model {
-            return Source::read(path, "model")?.model().map(Input::model);
-        }
-        let mut scheme = match &self.scheme {
-            Some(path) => Source::read(path, "scheme")?.scheme()?,
-            None if self.angles.is_empty() => {
-                return Err(Failure::input(
-                    "nothing to judge; expected --angles A,B,G (once per position) or --scheme FILE".into(),
-                ));
+    /// The models and the schemes: from the files or the angles, with whatever options override.
+    pub(crate) fn read(&self, given: &Given) -> Result<Vec<Named>, Failure> {
+        let mut read = if let Some(path) = &self.model {
+            let source = Source::read(path, "model")?;
+            vec![(source.name(), Input::model(source.model()?))]
+        } else if let Some(path) = &self.scheme {
+            let source = Source::read(path, "scheme")?;
+            vec![(source.name(), Input::scheme(source.scheme()?))]
+        } else if !self.files.is_empty() {
+            read_all(&self.files)?
+        } else if !self.angles.is_empty() {
+            let mut scheme = Scheme::of_angles(self.angles.iter().map(|a| a.0.clone()));
+            for (position, a) in scheme.positions.iter_mut().zip(&self.angles) {
+                position.rotation.clone_from(&a.1);
             }
-            None => {
-                let mut scheme = Scheme::of_angles(self.angles.iter().map(|a| a.0.clone()));
-                for (position, a) in scheme.positions.iter_mut().zip(&self.angles) {
-                    position.rotation.clone_from(&a.1);
-                }
-                scheme
-            }
+            vec![(String::new(), Input::scheme(scheme))]
+        } else {
+            return Err(Failure::input(
+                "nothing to judge; expected a scheme or model FILE, or --angles A,B,G once per position"
+                    .into(),
+            ));
         };
-        self.assumptions.apply(&mut scheme);
-        scheme.path = self.path.or(scheme.path);
-        if let Some(terms) = self.terms.unknowns()? {
-            scheme.unknowns = terms;
+        given.concern(&read)?;
+        let terms = self.terms.unknowns()?;
+        for (_, input) in &mut read {
+            let Input::Scheme(scheme) = input else { continue };
+            self.assumptions.apply(scheme);
+            scheme.path = self.path.or(scheme.path);
+            if let Some(terms) = &terms {
+                scheme.unknowns = terms.clone();
+            }
+            scheme.measured_azimuth |= self.measured_azimuth;
+            scheme.combinations.extend(self.combination.iter().cloned());
         }
-        scheme.measured_azimuth |= self.measured_azimuth;
-        scheme.combinations.extend(self.combination.iter().cloned());
-        Ok(Input::scheme(scheme))
+        Ok(read)
     }
+
+    /// The same of a command that takes one.
+    pub(crate) fn read_one(&self, given: &Given) -> Result<Input, Failure> {
+        let read = self.read(given)?.into_iter().next();
+        read.map(|(_, input)| input).ok_or_else(|| Failure::input("nothing to judge".into()))
+    }
+}
+
+/// What a command says that judges one scheme or model at a time.
+pub(crate) fn one_file(arg: Arg) -> Arg {
+    match arg.get_id() == "files" {
+        true => arg.num_args(0..=1).help(
+            "A scheme file (TOML) or a model file (TOML, or JSON), with numbers for a simulation; - is stdin",
+        ),
+        false => arg,
+    }
+}
+
+/// Schemes and models from files, told apart by what they say.
+pub(crate) fn read_all(paths: &[PathBuf]) -> Result<Vec<Named>, Failure> {
+    if paths.iter().filter(|path| is_stdin(path)).count() > 1 {
+        return Err(Failure::input("- is given twice; expected one file on stdin".into()));
+    }
+    let one = |path: &PathBuf| {
+        let source = Source::read(path, "scheme or model")?;
+        Ok((source.name(), source.scheme_or_model()?))
+    };
+    paths.iter().map(one).collect()
 }

@@ -19,10 +19,10 @@ use obsdeg_report::{
     File, ReportError, calibration_figures, residuals_csv, system_calibration_figures, system_residuals_csv,
 };
 
-use crate::arguments::Assumptions;
+use crate::arguments::{Assumptions, Given, Named};
 use crate::conditions::{GyroNoiseArguments, within};
 use crate::failure::Failure;
-use crate::input::{Source, open};
+use crate::input::{Input, ModelFile, Source, is_stdin, open};
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
@@ -33,8 +33,8 @@ Examples:
   obsdeg calibrate scheme.toml monday.csv tuesday.parquet --noise 2e-5 -o calibration
   obsdeg calibrate scheme.toml wednesday.csv --prior calibration/calibration.json
   gzip -dc record.csv.gz | obsdeg calibrate scheme.toml -
-  obsdeg calibrate --model examples/influenza/model.toml examples/influenza/data.csv --profile beta
-  gzip -dc examples/handheld/record.csv.gz | obsdeg calibrate --model examples/handheld/accelerometers.toml -
+  obsdeg calibrate examples/influenza/model.toml examples/influenza/data.csv --profile beta
+  gzip -dc examples/handheld/record.csv.gz | obsdeg calibrate examples/handheld/accelerometers.toml -
 
 A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well),
 `Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the
@@ -48,20 +48,29 @@ read).";
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
-    /// The scheme file (TOML), then one or more records of its runs (CSV or Parquet; - is stdin); with --model the record alone
+    /// Seed of the exact verdicts
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// The scheme or model file, then records of its runs (CSV or Parquet; a model takes one); - is stdin
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 
-    /// Any other system: a model file; columns of the record are `t`, its outputs, known inputs, `sigma_NAME` of either, `experiment`
+    /// The scheme file; FILEs are records then
     #[arg(long, value_name = "FILE")]
+    scheme: Option<PathBuf>,
+
+    /// The model file of any other system; FILE is the record then, with columns `t`, outputs, known inputs, `sigma_NAME` of either,
+    /// `experiment`
+    #[arg(long, value_name = "FILE", conflicts_with = "scheme")]
     model: Option<PathBuf>,
 
-    /// With --model: starts of the iteration, that of the file and others about it; fewer are made where no other solution is to be expected
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    /// Starts of the iteration, that of the file and others about it; fewer are made where no other solution is to be expected
+    #[arg(long, value_name = "N", help_heading = "Models", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     starts: u32,
 
-    /// With --model: the profile of an unknown, what the data say of it when all others follow; may be given several times
-    #[arg(long, value_name = "NAME")]
+    /// The profile of an unknown, what the data say of it when all others follow; may be given several times
+    #[arg(long, value_name = "NAME", help_heading = "Models")]
     profile: Vec<String>,
 
     #[command(flatten)]
@@ -107,10 +116,6 @@ pub(crate) struct Arguments {
     #[arg(long = "prior", value_name = "FILE")]
     before: Option<PathBuf>,
 
-    /// Seed of the exact verdicts
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-
     #[command(flatten)]
     output: Output,
 }
@@ -119,9 +124,7 @@ pub(crate) struct Arguments {
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.help("Write calibration, coefficients, residuals and figures to a folder"),
-        "carry" => arg.help(
-            "What is carried between positions: platform, inertial or reset (default: that of the scheme)",
-        ),
+        "carry" => arg.help("What is carried between positions (default: that of the scheme)"),
         "latitude" => arg.help("Latitude in degrees (default: that of the scheme, or 28.2)"),
         _ => arg,
     }
@@ -140,7 +143,7 @@ fn number_within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     number.ok_or_else(|| format!("expected a number from {low} to {high}"))
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     let interrupted = interrupt::flag()?;
     a.output.target.check_folder()?;
     let bar = Bar::start(0, "", a.output.target.quiet);
@@ -148,17 +151,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         bar.calibrates(now);
         !interrupted.load(Ordering::Relaxed)
     };
-    if let Some(model) = &a.model {
-        return run_model(a, model, &going);
-    }
-    let Some((file, records)) = a.files.split_first() else { return Ok(()) };
-    if records.is_empty() {
-        return Err(Failure::input(
-            "no record; expected a scheme file and a record of its run (or --model)".into(),
-        ));
-    }
-    let source = Source::read(file, "scheme")?;
-    let mut scheme = source.scheme()?;
+    let (named, records) = a.read()?;
+    given.concern([&named])?;
+    let mut scheme = match named.1 {
+        Input::Scheme(scheme) => scheme,
+        Input::Model(file) => return run_model(a, &file, records, &going),
+    };
     a.assumptions.apply(&mut scheme);
     let records = records.iter().map(|path| record(path)).collect::<Result<Vec<_>, _>>()?;
     let options = Options {
@@ -195,10 +193,14 @@ fn unfinished() -> Failure {
 }
 
 /// A model and its data.
-fn run_model(a: &Arguments, path: &Path, going: &dyn Fn(Going<'_>) -> bool) -> Result<(), Failure> {
-    let file = Source::read(path, "model")?.model()?;
-    let [data] = &a.files[..] else {
-        return Err(Failure::input(format!("found {} records; expected one with --model", a.files.len())));
+fn run_model(
+    a: &Arguments,
+    file: &ModelFile,
+    records: &[PathBuf],
+    going: &dyn Fn(Going<'_>) -> bool,
+) -> Result<(), Failure> {
+    let [data] = records else {
+        return Err(Failure::input(format!("found {} records; expected one of a model", records.len())));
     };
     let record = record(data)?;
     let options = SystemOptions {
@@ -229,6 +231,30 @@ fn run_model(a: &Arguments, path: &Path, going: &dyn Fn(Going<'_>) -> bool) -> R
 }
 
 impl Arguments {
+    /// The scheme or the model, with its file, and the records of its runs.
+    fn read(&self) -> Result<(Named, &[PathBuf]), Failure> {
+        let (named, records) = if let Some(path) = &self.model {
+            let source = Source::read(path, "model")?;
+            ((source.name(), Input::model(source.model()?)), &self.files[..])
+        } else if let Some(path) = &self.scheme {
+            let source = Source::read(path, "scheme")?;
+            ((source.name(), Input::scheme(source.scheme()?)), &self.files[..])
+        } else {
+            let [file, records @ ..] = &self.files[..] else {
+                return Err(Failure::input("expected a scheme or model file and a record of its run".into()));
+            };
+            if is_stdin(file) && records.iter().any(|r| is_stdin(r)) {
+                return Err(Failure::input("- is given twice; expected one file on stdin".into()));
+            }
+            let source = Source::read(file, "scheme or model")?;
+            ((source.name(), source.scheme_or_model()?), records)
+        };
+        match records {
+            [] => Err(Failure::input(format!("no record; expected records of the run of {}", named.0))),
+            records => Ok((named, records)),
+        }
+    }
+
     fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::of(scheme);
         out.apply(&Settings {

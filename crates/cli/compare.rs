@@ -1,14 +1,14 @@
 //! `obsdeg compare`: schemes side by side.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
 use obsdeg_evidence::compare::{Entry, compare};
 
-use crate::arguments::Assumptions;
+use crate::arguments::{Assumptions, read_all};
 use crate::conditions::{GyroNoiseArguments, MeasurementArguments};
 use crate::failure::Failure;
-use crate::input::Source;
+use crate::input::{Input, title};
 use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Spinner;
@@ -18,23 +18,24 @@ Examples:
   obsdeg compare examples/five-positions/scheme.toml examples/six-positions/scheme.toml
   obsdeg compare a.toml b.toml --carry inertial --requirement D=0.05 --format markdown -o review.md
 
-Requirements are those of a scheme file, [requirements], or --requirement. Gyro noise adds the noise floor of every coefficient: predicted
-sigmas are without drift noise.
+Requirements are those of a scheme file, [requirements], or --requirement. Gyro noise adds the noise floor of every coefficient: \
+predicted sigmas are without drift noise.
+
 Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(words))]
 pub(crate) struct Arguments {
-    /// Scheme files (TOML)
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Scheme files (TOML); - is stdin
     #[arg(value_name = "FILE", required = true)]
     schemes: Vec<PathBuf>,
 
     #[command(flatten)]
     assumptions: Assumptions,
-
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 
     #[command(flatten)]
     output: Output,
@@ -49,9 +50,7 @@ pub(crate) struct Arguments {
 /// What shared options say here.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
-        "carry" => {
-            arg.help("What is carried between positions, for all schemes: platform, inertial or reset")
-        }
+        "carry" => arg.help("What is carried between positions, for all schemes"),
         "latitude" => arg.help("Latitude in degrees, for all schemes (default: that of the file, or 28.2)"),
         _ => arg,
     }
@@ -59,15 +58,18 @@ fn words(arg: Arg) -> Arg {
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
-    a.output.target.check()?;
+    a.output.check()?;
     let mut entries = Vec::with_capacity(a.schemes.len());
-    for path in &a.schemes {
-        let source = Source::read(path, "scheme")?;
-        let mut scheme = source.scheme()?;
+    for (path, input) in read_all(&a.schemes)? {
+        let Input::Scheme(mut scheme) = input else {
+            return Err(Failure::input(format!(
+                "{path} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge models side by side)"
+            )));
+        };
         a.assumptions.apply(&mut scheme);
         let mut conditions = a.measurement.conditions(&scheme);
         conditions.apply(&a.gyro_noise.settings());
-        entries.push(Entry { name: source.title(), scheme, conditions });
+        entries.push(Entry { name: title(Path::new(&path)), scheme: *scheme, conditions });
     }
     a.measurement.concern(entries.iter().map(|e| &e.scheme))?;
     let spinner = Spinner::start("judging schemes", a.output.target.quiet);

@@ -1,15 +1,19 @@
 //! `obsdeg completions` and `obsdeg man`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use clap_complete::Shell;
+use obsdeg_report::File;
 
 use crate::failure::Failure;
 use crate::{command, output};
 
 const AFTER_HELP: &str = "\
 Examples:
-  obsdeg completions bash > /etc/bash_completion.d/obsdeg
-  obsdeg completions zsh > _obsdeg";
+  obsdeg completions bash > ~/.local/share/bash-completion/completions/obsdeg
+  obsdeg completions zsh > ~/.zfunc/_obsdeg             with fpath+=~/.zfunc before compinit in ~/.zshrc
+  obsdeg completions fish > ~/.config/fish/completions/obsdeg.fish";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
@@ -24,17 +28,66 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     output::print(&text)
 }
 
-/// The manual page: the program, then every command.
-pub(crate) fn man() -> Result<(), Failure> {
-    let mut text = Vec::new();
+#[derive(Debug, Args)]
+#[command(after_help = MAN_AFTER_HELP)]
+pub(crate) struct ManArguments {
+    /// The command whose page it is (default: that of the program)
+    #[arg(value_name = "COMMAND", value_parser = commands())]
+    command: Option<String>,
+
+    /// Write all pages to a folder instead, obsdeg.1, obsdeg-analyze.1 and so on
+    #[arg(short, long, value_name = "DIR", conflicts_with = "command")]
+    output: Option<PathBuf>,
+
+    /// Replace files in the folder
+    #[arg(long)]
+    force: bool,
+}
+
+const MAN_AFTER_HELP: &str = "\
+Examples:
+  obsdeg man | man -l -
+  obsdeg man analyze | man -l -
+  obsdeg man -o ~/.local/share/man/man1                 then: man obsdeg-analyze";
+
+/// The commands that have a page.
+fn commands() -> impl Fn(&str) -> Result<String, String> + Clone + Send + Sync + 'static {
+    |asked| {
+        let names = pages(&command()).map(|(name, _)| name).collect::<Vec<_>>();
+        let known = names.iter().any(|n| n == &format!("obsdeg-{asked}"));
+        let names: Vec<&str> = names.iter().filter_map(|n| n.strip_prefix("obsdeg-")).collect();
+        if known { Ok(asked.into()) } else { Err(format!("expected one of {}", names.join(", "))) }
+    }
+}
+
+/// The pages: of the program and of every command that its help lists.
+fn pages(command: &clap::Command) -> impl Iterator<Item = (String, clap::Command)> {
+    let program = (command.get_name().to_string(), command.clone());
+    let listed = |c: &&clap::Command| !c.is_hide_set() && c.get_name() != "help";
+    let of: Vec<_> = command.get_subcommands().filter(listed).cloned().collect();
+    let of = of.into_iter().map(|c| {
+        let name = format!("obsdeg-{}", c.get_name());
+        (name.clone(), c.name(name))
+    });
+    std::iter::once(program).chain(of)
+}
+
+/// The manual: a page, or all of them in a folder.
+pub(crate) fn man(a: &ManArguments) -> Result<(), Failure> {
     let mut command = command();
     command.build();
-    let mut render = |c: clap::Command| {
-        clap_mangen::Man::new(c).render(&mut text).map_err(|e| Failure::internal(e.to_string()))
+    let page = |c: clap::Command| {
+        let mut text = Vec::new();
+        let rendered = clap_mangen::Man::new(c).render(&mut text);
+        rendered.map(|()| text).map_err(|e| Failure::internal(e.to_string()))
     };
-    render(command.clone())?;
-    for sub in command.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help") {
-        render(sub.clone().name(format!("obsdeg-{}", sub.get_name())))?;
-    }
-    output::print(&text)
+    let Some(folder) = &a.output else {
+        let asked = a.command.as_ref().map_or("obsdeg".into(), |c| format!("obsdeg-{c}"));
+        let found = pages(&command).find(|(name, _)| *name == asked);
+        return found.map_or(Ok(()), |(_, c)| output::print(&page(c)?));
+    };
+    let files: Vec<File> = pages(&command)
+        .map(|(name, c)| Ok(File { name: format!("{name}.1"), bytes: page(c)? }))
+        .collect::<Result<_, Failure>>()?;
+    output::write_files(folder, &files, a.force)
 }

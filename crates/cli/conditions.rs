@@ -8,7 +8,7 @@ use obsdeg_core::model::settings::{
 use obsdeg_core::model::{PerGyro, Platform, Scheme};
 use obsdeg_evidence::simulation::{Conditions, general_first};
 
-use crate::arguments::one_of;
+use crate::arguments::{Word, one_of};
 use crate::failure::Failure;
 
 /// Reads a number of a range.
@@ -106,13 +106,12 @@ pub(crate) struct ConditionArguments {
     #[command(flatten)]
     measurement: MeasurementArguments,
 
-    /// linear: the model itself; exact: direction cosines, specific force in the true platform frame (default: linear)
-    #[arg(long, value_name = "LEVEL", hide_possible_values = true, value_parser = one_of([("linear", Truth::Linear), ("exact", Truth::Exact)]))]
+    /// What the simulated truth is (default: linear)
+    #[arg(long, value_name = "LEVEL", value_parser = one_of(TRUTHS))]
     truth: Option<Truth>,
 
-    /// linear: small angles, gains known beforehand; extended: full attitudes, Jacobians at the estimate; iterated: the same,
-    /// linearised again along the whole run (default: linear where its model holds, else iterated)
-    #[arg(long, value_name = "FILTER", hide_possible_values = true, value_parser = one_of(FilterKind::ALL.map(|f| (f.name(), f))))]
+    /// The filter (default: linear where its model holds, else iterated)
+    #[arg(long, value_name = "FILTER", value_parser = one_of(FilterKind::ALL.map(|f| (f.name(), filter_words(f), f))))]
     filter: Option<FilterKind>,
 
     /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
@@ -128,8 +127,8 @@ pub(crate) struct ConditionArguments {
     #[command(flatten)]
     gyro_noise: GyroNoiseArguments,
 
-    /// Transition matrix of the filter: exponential or rk4 (default: exponential)
-    #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = one_of([("exponential", Propagation::Exponential), ("rk4", Propagation::Rk4)]))]
+    /// Transition matrix of the filter (default: exponential)
+    #[arg(long, value_name = "HOW", value_parser = one_of(PROPAGATIONS))]
     propagation: Option<Propagation>,
 
     /// True value of an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_FX=11, D_I=5, psi=0.1 (the paper's;
@@ -148,6 +147,26 @@ pub(crate) struct ConditionArguments {
     /// Factor on the true drifts and their priors (default: 1; 1e-6 to 1e6)
     #[arg(long, value_name = "X", value_parser = within(ranges::DRIFT_SCALE))]
     drift_scale: Option<f64>,
+}
+
+/// The words of `--truth`.
+const TRUTHS: [Word<Truth>; 2] = [
+    ("linear", "the model itself", Truth::Linear),
+    ("exact", "direction cosines, specific force in the true platform frame", Truth::Exact),
+];
+
+/// The words of `--propagation`.
+const PROPAGATIONS: [Word<Propagation>; 2] = [
+    ("exponential", "the matrix exponential", Propagation::Exponential),
+    ("rk4", "Runge-Kutta of fourth order", Propagation::Rk4),
+];
+
+fn filter_words(filter: FilterKind) -> &'static str {
+    match filter {
+        FilterKind::Linear => "small angles, gains known beforehand",
+        FilterKind::Extended => "full attitudes, Jacobians at the estimate",
+        FilterKind::Iterated => "the same, linearised again along the whole run",
+    }
 }
 
 /// Refuses an assignment that concerns an unknown of none of the schemes: nothing would hear of it.

@@ -6,34 +6,37 @@ use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
 use obsdeg_evidence::system::crosscheck_system;
 use obsdeg_report::{ReportError, crosscheck_figures};
 
-use crate::arguments::InputArguments;
+use crate::arguments::{CARRIES, Given, InputArguments, one_file, one_of};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
 use crate::input::Input;
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
-use crate::simulate::with_numbers;
 
 const AFTER_HELP: &str = "\
 Examples:
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
-  obsdeg crosscheck --scheme scheme.toml --runs 1000 -o evidence
+  obsdeg crosscheck scheme.toml --runs 1000 -o evidence
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 --filter-carry inertial     (must disagree)
-  obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 --truth exact     (runs at the scheme's own drifts)
-  obsdeg crosscheck --model examples/lotka-volterra/model.toml
+  obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 --truth exact     (at the scheme's own drifts)
+  obsdeg crosscheck examples/lotka-volterra/model.toml
 
-Evidence: a. degrees, ranks, null space, combinations and partners by samples of a model of its own in many digits, and log-log
-slopes of sigma against the dwell, b. prior inflation and null vectors, c. covariance against inverse information, and the model
-against equations of direction cosines, d. Monte Carlo consistency, e. rank correlation of orders, f. filters that are wrong on
-purpose.
-With -o it writes evidence.json and its figures as SVG and PNG.
-What is not resolvable, by a test that is stated, neither agrees nor disagrees.
+Evidence: a. degrees, ranks, null space, combinations and partners by samples of a model of its own in many digits, and log-log \
+slopes of sigma against the dwell, b. prior inflation and null vectors, c. covariance against inverse information, and the model \
+against equations of direction cosines, d. Monte Carlo consistency, e. rank correlation of orders, f. filters that are wrong on \
+purpose. What is not resolvable, by a test that is stated, neither agrees nor disagrees. With -o it writes evidence.json and its \
+figures as SVG and PNG.
+
 Exit codes: 0 nothing disagrees, 1 something disagrees, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(with_numbers), mut_args(to_a_folder))]
+#[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder))]
 pub(crate) struct Arguments {
+    /// Seed of all random choices; the result does not depend on the number of threads
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
     #[command(flatten)]
     input: InputArguments,
 
@@ -44,12 +47,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     runs: u32,
 
-    /// Seed of all random choices; the result does not depend on the number of threads
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-
     /// Make the filter wrong: another carry
-    #[arg(long, value_name = "CARRY", help_heading = "Controls")]
+    #[arg(long, value_name = "CARRY", help_heading = "Controls", value_parser = one_of(CARRIES))]
     filter_carry: Option<Carry>,
 
     /// Make the filter wrong: another latitude in degrees
@@ -64,10 +63,10 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.target.check_folder()?;
-    let passed = match a.input.read()? {
+    let passed = match a.input.read_one(given)? {
         Input::Scheme(scheme) => {
             a.conditions.concern(std::iter::once(&*scheme))?;
             let conditions = a.conditions.conditions(&scheme);

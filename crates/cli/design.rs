@@ -15,7 +15,7 @@ use obsdeg_design::design::{
 use obsdeg_evidence::simulation::{Conditions, general_first};
 use obsdeg_report::{File, design_figures, position_figure, visible};
 
-use crate::arguments::{Assumptions, TermArguments, one_of};
+use crate::arguments::{Assumptions, TermArguments, Word, one_of};
 use crate::conditions::{MeasurementArguments, assigned, concern_some, within};
 use crate::failure::Failure;
 use crate::input::Source;
@@ -48,17 +48,21 @@ winner.toml (a scheme file), its positions as a picture, and the front of total 
 Exit codes: 0 done (with --minimum also when no positions do), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
 /// The words of `--criterion`.
-const CRITERIA: [(&str, CriterionName); 5] = [
-    ("worst", CriterionName::Worst),
-    ("a", CriterionName::A),
-    ("d", CriterionName::D),
-    ("e", CriterionName::E),
-    ("margin", CriterionName::Margin),
+const CRITERIA: [Word<CriterionName>; 5] = [
+    ("worst", "the largest sigma", CriterionName::Worst),
+    ("a", "the trace of the covariance", CriterionName::A),
+    ("d", "the determinant of the covariance", CriterionName::D),
+    ("e", "its largest eigenvalue", CriterionName::E),
+    ("margin", "the largest sigma over its requirement, as for --meet", CriterionName::Margin),
 ];
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
+    /// Seed of all random choices; the result does not depend on the number of threads
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
     /// Find the best scheme of so many positions
     #[arg(long, value_name = "K", required_unless_present = "minimum")]
     positions: Option<usize>,
@@ -124,10 +128,6 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "minimum")]
     merge: Vec<PathBuf>,
 
-    /// Seed of all random choices; the result does not depend on the number of threads
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-
     #[command(flatten)]
     wanted: WantedArguments,
 
@@ -155,9 +155,9 @@ struct WantedArguments {
     #[arg(long, value_name = "[NAME=]K", value_parser = degree_cap)]
     max_degree: Vec<(Option<String>, usize)>,
 
-    /// What makes one scheme better: worst (largest sigma), a, d, e (optimal design), or margin (largest sigma over --requirement, as for --meet);
-    /// a smaller worst degree comes before it. psi is estimated with the coefficients but counts in margin and --meet only (default: worst)
-    #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = one_of(CRITERIA))]
+    /// What makes one scheme better; a smaller worst degree comes before it. psi is estimated with the coefficients but counts in margin and
+    /// --meet only (default: worst)
+    #[arg(long, value_name = "HOW", value_parser = one_of(CRITERIA))]
     criterion: Option<CriterionName>,
 
     /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those

@@ -8,6 +8,7 @@ use crate::progress::Spinner;
 
 /// How much the engine may do.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Solutions")]
 pub(crate) struct EngineArguments {
     /// How much work the symbolic engine may do for one formula, 0 (none) to 1000000: a unit is five million products of terms, about half a second, and
     /// ends at the same place on every machine and under any load. What cannot be counted (factorisation) ends after two seconds of
@@ -32,13 +33,13 @@ impl EngineArguments {
         })))
     }
 
-    /// What `work` finds with the engine, with a sign of life; then the next process may have it.
+    /// What `work` finds with the engine, with a sign of life, and what the engine says of itself; then the next process may have it.
     pub(crate) fn lend<T>(
         &self,
         message: &'static str,
         quiet: bool,
         work: impl FnOnce(Option<&mut Worker>) -> Result<T, Failure>,
-    ) -> Result<T, Failure> {
+    ) -> Result<(T, Vec<String>), Failure> {
         let mut worker = self.worker(quiet)?;
         let spinner = Spinner::start(message, quiet);
         let found = work(worker.as_mut());
@@ -46,9 +47,7 @@ impl EngineArguments {
         if let Some(worker) = worker.as_mut() {
             worker.rest();
         }
-        let found = found?;
-        notice(worker.as_ref(), quiet);
-        Ok(found)
+        Ok((found?, worker.iter().flat_map(Worker::banner).cloned().collect()))
     }
 }
 
@@ -58,9 +57,9 @@ fn say_waiting() {
     );
 }
 
-/// The banner of the engine is its licence notice.
-pub(crate) fn notice(worker: Option<&Worker>, quiet: bool) {
-    for line in worker.into_iter().flat_map(Worker::banner).filter(|_| !quiet) {
+/// The banner of the engine is its licence notice: whole, and after the answer.
+pub(crate) fn notice(banner: &[String], quiet: bool) {
+    for line in banner.iter().filter(|_| !quiet) {
         say(line);
     }
 }

@@ -136,7 +136,7 @@ impl From<DesignError> for Failure {
 impl From<ReportError> for Failure {
     fn from(e: ReportError) -> Self {
         match e {
-            ReportError::NoPdf => Self::input(e.to_string()),
+            ReportError::NoPdf | ReportError::NoTable { .. } => Self::input(e.to_string()),
             e => Self::internal(e.to_string()),
         }
     }

@@ -50,6 +50,11 @@ impl ModelFile {
     }
 }
 
+/// Whether a path stands for stdin.
+pub(crate) fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
 /// A file that was read.
 pub(crate) struct Source {
     path: PathBuf,
@@ -57,25 +62,32 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// The text of a file; `what` it is stands in the errors. Pipes and devices are read too (`/dev/stdin`, `<(command)`), up to the same
+    /// The text of a file, or of stdin (`-`); `what` it is stands in the errors. Pipes and devices are read too (`/dev/stdin`, `<(command)`), up to the same
     /// limit; a pipe that nobody writes to is refused.
     pub(crate) fn read(path: &Path, what: &str) -> Result<Self, Failure> {
+        let stdin = is_stdin(path);
+        let path = if stdin { Path::new("stdin") } else { path };
         let name = path.display();
         let wrong = |e: Error| Failure::input(format!("cannot read the {what} file {name}: {e}"));
         let too_large = |size: &str| {
             Failure::input(format!("the {what} file {name} has {size} bytes; expected at most {MAX_FILE}"))
         };
-        let file = open(path).map_err(wrong)?;
-        let metadata = file.metadata().map_err(wrong)?;
-        if metadata.is_file() && metadata.len() > MAX_FILE {
-            return Err(too_large(&metadata.len().to_string()));
-        }
         let mut bytes = Vec::new();
-        let read = file.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(wrong)?;
+        let (read, is_file) = if stdin {
+            (std::io::stdin().take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(wrong)?, false)
+        } else {
+            let file = open(path).map_err(wrong)?;
+            let metadata = file.metadata().map_err(wrong)?;
+            if metadata.is_file() && metadata.len() > MAX_FILE {
+                return Err(too_large(&metadata.len().to_string()));
+            }
+            let read = file.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(wrong)?;
+            (read, metadata.is_file())
+        };
         if read as u64 > MAX_FILE {
             return Err(too_large(&format!("more than {MAX_FILE}")));
         }
-        if read == 0 && !metadata.is_file() {
+        if read == 0 && !is_file {
             return Err(wrong(Error::new(ErrorKind::UnexpectedEof, "nothing comes out of it")));
         }
         let text = String::from_utf8(bytes);
@@ -87,11 +99,9 @@ impl Source {
         &self.text
     }
 
-    /// The file's name without its ending; the folder's for a `scheme.toml`.
-    pub(crate) fn title(&self) -> String {
-        let stem = self.path.file_stem().unwrap_or(self.path.as_os_str());
-        let folder = self.path.parent().and_then(Path::file_name).filter(|_| stem == "scheme");
-        folder.unwrap_or(stem).to_string_lossy().into_owned()
+    /// The name of the file as it was given.
+    pub(crate) fn name(&self) -> String {
+        self.path.display().to_string()
     }
 
     /// The scheme or the model that it is.
@@ -103,7 +113,7 @@ impl Source {
     pub(crate) fn scheme(&self) -> Result<Scheme, Failure> {
         scheme_file::read(&self.text).map_err(|e| match self.is_model() {
             true => Failure::input(format!(
-                "{} is a model file; expected a scheme file, with [[position]] tables (models go with --model, or to report)",
+                "{} is a model file; expected a scheme file, with [[position]] tables (a model goes without --scheme)",
                 self.path.display()
             )),
             false => self.wrong(&e.message, e.span),
@@ -116,7 +126,7 @@ impl Source {
         match read {
             Ok(model) => Ok(ModelFile { model, source: self }),
             Err(_) if scheme_file::is_scheme(&self.text) => Err(Failure::input(format!(
-                "{} is a scheme file; expected a model file, with [states] and [outputs] (schemes go with --scheme)",
+                "{} is a scheme file; expected a model file, with [states] and [outputs] (a scheme goes without --model)",
                 self.path.display()
             ))),
             Err(e) => Err(self.wrong(&e.to_string(), e.span)),
@@ -142,6 +152,13 @@ impl Source {
             None => Failure::input(format!("{name}: {message}")),
         }
     }
+}
+
+/// A file's name without its ending; the folder's for a `scheme.toml`.
+pub(crate) fn title(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
+    let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "scheme");
+    folder.unwrap_or(stem).to_string_lossy().into_owned()
 }
 
 /// Opens without waiting for somebody to write into a pipe; reading waits for whoever has it open.

@@ -29,19 +29,21 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use arguments::Given;
 use failure::{Failure, say};
 use obsdeg_report::visible;
 
 const AFTER_HELP: &str = "\
 Examples:
   obsdeg analyze --angles 0,0,0 --angles 180,0,0
-  obsdeg analyze --scheme scheme.toml --carry inertial --format json -o verdicts.json
+  obsdeg analyze scheme.toml --carry inertial -o verdicts.json
+  obsdeg analyze model.toml
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
   obsdeg calibrate scheme.toml record.csv
   obsdeg compare a.toml b.toml
   obsdeg design --positions 5 --carry inertial
-  obsdeg report scheme.toml -o review.html
+  obsdeg report scheme.toml model.toml -o review.html
   obsdeg paper
 
 Exit codes: 0 done, 1 a check failed, 2 bad input, 3 internal error, 130 interrupted.";
@@ -74,8 +76,8 @@ enum Command {
     Paper(paper::Arguments),
     /// Print the completion script of a shell
     Completions(completions::Arguments),
-    /// Print the manual page
-    Man,
+    /// Print a manual page, or write all of them to a folder
+    Man(completions::ManArguments),
     /// Print a JSON Schema: of results, or of scheme files
     Schema(schema::Arguments),
     /// Serve symbolic jobs on stdin and stdout (started by the program itself)
@@ -88,13 +90,13 @@ fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
     Cli::command().mut_subcommands(move |command| {
-        arguments::scheme_or_model(command).mut_args(|a| {
+        command.mut_args(|a| {
             if takes(&a) && !a.is_allow_hyphen_values_set() { a.allow_negative_numbers(true) } else { a }
         })
     })
 }
 
-/// Which options of the command take a file that was given without one.
+/// Where the positions of a scheme file go that was given to `design`.
 fn file_hint(e: &clap::Error) -> Option<String> {
     let Some(ContextValue::String(found)) = e.get(ContextKind::InvalidArg) else { return None };
     let file = std::path::Path::new(found).extension().is_some_and(|x| x == "toml" || x == "json");
@@ -103,18 +105,18 @@ fn file_hint(e: &clap::Error) -> Option<String> {
     }
     let command = command();
     let asked = std::env::args().skip(1).find_map(|a| command.find_subcommand(a).cloned())?;
-    let takes = |id: &str| asked.get_arguments().any(|a| a.get_id() == id);
-    let options: Vec<String> = ["scheme", "model"]
-        .into_iter()
-        .filter(|id| takes(id))
-        .map(|id| format!("a {id} file goes with --{id}, as in --{id} {found}"))
-        .collect();
-    (!options.is_empty()).then(|| options.join("; "))
+    let chooses = asked.get_arguments().any(|a| a.get_id() == "candidates");
+    chooses.then(|| format!("the positions of a scheme file are chosen from with --candidates {found}"))
 }
 
-/// The arguments; what is wrong with them is said, and nothing of theirs but text.
-fn arguments() -> Result<Cli, ExitCode> {
-    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+/// The arguments, and which of them concern one kind of file; what is wrong with them is said, and nothing of theirs but text.
+fn arguments() -> Result<(Cli, Given), ExitCode> {
+    let command = command();
+    let parsed = command.clone().try_get_matches().and_then(|matches| {
+        let of = matches.subcommand().and_then(|(name, of)| Some((command.find_subcommand(name)?, of)));
+        let given = of.map(|(command, of)| Given::of(command, of)).unwrap_or_default();
+        Ok((Cli::from_arg_matches(&matches)?, given))
+    });
     parsed.map_err(|mut e| {
         if let Some(hint) = file_hint(&e) {
             e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint.into()]));
@@ -131,17 +133,18 @@ fn arguments() -> Result<Cli, ExitCode> {
 }
 
 fn run() -> Result<(), ExitCode> {
-    let done = match arguments()?.command {
-        Command::Analyze(a) => analyze::run(&a),
-        Command::Simulate(a) => simulate::run(&a),
-        Command::Crosscheck(a) => crosscheck::run(&a),
-        Command::Calibrate(a) => calibrate::run(&a),
+    let (cli, given) = arguments()?;
+    let done = match cli.command {
+        Command::Analyze(a) => analyze::run(&a, &given),
+        Command::Simulate(a) => simulate::run(&a, &given),
+        Command::Crosscheck(a) => crosscheck::run(&a, &given),
+        Command::Calibrate(a) => calibrate::run(&a, &given),
         Command::Compare(a) => compare::run(&a),
         Command::Design(a) => design::run(&a),
-        Command::Report(a) => report::run(&a),
+        Command::Report(a) => report::run(&a, &given),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
-        Command::Man => completions::man(),
+        Command::Man(a) => completions::man(&a),
         Command::Schema(a) => schema::run(&a),
         Command::SymbolicWorker => symbolic_worker(),
     };

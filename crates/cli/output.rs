@@ -4,21 +4,40 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use obsdeg_report::{Answer, File, Format, Layout, written};
+use obsdeg_report::{Answer, File, Format, Layout, csv, written};
 
+use crate::arguments::{Word, one_of};
 use crate::failure::Failure;
 use crate::files;
 use crate::progress::Spinner;
 
 /// Columns of a table that does not go to a terminal.
-const PIPE: Layout = Layout { width: Some(120), color: false };
+const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false };
+
+/// The words of `--format`.
+const FORMATS: [Word<Format>; 5] = [
+    ("table", "for the terminal", Format::Table),
+    ("json", "everything, under a schema (obsdeg schema)", Format::Json),
+    ("markdown", "GitHub-flavoured", Format::Markdown),
+    ("csv", "one table, all digits; --table says which", Format::Csv),
+    ("latex", "tables for \\input (booktabs, longtable, amsmath)", Format::Latex),
+];
 
 /// In which format and where results are written.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct Output {
-    /// table, json, markdown, csv or latex
-    #[arg(long, value_name = "FORMAT", default_value_t = Format::Table)]
-    format: Format,
+    /// The format (default: by the ending of -o, .json .md .csv .tex; else table)
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(FORMATS))]
+    format: Option<Format>,
+
+    /// Which list of the JSON the CSV holds, such as quantities or combinations (default: the main one)
+    #[arg(long, value_name = "NAME")]
+    table: Option<String>,
+
+    /// Nothing but ASCII in tables (default: under TERM=dumb and where the locale is not UTF-8)
+    #[arg(long)]
+    ascii: bool,
 
     #[command(flatten)]
     pub(crate) target: Target,
@@ -26,10 +45,11 @@ pub(crate) struct Output {
 
 /// Where results are written.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct Target {
-    /// Write to a file instead of stdout
+    /// Write to a file instead of stdout (-)
     #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: Option<PathBuf>,
+    output: Option<PathBuf>,
 
     /// Replace an existing file
     #[arg(long)]
@@ -43,7 +63,7 @@ pub(crate) struct Target {
 /// What the options say where there are figures and series too ([`Output::write_folder`]).
 pub(crate) fn to_a_folder(arg: Arg) -> Arg {
     let arg = match arg.get_id().as_str() {
-        "format" => arg.help("Format on stdout: table, json, markdown, csv or latex"),
+        "format" => arg.help("The format on stdout (default: table)"),
         "output" => arg.value_name("DIR").help("Write summary, series and figures to a folder"),
         "force" => arg.help("Replace files in an existing folder"),
         "quiet" => arg,
@@ -52,11 +72,69 @@ pub(crate) fn to_a_folder(arg: Arg) -> Arg {
     arg.help_heading("Output")
 }
 
+/// What a table on stdout looks like.
+fn layout(ascii: bool) -> Layout {
+    let said = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(said);
+    let utf8 = |l: &String| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u));
+    let plain = ascii || !locale.is_none_or(|l| utf8(&l));
+    let stdout = std::io::stdout();
+    if !stdout.is_terminal() {
+        return Layout { ascii: plain, ..PIPE };
+    }
+    Layout {
+        width: terminal_size::terminal_size().map(|(w, _)| w.0),
+        color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
+        ascii: plain || said("TERM").is_some_and(|t| t == "dumb"),
+    }
+}
+
 impl Output {
+    /// Refuses early, before any work, what cannot be written.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        self.format()?;
+        self.target.check()
+    }
+
+    /// The format that is asked for, or that of the file's ending.
+    fn format(&self) -> Result<Format, Failure> {
+        let path = self.target.path();
+        let ending = path.and_then(Path::extension).map(|e| e.to_string_lossy().to_lowercase());
+        let by_ending = match ending.as_deref() {
+            Some("json") => Format::Json,
+            Some("md") => Format::Markdown,
+            Some("csv") => Format::Csv,
+            Some("tex") => Format::Latex,
+            Some(page @ ("html" | "htm" | "pdf")) if self.format.is_none() => {
+                return Err(Failure::input(format!(
+                    "no format for .{page} here; expected a file that ends in .json, .md, .csv, .tex or .txt, or --format (pages are written by `obsdeg report`)"
+                )));
+            }
+            _ if self.table.is_some() => Format::Csv,
+            _ => Format::Table,
+        };
+        let format = self.format.unwrap_or(by_ending);
+        match &self.table {
+            Some(table) if format != Format::Csv => {
+                Err(Failure::input(format!("--table {table} is about CSV, and the format is {format}")))
+            }
+            _ => Ok(format),
+        }
+    }
+
+    /// A result as text.
+    fn text(&self, result: &impl Answer, format: Format, layout: Layout) -> Result<String, Failure> {
+        Ok(match format {
+            Format::Csv => csv(result, self.table.as_deref())?,
+            _ => written(result, format, layout)?,
+        })
+    }
+
     /// Writes a result to the file or to stdout.
     pub(crate) fn write(&self, result: &impl Answer) -> Result<(), Failure> {
-        let layout = if self.target.output.is_some() { PIPE } else { terminal() };
-        self.target.write(written(result, self.format, layout)?.as_bytes(), &[])
+        let stdout = self.target.path().is_none();
+        let layout = if stdout { layout(self.ascii) } else { Layout { ascii: self.ascii, ..PIPE } };
+        self.target.write(self.text(result, self.format()?, layout)?.as_bytes(), &[])
     }
 
     /// Writes a result to stdout and, if there is a folder, its JSON and `more` into that.
@@ -69,8 +147,12 @@ impl Output {
     where
         Failure: From<E>,
     {
-        let text = written(result, self.format, terminal())?;
-        if let Some(folder) = &self.target.output {
+        let asked = self.format.unwrap_or(if self.table.is_some() { Format::Csv } else { Format::Table });
+        if let Some(table) = self.table.as_ref().filter(|_| asked != Format::Csv) {
+            return Err(Failure::input(format!("--table {table} is about CSV, and the format is {asked}")));
+        }
+        let text = self.text(result, asked, layout(self.ascii))?;
+        if let Some(folder) = self.target.path() {
             let _spinner = Spinner::start("drawing figures", self.target.quiet);
             let bytes = written(result, Format::Json, Layout::default())?.into_bytes();
             let mut files = vec![File { name: json.into(), bytes }];
@@ -83,9 +165,14 @@ impl Output {
 }
 
 impl Target {
+    /// The file or folder; none is stdout.
+    pub(crate) fn path(&self) -> Option<&Path> {
+        self.output.as_deref().filter(|path| *path != Path::new("-"))
+    }
+
     /// Refuses early, before any work, what cannot be written to a file: one that exists, and what is no file.
     pub(crate) fn check(&self) -> Result<(), Failure> {
-        let Some(path) = &self.output else { return Ok(()) };
+        let Some(path) = self.path() else { return Ok(()) };
         files::destination(path).map_err(|e| cannot_write(path, &e))?;
         match path.exists() && !self.force {
             true => Err(Failure::input(format!("{} exists; --force replaces it", path.display()))),
@@ -95,12 +182,17 @@ impl Target {
 
     /// Refuses early a folder with something in it.
     pub(crate) fn check_folder(&self) -> Result<(), Failure> {
-        self.output.as_deref().map_or(Ok(()), |folder| self.check_emptiness(folder))
+        if self.output.as_deref() == Some(Path::new("-")) {
+            return Err(Failure::input(
+                "-o - is stdout; expected a folder, for figures and series too".into(),
+            ));
+        }
+        self.path().map_or(Ok(()), |folder| self.check_emptiness(folder))
     }
 
     /// Refuses early a folder beside the file with something in it.
     pub(crate) fn check_beside(&self, folder: &str) -> Result<(), Failure> {
-        let beside = self.output.as_deref().map(|path| files::folder(path).join(folder));
+        let beside = self.path().map(|path| files::folder(path).join(folder));
         beside.map_or(Ok(()), |folder| self.check_emptiness(&folder))
     }
 
@@ -120,38 +212,34 @@ impl Target {
 
     /// The file if it is there and is not to be replaced.
     pub(crate) fn existing(&self) -> Option<&Path> {
-        self.output.as_deref().filter(|path| path.exists() && !self.force)
+        self.path().filter(|path| path.exists() && !self.force)
     }
 
     /// Writes `text` to the file, in place of what is there.
     pub(crate) fn replace(&self, text: &[u8]) -> Result<(), Failure> {
-        let Some(path) = &self.output else { return print(text) };
-        place(path, &[(path.clone(), text)])
+        let Some(path) = self.path() else { return print(text) };
+        place(path, &[(path.to_path_buf(), text)])
     }
 
     /// Writes `text` to the file or to stdout; beside a file what it refers to, which comes first.
     pub(crate) fn write(&self, text: &[u8], beside: &[File]) -> Result<(), Failure> {
-        let Some(path) = &self.output else { return print(text) };
+        let Some(path) = self.path() else { return print(text) };
         self.check()?;
-        let all: Vec<_> = below(files::folder(path), beside).chain([(path.clone(), text)]).collect();
+        let all: Vec<_> = below(files::folder(path), beside).chain([(path.to_path_buf(), text)]).collect();
         place(path, &all)
-    }
-}
-
-/// The layout for stdout.
-fn terminal() -> Layout {
-    let stdout = std::io::stdout();
-    if !stdout.is_terminal() {
-        return PIPE;
-    }
-    Layout {
-        width: terminal_size::terminal_size().map(|(w, _)| w.0),
-        color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
     }
 }
 
 fn cannot_write(path: &Path, e: &std::io::Error) -> Failure {
     Failure::input(format!("cannot write {}: {e}", path.display()))
+}
+
+/// Puts files into a folder; those that are there are replaced only when `force` says so.
+pub(crate) fn write_files(folder: &Path, files: &[File], force: bool) -> Result<(), Failure> {
+    if let Some((path, _)) = below(folder, files).find(|(path, _)| path.exists() && !force) {
+        return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
+    }
+    place(folder, &below(folder, files).collect::<Vec<_>>())
 }
 
 /// Where files go below a folder.

@@ -12,8 +12,8 @@ Examples:
   obsdeg paper
   obsdeg paper --format json --seed 7
 
-Equations (1) to (28) are compared with the model at random points of prime fields, claims about degrees are judged by the engine,
-those of section 3.3 by the filter under the conditions of section 3.1. Each line says agree, with a condition, disagree, or not
+Equations (1) to (28) are compared with the model at random points of prime fields, claims about degrees are judged by the engine, \
+those of section 3.3 by the filter under the conditions of section 3.1. Each line says agree, with a condition, disagree, or not \
 covered, and why.
 
 The paper: Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06.
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
-    a.output.target.check()?;
+    a.output.check()?;
     let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
     a.output.write(&audit)
 }

@@ -9,11 +9,11 @@ use obsdeg_design::review::{ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
-use crate::arguments::{Assumptions, one_of};
+use crate::arguments::{Assumptions, Given, Word, one_of, read_all};
 use crate::conditions::ConditionArguments;
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
-use crate::input::{Input, ModelFile, Source};
+use crate::input::{Input, ModelFile, Source, title};
 use crate::interrupt;
 use crate::origin::origin;
 use crate::output::Target;
@@ -27,27 +27,32 @@ Examples:
   obsdeg report examples/two-compartment/model.toml -o review.md
   obsdeg report scheme.toml --calibration calibration -o review.html
 
-The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their
-pictures in a folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
+The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their pictures in a \
+folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
+
 Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
 /// The words of `--format`.
-const FORMATS: [(&str, ReviewFormat); 4] = [
-    ("html", ReviewFormat::Html),
-    ("pdf", ReviewFormat::Pdf),
-    ("markdown", ReviewFormat::Markdown),
-    ("latex", ReviewFormat::Latex),
+const FORMATS: [Word<ReviewFormat>; 4] = [
+    ("html", "one self-contained page", ReviewFormat::Html),
+    ("pdf", "one file (cargo feature `pdf`)", ReviewFormat::Pdf),
+    ("markdown", "with its pictures in a folder beside it", ReviewFormat::Markdown),
+    ("latex", "with its pictures in a folder beside it", ReviewFormat::Latex),
 ];
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(words))]
 pub(crate) struct Arguments {
-    /// Scheme files (TOML) and model files (TOML, or JSON)
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Scheme files (TOML) and model files (TOML, or JSON); - is stdin
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 
-    /// html, pdf, markdown or latex (default: by the ending of the file)
-    #[arg(long, value_name = "FORMAT", hide_possible_values = true, value_parser = one_of(FORMATS))]
+    /// The format (default: by the ending of the file)
+    #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = one_of(FORMATS))]
     format: Option<ReviewFormat>,
 
     #[command(flatten)]
@@ -61,12 +66,8 @@ pub(crate) struct Arguments {
     calibration: Vec<PathBuf>,
 
     /// Monte Carlo runs of the evidence
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
-    runs: u32,
-
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    #[arg(long = "runs", value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    monte_carlo: u32,
 
     #[command(flatten)]
     engine: EngineArguments,
@@ -80,9 +81,7 @@ fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.required(true).help("The file to be written"),
         "force" => arg.help("Replace existing files"),
-        "carry" => {
-            arg.help("What is carried between positions, for all schemes: platform, inertial or reset")
-        }
+        "carry" => arg.help("What is carried between positions, for all schemes"),
         "latitude" => arg.help(
             "Latitude in degrees, for all schemes (default: that of the file; 28.2 where numbers need one)",
         ),
@@ -90,9 +89,9 @@ fn words(arg: Arg) -> Arg {
     }
 }
 
-pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     interrupt::ends()?;
-    let path = a.target.output.as_deref().unwrap_or(Path::new(""));
+    let path = a.target.path().unwrap_or(Path::new("-"));
     let format = format(a.format, path)?;
     let folder = picture_folder(&path.file_stem().unwrap_or_default().to_string_lossy());
     a.target.check()?;
@@ -101,12 +100,13 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     }
     let mut entries: Vec<Entry> = Vec::new();
     let mut files: Vec<ModelFile> = Vec::new();
-    for path in &a.files {
-        let source = Source::read(path, "scheme or model")?;
-        let title = source.title();
-        match source.scheme_or_model()? {
+    let read = read_all(&a.files)?;
+    given.concern(&read)?;
+    for (path, input) in read {
+        match input {
             Input::Model(file) => files.push(*file),
             Input::Scheme(mut scheme) => {
+                let title = title(Path::new(&path));
                 a.assumptions.apply(&mut scheme);
                 let conditions = a.conditions.conditions(&scheme);
                 let name = if scheme.name.is_empty() { title } else { scheme.name.clone() };
@@ -122,7 +122,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
     let mut worker = a.engine.worker(a.target.quiet)?;
     let bar = Bar::start(1000, "", a.target.quiet);
-    let options = ReviewOptions { runs: a.runs as usize, seed: a.seed };
+    let options = ReviewOptions { runs: a.monte_carlo as usize, seed: a.seed };
     let reviewed = review(&entries, &models, options, worker.as_mut(), &|what, share| {
         bar.says(what);
         bar.at((share * 900.0) as u64);
@@ -137,8 +137,9 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let origin = origin(a.files.iter().chain(&calibrated))?;
     bar.says("writing");
     let written = obsdeg_report::review(&reviewed, &calibrations, &origin, format, &folder)?;
-    notice(worker.as_ref(), a.target.quiet);
-    written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))
+    written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
+    notice(worker.as_ref().map_or(&[], |w| w.banner()), a.target.quiet);
+    Ok(())
 }
 
 /// Where a calibration is.

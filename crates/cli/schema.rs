@@ -6,13 +6,14 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
-use obsdeg_design::design::{Design, Part};
+use obsdeg_design::design::{Design, Part, Walks};
 use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
 use obsdeg_evidence::simulation::Simulation;
 use obsdeg_evidence::system::{SystemEvidence, SystemRun};
-use schemars::schema_for;
+use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::failure::Failure;
 use crate::output;
@@ -35,16 +36,20 @@ enum Kind {
     Design,
     /// The JSON of `obsdeg design --part`
     Part,
+    /// The JSON of `obsdeg design --minimum` where torquer errors make schemes walks
+    Walks,
     /// Scheme files
     Scheme,
-    /// The JSON of `obsdeg analyze --model`
+    /// The JSON of `obsdeg analyze` of a model
     System,
-    /// The JSON of `obsdeg simulate --model`
-    Run,
-    /// The JSON of `obsdeg calibrate --model`
+    /// The JSON of `obsdeg simulate` of a model
+    #[value(alias = "run")]
+    SystemRun,
+    /// The JSON of `obsdeg calibrate` of a model
     SystemCalibration,
-    /// The JSON of `obsdeg crosscheck --model`
-    Evidence,
+    /// The JSON of `obsdeg crosscheck` of a model
+    #[value(alias = "evidence")]
+    SystemEvidence,
     /// Model files
     Model,
 }
@@ -56,22 +61,31 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
-    let schema = match a.kind {
-        Kind::Analysis => schema_for!(Analysis),
-        Kind::Audit => schema_for!(Audit),
-        Kind::Simulation => schema_for!(Simulation),
-        Kind::Crosscheck => schema_for!(CrossCheck),
-        Kind::Calibration => schema_for!(Calibration),
-        Kind::Comparison => schema_for!(Comparison),
-        Kind::Design => schema_for!(Design),
-        Kind::Part => schema_for!(Part),
+    let mut schema = match a.kind {
+        Kind::Analysis => written::<Analysis>(),
+        Kind::Audit => written::<Audit>(),
+        Kind::Simulation => written::<Simulation>(),
+        Kind::Crosscheck => written::<CrossCheck>(),
+        Kind::Calibration => written::<Calibration>(),
+        Kind::Comparison => written::<Comparison>(),
+        Kind::Design => written::<Design>(),
+        Kind::Part => written::<Part>(),
+        Kind::Walks => written::<Walks>(),
         Kind::Scheme => schema_for!(SchemeFile),
-        Kind::System => schema_for!(SystemAnalysis),
-        Kind::Run => schema_for!(SystemRun),
-        Kind::SystemCalibration => schema_for!(SystemCalibration),
-        Kind::Evidence => schema_for!(SystemEvidence),
+        Kind::System => written::<SystemAnalysis>(),
+        Kind::SystemRun => written::<SystemRun>(),
+        Kind::SystemCalibration => written::<SystemCalibration>(),
+        Kind::SystemEvidence => written::<SystemEvidence>(),
         Kind::Model => schema_for!(ModelFile),
     };
+    let name = a.kind.to_possible_value();
+    let name = name.as_ref().map_or("", |v| v.get_name());
+    schema.insert("$id".into(), format!("urn:obsdeg:{name}:1").into());
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
     output::print((text + "\n").as_bytes())
+}
+
+/// The schema of what is written: what is left out there may be missing.
+fn written<T: JsonSchema>() -> Schema {
+    SchemaSettings::default().for_serialize().into_generator().into_root_schema_for::<T>()
 }

@@ -566,7 +566,7 @@ fn evidence_of_several_experiments() {
     // a state of the other experiment stands still
     let x2 = &traces.series[2].truth;
     assert!(x2[..=40].iter().all(|x| *x == 0.3) && x2[80] != 0.3);
-    for estimate in run.estimates.iter().filter(|e| e.is_determined()) {
+    for estimate in run.quantities.iter().filter(|e| e.is_determined()) {
         assert!(
             estimate.error_over_sigma.abs() < 4.0 && estimate.sigma < estimate.prior_sigma,
             "{estimate:?}"
@@ -598,7 +598,7 @@ fn evidence_on_constraints() {
     assert_eq!((e.defect.predicted, e.defect.measured), (0, 0));
     let (run, _) = simulate_system(&read(&text), 1).expect("a run");
     assert!(run.consistency.consistent, "{run:?}");
-    let q: Vec<f64> = run.estimates.iter().take(4).map(|e| e.estimate).collect();
+    let q: Vec<f64> = run.quantities.iter().take(4).map(|e| e.estimate).collect();
     assert!((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-3, "{q:?}");
     let off = text.replace("q = [0.5, 0.5, 0.5, 0.5]", "q = [0.5, 0.5, 0.5, 0.6]");
     let error = simulate_system(&read(&off), 1).map(|r| r.0).expect_err("off the sphere").to_string();

@@ -26,6 +26,7 @@ mod release;
 mod report;
 mod report_page;
 mod rotation;
+mod schemas;
 mod scheme_schema;
 mod schemes;
 mod second_path;

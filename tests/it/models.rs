@@ -460,7 +460,7 @@ fn slopes_that_do_not_settle_are_not_measured() {
 fn filters_of_models() {
     let (run, traces) = simulate_system(&example("two-position-alignment"), 1).expect("a run");
     assert!(run.consistency.consistent, "{run:?}");
-    for e in &run.estimates {
+    for e in &run.quantities {
         assert!(e.sigma < e.prior_sigma && e.error_over_sigma.abs() < 4.0, "{e:?}");
     }
     assert_eq!((traces.time.len(), traces.series.len()), (1201, 10));
@@ -471,10 +471,10 @@ fn filters_of_models() {
     assert!(sigma("bN", 600) > 100.0 * sigma("bN", 1200));
     let (prey, _) = simulate_system(&example("lotka-volterra"), 1).expect("a run");
     let beyond: Vec<&str> =
-        prey.estimates.iter().filter(|e| e.error_over_sigma.abs() > 4.0).map(|e| e.name.as_str()).collect();
+        prey.quantities.iter().filter(|e| e.error_over_sigma.abs() > 4.0).map(|e| e.name.as_str()).collect();
     assert_eq!((beyond, prey.consistency.consistent), (vec!["x2", "b"], false));
     // the product that is observable comes out all the same
-    let of = |name: &str| prey.estimates.iter().find(|e| e.name == name).expect("an unknown");
+    let of = |name: &str| prey.quantities.iter().find(|e| e.name == name).expect("an unknown");
     let product = of("b").estimate * of("x2").estimate / (of("b").truth * of("x2").truth);
     assert!((product - 1.0).abs() < 0.03, "{product}");
     // the same seed, the same run; what is missing is named

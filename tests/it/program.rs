@@ -7,6 +7,8 @@ use serde_json::Value;
 pub(crate) fn obsdeg(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).stdin(Stdio::null());
+    // whatever the locale of whoever tests
+    command.env_remove("LC_ALL").env_remove("LC_CTYPE").env("LANG", "C.UTF-8");
     command
 }
 

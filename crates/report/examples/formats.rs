@@ -11,6 +11,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let format: Format = std::env::args().nth(1).as_deref().unwrap_or("markdown").parse()?;
     let positions = [[0, 0, 0], [180, 0, 0]].map(|p| p.map(Angle::from_degrees));
     let answer = analyze(&Scheme::of_angles(positions), AnalysisOptions::default(), None)?;
-    print!("{}", written(&answer, format, Layout { width: Some(100), color: false })?);
+    print!("{}", written(&answer, format, Layout { width: Some(100), ..Layout::default() })?);
     Ok(())
 }

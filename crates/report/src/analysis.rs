@@ -46,7 +46,7 @@ fn expression(text: &str) -> Cell {
 fn verdicts(a: &Analysis) -> [Block; 2] {
     let dwell = words::dwell_matters(a).then(|| left("with dwell"));
     let columns = |first: &[Column], last| {
-        [first, &[left("verdict"), right("degree")], dwell.as_slice(), &[left(last)]].concat()
+        [first, &[left("status"), right("degree")], dwell.as_slice(), &[left(last)]].concat()
     };
     let row = |first: Vec<Cell>, status: Status, degree, order, last: Cell| {
         let dwell = dwell.is_some().then(|| words::with_dwell(a, degree, order).into());
@@ -134,44 +134,5 @@ impl Answer for Analysis {
             lead: vec![words::rank(self)],
             blocks,
         }
-    }
-
-    /// One row per unknown, then one per combination, with all partners.
-    fn records(&self) -> Option<Vec<Vec<String>>> {
-        let header = [
-            "kind",
-            "name",
-            "unit",
-            "status",
-            "degree",
-            "accuracy_order",
-            "with_dwell",
-            "partners",
-            "solution",
-        ];
-        let order = |k: Option<usize>| k.map_or_else(String::new, |k| k.to_string());
-        let row = |first: [&str; 3],
-                   status: Status,
-                   degrees: [Option<usize>; 2],
-                   partners,
-                   s: &Option<Solution>| {
-            let [degree, accuracy] = degrees;
-            let mut row = first.map(String::from).to_vec();
-            row.extend([status.to_string().replace(' ', "_"), order(degree), order(accuracy)]);
-            row.extend([words::with_dwell(self, degree, accuracy), partners]);
-            row.push(s.as_ref().map_or_else(String::new, |s| s.text.clone()));
-            row
-        };
-        let unknowns = self.quantities.iter().map(|q| {
-            let degrees = [q.degree, q.accuracy_order];
-            row(["unknown", &q.name, &q.unit], q.status, degrees, q.partners.join(" "), &q.solution)
-        });
-        let combinations = self.combinations.iter().map(|c| {
-            let kind = if c.requested { "requested" } else { "combination" };
-            let degrees = [c.degree, c.accuracy_order];
-            row([kind, &c.expression, ""], c.status, degrees, String::new(), &c.solution)
-        });
-        let header = header.map(String::from).to_vec();
-        Some(std::iter::once(header).chain(unknowns).chain(combinations).collect())
     }
 }

@@ -27,4 +27,8 @@ impl Answer for Audit {
             blocks: vec![Block::table("", columns, rows)],
         }
     }
+
+    fn main_table(&self) -> &'static str {
+        "lines"
+    }
 }

@@ -11,7 +11,7 @@ use crate::document::{
 };
 use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
-use crate::{Answer, ReportError, words};
+use crate::{Answer, ReportError, Table, words};
 
 /// How many outliers are listed.
 const LISTED: usize = 20;
@@ -309,7 +309,7 @@ impl Answer for Calibration {
             right("rescaled"),
             right("predicted"),
             right("prior"),
-            left("verdict"),
+            left("status"),
         ];
         let mut blocks = vec![Block::table(
             "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the scheme would do, in sigma and to sigma)",
@@ -406,21 +406,28 @@ impl Answer for Calibration {
     }
 
     /// Everything that has an estimate, with the covariance of all.
-    fn records(&self) -> Option<Vec<Vec<String>>> {
-        Some(covariance_rows(&self.covariance))
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        let mut tables = crate::tables::of_json(&serde_json::to_value(self)?);
+        tables.push(covariance_table(&self.covariance));
+        Ok(tables)
+    }
+
+    /// Estimates and sigmas with the covariance of all.
+    fn main_table(&self) -> &'static str {
+        "covariance"
     }
 }
 
 /// Estimates and sigmas with the covariance of all.
-pub(crate) fn covariance_rows(t: &CovarianceTable) -> Vec<Vec<String>> {
+pub(crate) fn covariance_table(t: &CovarianceTable) -> Table {
     let head = ["name", "unit", "estimate", "sigma"].map(String::from).into_iter();
-    let head = head.chain(t.names.iter().map(|n| format!("covariance with {n}"))).collect();
+    let columns = head.chain(t.names.iter().map(|n| format!("covariance with {n}"))).collect();
     let row = |i: usize| {
         let own = [t.estimates[i], t.covariance[i][i].sqrt()].map(|x| x.to_string());
         let texts = [t.names[i].clone(), t.units[i].clone()].into_iter().chain(own);
         texts.chain(t.covariance[i].iter().map(f64::to_string)).collect()
     };
-    std::iter::once(head).chain((0..t.names.len()).map(row)).collect()
+    Table { name: "covariance".into(), columns, rows: (0..t.names.len()).map(row).collect() }
 }
 
 /// Every measurement and what is left of it, as CSV.

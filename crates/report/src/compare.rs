@@ -275,4 +275,8 @@ impl Answer for Comparison {
             blocks,
         }
     }
+
+    fn main_table(&self) -> &'static str {
+        "schemes.quantities"
+    }
 }

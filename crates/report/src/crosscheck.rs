@@ -60,7 +60,7 @@ fn by_derivatives(c: &CrossCheck) -> Block {
         "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was at the start of each",
         [
             left("unknown"),
-            left("verdict"),
+            left("status"),
             left("measured"),
             right("degree"),
             right("slope predicted"),

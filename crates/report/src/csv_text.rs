@@ -1,6 +1,5 @@
 //! Comma-separated values.
 
-use crate::document::{Block, Document};
 use crate::{ReportError, visible};
 
 /// A field: a text that a spreadsheet would take for a formula has an apostrophe before it, as one types it there.
@@ -26,16 +25,4 @@ pub(crate) fn write(rows: impl IntoIterator<Item = Vec<String>>) -> Result<Strin
     }
     let bytes = writer.into_inner().map_err(|e| csv::Error::from(e.into_error()))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
-/// The first table.
-pub(crate) fn document(d: &Document) -> Result<String, ReportError> {
-    let first = d.blocks.iter().find_map(|b| match b {
-        Block::Table { columns, rows, .. } => Some((columns, rows)),
-        _ => None,
-    });
-    let Some((columns, rows)) = first else { return Ok(String::new()) };
-    let header = columns.iter().map(|c| c.name.clone().into_owned()).collect();
-    let rows = rows.iter().map(|r| r.iter().map(|c| c.text.clone()).collect());
-    write(std::iter::once(header).chain(rows))
 }

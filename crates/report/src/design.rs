@@ -456,6 +456,10 @@ impl Answer for Design {
         );
         Document { title: format!("Design: {what}, {} carry", self.carry), lead: Vec::new(), blocks }
     }
+
+    fn main_table(&self) -> &'static str {
+        if self.found.is_empty() { "answer" } else { "found" }
+    }
 }
 
 fn candidates(names: &[String]) -> String {

@@ -35,6 +35,7 @@ mod simulation;
 mod system;
 mod system_calibration;
 mod table;
+mod tables;
 mod vector;
 mod visible;
 mod walks;
@@ -47,6 +48,7 @@ pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use poses::position_figure;
 pub use series::{series_csv, series_parquet};
 pub use system_calibration::{system_calibration_figures, system_residuals_csv};
+pub use tables::Table;
 pub use visible::visible;
 
 use std::fmt;
@@ -66,7 +68,7 @@ pub enum Format {
     Json,
     /// GitHub-flavoured Markdown.
     Markdown,
-    /// Comma-separated values: one row per unknown and combination.
+    /// Comma-separated values: one [`Table`] of the answer.
     Csv,
     /// LaTeX tables for `\input` (packages booktabs, longtable, amsmath).
     Latex,
@@ -111,8 +113,10 @@ impl fmt::Display for Format {
 pub struct Layout {
     /// Columns of the terminal; `None` for no limit.
     pub width: Option<u16>,
-    /// Whether headings are styled with ANSI codes.
+    /// Whether headings and verdicts are styled with ANSI codes.
     pub color: bool,
+    /// Whether there is nothing but ASCII: lines are drawn so, and other characters written as `\u{e9}`.
+    pub ascii: bool,
 }
 
 /// Why a result could not be written.
@@ -121,6 +125,14 @@ pub enum ReportError {
     /// JSON.
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
+    /// No such table.
+    #[error("no table `{asked}` in this answer; expected one of {}", known.join(", "))]
+    NoTable {
+        /// What was asked for.
+        asked: String,
+        /// The tables that there are.
+        known: Vec<String>,
+    },
     /// CSV.
     #[error("cannot write CSV: {0}")]
     Csv(#[from] csv::Error),
@@ -146,9 +158,56 @@ pub trait Answer: serde::Serialize {
     /// What it says, in no format.
     fn document(&self) -> Document;
 
-    /// Its rows in CSV, names first, where they are not those of the first table.
-    fn records(&self) -> Option<Vec<Vec<String>>> {
-        None
+    /// Its tables: what is listed in its JSON.
+    ///
+    /// # Errors
+    /// Those of its serialisation.
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        Ok(tables::of_json(&serde_json::to_value(self)?))
+    }
+
+    /// The table that is meant when none is named.
+    fn main_table(&self) -> &'static str {
+        "quantities"
+    }
+}
+
+/// Answers on several files, by their names.
+pub struct Several<A>(pub Vec<(String, A)>);
+
+impl<A: Answer> serde::Serialize for Several<A> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(serde::Serialize)]
+        struct One<'a, A> {
+            file: &'a str,
+            answer: &'a A,
+        }
+        serializer.collect_seq(self.0.iter().map(|(file, answer)| One { file, answer }))
+    }
+}
+
+impl<A: Answer> Answer for Several<A> {
+    fn document(&self) -> Document {
+        let mut blocks = Vec::new();
+        for (file, answer) in &self.0 {
+            let document = answer.document();
+            let title = format!("{file}: {}", document.title);
+            blocks.push(document::Block::Section { level: 1, title });
+            blocks.extend(document.lead.into_iter().map(document::Block::Text));
+            blocks.extend(document.blocks);
+        }
+        Document { title: String::new(), lead: vec![], blocks }
+    }
+
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        let of = |(file, answer): &'_ (String, A)| Ok((file.clone(), answer.tables()?));
+        let all: Vec<(String, Vec<Table>)> =
+            self.0.iter().map(of).collect::<Result<_, serde_json::Error>>()?;
+        Ok(tables::together(all))
+    }
+
+    fn main_table(&self) -> &'static str {
+        self.0.first().map_or("answer", |(_, answer)| answer.main_table())
     }
 }
 
@@ -161,12 +220,22 @@ pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<S
         Format::Table => table::document(&answer.document(), layout),
         Format::Json => visible::json(answer)?,
         Format::Markdown => markdown::document(&answer.document()),
-        Format::Csv => match answer.records() {
-            Some(rows) => csv_text::write(rows)?,
-            None => csv_text::document(&answer.document())?,
-        },
+        Format::Csv => csv(answer, None)?,
         Format::Latex => latex::document(&answer.document()),
     })
+}
+
+/// A table of a result as CSV; the main one where none is named.
+///
+/// # Errors
+/// [`ReportError::NoTable`], and when a serializer fails.
+pub fn csv(answer: &impl Answer, table: Option<&str>) -> Result<String, ReportError> {
+    let tables = answer.tables()?;
+    let asked = table.unwrap_or(answer.main_table());
+    let known = || tables.iter().map(|t| t.name.clone()).collect();
+    let table = tables.iter().find(|t| t.name == asked);
+    let table = table.ok_or_else(|| ReportError::NoTable { asked: asked.into(), known: known() })?;
+    csv_text::write(std::iter::once(table.columns.clone()).chain(table.rows.iter().cloned()))
 }
 
 /// A part in percent, never below what it is: `0.0021 %`.

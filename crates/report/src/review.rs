@@ -209,7 +209,7 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
         [
             left("unknown"),
             left("unit"),
-            left("verdict"),
+            left("status"),
             right("degree"),
             right("accuracy order"),
             left("not told from"),
@@ -473,7 +473,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
     };
     blocks.extend(run.blocks.into_iter().filter(kept));
     let flat: Vec<&str> = (s.simulation.quantities.iter())
-        .filter(|q| q.status == Exact::NotExcited && q.verdict == Outcome::PriorOnly)
+        .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)
         .map(|q| q.name.as_str())
         .collect();
     blocks.extend(pictures::errors(&s.traces, &flat, id));

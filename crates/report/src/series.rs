@@ -5,12 +5,15 @@ use std::sync::Arc;
 use obsdeg_evidence::simulation::Traces;
 use parquet::basic::{Compression, Type as Physical};
 use parquet::data_type::{DoubleType, Int32Type};
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
 
-use crate::ReportError;
 use crate::figures::file_name;
+use crate::{Answer, Format, Layout, ReportError, written};
 
 /// A unit as a part of a column name: `deg/h/g` is `dph_per_g`, `mg/l` is `mg_per_l`.
 fn suffix(unit: &str) -> String {
@@ -19,16 +22,24 @@ fn suffix(unit: &str) -> String {
     if plain.is_empty() { plain } else { format!("_{plain}") }
 }
 
-/// The columns after the position: name and values.
-fn columns(record: &Traces) -> Vec<(String, Vec<f64>)> {
-    let mut out = vec![(format!("t{}", suffix(&record.time_unit)), record.time.clone())];
+/// A column after the position.
+struct Column {
+    name: String,
+    unit: String,
+    values: Vec<f64>,
+}
+
+fn columns(record: &Traces) -> Vec<Column> {
+    let name = format!("t{}", suffix(&record.time_unit));
+    let mut out = vec![Column { name, unit: record.time_unit.clone(), values: record.time.clone() }];
     for (i, name) in record.names.iter().enumerate() {
         let (series, scale) = (&record.series[i], record.scales[i]);
         for (what, values) in
             [("true", &series.truth), ("estimate", &series.estimate), ("sigma", &series.sigma)]
         {
-            let column = format!("{}_{what}{}", file_name(name), suffix(&record.units[i]));
-            out.push((column, values.iter().map(|x| x / scale).collect()));
+            let unit = record.units[i].clone();
+            let name = format!("{}_{what}{}", file_name(name), suffix(&unit));
+            out.push(Column { name, unit, values: values.iter().map(|x| x / scale).collect() });
         }
     }
     out
@@ -40,19 +51,21 @@ fn columns(record: &Traces) -> Vec<(String, Vec<f64>)> {
 /// [`ReportError::Csv`].
 pub fn series_csv(record: &Traces) -> Result<String, ReportError> {
     let columns = columns(record);
-    let header = std::iter::once("position".to_string()).chain(columns.iter().map(|c| c.0.clone())).collect();
+    let header =
+        std::iter::once("position".to_string()).chain(columns.iter().map(|c| c.name.clone())).collect();
     let rows = (0..record.time.len()).map(|k| {
         let position = (record.position[k] + 1).to_string();
-        std::iter::once(position).chain(columns.iter().map(|c| c.1[k].to_string())).collect()
+        std::iter::once(position).chain(columns.iter().map(|c| c.values[k].to_string())).collect()
     });
     crate::csv_text::write(std::iter::once(header).chain(rows))
 }
 
-/// The same as Parquet (snappy).
+/// The same as Parquet (snappy). Its metadata say what it belongs to: `obsdeg.version`, `obsdeg.seed`, `obsdeg.units` (JSON, unit by
+/// column) and `obsdeg.summary_sha256`, the digest of the summary of the run as JSON, which holds all its conditions.
 ///
 /// # Errors
-/// [`ReportError::Parquet`].
-pub fn series_parquet(record: &Traces) -> Result<Vec<u8>, ReportError> {
+/// [`ReportError::Parquet`], [`ReportError::Json`].
+pub fn series_parquet(record: &Traces, summary: &impl Answer) -> Result<Vec<u8>, ReportError> {
     let columns = columns(record);
     let field = |name: &str, kind| {
         Type::primitive_type_builder(name, kind)
@@ -61,12 +74,13 @@ pub fn series_parquet(record: &Traces) -> Result<Vec<u8>, ReportError> {
             .map(Arc::new)
     };
     let mut fields = vec![field("position", Physical::INT32)?];
-    for (name, _) in &columns {
-        fields.push(field(name, Physical::DOUBLE)?);
+    for column in &columns {
+        fields.push(field(&column.name, Physical::DOUBLE)?);
     }
     let schema = Arc::new(Type::group_type_builder("series").with_fields(fields).build()?);
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
+        .set_key_value_metadata(Some(metadata(&columns, summary)?))
         .set_created_by(concat!("obsdeg ", env!("CARGO_PKG_VERSION")).into())
         .build();
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
@@ -76,7 +90,7 @@ pub fn series_parquet(record: &Traces) -> Result<Vec<u8>, ReportError> {
         column.typed::<Int32Type>().write_batch(&positions, None, None)?;
         column.close()?;
     }
-    for (_, values) in &columns {
+    for Column { values, .. } in &columns {
         if let Some(mut column) = group.next_column()? {
             column.typed::<DoubleType>().write_batch(values, None, None)?;
             column.close()?;
@@ -84,4 +98,20 @@ pub fn series_parquet(record: &Traces) -> Result<Vec<u8>, ReportError> {
     }
     group.close()?;
     Ok(writer.into_inner()?)
+}
+
+fn metadata(columns: &[Column], summary: &impl Answer) -> Result<Vec<KeyValue>, ReportError> {
+    let text = written(summary, Format::Json, Layout::default())?;
+    let digest: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+    let json: Value = serde_json::from_str(&text)?;
+    let units: Map<String, Value> =
+        columns.iter().map(|c| (c.name.clone(), Value::from(c.unit.clone()))).collect();
+    Ok([
+        ("version", env!("CARGO_PKG_VERSION").into()),
+        ("seed", json["seed"].to_string()),
+        ("units", Value::Object(units).to_string()),
+        ("summary_sha256", digest),
+    ]
+    .map(|(key, value): (&str, String)| KeyValue::new(format!("obsdeg.{key}"), value))
+    .into())
 }

@@ -148,7 +148,7 @@ fn linear(e: &Estimate) -> Option<Vec<String>> {
 fn row(e: &Estimate) -> Vec<String> {
     let mut out = vec![e.name.clone(), e.unit.clone()];
     out.extend(words::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
-    out.extend([optional(e.time_to_requirement_s), words::outcome(e.verdict).into()]);
+    out.extend([optional(e.time_to_requirement_s), words::outcome(e.outcome).into()]);
     out
 }
 
@@ -195,16 +195,16 @@ impl Answer for Simulation {
     fn document(&self) -> Document {
         let mut columns = vec![left("unknown"), left("unit")];
         columns.extend(words::ESTIMATE.map(right));
-        columns.extend([right("at [s]"), left("verdict")]);
+        columns.extend([right("at [s]"), left("outcome")]);
         let table =
             |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
         let end = self.timeline.last().map_or(0.0, |t| t.end_s);
         // torquer errors act in slews, which verdicts then take as fast
         let torqued = self.quantities.iter().any(|q| q.name.starts_with("GS_") || q.name.starts_with("GM_"));
         let degree = if torqued && self.timeline.iter().any(|t| t.slew) {
-            "exact verdict of turns fast against the earth rate, - not observable; verdict: with the slews"
+            "exact verdict of turns fast against the earth rate, - not observable; outcome: with the slews"
         } else if self.timeline.iter().any(|t| t.slew) {
-            "exact verdict of repositioning at once, - not observable; verdict: with the slews"
+            "exact verdict of repositioning at once, - not observable; outcome: with the slews"
         } else {
             "exact verdict, - not observable"
         };

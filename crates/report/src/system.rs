@@ -86,7 +86,7 @@ fn combinations(heading: &str, list: &[SystemCombination]) -> Block {
         let verdict = if c.degree.is_some() { "observable" } else { "not observable" };
         vec![c.expression.clone(), verdict.into(), words::degree(c.degree)]
     };
-    Block::table(heading, [left("combination"), left("verdict"), right("degree")], list.iter().map(row))
+    Block::table(heading, [left("combination"), left("status"), right("degree")], list.iter().map(row))
 }
 
 impl Answer for SystemAnalysis {
@@ -113,7 +113,7 @@ impl Answer for SystemAnalysis {
         });
         let mut columns = vec![left("unknown"), left("kind")];
         columns.extend(units.then(|| left("unit")));
-        columns.extend([left("verdict"), right("degree"), left("explanation")]);
+        columns.extend([left("status"), right("degree"), left("explanation")]);
         let mut blocks = vec![Block::table("Verdicts", columns, rows)];
         let solved = order.iter().filter_map(|q| {
             let solution = q.solution.as_ref()?;
@@ -217,7 +217,7 @@ impl Answer for SystemRun {
     fn document(&self) -> Document {
         let row = |e: &SystemEstimate| {
             let exact = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
-            let verdict = match e.verdict {
+            let verdict = match e.outcome {
                 Outcome::Reached | Outcome::Converging => exact,
                 other => format!("{exact}, {}", words::outcome(other)),
             };
@@ -227,18 +227,18 @@ impl Answer for SystemRun {
             out.push(number(e.prior_sigma));
             out
         };
-        let mut columns = vec![left("unknown"), left("unit"), left("verdict")];
+        let mut columns = vec![left("unknown"), left("unit"), left("status")];
         columns.extend(words::ESTIMATE.map(right));
         columns.push(right("prior sigma"));
         let table = Block::table(
             "Estimates at the end (verdict and degree: exact, and what the run makes of it)",
             columns,
-            self.estimates.iter().map(row),
+            self.quantities.iter().map(row),
         );
         let mut consistency = words::consistency(&self.consistency);
         let beyond =
             |e: &&SystemEstimate| e.status != Some(Status::Observable) && e.error_over_sigma.abs() > 4.0;
-        let beyond: Vec<&str> = self.estimates.iter().filter(beyond).map(|e| e.name.as_str()).collect();
+        let beyond: Vec<&str> = self.quantities.iter().filter(beyond).map(|e| e.name.as_str()).collect();
         if !beyond.is_empty() {
             consistency.push(format!(
             "{}: not observable, yet the filter trusts its estimate: linearised anew at every step, it takes up information that is not there",
@@ -298,7 +298,7 @@ impl Answer for SystemEvidence {
             "Information of the samples, linearised along the true run",
             [
                 left("unknown"),
-                left("verdict"),
+                left("status"),
                 right("degree"),
                 right("slope"),
                 right("measured"),

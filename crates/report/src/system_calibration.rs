@@ -5,7 +5,7 @@ use obsdeg_calibration::system::{SystemCalibration, SystemEstimated, SystemFindi
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
-use crate::{Answer, ReportError, words};
+use crate::{Answer, ReportError, Table, words};
 
 /// How many of many are listed.
 const LISTED: usize = 20;
@@ -79,7 +79,7 @@ impl Answer for SystemCalibration {
             right("estimate"),
             right("sigma"),
             right("rescaled"),
-            left("verdict"),
+            left("status"),
         ];
         let mut blocks = vec![Block::table(
             "Estimates (degree: exact verdict; states: at the start)",
@@ -183,8 +183,15 @@ impl Answer for SystemCalibration {
         Document { title: format!("Calibration: {}", self.name), lead, blocks }
     }
 
-    fn records(&self) -> Option<Vec<Vec<String>>> {
-        Some(crate::calibration::covariance_rows(&self.covariance))
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        let mut tables = crate::tables::of_json(&serde_json::to_value(self)?);
+        tables.push(crate::calibration::covariance_table(&self.covariance));
+        Ok(tables)
+    }
+
+    /// Estimates and sigmas with the covariance of all.
+    fn main_table(&self) -> &'static str {
+        "covariance"
     }
 }
 

@@ -1,5 +1,7 @@
 //! The table for the terminal.
 
+use std::borrow::Cow;
+
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
 use crate::document::{Block, Column, Document};
@@ -54,11 +56,50 @@ fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell
     for row in rows {
         let aligned = row.iter().zip(columns).map(|(cell, column)| {
             let side = if column.number { CellAlignment::Right } else { CellAlignment::Left };
-            Cell::new(visible(&cell.text)).set_alignment(side)
+            let graded = layout.color && GRADED.contains(&column.name.as_ref());
+            let text = if graded { marked(&cell.text) } else { visible(&cell.text) };
+            Cell::new(text).set_alignment(side)
         });
         table.add_row(aligned);
     }
-    out.extend(table.to_string().lines().flat_map(|l| [l.trim_end(), "\n"]));
+    for line in table.to_string().lines() {
+        let coloured =
+            COLOURS.iter().fold(line.trim_end().to_string(), |l, (mark, code, _)| l.replace(*mark, code));
+        out.push_str(&coloured.replace(END, "\u{1b}[0m"));
+        out.push('\n');
+    }
+}
+
+/// Columns whose words are graded.
+const GRADED: [&str; 4] = ["status", "verdict", "outcome", "finding"];
+
+/// A mark without width that stands for a colour, its code, and the words that have it; what they say is never said by colour alone.
+const COLOURS: [(char, &str, &[&str]); 3] = [
+    ('\u{2062}', "\u{1b}[32m", &["observable", "agree", "agrees", "ok", "met", "consistent"]),
+    (
+        '\u{2063}',
+        "\u{1b}[33m",
+        &["inseparable", "not seen", "LIMITED", "not resolvable", "open", "with a condition"],
+    ),
+    (
+        '\u{2064}',
+        "\u{1b}[31m",
+        &["not excited", "disagree", "disagrees", "NOT MET", "missed", "inconsistent"],
+    ),
+];
+
+/// The mark of the end of a colour.
+const END: char = '\u{2061}';
+
+/// Every word of a graded text in marks, so that it may be wrapped.
+fn marked(text: &str) -> Cow<'_, str> {
+    match COLOURS.iter().find(|(.., words)| words.contains(&text)) {
+        Some((mark, ..)) => {
+            let words: Vec<String> = text.split(' ').map(|word| format!("{mark}{word}{END}")).collect();
+            Cow::Owned(words.join(" "))
+        }
+        None => visible(text),
+    }
 }
 
 pub(crate) fn document(d: &Document, layout: Layout) -> String {
@@ -85,6 +126,19 @@ pub(crate) fn document(d: &Document, layout: Layout) -> String {
             }
             // a status is a table by now
             Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => {}
+        }
+    }
+    if layout.ascii { in_ascii(&out) } else { out }
+}
+
+/// Lines drawn with ASCII, other characters by their numbers.
+fn in_ascii(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '─' => out.push('-'),
+            c if c.is_ascii() => out.push(c),
+            c => out.extend(c.escape_unicode()),
         }
     }
     out

@@ -89,4 +89,8 @@ impl Answer for Walks {
             ],
         }
     }
+
+    fn main_table(&self) -> &'static str {
+        "answer"
+    }
 }

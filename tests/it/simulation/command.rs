@@ -1,5 +1,7 @@
 //! The command: its words, its formats, its folder, what it refuses.
 
+use sha2::{Digest, Sha256};
+
 use super::*;
 
 /// What is known from the prior only says on whose: of the paper's case D_FZ - wN psi_y is seen, neither of them alone.
@@ -14,7 +16,7 @@ fn what_rests_on_a_prior_says_on_whose() {
     let w_n = W_N_DPH * 28.2f64.to_radians().cos();
     assert!((of(&s, "D_FZ").sigma / (w_n * 0.1f64.to_radians()) - 1.0).abs() < 0.05, "{:?}", of(&s, "D_FZ"));
     for q in &s.quantities {
-        assert!(q.prior_of.is_empty() || q.verdict == Outcome::PriorOnly, "{q:?}");
+        assert!(q.prior_of.is_empty() || q.outcome == Outcome::PriorOnly, "{q:?}");
         for other in &q.prior_of {
             assert!(of(&s, other).prior_of.contains(&q.name), "mutual: {} {other}", q.name);
         }
@@ -124,6 +126,16 @@ fn the_folder_of_a_run() {
 
     let parquet = bytes::Bytes::from(file("series.parquet").clone());
     let reader = SerializedFileReader::new(parquet).expect("Parquet");
+    // what it belongs to
+    let metadata = reader.metadata().file_metadata().key_value_metadata().expect("metadata");
+    let of = |key: &str| {
+        let found = metadata.iter().find(|m| m.key == format!("obsdeg.{key}"));
+        found.and_then(|m| m.value.clone()).expect("it is there")
+    };
+    let digest: String = Sha256::digest(file("summary.json")).iter().map(|b| format!("{b:02x}")).collect();
+    assert_eq!((of("summary_sha256"), of("seed")), (digest, "1".into()));
+    let units: serde_json::Value = serde_json::from_str(&of("units")).expect("JSON");
+    assert_eq!((&units["t_s"], &units["D_FX_sigma_dph"]), (&"s".into(), &"deg/h".into()), "{units}");
     let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
     let names: Vec<String> = columns.iter().map(|c| c.name().to_string()).collect();
     assert_eq!(names, header);

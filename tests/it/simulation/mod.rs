@@ -70,20 +70,20 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
             let lost = s.quantities.iter().chain(&s.combinations).filter(|q| q.degree.is_none());
             for q in lost {
                 assert_eq!(
-                    (q.verdict, q.time_to_requirement_s),
+                    (q.outcome, q.time_to_requirement_s),
                     (Outcome::PriorOnly, None),
                     "{carry}: {q:?}"
                 );
             }
             for q in s.quantities.iter().filter(|q| q.degree.is_some()) {
-                assert_ne!(q.verdict, Outcome::PriorOnly, "{carry}: {q:?}");
+                assert_ne!(q.outcome, Outcome::PriorOnly, "{carry}: {q:?}");
             }
             // they miss their requirements, whatever sigma is
             let unseen = s.quantities.iter().filter(|q| q.degree.is_none()).count();
             assert_eq!(
                 (s.requirements.stated, s.requirements.met),
                 (15 + 3 * usize::from(carry == Carry::Reset), {
-                    s.quantities.iter().filter(|q| q.verdict == Outcome::Reached).count()
+                    s.quantities.iter().filter(|q| q.outcome == Outcome::Reached).count()
                 })
             );
             assert!(s.requirements.missed.len() >= unseen && unseen > 0);
@@ -91,12 +91,12 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
     }
     // the paper's D_FZ, whose sigma is below what is required only because psi's prior is
     let d_fz = of(&simulated(Carry::Platform, &Conditions::default()), "D_FZ").clone();
-    assert!(d_fz.required_sigma.is_some_and(|r| d_fz.sigma < r) && d_fz.verdict == Outcome::PriorOnly);
+    assert!(d_fz.required_sigma.is_some_and(|r| d_fz.sigma < r) && d_fz.outcome == Outcome::PriorOnly);
     let output = run(&[&P1P2[..], &["--format", "json"]].concat());
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let of_json = |name: &str| {
         let list = json["quantities"].as_array().expect("a list");
-        list.iter().find(|q| q["name"] == name).expect("an unknown")["verdict"].clone()
+        list.iter().find(|q| q["name"] == name).expect("an unknown")["outcome"].clone()
     };
     assert_eq!((of_json("D_FZ"), of_json("D_FY")), ("prior_only".into(), "reached".into()));
     let (_, record) = simulate(&paper(Carry::Platform), &Conditions::default(), 1).expect("simulated");
@@ -117,7 +117,7 @@ fn psi_at_the_end_is_what_a_run_shows() {
     let (s, _) = simulate(&pole, &Conditions::default(), 1).expect("simulated");
     let verdicts = ["psi_x", "psi_y", "psi_z"].map(|name| {
         let q = of(&s, name);
-        (q.degree, q.accuracy_order, q.verdict)
+        (q.degree, q.accuracy_order, q.outcome)
     });
     assert_eq!(
         verdicts,
@@ -242,7 +242,7 @@ fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
         );
     }
     let s = simulated(Carry::Platform, &chosen);
-    assert_eq!(of(&s, "D_IX").verdict, Outcome::LargeAnglesOnly);
+    assert_eq!(of(&s, "D_IX").outcome, Outcome::LargeAnglesOnly);
     assert!(of(&s, "D_FX").sigma > 10.0 * of(&s, "D_FX").linear.expect("beside it").sigma);
 }
 
@@ -487,7 +487,7 @@ fn with_slews_the_samples_decide() {
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         let of = |q: &serde_json::Value| {
             let text = |key: &str| q[key].as_str().expect("a text").to_string();
-            (text("name"), (q["degree"].as_u64(), text("verdict"), q["sigma"].as_f64().expect("a number")))
+            (text("name"), (q["degree"].as_u64(), text("outcome"), q["sigma"].as_f64().expect("a number")))
         };
         json["quantities"].as_array().expect("a list").iter().map(of).collect::<BTreeMap<_, _>>()
     };

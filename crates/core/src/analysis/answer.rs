@@ -11,7 +11,7 @@ use crate::model::slew::Turn;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
-use crate::solution::solve::{Solved, Verification};
+use crate::solution::solve::{FoundBy, Solved, Verification};
 use crate::solution::solver::Frame;
 
 /// The answer for one scheme.
@@ -143,6 +143,8 @@ pub struct Solution {
     pub turning: bool,
     /// How exact its coefficients are.
     pub form: Form,
+    /// Where its coefficients come from.
+    pub found_by: FoundBy,
     /// How it was checked.
     pub verification: Verification,
     /// The same as computed, for formatting.

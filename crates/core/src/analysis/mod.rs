@@ -20,6 +20,7 @@ use crate::model::platform::{Platform, Point};
 use crate::model::ring::Float;
 use crate::model::slew::{Slew, Turn};
 use crate::model::{Angle, Carry, Position, Scheme, SchemeError, Source, Term, Unknowns};
+use crate::solution::FoundBy;
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
 use crate::solution::loci::loci;
@@ -71,7 +72,8 @@ pub fn analyze(
     let mut printer = Printer { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
     printer.notes.extend(findings.accuracy.as_ref().err().map(ToString::to_string));
     let quantities = quantities(&platform, &findings, &mut printer)?;
-    let combinations = findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
+    let combinations: Vec<CombinationReport> =
+        findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
     let found = loci(&platform, verdicts, &mut printer.solver, options.seed);
     let found = printer.noted(found).unwrap_or_default();
     printer.notes.extend(found.incomplete);
@@ -87,7 +89,11 @@ pub fn analyze(
                 .into(),
         );
     }
-    if options.solutions && !course {
+    let solved = quantities.iter().map(|q| (q.degree, &q.solution));
+    let mut solved = solved.chain(combinations.iter().map(|c| (c.degree, &c.solution)));
+    let exact = |s: &Option<Solution>| s.as_ref().is_some_and(|s| s.found_by != FoundBy::FloatingPoint);
+    let wanting = solved.any(|(degree, s)| degree.is_some() && !exact(s));
+    if options.solutions && !course && (wanting || !scheme.generic_names().is_empty()) {
         let note = engine_note(built, &mut printer.solver);
         printer.notes.extend(note);
     }
@@ -143,6 +149,7 @@ impl Printer<'_> {
                 terms: terms(&solved, self.options.frame, &self.stations),
                 turning: solved.terms.iter().any(|t| t.order > 0 && self.stations[t.station].rate.is_some()),
                 form: solved.form(),
+                found_by: solved.found_by,
                 verification: solved.verification,
                 solved,
             }),

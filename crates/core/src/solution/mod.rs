@@ -21,5 +21,5 @@ pub use formulas::Formula;
 pub use loci::Locus;
 pub use print::{Group, Grouped, SolutionTerm, StationLabel, group};
 pub use requested::CombinationError;
-pub use solve::{Solved, Term, Verification};
+pub use solve::{FoundBy, Solved, Term, Verification};
 pub use solver::{Frame, Functional, Solver, Sparse};

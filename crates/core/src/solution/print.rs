@@ -235,7 +235,7 @@ pub(crate) fn text(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> 
 mod tests {
     use super::*;
     use crate::degree::coefficient::Number;
-    use crate::solution::solve::Verification;
+    use crate::solution::solve::{FoundBy, Verification};
     use obsdeg_exact::Radical;
 
     #[test]
@@ -255,6 +255,7 @@ mod tests {
                 term(0, 3, 1, -1, [0, 0]),
                 term(1, 3, 1, -1, [0, 0]),
             ],
+            found_by: FoundBy::PrimeFields,
             verification: Verification::Modular,
         };
         let attitude = crate::model::scheme::parse_attitude("0,0,0").expect("an attitude");

@@ -20,6 +20,18 @@ const OTHER_RATES: (f64, f64, f64) = (0.8, 0.5, 1.3);
 /// How far the sum of terms with decimals may be from its target, relative to the sum of their magnitudes.
 const RESIDUAL: f64 = 1e-9;
 
+/// Where the coefficients of a solution come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FoundBy {
+    /// Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images in two prime fields.
+    PrimeFields,
+    /// Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are the same.
+    SymbolicEngine,
+    /// Decimals.
+    FloatingPoint,
+}
+
 /// How a solution was checked before it was printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -54,6 +66,8 @@ pub struct Term {
 pub struct Solved {
     /// The terms, by power of the rate of turning, order, component and station.
     pub terms: Vec<Term>,
+    /// Where its coefficients come from.
+    pub found_by: FoundBy,
     /// How it was checked.
     pub verification: Verification,
 }
@@ -222,25 +236,28 @@ impl Solver<'_> {
         let of_term = |i: usize| -> Vec<u64> { numbers.iter().map(|v| v[i]).collect() };
         let exact: Option<Vec<Number>> =
             (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
-        let symbolic = self.ask_for_solution(functional, &problem, &used, &plan);
-        let (numbers, verification) = match (symbolic, exact) {
-            (Some(texts), exact) => {
+        let symbolic = match exact {
+            // nothing is left to ask for
+            Some(_) => None,
+            None => self.ask_for_solution(functional, &problem, &used, &plan),
+        };
+        let (numbers, found_by, verification) = match (symbolic, exact) {
+            (_, Some(exact)) => (exact, FoundBy::PrimeFields, Verification::Modular),
+            (Some(texts), None) => {
                 if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
                     return Err(Unsolved::Disagreement);
                 }
                 let longest = texts.iter().map(|t| self.symbols.display(t).len()).max().unwrap_or(0);
                 let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
-                if let Some(exact) = exact {
-                    (exact, Verification::Symbolic)
-                } else if longest <= limit {
-                    (texts.into_iter().map(|t| self.text_number(t)).collect(), Verification::Symbolic)
+                if longest <= limit {
+                    let numbers = texts.into_iter().map(|t| self.text_number(t)).collect();
+                    (numbers, FoundBy::SymbolicEngine, Verification::Symbolic)
                 } else {
                     let decimals = self.decimals(functional, &problem, &plan);
                     let numbers = decimals.ok_or(Unsolved::TooLong { characters: longest })?;
-                    (numbers, Verification::Numeric)
+                    (numbers, FoundBy::FloatingPoint, Verification::Numeric)
                 }
             }
-            (None, Some(exact)) => (exact, Verification::Modular),
             (None, None) => {
                 let numbers = self.decimals(functional, &problem, &plan);
                 let missing = match &self.worker {
@@ -248,7 +265,7 @@ impl Solver<'_> {
                     Some(_) if self.too_many_angles() => Unsolved::TooManyAngles,
                     Some(_) => Unsolved::NoFormula,
                 };
-                (numbers.ok_or(missing)?, Verification::Numeric)
+                (numbers.ok_or(missing)?, FoundBy::FloatingPoint, Verification::Numeric)
             }
         };
         let mut terms: Vec<Term> = plan
@@ -271,7 +288,7 @@ impl Solver<'_> {
         for (term, coefficient) in terms.iter_mut().zip(printed) {
             term.coefficient = coefficient;
         }
-        Ok(Solved { terms, verification })
+        Ok(Solved { terms, found_by, verification })
     }
 
     /// What the turning of the platform adds to a solution by the rows `support`: one motion per rotation and rates of the amounts, in

@@ -15,14 +15,14 @@ use super::search::Progress;
 use super::{Design, DesignError, DesignOptions, NOTHING_YET, Prepared, answered, watched};
 
 /// Name and version of the JSON layout.
-pub const PART_SCHEMA: &str = "obsdeg.design.part/1";
+pub const PART_SCHEMA: &str = "obsdeg.part/1";
 /// Starts that are searched at once: an interrupted part goes on behind the last that are all done.
 const CHUNK: usize = 16;
 
 /// One part of an exhaustive search, done or interrupted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Part {
-    /// `obsdeg.design.part/1`.
+    /// `obsdeg.part/1`.
     pub schema: String,
     /// Version of the program.
     pub version: String,

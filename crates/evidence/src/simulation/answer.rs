@@ -187,7 +187,7 @@ pub struct Estimate {
     /// When it was reached first, in s; null for what the samples do not determine.
     pub time_to_requirement_s: Option<f64>,
     /// What came out.
-    pub verdict: Outcome,
+    pub outcome: Outcome,
     /// On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only.
     pub prior_of: Vec<String>,
 }

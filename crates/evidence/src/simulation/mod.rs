@@ -188,7 +188,7 @@ fn summary(
     });
     let mut quantities: Vec<Estimate> = unknowns.collect();
     for (q, u) in
-        quantities.iter_mut().zip(&prediction.unknowns).filter(|(q, _)| q.verdict == Outcome::PriorOnly)
+        quantities.iter_mut().zip(&prediction.unknowns).filter(|(q, _)| q.outcome == Outcome::PriorOnly)
     {
         let unseen = u.partners.iter().filter(|&&p| !prediction.unknowns[p].determined_at_end);
         q.prior_of = unseen.map(|&p| names[p].clone()).collect();
@@ -219,7 +219,7 @@ fn summary(
             quantities.iter().map(|q| Claim {
                 name: &q.name,
                 required: q.required_sigma,
-                sigma: q.verdict.miss().map_or(Ok(q.sigma), Err),
+                sigma: q.outcome.miss().map_or(Ok(q.sigma), Err),
             }),
             conditions.requires_by_default(),
         ),
@@ -328,7 +328,7 @@ fn estimate(
         prior_sigma,
         required_sigma,
         time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
-        verdict: Outcome::of(
+        outcome: Outcome::of(
             determined,
             record.filter.kind,
             error_over_sigma,

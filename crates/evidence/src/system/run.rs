@@ -47,7 +47,7 @@ pub struct SystemRun {
     /// The system.
     pub name: String,
     /// Estimates at the end.
-    pub estimates: Vec<SystemEstimate>,
+    pub quantities: Vec<SystemEstimate>,
     /// Whether errors and innovations are what the filter believes.
     pub consistency: Consistency,
     /// How long every experiment ran, in the unit of the model.
@@ -88,7 +88,7 @@ pub struct SystemEstimate {
     /// Sigma at the start.
     pub prior_sigma: f64,
     /// What came out; nothing is required.
-    pub verdict: Outcome,
+    pub outcome: Outcome,
 }
 
 impl SystemEstimate {
@@ -329,7 +329,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             name: model.name.clone(),
-            estimates,
+            quantities: estimates,
             consistency: consistency.map_err(stopped(duration))?,
             duration,
             step: dt,
@@ -378,7 +378,7 @@ fn estimates(
             sigma,
             error_over_sigma,
             prior_sigma,
-            verdict: Outcome::of(
+            outcome: Outcome::of(
                 determined,
                 FilterKind::Linear,
                 error_over_sigma,

@@ -83,9 +83,9 @@ fn credible(m: &ModelReview) -> (Grade, String) {
 /// Estimates of the run that say what the prior says.
 fn by_prior(m: &ModelReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
-    let estimates = m.run.iter().flat_map(|(run, _)| &run.estimates);
+    let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
     // a start that is known rests on nothing else
-    let unknown = estimates.filter(|e| e.status.is_some() && (!e.is_determined() || rests(e.verdict)));
+    let unknown = estimates.filter(|e| e.status.is_some() && (!e.is_determined() || rests(e.outcome)));
     unknown.map(|e| e.name.as_str()).collect()
 }
 
@@ -152,8 +152,8 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
     if let Some((run, traces)) = &m.run {
         let document = run.document();
         blocks.extend(document.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
-        let flat: Vec<&str> = (run.estimates.iter())
-            .filter(|e| e.status == Some(Exact::NotExcited) && e.verdict == Outcome::PriorOnly)
+        let flat: Vec<&str> = (run.quantities.iter())
+            .filter(|e| e.status == Some(Exact::NotExcited) && e.outcome == Outcome::PriorOnly)
             .map(|e| e.name.as_str())
             .collect();
         blocks.extend(pictures::errors(traces, &flat, id));

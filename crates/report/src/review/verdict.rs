@@ -41,7 +41,7 @@ fn small_angles(s: &SchemeReview) -> Option<String> {
 /// Estimates of the run that say what the prior says.
 fn by_prior(s: &SchemeReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
-    s.simulation.quantities.iter().filter(|q| rests(q.verdict)).map(|q| q.name.as_str()).collect()
+    s.simulation.quantities.iter().filter(|q| rests(q.outcome)).map(|q| q.name.as_str()).collect()
 }
 
 /// Unknowns with a degree that the dwell does not leave determined.
