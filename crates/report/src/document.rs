@@ -202,6 +202,11 @@ pub(crate) enum Drawing {
 }
 
 impl Picture {
+    /// Whether it stands by itself.
+    pub(crate) fn is_wide(&self) -> bool {
+        matches!(self.drawing, Drawing::Panels(_))
+    }
+
     pub(crate) fn svg(&self) -> String {
         match &self.drawing {
             Drawing::Curves(figure) => figure.svg(),
@@ -253,12 +258,14 @@ pub(crate) enum Part<'a> {
     Pictures(Vec<&'a Picture>),
 }
 
-/// Blocks, with pictures that follow each other taken together.
+/// Blocks, with pictures that follow each other taken together unless they are wide.
 pub(crate) fn parts(blocks: &[Block]) -> Vec<Part<'_>> {
     let mut out: Vec<Part<'_>> = Vec::new();
     for block in blocks {
         match (block, out.last_mut()) {
-            (Block::Picture(p), Some(Part::Pictures(list))) => list.push(p),
+            (Block::Picture(p), Some(Part::Pictures(list))) if !p.is_wide() && !list[0].is_wide() => {
+                list.push(p)
+            }
             (Block::Picture(p), _) => out.push(Part::Pictures(vec![p])),
             (block, _) => out.push(Part::Block(block)),
         }

@@ -118,8 +118,9 @@ fn part(part: Part<'_>) -> Json {
     let block = match part {
         Part::Pictures(pictures) => {
             let of = |p: &&crate::document::Picture| json!({ "name": p.name, "caption": p.caption });
+            let width = if pictures.iter().any(|p| p.is_wide()) { "100%" } else { "11cm" };
             let pictures: Vec<Json> = pictures.iter().map(of).collect();
-            return json!({ "kind": "pictures", "pictures": pictures });
+            return json!({ "kind": "pictures", "pictures": pictures, "width": width });
         }
         Part::Block(block) => block,
     };
