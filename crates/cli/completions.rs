@@ -89,5 +89,8 @@ pub(crate) fn man(a: &ManArguments) -> Result<(), Failure> {
     let files: Vec<File> = pages(&command)
         .map(|(name, c)| Ok(File { name: format!("{name}.1"), bytes: page(c)? }))
         .collect::<Result<_, Failure>>()?;
+    // a home of one's own may have no manual yet
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::input(format!("cannot write {}: {e}", folder.display())))?;
     output::write_files(folder, &files, a.force)
 }
