@@ -39,12 +39,13 @@ Examples:
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --positions 7 --carry inertial --merge part-*.json
 
-Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random
-starts. Where order matters and repositioning takes no time, a bound on what the last two positions can add leaves most of many sequences out (branch
-and bound): eight of the 24 cardinal attitudes in some minutes. Under reset carry information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units
-differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews
-half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json,
+Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random \
+starts. Where order matters and repositioning takes no time, a bound on what the last two positions can add leaves most of many sequences out (branch \
+and bound): eight of the 24 cardinal attitudes in some minutes. Under reset carry information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units \
+differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews \
+half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json, \
 winner.toml (a scheme file), its positions as a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
+
 Exit codes: 0 done (with --minimum also when no positions do), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
 /// The words of `--criterion`.
