@@ -1,18 +1,20 @@
 //! `obsdeg analyze`: the degree tables of schemes and models.
 
+use std::path::{Path, PathBuf};
+
 use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
-use obsdeg_report::{Answer, Document, Several};
+use obsdeg_report::{Answer, Document, File, Several, position_figure};
 use serde::Serialize;
 
-use crate::arguments::{Given, InputArguments, Word, one_of};
+use crate::arguments::{Given, InputArguments, Named, Word, one_of};
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
-use crate::input::Input;
+use crate::input::{Input, title};
 use crate::interrupt;
-use crate::output::Output;
+use crate::output::{Output, write_files};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -25,6 +27,7 @@ Examples:
   obsdeg analyze scheme.toml -o verdicts.json           JSON by the ending; .csv, .md, .tex as well
   obsdeg analyze model.toml                             any system x' = f(x, u, p, t), z = h
   obsdeg analyze examples/*/scheme.toml -o all.csv      several, one after another
+  obsdeg analyze --angles NUE --angles NDW --figures pictures
 
 Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in rad/s and Z in g.
 
@@ -65,6 +68,10 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     output: Output,
+
+    /// Draw the positions of every scheme, with g and the earth rate, as SVG into a folder
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    figures: Option<PathBuf>,
 }
 
 /// The words of `--solutions`.
@@ -102,6 +109,18 @@ pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     let mut judged = Vec::new();
     let read = a.input.read(given)?;
     let several = read.len() > 1;
+    if let Some(folder) = &a.figures {
+        let of = |(name, input): &Named| {
+            let Input::Scheme(scheme) = input else { return None };
+            let mut file = position_figure(scheme);
+            if several {
+                file.name = format!("{}-{}", title(Path::new(name)), file.name);
+            }
+            Some(file)
+        };
+        let files: Vec<File> = read.iter().filter_map(of).collect();
+        write_files(folder, &files, target.force)?;
+    }
     for (name, input) in read {
         // what is wrong in a model is drawn in its file
         let of_scheme = several && matches!(input, Input::Scheme(_));

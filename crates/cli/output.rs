@@ -53,7 +53,7 @@ pub(crate) struct Target {
 
     /// Replace an existing file
     #[arg(long)]
-    force: bool,
+    pub(crate) force: bool,
 
     /// Say nothing on stderr but errors
     #[arg(short, long)]

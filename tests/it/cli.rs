@@ -570,6 +570,23 @@ fn formats_follow_the_ending() {
     refused(&["simulate", "--angles", "NUE", "-o", "-"], &["-o - is stdout; expected a folder"]);
 }
 
+/// The positions of every scheme as pictures, in a folder of their own.
+#[test]
+fn positions_are_drawn() {
+    let (folder, _) = scratch();
+    let at = folder.path().join("pictures");
+    let to = ["--solutions", "off", "--figures", at.to_str().expect("UTF-8")];
+    let plain = stdout(&run(&[&P1P2[..], &["--solutions", "off"]].concat()));
+    assert_eq!(stdout(&run(&[&P1P2[..], &to].concat())), plain);
+    let svg = std::fs::read_to_string(at.join("positions.svg")).expect("written");
+    assert!(svg.starts_with("<svg") && svg.contains("p2"), "{svg}");
+    refused(&[&P1P2[..], &to].concat(), &["positions.svg exists; --force"]);
+    let several = ["examples/pole/scheme.toml", "examples/six-positions/scheme.toml"];
+    assert!(run(&[&["analyze"], &several[..], &to].concat()).status.success());
+    assert!(at.join("pole-positions.svg").is_file() && at.join("six-positions-positions.svg").is_file());
+    refused(&[&["analyze", "examples/sir/model.toml"], &to[2..]].concat(), &["--figures is about schemes"]);
+}
+
 /// Nothing but ASCII where that is asked for, and where the locale has nothing else.
 #[test]
 fn tables_in_ascii() {

@@ -158,6 +158,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "beta=nan:1",
             "beta=-1e300:1e300",
         ],
+        "figures" => &["pictures", ".", "s.toml"],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "force" | "quiet"
         | "help" | "estimate-noise" | "ascii" => {
