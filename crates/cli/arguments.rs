@@ -278,7 +278,7 @@ impl InputArguments {
 /// What a command says that judges one scheme or model at a time.
 pub(crate) fn one_file(arg: Arg) -> Arg {
     match arg.get_id() == "files" {
-        true => arg.num_args(0..=1).help(
+        true => arg.num_args(0..=1).action(clap::ArgAction::Set).help(
             "A scheme file (TOML) or a model file (TOML, or JSON), with numbers for a simulation; - is stdin",
         ),
         false => arg,

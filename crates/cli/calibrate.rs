@@ -146,7 +146,7 @@ fn number_within(text: &str, low: f64, high: f64) -> Result<f64, String> {
 
 pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     let interrupted = interrupt::flag()?;
-    a.output.target.check_folder()?;
+    a.output.check_folder()?;
     let bar = Bar::start(0, "", a.output.target.quiet);
     let going = |now: Going<'_>| {
         bar.calibrates(now);

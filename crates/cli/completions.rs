@@ -89,6 +89,11 @@ pub(crate) fn man(a: &ManArguments) -> Result<(), Failure> {
     let files: Vec<File> = pages(&command)
         .map(|(name, c)| Ok(File { name: format!("{name}.1"), bytes: page(c)? }))
         .collect::<Result<_, Failure>>()?;
+    if folder == std::path::Path::new("-") {
+        return Err(Failure::input(
+            "-o - is stdout; expected a folder for the pages (one goes to stdout without -o)".into(),
+        ));
+    }
     // a home of one's own may have no manual yet
     std::fs::create_dir_all(folder)
         .map_err(|e| Failure::input(format!("cannot write {}: {e}", folder.display())))?;

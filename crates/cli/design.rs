@@ -205,7 +205,7 @@ fn percent(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     if a.part.is_none() {
-        a.output.target.check_folder()?;
+        a.output.check_folder()?;
     }
     let (mut base, candidates) = candidates(&a.candidates)?;
     a.assumptions.apply(&mut base);

@@ -113,7 +113,7 @@ impl Source {
     pub(crate) fn scheme(&self) -> Result<Scheme, Failure> {
         scheme_file::read(&self.text).map_err(|e| match self.is_model() {
             true => Failure::input(format!(
-                "{} is a model file; expected a scheme file, with [[position]] tables (a model goes without --scheme)",
+                "{} is a model file; expected a scheme file, with [[position]] tables",
                 self.path.display()
             )),
             false => self.wrong(&e.message, e.span),
@@ -126,7 +126,7 @@ impl Source {
         match read {
             Ok(model) => Ok(ModelFile { model, source: self }),
             Err(_) if scheme_file::is_scheme(&self.text) => Err(Failure::input(format!(
-                "{} is a scheme file; expected a model file, with [states] and [outputs] (a scheme goes without --model)",
+                "{} is a scheme file; expected a model file, with [states] and [outputs]",
                 self.path.display()
             ))),
             Err(e) => Err(self.wrong(&e.to_string(), e.span)),

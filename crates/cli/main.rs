@@ -80,9 +80,6 @@ enum Command {
     Man(completions::ManArguments),
     /// Print a JSON Schema: of results, or of scheme files
     Schema(schema::Arguments),
-    /// Serve symbolic jobs on stdin and stdout (started by the program itself)
-    #[command(hide = true)]
-    SymbolicWorker,
 }
 
 /// The command line as it is read: a negative number behind an option is its value, so that the option can say what it expects.
@@ -133,6 +130,10 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
 }
 
 fn run() -> Result<(), ExitCode> {
+    // started by the program itself, for symbolic jobs on stdin and stdout
+    if std::env::args_os().nth(1).is_some_and(|a| a == "symbolic-worker") {
+        return symbolic_worker().map_err(|failure| failure.report());
+    }
     let (cli, given) = arguments()?;
     let done = match cli.command {
         Command::Analyze(a) => analyze::run(&a, &given),
@@ -146,7 +147,6 @@ fn run() -> Result<(), ExitCode> {
         Command::Completions(a) => completions::run(&a),
         Command::Man(a) => completions::man(&a),
         Command::Schema(a) => schema::run(&a),
-        Command::SymbolicWorker => symbolic_worker(),
     };
     done.map_err(|failure| failure.report())
 }

@@ -35,7 +35,7 @@ pub(crate) struct Output {
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
 
-    /// Nothing but ASCII in tables (default: under TERM=dumb and where the locale is not UTF-8)
+    /// Nothing but ASCII in tables (default: on a terminal under TERM=dumb, and where the locale says that it is not UTF-8)
     #[arg(long)]
     ascii: bool,
 
@@ -64,7 +64,9 @@ pub(crate) struct Target {
 pub(crate) fn to_a_folder(arg: Arg) -> Arg {
     let arg = match arg.get_id().as_str() {
         "format" => arg.help("The format on stdout (default: table)"),
-        "output" => arg.value_name("DIR").help("Write summary, series and figures to a folder"),
+        "output" => arg
+            .value_name("DIR")
+            .help("Write summary, series and figures to a folder; a name that ends in .json, .md, .csv or .tex: the answer alone"),
         "force" => arg.help("Replace files in an existing folder"),
         "quiet" => arg,
         _ => return arg,
@@ -90,6 +92,19 @@ fn layout(ascii: bool) -> Layout {
 }
 
 impl Output {
+    /// Whether the ending says that the answer alone goes to a file, where there may be a folder with figures and series too.
+    fn is_file(&self) -> bool {
+        let path = self.target.path().filter(|path| !path.is_dir());
+        let ending = path.and_then(Path::extension).map(|e| e.to_string_lossy().to_lowercase());
+        ending
+            .is_some_and(|e| ["json", "md", "csv", "tex", "txt", "html", "htm", "pdf"].contains(&e.as_str()))
+    }
+
+    /// Refuses early, before any work, a folder with something in it, or a file that is there.
+    pub(crate) fn check_folder(&self) -> Result<(), Failure> {
+        if self.is_file() { self.check() } else { self.target.check_folder() }
+    }
+
     /// Refuses early, before any work, what cannot be written.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         self.format()?;
@@ -147,6 +162,9 @@ impl Output {
     where
         Failure: From<E>,
     {
+        if self.is_file() {
+            return self.write(result);
+        }
         let asked = self.format.unwrap_or(if self.table.is_some() { Format::Csv } else { Format::Table });
         if let Some(table) = self.table.as_ref().filter(|_| asked != Format::Csv) {
             return Err(Failure::input(format!("--table {table} is about CSV, and the format is {asked}")));

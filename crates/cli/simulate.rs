@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     interrupt::ends()?;
-    a.output.target.check_folder()?;
+    a.output.check_folder()?;
     match a.input.read_one(given)? {
         Input::Scheme(scheme) => {
             a.conditions.concern(std::iter::once(&*scheme))?;

@@ -494,7 +494,7 @@ fn bad_records_are_refused_with_their_place() {
     assert_eq!(output.status.code(), Some(1));
     let text = stdout(&output);
     assert!(
-        text.contains("NOT consistent") && text.contains("alike at all positions: sigmas are 3."),
+        text.contains("NOT consistent") && text.contains("over all positions together: sigmas are 3."),
         "{text}"
     );
 }

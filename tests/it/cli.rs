@@ -290,8 +290,8 @@ fn every_command_checks_the_whole_scheme_file() {
 #[test]
 fn a_file_of_the_other_kind_is_named() {
     let (scheme, model) = ("examples/pole/scheme.toml", "examples/sir/model.toml");
-    refused(&["analyze", "--model", scheme], &["is a scheme file; expected a model file", "--model"]);
-    refused(&["analyze", "--scheme", model], &["is a model file; expected a scheme file", "--scheme"]);
+    refused(&["analyze", "--model", scheme], &["is a scheme file; expected a model file"]);
+    refused(&["analyze", "--scheme", model], &["is a model file; expected a scheme file"]);
     refused(&["compare", model], &["is a model file; expected scheme files"]);
     let (folder, _) = scratch();
     let file = folder.path().join("m.json").display().to_string();
@@ -568,6 +568,21 @@ fn formats_follow_the_ending() {
     refused(&[&P1P2[..], &["--table", "x"]].concat(), &["error: no table `x`", "quantities", "combinations"]);
     refused(&[&P1P2[..], &["--table", "x", "--format", "json"]].concat(), &["--table x is about CSV"]);
     refused(&["simulate", "--angles", "NUE", "-o", "-"], &["-o - is stdout; expected a folder"]);
+    // where there may be a folder, an ending says that there is not
+    let path = at("run.json");
+    assert!(run(&["simulate", "--angles", "NUE", "-o", &path]).status.success());
+    let alone = stdout(&run(&["simulate", "--angles", "NUE", "--format", "json"]));
+    assert_eq!(std::fs::read_to_string(&path).expect("written"), alone);
+    refused(&["simulate", "--angles", "NUE", "-o", &path], &["run.json exists; --force"]);
+    // a list with nothing in it is no error
+    let none = [
+        "calibrate",
+        "examples/bench-day/scheme.toml",
+        "examples/bench-day/record.csv",
+        "--table",
+        "outliers",
+    ];
+    assert_eq!(stdout(&run(&none)), "");
 }
 
 /// The positions of every scheme as pictures, in a folder of their own.

@@ -86,7 +86,7 @@ fn assert_files(folder: &Path) -> usize {
             continue;
         }
         let bytes = fs::read(&path).expect("readable");
-        if !path.extension().is_some_and(|e| e == "png" || e == "parquet") {
+        if !path.extension().is_some_and(|e| ["png", "parquet", "pdf"].iter().any(|binary| e == *binary)) {
             assert_text(std::str::from_utf8(&bytes).expect("UTF-8"), &path.display().to_string());
         }
         n += 1;

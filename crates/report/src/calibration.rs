@@ -46,7 +46,7 @@ fn finding(f: &Finding, records: &[RecordReport]) -> String {
             sigmas(*factor)
         ),
         Finding::Noise { chi_square, factor } => format!(
-            "chi-square is {} per degree of freedom, alike at all positions: {}",
+            "chi-square is {} per degree of freedom over all positions together: {}",
             number(*chi_square),
             sigmas(*factor)
         ),

@@ -225,7 +225,7 @@ pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<S
     })
 }
 
-/// A table of a result as CSV; the main one where none is named.
+/// A table of a result as CSV; the main one where none is named. Of a list with nothing in it nothing is written.
 ///
 /// # Errors
 /// [`ReportError::NoTable`], and when a serializer fails.
@@ -234,6 +234,9 @@ pub fn csv(answer: &impl Answer, table: Option<&str>) -> Result<String, ReportEr
     let asked = table.unwrap_or(answer.main_table());
     let known = || tables.iter().map(|t| t.name.clone()).collect();
     let table = tables.iter().find(|t| t.name == asked);
+    if table.is_none() && tables::is_empty_list(&serde_json::to_value(answer)?, asked) {
+        return Ok(String::new());
+    }
     let table = table.ok_or_else(|| ReportError::NoTable { asked: asked.into(), known: known() })?;
     csv_text::write(std::iter::once(table.columns.clone()).chain(table.rows.iter().cloned()))
 }

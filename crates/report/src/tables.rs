@@ -42,6 +42,12 @@ impl Table {
     }
 }
 
+/// Whether the way leads to an empty list.
+pub(crate) fn is_empty_list(answer: &Value, path: &str) -> bool {
+    let pointer = format!("/{}", path.replace('.', "/"));
+    answer.pointer(&pointer).is_some_and(|v| v.as_array().is_some_and(Vec::is_empty) || v.is_null())
+}
+
 /// The tables of an answer: its own fields, then every list of objects in it, however deep. A list within a list has the name of the
 /// object that it belongs to in its first column.
 pub(crate) fn of_json(answer: &Value) -> Vec<Table> {
@@ -123,6 +129,17 @@ fn list(items: &[Value], name: &str, keys: &[(String, String)], out: &mut Vec<Ta
                 list(inner, name, &keys, &mut found);
                 merge(&mut below, found);
             }
+            // a matrix
+            Value::Array(inner) if inner.iter().all(Value::is_number) => {
+                let place = |k: usize, v: &Value| {
+                    [("row", (i + 1).to_string()), ("column", (k + 1).to_string()), ("value", text(v))]
+                };
+                let row = |(k, v)| {
+                    let cells = place(k, v).map(|(name, text)| (name.to_string(), text));
+                    keys.iter().cloned().chain(cells).collect()
+                };
+                rows.extend(inner.iter().enumerate().map(row));
+            }
             Value::Array(inner) => {
                 let cells = inner.iter().enumerate().map(|(k, v)| ((k + 1).to_string(), text(v)));
                 rows.push(keys.iter().cloned().chain(cells).collect());
@@ -177,6 +194,7 @@ mod tests {
             ],
             "null_space": [[{ "name": "x" }], [{ "name": "y" }]],
             "noise": [["y", 0.1]],
+            "matrix": [[1.0, 0.5], [0.5, 2.0]],
         }));
         let shown = |t: &Table| {
             let rows: Vec<String> = t.rows.iter().map(|r| r.join(",")).collect();
@@ -190,6 +208,7 @@ mod tests {
                 "schemes.quantities: schemes.name,name,sigma,degree | a,x,1.5e-300, | a,y,,2 | b,x,,",
                 "null_space: null_space.number,name | 1,x | 2,y",
                 "noise: 1,2 | y,0.1",
+                "matrix: row,column,value | 1,1,1.0 | 1,2,0.5 | 2,1,0.5 | 2,2,2.0",
             ]
         );
     }

@@ -7,6 +7,8 @@ mod tex;
 mod text;
 mod value;
 
+use std::collections::BTreeMap;
+
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, Quantity, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
@@ -119,20 +121,24 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
     if options.formulas {
         position_formulas(&json, &document, draw, &case, seen);
     }
-    let csv = written(Format::Csv);
-    let csv: Vec<csv::StringRecord> =
-        csv::Reader::from_reader(csv.as_bytes()).records().map(|r| r.expect("a record")).collect();
+    let mut fields: Vec<BTreeMap<String, String>> = Vec::new();
+    for table in ["quantities", "combinations"].into_iter().filter(|t| !list_of(&json, t).is_empty()) {
+        let text = obsdeg_report::csv(&a, Some(table)).expect("a table");
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        fields.extend(reader.deserialize().map(|row| row.expect("a row")));
+    }
     let (quantities, combinations) = (list_of(&json, "quantities"), list_of(&json, "combinations"));
-    assert_eq!((latex.len(), csv.len()), (quantities.len() + combinations.len(), latex.len()));
-    let rows = quantities.iter().chain(&combinations).zip(latex).zip(&csv);
-    for (i, ((q, latex), csv)) in rows.enumerate() {
+    assert_eq!((latex.len(), fields.len()), (quantities.len() + combinations.len(), latex.len()));
+    let rows = quantities.iter().chain(&combinations).zip(latex).zip(&fields);
+    for (i, ((q, latex), row)) in rows.enumerate() {
         let single = i < quantities.len();
         let left = q[if single { "name" } else { "expression" }].as_str().expect("a text");
         let c = Check { case: &case, about: format!("{left} of {draw:?} in {frame:?}: {q:#}") };
         // for spreadsheets a text that begins with a minus and names what only quotes can has an apostrophe
-        let field =
-            |i: usize| csv[i].strip_prefix('\'').filter(|f| f.contains('"')).unwrap_or(&csv[i]).to_string();
-        assert_eq!(field(1), left);
+        let field = |key: &str| {
+            row[key].strip_prefix('\'').filter(|f| f.contains('"')).unwrap_or(&row[key]).to_string()
+        };
+        assert_eq!(field(if single { "name" } else { "expression" }), left);
         let expected = c.text(left);
         c.equal("left side in LaTeX", c.latex(&latex[0]), expected, EXACT);
         if single {
@@ -147,7 +153,7 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
             continue;
         };
         let printed = solution["text"].as_str().expect("a text");
-        assert_eq!(field(csv.len() - 1), printed);
+        assert_eq!(field("solution.text"), printed);
         let tolerance = match solution["form"].as_str() {
             Some("exact") => {
                 seen.exact += 1;

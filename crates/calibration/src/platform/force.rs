@@ -294,8 +294,11 @@ impl Forces {
                 false => (&pieces[pieces.len() - 1], pieces[first - 1].lines.0, pieces[first].lines.1),
             };
             let tilts = attitudes.iter().map(|c| tilt(c, &outer.force)).enumerate();
-            let like =
-                tilts.filter(|(q, off)| *q != p && *off <= TILT_DEG).min_by(|a, b| a.1.total_cmp(&b.1));
+            let own = angle(&outer.force, &force);
+            // at another position, and not merely on the way from it
+            let like = tilts
+                .filter(|(q, off)| *q != p && *off <= TILT_DEG && 3.0 * off < own)
+                .min_by(|a, b| a.1.total_cmp(&b.1));
             return Err(Box::new(Mistaken::Shifted {
                 record: record.into(),
                 from,
@@ -303,7 +306,7 @@ impl Forces {
                 position: names[p].into(),
                 what: if begins { "comes to rest at" } else { "leaves" },
                 side: if begins { "before" } else { "after" },
-                off_deg: format!("{:.1}", angle(&outer.force, &force)),
+                off_deg: format!("{own:.1}"),
                 like: like.map_or_else(|| "no position (it turns)".into(), |(q, _)| names[q].into()),
             }));
         }
