@@ -6,10 +6,10 @@ use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
-use obsdeg_report::{Answer, Document, File, Several, position_figure};
+use obsdeg_report::{Answer, Document, Several, position_figure};
 use serde::Serialize;
 
-use crate::arguments::{Given, InputArguments, Named, Word, one_of};
+use crate::arguments::{Given, InputArguments, Word, one_of};
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
 use crate::input::{Input, title};
@@ -109,24 +109,26 @@ pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     let mut judged = Vec::new();
     let read = a.input.read(given)?;
     let several = read.len() > 1;
-    if let Some(folder) = &a.figures {
-        let of = |(name, input): &Named| {
-            let Input::Scheme(scheme) = input else { return None };
-            let mut file = position_figure(scheme);
-            if several {
-                file.name = format!("{}-{}", title(Path::new(name)), file.name);
-            }
-            Some(file)
-        };
-        let files: Vec<File> = read.iter().filter_map(of).collect();
-        write_files(folder, &files, target.force)?;
-    }
+    let mut figures = Vec::new();
     for (name, input) in read {
         // what is wrong in a model is drawn in its file
         let of_scheme = several && matches!(input, Input::Scheme(_));
         let (answer, said) = judge(a, &input).map_err(|e| if of_scheme { e.in_file(&name) } else { e })?;
+        // the same of every answer that needed the engine
+        if banner.is_empty() {
+            banner = said;
+        }
+        if let (Input::Scheme(scheme), Some(_)) = (&input, &a.figures) {
+            let mut file = position_figure(scheme);
+            if several {
+                file.name = format!("{}-{}", title(Path::new(&name)), file.name);
+            }
+            figures.push(file);
+        }
         judged.push((name, answer));
-        banner = said;
+    }
+    if let Some(folder) = &a.figures {
+        write_files(folder, &figures, target.force)?;
     }
     match judged.len() {
         1 => judged.iter().try_for_each(|(_, one)| a.output.write(one))?,

@@ -1,6 +1,6 @@
 //! Arguments that several commands share.
 
-use std::path::PathBuf;
+use std::path::{Path as FilePath, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::parser::ValueSource;
@@ -234,11 +234,9 @@ impl InputArguments {
     /// The models and the schemes: from the files or the angles, with whatever options override.
     pub(crate) fn read(&self, given: &Given) -> Result<Vec<Named>, Failure> {
         let mut read = if let Some(path) = &self.model {
-            let source = Source::read(path, "model")?;
-            vec![(source.name(), Input::model(source.model()?))]
+            vec![model_in(path)?]
         } else if let Some(path) = &self.scheme {
-            let source = Source::read(path, "scheme")?;
-            vec![(source.name(), Input::scheme(source.scheme()?))]
+            vec![scheme_in(path)?]
         } else if !self.files.is_empty() {
             read_all(&self.files)?
         } else if !self.angles.is_empty() {
@@ -283,6 +281,18 @@ pub(crate) fn one_file(arg: Arg) -> Arg {
         ),
         false => arg,
     }
+}
+
+/// The scheme in a file that must be one.
+pub(crate) fn scheme_in(path: &FilePath) -> Result<Named, Failure> {
+    let source = Source::read(path, "scheme")?;
+    Ok((source.name(), Input::scheme(source.scheme()?)))
+}
+
+/// The model in a file that must be one.
+pub(crate) fn model_in(path: &FilePath) -> Result<Named, Failure> {
+    let source = Source::read(path, "model")?;
+    Ok((source.name(), Input::model(source.model()?)))
 }
 
 /// Schemes and models from files, told apart by what they say.

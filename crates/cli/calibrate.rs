@@ -19,7 +19,7 @@ use obsdeg_report::{
     File, ReportError, calibration_figures, residuals_csv, system_calibration_figures, system_residuals_csv,
 };
 
-use crate::arguments::{Assumptions, Given, Named};
+use crate::arguments::{Assumptions, Given, Named, model_in, scheme_in};
 use crate::conditions::{GyroNoiseArguments, within};
 use crate::failure::Failure;
 use crate::input::{Input, ModelFile, Source, is_stdin, open};
@@ -235,11 +235,9 @@ impl Arguments {
     /// The scheme or the model, with its file, and the records of its runs.
     fn read(&self) -> Result<(Named, &[PathBuf]), Failure> {
         let (named, records) = if let Some(path) = &self.model {
-            let source = Source::read(path, "model")?;
-            ((source.name(), Input::model(source.model()?)), &self.files[..])
+            (model_in(path)?, &self.files[..])
         } else if let Some(path) = &self.scheme {
-            let source = Source::read(path, "scheme")?;
-            ((source.name(), Input::scheme(source.scheme()?)), &self.files[..])
+            (scheme_in(path)?, &self.files[..])
         } else {
             let [file, records @ ..] = &self.files[..] else {
                 return Err(Failure::input("expected a scheme or model file and a record of its run".into()));

@@ -510,6 +510,18 @@ fn the_banner_stays_off_stdout() {
     assert!(quiet.stderr.is_empty());
 }
 
+/// One of several answers needed the engine: its notice is said, whatever came after.
+#[cfg(feature = "symbolica")]
+#[test]
+fn the_banner_is_kept_among_several() {
+    let (model, scheme) = ("examples/lotka-volterra/model.toml", "examples/pole/scheme.toml");
+    let alone = stderr(&run(&["analyze", model]));
+    for files in [[model, scheme], [scheme, model]] {
+        assert_eq!(stderr(&run(&["analyze", files[0], files[1]])), alone);
+    }
+    assert!(stderr(&run(&["analyze", scheme])).is_empty());
+}
+
 /// Files are told apart by what they say, whatever command reads them; `-` is stdin, and stdout.
 #[test]
 fn one_way_to_name_files() {
@@ -565,6 +577,7 @@ fn formats_follow_the_ending() {
     refused(&[&P1P2[..], &["-o", &at("c.html")]].concat(), &["no format for .html", "obsdeg report"]);
     let positions = stdout(&run(&[&P1P2[..], &off, &["--table", "positions"]].concat()));
     assert_eq!(positions.lines().nth(1), Some("p1,0.0; 0.0; 0.0,NUE,,0.0; -1.0; 0.0"), "{positions}");
+    refused(&[&P1P2[..], &["--table", "latitude_deg"]].concat(), &["error: no table `latitude_deg`"]);
     refused(&[&P1P2[..], &["--table", "x"]].concat(), &["error: no table `x`", "quantities", "combinations"]);
     refused(&[&P1P2[..], &["--table", "x", "--format", "json"]].concat(), &["--table x is about CSV"]);
     refused(&["simulate", "--angles", "NUE", "-o", "-"], &["-o - is stdout; expected a folder"]);
@@ -600,6 +613,11 @@ fn positions_are_drawn() {
     assert!(run(&[&["analyze"], &several[..], &to].concat()).status.success());
     assert!(at.join("pole-positions.svg").is_file() && at.join("six-positions-positions.svg").is_file());
     refused(&[&["analyze", "examples/sir/model.toml"], &to[2..]].concat(), &["--figures is about schemes"]);
+    // nothing is drawn of what cannot be judged
+    let none = folder.path().join("none");
+    let to = ["--combination", "D_QQ", "--figures", none.to_str().expect("UTF-8")];
+    refused(&[&P1P2[..], &to].concat(), &["D_QQ"]);
+    assert!(!none.exists());
 }
 
 /// Nothing but ASCII where that is asked for, and where the locale has nothing else.

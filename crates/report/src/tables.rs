@@ -45,7 +45,7 @@ impl Table {
 /// Whether the way leads to an empty list.
 pub(crate) fn is_empty_list(answer: &Value, path: &str) -> bool {
     let pointer = format!("/{}", path.replace('.', "/"));
-    answer.pointer(&pointer).is_some_and(|v| v.as_array().is_some_and(Vec::is_empty) || v.is_null())
+    answer.pointer(&pointer).is_some_and(|v| v.as_array().is_some_and(Vec::is_empty))
 }
 
 /// The tables of an answer: its own fields, then every list of objects in it, however deep. A list within a list has the name of the
@@ -131,14 +131,12 @@ fn list(items: &[Value], name: &str, keys: &[(String, String)], out: &mut Vec<Ta
             }
             // a matrix
             Value::Array(inner) if inner.iter().all(Value::is_number) => {
-                let place = |k: usize, v: &Value| {
-                    [("row", (i + 1).to_string()), ("column", (k + 1).to_string()), ("value", text(v))]
-                };
-                let row = |(k, v)| {
-                    let cells = place(k, v).map(|(name, text)| (name.to_string(), text));
-                    keys.iter().cloned().chain(cells).collect()
-                };
-                rows.extend(inner.iter().enumerate().map(row));
+                for (k, v) in inner.iter().enumerate() {
+                    let cells =
+                        [("row", (i + 1).to_string()), ("column", (k + 1).to_string()), ("value", text(v))];
+                    let cells = cells.map(|(name, text)| (name.to_string(), text));
+                    rows.push(keys.iter().cloned().chain(cells).collect());
+                }
             }
             Value::Array(inner) => {
                 let cells = inner.iter().enumerate().map(|(k, v)| ((k + 1).to_string(), text(v)));
