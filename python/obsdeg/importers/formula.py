@@ -1,0 +1,275 @@
+"""Formulas: SymPy expressions with exact numbers, read from text and written as obsdeg reads them."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import re
+from collections.abc import Callable, Iterable, Mapping
+from decimal import Decimal
+from typing import Any, TypeAlias
+
+import sympy  # type: ignore[import-untyped]
+
+from .problem import ImportProblem
+
+#: A SymPy expression (SymPy has no types of its own).
+Expr: TypeAlias = Any
+
+#: The time of a run, which is 0 at its start. No name of a file looks like it.
+TIME: Expr = sympy.Symbol("<time>")
+
+#: Functions of one argument that obsdeg knows, by their names there.
+FUNCTIONS: dict[str, Callable[[Expr], Expr]] = {
+    "sin": sympy.sin,
+    "cos": sympy.cos,
+    "tan": sympy.tan,
+    "asin": sympy.asin,
+    "acos": sympy.acos,
+    "atan": sympy.atan,
+    "exp": sympy.exp,
+    "log": sympy.log,
+    "sqrt": sympy.sqrt,
+    "tanh": sympy.tanh,
+    "abs": sympy.Abs,
+    "sign": sympy.sign,
+}
+#: Others that are written by those.
+DERIVED: dict[str, Callable[..., Expr]] = {
+    "ln": sympy.log,
+    "log10": lambda x: sympy.log(x) / sympy.log(10),
+    "log2": lambda x: sympy.log(x) / sympy.log(2),
+    "sinh": lambda x: (sympy.exp(x) - sympy.exp(-x)) / 2,
+    "cosh": lambda x: (sympy.exp(x) + sympy.exp(-x)) / 2,
+    "sec": lambda x: 1 / sympy.cos(x),
+    "csc": lambda x: 1 / sympy.sin(x),
+    "cot": lambda x: 1 / sympy.tan(x),
+    "atan2": sympy.atan2,
+    "min": sympy.Min,
+    "max": sympy.Max,
+    "power": sympy.Pow,
+    "pow": sympy.Pow,
+}
+_PRINTED = {f: name for name, f in FUNCTIONS.items() if name != "sqrt"} | {sympy.atan2: "atan2"}
+
+_TOKEN = re.compile(r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d][\w!]*)")
+_SUM, _PRODUCT, _POWER, _ATOM = 1, 2, 3, 4
+
+
+def exact(number: float | str) -> Expr:
+    """The rational number that a decimal text says; of a float, that of its shortest text.
+
+    Raises:
+        ImportProblem: it is infinite or no number.
+    """
+    text = repr(float(number)) if isinstance(number, float) else str(number)
+    try:
+        return sympy.Rational(text.strip())
+    except (TypeError, ValueError):
+        raise ImportProblem(f"the number `{text}`", "a finite decimal number") from None
+
+
+def exactly(expression: Expr) -> Expr:
+    """The same expression with rational numbers for its floats, and symbols without assumptions."""
+    swaps: dict[Expr, Expr] = {f: exact(float(f)) for f in expression.atoms(sympy.Float)}
+    swaps |= {s: sympy.Symbol(s.name) for s in expression.atoms(sympy.Symbol) if s != TIME}
+    return expression.xreplace(swaps)
+
+
+def symbol(name: str) -> Expr:
+    """The symbol of a name."""
+    return sympy.Symbol(name)
+
+
+def names_in(*expressions: Expr) -> set[str]:
+    """The names that stand in expressions; the time is none."""
+    found: set[Expr] = set().union(*(sympy.sympify(e).free_symbols for e in expressions))
+    return {s.name for s in found if s != TIME}
+
+
+def put(expression: Expr, values: Mapping[str, Expr]) -> Expr:
+    """Replaces names, all at once and once each."""
+    swaps = {s: values[s.name] for s in expression.free_symbols if s != TIME and s.name in values}
+    return expression.xreplace(swaps) if swaps else expression
+
+
+def expand(expression: Expr, values: Mapping[str, Expr], what: str) -> Expr:
+    """Replaces names by what they stand for until none is left.
+
+    Raises:
+        ImportProblem: names that stand for each other.
+    """
+    for _ in range(len(values) + 2):
+        if not names_in(expression) & values.keys():
+            return expression
+        expression = put(expression, values)
+    circle = ", ".join(sorted(names_in(expression) & values.keys()))
+    raise ImportProblem(f"{what} through itself ({circle})", "rules that can be put into each other")
+
+
+def parse(text: str, *, calls: Mapping[str, Callable[..., Expr]] | None = None) -> Expr:
+    """Reads ``+ - * / ^ **``, brackets, exact decimals, names and functions.
+
+    Arguments:
+        text: The formula.
+        calls: Functions beside the usual ones, by name.
+
+    Raises:
+        ImportProblem: it is no such formula; the construct is named.
+    """
+    known: dict[str, Callable[..., Expr]] = {**FUNCTIONS, **DERIVED, **(calls or {})}
+    tokens: list[Expr | str] = []
+
+    def token(match: re.Match[str]) -> str:
+        number = match.group("number")
+        tokens.append(exact(number) if number else match.group("name"))
+        return f" _{len(tokens) - 1}_ "
+
+    plain = _TOKEN.sub(token, text).replace("^", "**").replace("//", "/")
+    try:
+        tree = ast.parse(" ".join(plain.split()), mode="eval").body
+    except (SyntaxError, RecursionError, MemoryError):
+        raise ImportProblem(f"`{shortened(text)}`", "a formula of + - * / ^, brackets, numbers, names and functions") from None
+    operations: dict[type, Callable[[Expr, Expr], Expr]] = {
+        ast.Add: lambda a, b: a + b,
+        ast.Sub: lambda a, b: a - b,
+        ast.Mult: lambda a, b: a * b,
+        ast.Div: lambda a, b: a / b,
+        ast.Pow: lambda a, b: a**b,
+    }
+
+    def value(node: ast.expr) -> Expr:
+        match node:
+            case ast.Name(id=label):
+                found = tokens[int(label.strip("_"))]
+                if isinstance(found, str):
+                    return sympy.pi if found == "pi" else sympy.Symbol(found)
+                return found
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return -value(inner)
+            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+                return value(inner)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in operations:
+                return operations[type(op)](value(left), value(right))
+            case ast.Call(func=ast.Name(id=label), args=arguments, keywords=[]):
+                name = tokens[int(label.strip("_"))]
+                if isinstance(name, str) and name in known:
+                    try:
+                        return known[name](*map(value, arguments))
+                    except TypeError:
+                        raise ImportProblem(f"`{name}` of {len(arguments)} arguments", "as many as it takes") from None
+                raise ImportProblem(f"the function `{name}`", "one of " + ", ".join(sorted(known)))
+        raise ImportProblem(f"`{shortened(text)}`", "a formula of + - * / ^, brackets, numbers, names and functions")
+
+    return value(tree)
+
+
+def shortened(text: str) -> str:
+    """A text that fits into a sentence."""
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def number_text(value: Expr) -> str:
+    """A rational number: a decimal where it is one of at most 30 digits, else a fraction in brackets."""
+    p, q = int(value.p), int(value.q)
+    sign, rest = "-" if p < 0 else "", q
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    if rest == 1:
+        shift = next(k for k in itertools.count() if 10**k % q == 0)
+        digits = str(abs(p) * 10**shift // q)
+        figures = digits.rstrip("0") or "0"
+        power = len(digits) - len(figures) - shift
+        if len(figures) <= 30:
+            plain = format(Decimal(f"{figures}e{power}"), "f")
+            return sign + (plain if len(plain) <= 12 else f"{figures}e{power}" if power else figures)
+    return f"({sign}{_whole(abs(p))}{f'/{_whole(q)}' if q != 1 else ''})"
+
+
+def _whole(n: int) -> str:
+    # obsdeg reads at most 36 digits
+    return str(n) if n < 10**30 else f"({_whole(n // 10**30)}*1e30 + {n % 10**30})"
+
+
+def text_of(expression: Expr, names: Mapping[str, str] | None = None, *, power: str = "^", time: str = "t") -> str:
+    """A formula as obsdeg reads it.
+
+    Arguments:
+        expression: What is written.
+        names: New names, by the old ones.
+        power: The sign of powers.
+        time: The name of the time.
+
+    Raises:
+        ImportProblem: a function or condition that obsdeg does not know.
+    """
+    names = names or {}
+
+    def wrap(e: Expr, level: int) -> str:
+        text, own = write(e)
+        return text if own >= level else f"({text})"
+
+    def factors(parts: Iterable[Expr]) -> tuple[str, str]:
+        above, below = [], []
+        for part in parts:
+            base, exponent = part.as_base_exp() if part.is_Pow else (part, sympy.S.One)
+            if exponent.is_Rational and exponent.is_negative:
+                below.append(wrap(base ** (-exponent), _POWER))
+            else:
+                above.append(wrap(part, _POWER))
+        return "*".join(above), below[0] if len(below) == 1 else f"({'*'.join(below)})" if below else ""
+
+    def write(e: Expr) -> tuple[str, int]:
+        if e == TIME:
+            return time, _ATOM
+        if e.is_Symbol:
+            return names.get(e.name, e.name), _ATOM
+        if e.is_Rational:
+            text = number_text(e)
+            return text, _SUM if text.startswith("-") else _ATOM
+        if e is sympy.E:
+            return "exp(1)", _ATOM
+        if e is sympy.pi:
+            return "pi", _ATOM
+        if e.is_Add:
+            out = ""
+            for term in e.args:
+                text = wrap(term, _PRODUCT)
+                if term.could_extract_minus_sign():
+                    out += f" - {wrap(-term, _PRODUCT)}" if out else f"-{wrap(-term, _PRODUCT)}"
+                else:
+                    out += f" + {text}" if out else text
+            return out, _SUM
+        if e.is_Mul:
+            coefficient, rest = e.as_coeff_Mul()
+            if coefficient.is_negative:
+                text, _ = write(-e)
+                return f"-{text}" if (-e).is_Mul or (-e).is_Atom or (-e).is_Pow or (-e).is_Function else f"-({text})", _SUM
+            above, below = factors(rest.args if rest.is_Mul else (rest,))
+            if coefficient != 1:
+                size = number_text(coefficient)
+                above = f"{size}*{above}" if above else size
+            return f"{above or '1'}/{below}" if below else above, _PRODUCT
+        if e.is_Pow:
+            base, exponent = e.args
+            if exponent == sympy.S.Half:
+                return f"sqrt({write(base)[0]})", _ATOM
+            if exponent.is_Rational and exponent.is_negative:
+                return f"1/{wrap(base ** (-exponent), _POWER)}", _PRODUCT
+            return f"{wrap(base, _ATOM)}{power}{wrap(exponent, _ATOM)}", _POWER
+        if isinstance(e, sympy.exp):
+            return f"exp({write(e.args[0])[0]})", _ATOM
+        if e.func in _PRINTED:
+            return f"{_PRINTED[e.func]}({', '.join(write(a)[0] for a in e.args)})", _ATOM
+        if isinstance(e, (sympy.Max, sympy.Min)):
+            # max(a, b) = (a + b + |a - b|)/2
+            first, rest = e.args[0], e.func(*e.args[1:])
+            sign = 1 if isinstance(e, sympy.Max) else -1
+            return write((first + rest + sign * sympy.Abs(first - rest)) / 2)
+        if e.func in (sympy.sinh, sympy.cosh):
+            return write(e.rewrite(sympy.exp))
+        raise ImportProblem(f"`{shortened(str(e))}`", "+ - * / ^ and " + ", ".join([*FUNCTIONS, "atan2"]))
+
+    return write(sympy.sympify(expression))[0]

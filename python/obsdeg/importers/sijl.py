@@ -1,0 +1,102 @@
+"""Models of StructuralIdentifiability.jl: the text of its macro `@ODEmodel`.
+
+`x'(t) = ...` declares a state, `y(t) = ...` an output; what else is a function of the time is a known input, and every other name an unknown parameter.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from .formula import Expr, names_in, parse
+from .problem import ImportProblem
+from .system import State, System
+
+_MACRO = re.compile(r"@ODEmodel\s*\(")
+_LEFT = re.compile(r"\s*([^\W\d][\w!]*)\s*('?)\s*\(\s*t\s*\)\s*$")
+_OF_TIME = re.compile(r"([^\W\d][\w!]*)\s*\(\s*t\s*\)")
+# 2x, 3(a + b): a number in front multiplies
+_COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?=[^\W\d]|\()")
+
+
+def load(path: str | Path, *, model: int = 1) -> System:
+    """The system of the n-th `@ODEmodel` of a file.
+
+    Raises:
+        ImportProblem: it is no such model.
+    """
+    try:
+        return read(Path(path).read_text(encoding="utf-8"), model=model, name=Path(path).stem)
+    except ImportProblem as problem:
+        raise problem.located(file=str(path)) from None
+
+
+def read(text: str, *, model: int = 1, name: str = "model") -> System:
+    """The system of the n-th `@ODEmodel` of a text.
+
+    Raises:
+        ImportProblem: it is no such model.
+    """
+    text = re.sub(r"#=.*?=#", lambda m: "\n" * m.group().count("\n"), text, flags=re.DOTALL)
+    text = re.sub(r"#[^\n]*", "", text)
+    starts = [m.end() for m in _MACRO.finditer(text)]
+    if not 1 <= model <= len(starts):
+        raise ImportProblem(f"{len(starts)} `@ODEmodel(`", f"at least {model} of them")
+    named = re.search(r"([^\W\d]\w*)\s*=\s*$", text[: text.rindex("@", 0, starts[model - 1])])
+    system = System(named.group(1) if named else name)
+    of_time: dict[str, str] = {}
+    outputs: dict[str, tuple[str, str]] = {}
+    rates: dict[str, tuple[str, str]] = {}
+    for line, equation in _equations(text, starts[model - 1]):
+        place = f"line {line}"
+        left, equals, right = equation.partition("=")
+        found = _LEFT.match(left)
+        if not equals or not found:
+            raise ImportProblem(f"`{' '.join(equation.split())}`", "x'(t) = ... or y(t) = ...", place=place)
+        label, prime = found.groups()
+        target = rates if prime else outputs
+        if label in rates or label in outputs:
+            raise ImportProblem(f"a second equation of `{label}`", "one", place=place)
+        target[label] = (right, place)
+        of_time.update({m.group(1): place for m in _OF_TIME.finditer(right)})
+
+    def formula(right: str, place: str) -> Expr:
+        try:
+            expression = parse(_COEFFICIENT.sub(r"\1*", _OF_TIME.sub(r"\1", right)))
+        except ImportProblem as problem:
+            raise problem.located(place=place) from None
+        if "t" in names_in(expression):
+            raise ImportProblem("the time `t` by itself", "functions of it, as x(t)", place=place, hint="make it a state: clock'(t) = 1")
+        return expression
+
+    for label, (right, place) in rates.items():
+        system.states[label] = State(formula(right, place))
+    for label, (right, place) in outputs.items():
+        expression = formula(right, place)
+        if lost := sorted(names_in(expression) & outputs.keys()):
+            raise ImportProblem(f"the output `{lost[0]}` in an equation", "states, inputs and parameters", place=place)
+        system.outputs[label] = expression
+    if not outputs:
+        raise ImportProblem("no output", "y(t) = ...")
+    system.known_inputs = {n: "generic" for n in of_time if n not in rates and n not in outputs}
+    everything = names_in(*(s.rate for s in system.states.values()), *system.outputs.values())
+    order = [m for right, _ in [*rates.values(), *outputs.values()] for m in re.findall(r"[^\W\d][\w!]*", right)]
+    named_once = dict.fromkeys(n for n in order if n in everything and n not in rates and n not in system.known_inputs)
+    system.parameters = dict.fromkeys(named_once, "")
+    return system
+
+
+def _equations(text: str, start: int) -> list[tuple[int, str]]:
+    """The equations between the brackets, with the lines at which they begin."""
+    depth, begin, out = 1, start, []
+    for i in range(start, len(text)):
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(text[i], 0)
+        if depth == 0 or (depth == 1 and text[i] == ","):
+            equation = text[begin:i]
+            if equation.strip():
+                first = begin + len(equation) - len(equation.lstrip())
+                out.append((text.count("\n", 0, first) + 1, equation))
+            begin = i + 1
+        if depth == 0:
+            return out
+    raise ImportProblem("the end of the text", "`)`", place=f"line {text.count(chr(10)) + 1}")

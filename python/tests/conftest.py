@@ -1,0 +1,58 @@
+"""What the tests of the importers share: the judge, the reference models, the published problems."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+#: The checkout.
+ROOT = Path(__file__).resolve().parents[2]
+
+try:
+    import obsdeg.importers  # noqa: F401
+except ModuleNotFoundError:
+    # not installed: the sources
+    sys.path.insert(0, str(ROOT / "python"))
+
+
+def _program() -> str:
+    built = [ROOT / "target" / profile / "obsdeg" for profile in ("release", "debug")]
+    found = os.environ.get("OBSDEG_PROGRAM") or next((str(p) for p in built if p.exists()), None) or shutil.which("obsdeg")
+    if found is None:
+        pytest.fail("no program `obsdeg`: build it (cargo build), or name it in OBSDEG_PROGRAM")
+    return found
+
+
+def judge(model: str) -> dict[str, Any]:
+    """The answer of `analyze` to a model's text, as its JSON. The one place that says who judges."""
+    command = [_program(), "analyze", "-", "--format", "json", "--solutions", "off"]
+    done = subprocess.run(command, input=model, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+def statuses(model: str) -> dict[str, str]:
+    """The status of every unknown."""
+    return {q["name"]: q["status"] for q in judge(model)["quantities"]}
+
+
+def shared(part: str) -> Path:
+    """A folder of the data that stands beside the checkout; a test fails where there is none."""
+    found = ROOT.parent / "shared" / part
+    if not found.is_dir():
+        pytest.fail(f"{found} is missing: the data of these tests stand beside the checkout, in `shared`")
+    return found
+
+
+def references() -> dict[str, dict[str, Any]]:
+    """The published systems with known verdicts, `tests/data/models`, by name."""
+    files = sorted((ROOT / "tests" / "data" / "models").glob("*.json"))
+    return {f.stem: json.loads(f.read_text(encoding="utf-8")) for f in files}
