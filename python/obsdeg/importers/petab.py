@@ -8,6 +8,7 @@ not depend on them.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -70,7 +71,10 @@ def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", unt
             layout = yaml.safe_load(text)
         for part in layout.get("problems", []):
             part.pop("visualization_files", None)  # nothing of the mathematics
-        problem = v1.Problem.from_yaml(layout, base_path=str(Path(file).parent))
+        with warnings.catch_warnings():
+            # of the library's own dependencies
+            warnings.filterwarnings("ignore", module="petab")
+            problem = v1.Problem.from_yaml(layout, base_path=str(Path(file).parent))
     except (ValueError, KeyError, OSError, TypeError, AttributeError, yaml.YAMLError) as error:
         raise ImportProblem(f"a problem that the petab library refuses: {error}", "PEtab of version 1", file=file) from error
     document = getattr(problem.model, "sbml_document", None)
@@ -184,7 +188,10 @@ class _Problem:
         out, k, runs = self.out, self.k, self.runs
         overridden = list(dict.fromkeys(n for r in runs for n in r.during))
         constants = [n for n in overridden if n not in k.rates]
-        assigned = {n: e for n, e in k.assigned.items()}
+        assigned = self.assigned = dict(k.assigned)
+        for n in constants:
+            # a condition says otherwise
+            k.assigned.pop(n, None)
         out.states = {n: State(rate) for n, rate in k.rates.items()}
         out.parameters = {n: "" for n in self.estimated}
         numbers = [{**k.values, **self.fixed, **{n: v for n, v in r.during.items() if n not in k.rates and v.is_Rational}} for r in runs]
@@ -254,7 +261,8 @@ class _Problem:
         """The unknowns that stand for the steady state before a run."""
         k, out = self.k, self.out
         assert run.before is not None
-        values = {**k.values, **self.fixed, **{n: v for n, v in run.before.items() if n not in k.rates}}
+        assigned = {n: start(e, f"the initial assignment of {n}") for n, e in self.assigned.items()}
+        values = {**assigned, **k.values, **self.fixed, **{n: v for n, v in run.before.items() if n not in k.rates}}
         begin = {n: start(run.before.get(n, k.starts.get(n)), f"the start of {n}") for n in k.rates}
         key = (tuple(sorted(values.items(), key=str)), tuple(begin.items()))
         if not hasattr(self, "steady"):

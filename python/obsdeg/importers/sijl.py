@@ -69,13 +69,14 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
             raise ImportProblem("the time `t` by itself", "functions of it, as x(t)", place=place, hint="make it a state: clock'(t) = 1")
         return expression
 
-    for label, (right, place) in rates.items():
-        system.states[label] = State(formula(right, place))
-    for label, (right, place) in outputs.items():
+    for label, (right, place) in [*rates.items(), *outputs.items()]:
         expression = formula(right, place)
         if lost := sorted(names_in(expression) & outputs.keys()):
             raise ImportProblem(f"the output `{lost[0]}` in an equation", "states, inputs and parameters", place=place)
-        system.outputs[label] = expression
+        if label in rates:
+            system.states[label] = State(expression)
+        else:
+            system.outputs[label] = expression
     if not outputs:
         raise ImportProblem("no output", "y(t) = ...")
     system.known_inputs = {n: "generic" for n in of_time if n not in rates and n not in outputs}
