@@ -9,7 +9,7 @@ use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_sy
 use obsdeg_report::{Answer, Document, Several, position_figure};
 use serde::Serialize;
 
-use crate::arguments::{Given, InputArguments, Word, one_of};
+use crate::arguments::{ANY, Given, InputArguments, Word, one_of, whole};
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
 use crate::input::{Input, title};
@@ -37,18 +37,18 @@ Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
     /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
     #[command(flatten)]
     input: InputArguments,
 
     /// The highest order of derivatives to look at in a model that has no proven end
-    #[arg(long, value_name = "K", help_heading = "Models", value_parser = clap::value_parser!(u16).range(0..=1000))]
+    #[arg(long, value_name = "K", help_heading = "Models", value_parser = whole::<u16>(0..=1000))]
     order: Option<u16>,
 
     /// Limit of the work of counting the solutions of a model: millions of products at each of two points (30 ms each) [default: 3]
-    #[arg(long, value_name = "MILLIONS", help_heading = "Models")]
+    #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
     count_limit: Option<u64>,
 
     /// Solving expressions and numbers of solutions

@@ -1,8 +1,10 @@
 //! Arguments that several commands share.
 
+use std::ffi::OsStr;
+use std::ops::RangeInclusive;
 use std::path::{Path as FilePath, PathBuf};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command};
 use obsdeg_core::model::{
@@ -170,8 +172,8 @@ pub(crate) struct TermArguments {
     #[arg(long, value_name = "TERMS", value_parser = listed)]
     terms: Option<String>,
 
-    /// What defines the platform axes, and so which misalignments the families have (default: accelerometers); `frame` in a scheme file
-    #[arg(long, value_name = "SENSORS", requires = "terms", value_parser = one_of(AXES))]
+    /// With --terms: what defines the platform axes, and so which misalignments the families have (default: accelerometers); `frame` in a scheme file
+    #[arg(long, value_name = "SENSORS", value_parser = one_of(AXES))]
     axes: Option<DefinedBy>,
 }
 
@@ -183,6 +185,12 @@ fn listed(text: &str) -> Result<String, TermError> {
 impl TermArguments {
     /// What is unknown, if they say so.
     pub(crate) fn unknowns(&self) -> Result<Option<Unknowns>, Failure> {
+        if let (None, Some(axes)) = (&self.terms, self.axes) {
+            let word = AXES.iter().find(|(.., a)| *a == axes).map_or("", |(word, ..)| word);
+            return Err(Failure::input(format!(
+                "--axes {word} does nothing here: expected --terms with it, as in --terms all (a scheme file says frame = \"{word}\")"
+            )));
+        }
         let of = |text: &String| Unknowns::of(text, self.axes).map_err(|e| Failure::input(e.to_string()));
         self.terms.as_ref().map(of).transpose()
     }
@@ -193,6 +201,37 @@ impl Assumptions {
     pub(crate) fn apply(&self, scheme: &mut Scheme) {
         scheme.carry = self.carry.unwrap_or(scheme.carry);
         scheme.latitude = self.latitude.or(scheme.latitude);
+    }
+}
+
+/// Any whole number.
+pub(crate) const ANY: RangeInclusive<u64> = 0..=u64::MAX;
+
+/// Reads a whole number of a range.
+pub(crate) fn whole<T: TryFrom<u64>>(
+    range: RangeInclusive<u64>,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = text.trim().parse().ok().filter(|n| range.contains(n));
+        let high = if range == ANY { "2^64-1".into() } else { range.end().to_string() };
+        let wrong = || format!("expected a whole number {} to {high}, found {text}", range.start());
+        number.and_then(|n| T::try_from(n).ok()).ok_or_else(wrong)
+    }
+}
+
+/// Any text; help and completions list the words that mean something of their own.
+#[derive(Clone)]
+pub(crate) struct WordOr<const N: usize>(pub(crate) [(&'static str, &'static str); N]);
+
+impl<const N: usize> TypedValueParser for WordOr<N> {
+    type Value = String;
+
+    fn parse_ref(&self, command: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.0.iter().map(|(word, help)| PossibleValue::new(*word).help(*help))))
     }
 }
 
@@ -273,6 +312,43 @@ impl InputArguments {
     }
 }
 
+/// The files of a command that takes several and nothing else to judge.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What is judged")]
+pub(crate) struct FileArguments {
+    /// Scheme files (TOML) and model files (TOML, or JSON); - is stdin
+    #[arg(value_name = "FILE", display_order = 0, required_unless_present_any = ["scheme", "model"])]
+    files: Vec<PathBuf>,
+
+    /// A scheme file, as without the option; it must be one
+    #[arg(long, value_name = "FILE")]
+    scheme: Vec<PathBuf>,
+
+    /// A model file, as without the option; it must be one
+    #[arg(long, value_name = "FILE")]
+    model: Vec<PathBuf>,
+}
+
+impl FileArguments {
+    /// All of them, in the order in which they are read.
+    pub(crate) fn paths(&self) -> impl Iterator<Item = &PathBuf> {
+        self.files.iter().chain(&self.scheme).chain(&self.model)
+    }
+
+    /// The schemes and models in them.
+    pub(crate) fn read(&self) -> Result<Vec<Named>, Failure> {
+        one_on_stdin(self.paths())?;
+        let mut read = read_all(&self.files)?;
+        for path in &self.scheme {
+            read.push(scheme_in(path)?);
+        }
+        for path in &self.model {
+            read.push(model_in(path)?);
+        }
+        Ok(read)
+    }
+}
+
 /// What a command says that judges one scheme or model at a time.
 pub(crate) fn one_file(arg: Arg) -> Arg {
     match arg.get_id() == "files" {
@@ -295,11 +371,17 @@ pub(crate) fn model_in(path: &FilePath) -> Result<Named, Failure> {
     Ok((source.name(), Input::model(source.model()?)))
 }
 
-/// Schemes and models from files, told apart by what they say.
-pub(crate) fn read_all(paths: &[PathBuf]) -> Result<Vec<Named>, Failure> {
-    if paths.iter().filter(|path| is_stdin(path)).count() > 1 {
-        return Err(Failure::input("- is given twice; expected one file on stdin".into()));
+/// Refuses to read stdin twice.
+fn one_on_stdin<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    match paths.filter(|path| is_stdin(path)).count() {
+        0 | 1 => Ok(()),
+        _ => Err(Failure::input("- is given twice; expected one file on stdin".into())),
     }
+}
+
+/// Schemes and models from files, told apart by what they say.
+fn read_all(paths: &[PathBuf]) -> Result<Vec<Named>, Failure> {
+    one_on_stdin(paths.iter())?;
     let one = |path: &PathBuf| {
         let source = Source::read(path, "scheme or model")?;
         Ok((source.name(), source.scheme_or_model()?))

@@ -19,7 +19,7 @@ use obsdeg_report::{
     File, ReportError, calibration_figures, residuals_csv, system_calibration_figures, system_residuals_csv,
 };
 
-use crate::arguments::{Assumptions, Given, Named, model_in, scheme_in};
+use crate::arguments::{ANY, Assumptions, Given, Named, model_in, scheme_in, whole};
 use crate::conditions::{GyroNoiseArguments, within};
 use crate::failure::Failure;
 use crate::input::{Input, ModelFile, Source, is_stdin, open};
@@ -50,7 +50,7 @@ read).";
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
     /// Seed of the exact verdicts
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
     /// The scheme or model file, then records of its runs (CSV or Parquet; a model takes one); - is stdin
@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     model: Option<PathBuf>,
 
     /// Starts of the iteration, that of the file and others about it; fewer are made where no other solution is to be expected
-    #[arg(long, value_name = "N", help_heading = "Models", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", help_heading = "Models", default_value_t = 16, value_parser = whole::<u32>(1..=10_000))]
     starts: u32,
 
     /// The profile of an unknown, what the data say of it when all others follow; may be given several times

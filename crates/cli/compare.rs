@@ -1,11 +1,11 @@
 //! `obsdeg compare`: schemes side by side.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Arg, Args};
 use obsdeg_evidence::compare::{Entry, compare};
 
-use crate::arguments::{Assumptions, read_all};
+use crate::arguments::{ANY, Assumptions, FileArguments, whole};
 use crate::conditions::{GyroNoiseArguments, MeasurementArguments};
 use crate::failure::Failure;
 use crate::input::{Input, title};
@@ -24,15 +24,14 @@ predicted sigmas are without drift noise.
 Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(words))]
+#[command(after_help = AFTER_HELP, override_usage = "obsdeg compare [OPTIONS] <FILE>...", mut_args(words))]
 pub(crate) struct Arguments {
     /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
-    /// Scheme files (TOML); - is stdin
-    #[arg(value_name = "FILE", required = true)]
-    schemes: Vec<PathBuf>,
+    #[command(flatten)]
+    files: FileArguments,
 
     #[command(flatten)]
     assumptions: Assumptions,
@@ -50,6 +49,9 @@ pub(crate) struct Arguments {
 /// What shared options say here.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
+        "files" => arg.help("Scheme files (TOML); - is stdin"),
+        // one is refused, with where it can be judged
+        "model" => arg.hide(true),
         "carry" => arg.help("What is carried between positions, for all schemes"),
         "latitude" => arg.help("Latitude in degrees, for all schemes (default: that of the file, or 28.2)"),
         _ => arg,
@@ -59,8 +61,8 @@ fn words(arg: Arg) -> Arg {
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.check()?;
-    let mut entries = Vec::with_capacity(a.schemes.len());
-    for (path, input) in read_all(&a.schemes)? {
+    let mut entries = Vec::new();
+    for (path, input) in a.files.read()? {
         let Input::Scheme(mut scheme) = input else {
             return Err(Failure::input(format!(
                 "{path} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge models side by side)"

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap_complete::Shell;
+use clap_mangen::Man;
+use clap_mangen::roff::{Roff, roman};
 use obsdeg_report::File;
 
 use crate::failure::Failure;
@@ -32,7 +34,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
 #[command(after_help = MAN_AFTER_HELP)]
 pub(crate) struct ManArguments {
     /// The command whose page it is (default: that of the program)
-    #[arg(value_name = "COMMAND", value_parser = commands())]
+    #[arg(value_name = "COMMAND")]
     command: Option<String>,
 
     /// Write all pages to a folder instead, obsdeg.1, obsdeg-analyze.1 and so on
@@ -50,21 +52,10 @@ Examples:
   obsdeg man analyze | man -l -
   obsdeg man -o ~/.local/share/man/man1                 then: man obsdeg-analyze";
 
-/// The commands that have a page.
-fn commands() -> impl Fn(&str) -> Result<String, String> + Clone + Send + Sync + 'static {
-    |asked| {
-        let names = pages(&command()).map(|(name, _)| name).collect::<Vec<_>>();
-        let known = names.iter().any(|n| n == &format!("obsdeg-{asked}"));
-        let names: Vec<&str> = names.iter().filter_map(|n| n.strip_prefix("obsdeg-")).collect();
-        if known { Ok(asked.into()) } else { Err(format!("expected one of {}", names.join(", "))) }
-    }
-}
-
-/// The pages: of the program and of every command that its help lists.
+/// The pages: of the program and of every command.
 fn pages(command: &clap::Command) -> impl Iterator<Item = (String, clap::Command)> {
     let program = (command.get_name().to_string(), command.clone());
-    let listed = |c: &&clap::Command| !c.is_hide_set() && c.get_name() != "help";
-    let of: Vec<_> = command.get_subcommands().filter(listed).cloned().collect();
+    let of: Vec<_> = command.get_subcommands().cloned().collect();
     let of = of.into_iter().map(|c| {
         let name = format!("obsdeg-{}", c.get_name());
         (name.clone(), c.name(name))
@@ -72,15 +63,35 @@ fn pages(command: &clap::Command) -> impl Iterator<Item = (String, clap::Command
     std::iter::once(program).chain(of)
 }
 
+/// A page; what stands after the help has sections of its own, in which examples keep their lines.
+fn page(command: clap::Command) -> std::io::Result<Vec<u8>> {
+    let footer = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    let mut text = Vec::new();
+    Man::new(command.after_help(None::<&str>)).render(&mut text)?;
+    let mut roff = Roff::new();
+    for part in footer.split("\n\n") {
+        let (first, rest) = part.split_once('\n').unwrap_or((part, ""));
+        if first == "Examples:" {
+            roff.control("SH", ["EXAMPLES"]).control("nf", []);
+            for line in rest.lines() {
+                roff.text([roman(line)]);
+            }
+            roff.control("fi", []);
+        } else if let Some(codes) = part.strip_prefix("Exit codes: ") {
+            roff.control("SH", ["EXIT STATUS"]).text([roman(codes)]);
+        } else {
+            roff.control("SH", ["NOTES"]).text([roman(part)]);
+        }
+    }
+    roff.to_writer(&mut text)?;
+    Ok(text)
+}
+
 /// The manual: a page, or all of them in a folder.
 pub(crate) fn man(a: &ManArguments) -> Result<(), Failure> {
-    let mut command = command();
+    let mut command = command().disable_help_subcommand(true);
     command.build();
-    let page = |c: clap::Command| {
-        let mut text = Vec::new();
-        let rendered = clap_mangen::Man::new(c).render(&mut text);
-        rendered.map(|()| text).map_err(|e| Failure::internal(e.to_string()))
-    };
+    let page = |c| page(c).map_err(|e| Failure::internal(e.to_string()));
     let Some(folder) = &a.output else {
         let asked = a.command.as_ref().map_or("obsdeg".into(), |c| format!("obsdeg-{c}"));
         let found = pages(&command).find(|(name, _)| *name == asked);

@@ -6,7 +6,7 @@ use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
 use obsdeg_evidence::system::crosscheck_system;
 use obsdeg_report::{ReportError, crosscheck_figures};
 
-use crate::arguments::{CARRIES, Given, InputArguments, one_file, one_of};
+use crate::arguments::{ANY, CARRIES, Given, InputArguments, one_file, one_of, whole};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
 use crate::input::Input;
@@ -34,7 +34,7 @@ Exit codes: 0 nothing disagrees, 1 something disagrees, 2 bad input, 3 internal 
 #[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder))]
 pub(crate) struct Arguments {
     /// Seed of all random choices; the result does not depend on the number of threads
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
     #[command(flatten)]
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     conditions: ConditionArguments,
 
     /// Monte Carlo runs
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = whole::<u32>(2..=10_000_000))]
     runs: u32,
 
     /// Make the filter wrong: another carry

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use clap::{Arg, Args};
+use clap::{Arg, ArgGroup, Args};
 use obsdeg_core::model::ranges::{PRIOR, SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::settings::Assignment;
@@ -15,10 +15,10 @@ use obsdeg_design::design::{
 use obsdeg_evidence::simulation::{Conditions, general_first};
 use obsdeg_report::{File, design_figures, position_figure, visible};
 
-use crate::arguments::{Assumptions, TermArguments, Word, one_of};
+use crate::arguments::{ANY, Assumptions, TermArguments, Word, WordOr, one_of, whole};
 use crate::conditions::{MeasurementArguments, assigned, concern_some, within};
 use crate::failure::Failure;
-use crate::input::Source;
+use crate::input::{Source, is_stdin};
 use crate::interrupt;
 use crate::output::{Output, print, to_a_folder};
 use crate::progress::Bar;
@@ -48,6 +48,13 @@ winner.toml (a scheme file), its positions as a picture, and the front of total 
 
 Exit codes: 0 done (with --minimum also when no positions do), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
+/// The words of `--candidates`; whatever else it says is a file.
+const CANDIDATES: [(&str, &str); 3] = [
+    ("cardinal", "the 24 attitudes along North, Up, East, South, Down, West"),
+    ("free", "the attitudes that weights on all attitudes need, reset carry"),
+    ("grid:", "and a step in degrees, as in grid:45: Euler angles in steps"),
+];
+
 /// The words of `--criterion`.
 const CRITERIA: [Word<CriterionName>; 5] = [
     ("worst", "the largest sigma", CriterionName::Worst),
@@ -58,24 +65,22 @@ const CRITERIA: [Word<CriterionName>; 5] = [
 ];
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
+#[command(after_help = AFTER_HELP, group(ArgGroup::new("asked").required(true).args(["positions", "minimum"])), mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
     /// Seed of all random choices; the result does not depend on the number of threads
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
     /// Find the best scheme of so many positions
-    #[arg(long, value_name = "K", required_unless_present = "minimum")]
+    #[arg(long, value_name = "K", value_parser = whole::<usize>(1..=100))]
     positions: Option<usize>,
 
     /// Only find the fewest positions that make every required coefficient observable, with the proof
-    #[arg(long, conflicts_with = "positions")]
+    #[arg(long)]
     minimum: bool,
 
-    /// What to choose from: cardinal (the 24 attitudes along North, Up, East, South, Down, West), grid:DEG (Euler angles in steps), free (the
-    /// attitudes that weights on all attitudes need, reset carry), or
-    /// the positions of a scheme file, whose carry, latitude, geometry, terms, conditions and gimbal limits hold too
-    #[arg(long, value_name = "WHAT", default_value = "cardinal")]
+    /// What to choose from, or a scheme file: its positions, with carry, latitude, geometry, terms, conditions and gimbal limits of the file
+    #[arg(long, value_name = "WHAT", default_value = "cardinal", value_parser = WordOr(CANDIDATES))]
     candidates: String,
 
     /// With --candidates free: angles are rounded to multiples of so many degrees, and schemes evaluated as they are rounded; the cardinal
@@ -95,11 +100,11 @@ pub(crate) struct Arguments {
     max_turn: Option<f64>,
 
     /// How many schemes are listed (default: 10)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1000))]
     keep: Option<u16>,
 
     /// Restarts of the exchange (default: 200)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1_000_000))]
     restarts: Option<u64>,
 
     /// Under reset carry, where many sequences would have to be searched: a scheme found by exchange is enough when it is within so many percent
@@ -117,7 +122,7 @@ pub(crate) struct Arguments {
     divide: bool,
 
     /// Other numbers of positions for the front of total time against the criterion
-    #[arg(long, value_name = "K", value_delimiter = ',')]
+    #[arg(long, value_name = "K", value_delimiter = ',', value_parser = whole::<usize>(1..=100))]
     front: Vec<usize>,
 
     /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
@@ -412,6 +417,11 @@ fn candidates(text: &str) -> Result<(Scheme, Candidates), Failure> {
             || Failure::input(format!("--candidates {text}: expected a step in degrees, as in grid:45"));
         let step = parse_decimal(step.trim()).map_err(|_| wrong())?;
         return Ok((Scheme::default(), Candidates::grid(step)?));
+    }
+    if !is_stdin(Path::new(text)) && !Path::new(text).exists() {
+        return Err(Failure::input(format!(
+            "--candidates {text}: there is no such file; expected cardinal, free, a grid such as grid:45, or a scheme file that exists"
+        )));
     }
     let scheme = Source::read(Path::new(text), "scheme")?.scheme()?;
     let candidates = Candidates::of_scheme(&scheme)?;

@@ -3,6 +3,7 @@
 use clap::Args;
 use obsdeg_symbolic::{Worker, WorkerConfig};
 
+use crate::arguments::whole;
 use crate::failure::{Failure, say};
 use crate::progress::Spinner;
 
@@ -13,7 +14,7 @@ pub(crate) struct EngineArguments {
     /// How much work the symbolic engine may do for one formula, 0 (none) to 1000000: a unit is five million products of terms, about half a second, and
     /// ends at the same place on every machine and under any load. What cannot be counted (factorisation) ends after two seconds of
     /// processor time per unit
-    #[arg(long, value_name = "UNITS", default_value_t = 5, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    #[arg(long, value_name = "UNITS", default_value_t = 5, value_parser = whole::<u64>(0..=1_000_000))]
     symbolic_limit: u64,
 }
 

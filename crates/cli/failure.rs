@@ -10,7 +10,9 @@ use obsdeg_core::solution::CombinationError;
 use obsdeg_design::design::DesignError;
 use obsdeg_evidence::prediction::PredictionError;
 use obsdeg_evidence::simulation::SimulationError;
-use obsdeg_report::{ReportError, visible};
+use obsdeg_report::{ReportError, in_ascii, visible};
+
+use crate::output::plain_messages;
 
 /// A check failed.
 const CHECK: u8 = 1;
@@ -24,8 +26,10 @@ pub(crate) const INTERRUPTED: u8 = 130;
 /// Says something of several lines on stderr. Names, paths and keys come from whoever wrote the input: nothing in them reaches a
 /// terminal but text.
 pub(crate) fn say(message: &str) {
+    let plain = plain_messages();
     for line in message.lines() {
-        eprintln!("{}", visible(line));
+        let line = visible(line);
+        eprintln!("{}", if plain { in_ascii(&line).into() } else { line });
     }
 }
 

@@ -26,6 +26,7 @@ mod simulate;
 
 use std::process::ExitCode;
 
+use clap::builder::PossibleValuesParser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -86,21 +87,34 @@ enum Command {
 fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
-    Cli::command().mut_subcommands(move |command| {
+    let command = Cli::command().mut_subcommands(move |command| {
         command.mut_args(|a| {
             if takes(&a) && !a.is_allow_hyphen_values_set() { a.allow_negative_numbers(true) } else { a }
         })
+    });
+    let pages: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_string()).collect();
+    command.mut_subcommand("man", |man| {
+        man.mut_arg("command", |a| a.value_parser(PossibleValuesParser::new(pages)))
     })
 }
 
-/// Where the positions of a scheme file go that was given to `design`.
-fn file_hint(e: &clap::Error) -> Option<String> {
+/// Where an argument belongs that a command does not know: the commands that have such an option, or where the positions of a scheme file
+/// go that was given to `design`.
+fn hint(e: &clap::Error) -> Option<String> {
     let Some(ContextValue::String(found)) = e.get(ContextKind::InvalidArg) else { return None };
-    let file = std::path::Path::new(found).extension().is_some_and(|x| x == "toml" || x == "json");
-    if e.kind() != ErrorKind::UnknownArgument || found.starts_with('-') || !file {
+    if e.kind() != ErrorKind::UnknownArgument {
         return None;
     }
     let command = command();
+    if let Some(option) = found.strip_prefix("--") {
+        let has = |c: &&clap::Command| c.get_arguments().any(|a| a.get_long() == Some(option));
+        let names: Vec<&str> = command.get_subcommands().filter(has).map(clap::Command::get_name).collect();
+        let named = names.iter().map(|name| format!("`obsdeg {name}`")).collect::<Vec<_>>().join(", ");
+        return (!names.is_empty()).then(|| format!("{found} is an option of {named}"));
+    }
+    if !std::path::Path::new(found).extension().is_some_and(|x| x == "toml" || x == "json") {
+        return None;
+    }
     let asked = std::env::args().skip(1).find_map(|a| command.find_subcommand(a).cloned())?;
     let chooses = asked.get_arguments().any(|a| a.get_id() == "candidates");
     chooses.then(|| format!("the positions of a scheme file are chosen from with --candidates {found}"))
@@ -115,11 +129,13 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
         Ok((Cli::from_arg_matches(&matches)?, given))
     });
     parsed.map_err(|mut e| {
-        if let Some(hint) = file_hint(&e) {
+        if let Some(hint) = hint(&e) {
+            e.remove(ContextKind::SuggestedArg);
             e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint.into()]));
         }
         let message = e.render().to_string();
-        if !e.use_stderr() || message.lines().all(|line| visible(line) == line) {
+        let text = message.lines().all(|line| visible(line) == line);
+        if !e.use_stderr() || text && (message.is_ascii() || !output::plain_messages()) {
             // in colour, where there is any; nobody listens if that fails
             let _ = e.print();
         } else {

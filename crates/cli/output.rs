@@ -27,7 +27,7 @@ const FORMATS: [Word<Format>; 5] = [
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct Output {
-    /// The format (default: by the ending of -o, .json .md .csv .tex; else table)
+    /// The format (default: by the ending of -o, .json .md .csv .tex .txt; without one table)
     #[arg(long, value_name = "FORMAT", value_parser = one_of(FORMATS))]
     format: Option<Format>,
 
@@ -35,7 +35,8 @@ pub(crate) struct Output {
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
 
-    /// Nothing but ASCII in tables (default: on a terminal under TERM=dumb, and where the locale says that it is not UTF-8)
+    /// Nothing but ASCII in tables and messages (default: where the locale is not UTF-8, which on a terminal it
+    /// also is where none of LC_ALL, LC_CTYPE, LANG is set, and on a terminal under TERM=dumb; pipes and files are UTF-8 without a locale)
     #[arg(long)]
     ascii: bool,
 
@@ -60,6 +61,15 @@ pub(crate) struct Target {
     pub(crate) quiet: bool,
 }
 
+/// Endings of files that something else writes: no folder is called so.
+const ELSEWHERE: [&str; 13] =
+    ["html", "htm", "pdf", "xlsx", "xls", "ods", "parquet", "xml", "yaml", "yml", "svg", "png", "toml"];
+
+/// What a file's name ends in, in small letters.
+fn ending(path: &Path) -> Option<String> {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase())
+}
+
 /// What the options say where there are figures and series too ([`Output::write_folder`]).
 pub(crate) fn to_a_folder(arg: Arg) -> Arg {
     let arg = match arg.get_id().as_str() {
@@ -76,28 +86,43 @@ pub(crate) fn to_a_folder(arg: Arg) -> Arg {
 
 /// What a table on stdout looks like.
 fn layout(ascii: bool) -> Layout {
-    let said = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(said);
-    let utf8 = |l: &String| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u));
-    let plain = ascii || !locale.is_none_or(|l| utf8(&l));
     let stdout = std::io::stdout();
-    if !stdout.is_terminal() {
-        return Layout { ascii: plain, ..PIPE };
+    let terminal = stdout.is_terminal();
+    let ascii = ascii || plain(terminal, said);
+    if !terminal {
+        return Layout { ascii, ..PIPE };
     }
     Layout {
         width: terminal_size::terminal_size().map(|(w, _)| w.0),
         color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
-        ascii: plain || said("TERM").is_some_and(|t| t == "dumb"),
+        ascii,
     }
+}
+
+/// A variable of the environment that says something.
+fn said(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|v| !v.is_empty())
+}
+
+/// Whether a stream takes nothing but ASCII. Without a locale that is the C locale, whose characters are those of ASCII: a terminal is believed
+/// to be of it, but what goes into pipes is read as files are, as UTF-8 (and Windows knows no such variables).
+fn plain(terminal: bool, said: impl Fn(&str) -> Option<String>) -> bool {
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&said);
+    let utf8 = locale.map(|l| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u)));
+    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && said("TERM").is_some_and(|t| t == "dumb")
+}
+
+/// Whether messages are ASCII: asked on the command line, which may be wrong otherwise, or by what stderr is.
+pub(crate) fn plain_messages() -> bool {
+    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), said)
 }
 
 impl Output {
     /// Whether the ending says that the answer alone goes to a file, where there may be a folder with figures and series too.
     fn is_file(&self) -> bool {
         let path = self.target.path().filter(|path| !path.is_dir());
-        let ending = path.and_then(Path::extension).map(|e| e.to_string_lossy().to_lowercase());
-        ending
-            .is_some_and(|e| ["json", "md", "csv", "tex", "txt", "html", "htm", "pdf"].contains(&e.as_str()))
+        let files = ["json", "md", "csv", "tex", "txt"];
+        path.and_then(ending).is_some_and(|e| files.contains(&e.as_str()) || ELSEWHERE.contains(&e.as_str()))
     }
 
     /// Refuses early, before any work, a folder with something in it, or a file that is there.
@@ -113,16 +138,16 @@ impl Output {
 
     /// The format that is asked for, or that of the file's ending.
     fn format(&self) -> Result<Format, Failure> {
-        let path = self.target.path();
-        let ending = path.and_then(Path::extension).map(|e| e.to_string_lossy().to_lowercase());
-        let by_ending = match ending.as_deref() {
+        let by_ending = match self.target.path().and_then(ending).as_deref() {
             Some("json") => Format::Json,
             Some("md") => Format::Markdown,
             Some("csv") => Format::Csv,
             Some("tex") => Format::Latex,
-            Some(page @ ("html" | "htm" | "pdf")) if self.format.is_none() => {
+            Some(other) if other != "txt" && self.format.is_none() => {
+                let pages = ["html", "htm", "pdf"].contains(&other);
+                let pages = if pages { " (pages are written by `obsdeg report`)" } else { "" };
                 return Err(Failure::input(format!(
-                    "no format for .{page} here; expected a file that ends in .json, .md, .csv, .tex or .txt, or --format (pages are written by `obsdeg report`)"
+                    "no format for .{other} here; expected a file that ends in .json, .md, .csv, .tex or .txt (a table), or --format{pages}"
                 )));
             }
             _ if self.table.is_some() => Format::Csv,
@@ -278,5 +303,28 @@ pub(crate) fn print(text: &[u8]) -> Result<(), Failure> {
             Err(Failure::input(format!("cannot write to stdout: {e}")))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ascii_follows_the_locale_and_the_terminal() {
+        let of = |terminal: bool, set: &[(&str, &str)]| {
+            plain(terminal, |name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string()))
+        };
+        assert_eq!(of(true, &[]), !cfg!(windows));
+        assert!(!of(false, &[]));
+        for terminal in [true, false] {
+            assert!(of(terminal, &[("LANG", "C")]) && of(terminal, &[("LC_CTYPE", "de_DE.ISO-8859-1")]));
+            assert!(!of(terminal, &[("LANG", "C.UTF-8")]) && !of(terminal, &[("LANG", "en_US.utf8")]));
+            // the first of them wins
+            assert!(of(terminal, &[("LC_ALL", "POSIX"), ("LANG", "C.UTF-8")]));
+            assert!(!of(terminal, &[("LC_CTYPE", "C.UTF-8"), ("LANG", "C")]));
+        }
+        let dumb = [("TERM", "dumb"), ("LANG", "C.UTF-8")];
+        assert!(of(true, &dumb) && !of(false, &dumb));
     }
 }

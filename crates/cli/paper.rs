@@ -3,6 +3,7 @@
 use clap::Args;
 use obsdeg_evidence::audit::audit;
 
+use crate::arguments::{ANY, whole};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Output;
@@ -23,7 +24,7 @@ Exit codes: 0 done (whatever the findings), 2 bad input, 3 internal error, 130 i
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
     /// Seed of the random points and of the noise
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
     #[command(flatten)]

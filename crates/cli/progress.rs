@@ -9,6 +9,9 @@ use obsdeg_calibration::Going;
 use obsdeg_design::design::Progress;
 use obsdeg_report::visible;
 
+/// What a spinner goes through, in characters that every terminal has.
+const TURNS: &str = "|/-\\ ";
+
 /// Shows a spinner on a terminal until it is dropped, if that takes longer than a second.
 pub(crate) struct Spinner {
     stop: Option<Sender<()>>,
@@ -26,7 +29,8 @@ impl Spinner {
             if stopped.recv_timeout(Duration::from_secs(1)) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
-            let bar = ProgressBar::new_spinner().with_message(message);
+            let style = ProgressStyle::default_spinner().tick_chars(TURNS);
+            let bar = ProgressBar::new_spinner().with_style(style).with_message(message);
             while stopped.recv_timeout(Duration::from_millis(100)) == Err(RecvTimeoutError::Timeout) {
                 bar.tick();
             }
@@ -81,7 +85,7 @@ impl Bar {
         };
         if self.bar.message() != visible(&what) {
             if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}: {human_pos}, {elapsed}") {
-                self.bar.set_style(style);
+                self.bar.set_style(style.tick_chars(TURNS));
             }
             self.says(&what);
         }

@@ -9,7 +9,7 @@ use obsdeg_design::review::{ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
-use crate::arguments::{Assumptions, Given, Word, one_of, read_all};
+use crate::arguments::{ANY, Assumptions, FileArguments, Given, Word, one_of, whole};
 use crate::conditions::ConditionArguments;
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
@@ -41,15 +41,14 @@ const FORMATS: [Word<ReviewFormat>; 4] = [
 ];
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(words))]
+#[command(after_help = AFTER_HELP, override_usage = "obsdeg report [OPTIONS] <FILE>... -o <FILE>", mut_args(words))]
 pub(crate) struct Arguments {
     /// Seed of all random choices
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
-    /// Scheme files (TOML) and model files (TOML, or JSON); - is stdin
-    #[arg(value_name = "FILE", required = true)]
-    files: Vec<PathBuf>,
+    #[command(flatten)]
+    files: FileArguments,
 
     /// The format (default: by the ending of the file)
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = one_of(FORMATS))]
@@ -66,7 +65,7 @@ pub(crate) struct Arguments {
     calibration: Vec<PathBuf>,
 
     /// Monte Carlo runs of the evidence
-    #[arg(long = "runs", value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    #[arg(long = "runs", value_name = "N", default_value_t = 100, value_parser = whole::<u32>(2..=10_000_000))]
     monte_carlo: u32,
 
     #[command(flatten)]
@@ -100,7 +99,7 @@ pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     }
     let mut entries: Vec<Entry> = Vec::new();
     let mut files: Vec<ModelFile> = Vec::new();
-    let read = read_all(&a.files)?;
+    let read = a.files.read()?;
     given.concern(&read)?;
     for (path, input) in read {
         match input {
@@ -134,7 +133,7 @@ pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
         e @ (ReviewError::Analysis { .. } | ReviewError::Interrupted) => Failure::input(e.to_string()),
     })?;
     let calibrated: Vec<PathBuf> = a.calibration.iter().map(|path| calibration_file(path)).collect();
-    let origin = origin(a.files.iter().chain(&calibrated))?;
+    let origin = origin(a.files.paths().chain(&calibrated))?;
     bar.says("writing");
     let written = obsdeg_report::review(&reviewed, &calibrations, &origin, format, &folder)?;
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;

@@ -5,7 +5,7 @@ use obsdeg_evidence::simulation::{Traces, simulate};
 use obsdeg_evidence::system::simulate_system;
 use obsdeg_report::{Answer, File, ReportError, series_csv, series_parquet, simulation_figures};
 
-use crate::arguments::{Given, InputArguments, one_file};
+use crate::arguments::{ANY, Given, InputArguments, one_file, whole};
 use crate::conditions::ConditionArguments;
 use crate::failure::Failure;
 use crate::input::Input;
@@ -29,7 +29,7 @@ Exit codes: 0 done (whatever the verdict), 2 bad input, 3 internal error, 130 in
 #[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder))]
 pub(crate) struct Arguments {
     /// Seed of the noise
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
     seed: u64,
 
     #[command(flatten)]

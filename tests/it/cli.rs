@@ -1,11 +1,11 @@
 //! The program end to end: real processes, real files.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Output, Stdio};
 
 use serde_json::Value;
 
-use crate::program::{json, obsdeg, run, stderr, stdout};
+use crate::program::{json, obsdeg, refused, run, scratch, stderr, stdout};
 
 /// Solutions hold the sine of 25 degrees.
 const CONSTANT: [&str; 5] = ["analyze", "--angles", "25,0,0", "--angles", "NUE"];
@@ -114,16 +114,6 @@ fn solutions_off_never_starts_the_engine() {
     let off = with("off");
     assert!(off.stderr.is_empty());
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
-}
-
-fn refused(arguments: &[&str], expected: &[&str]) {
-    let output = run(arguments);
-    let message = stderr(&output);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert!(output.stdout.is_empty(), "{arguments:?}");
-    for part in expected {
-        assert!(message.contains(part), "{arguments:?}: {message}");
-    }
 }
 
 /// Where the dwell makes something else of a degree, or nothing, the row says so in every format.
@@ -369,12 +359,6 @@ fn four_hundred_positions_and_duplicates() {
     assert_eq!(json(&arguments)["rank"], 15);
 }
 
-fn scratch() -> (tempfile::TempDir, PathBuf) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("verdicts.json");
-    (folder, file)
-}
-
 fn write_to(file: &Path, more: &[&str]) -> Output {
     let path = file.to_string_lossy();
     run(&[&P1P2[..], &["--solutions", "off", "--format", "json", "-o", &path], more].concat())
@@ -441,7 +425,7 @@ fn the_paper_is_audited() {
 }
 
 #[test]
-fn schemas_help_completions_and_manual() {
+fn schemas_and_help() {
     for kind in [
         "analysis",
         "audit",
@@ -468,21 +452,6 @@ fn schemas_help_completions_and_manual() {
     }
     assert!(help.contains("obsdeg analyze --angles 0,0,0 --angles 180,0,0") && help.contains("Exit codes"));
     assert!(!stdout(&run(&["--help"])).contains("symbolic-worker"));
-    for shell in ["bash", "zsh", "fish"] {
-        assert!(stdout(&run(&["completions", shell])).contains("obsdeg"));
-    }
-    let manual = stdout(&run(&["man"]));
-    assert!(manual.contains(".TH obsdeg") && manual.contains("obsdeg\\-analyze"), "{manual}");
-    let page = stdout(&run(&["man", "analyze"]));
-    assert!(page.contains(".TH obsdeg-analyze") && page.contains("Exit codes"), "{page}");
-    let (folder, _) = scratch();
-    let at = folder.path().join("man1");
-    let write = ["man", "-o", at.to_str().expect("UTF-8")];
-    assert!(run(&write).status.success());
-    assert_eq!(std::fs::read_to_string(at.join("obsdeg-analyze.1")).expect("written"), page);
-    assert_eq!(std::fs::read_to_string(at.join("obsdeg.1")).expect("written"), manual);
-    refused(&write, &["exists; --force"]);
-    refused(&["man", "nothing"], &["expected one of analyze, simulate"]);
 }
 
 /// Solutions and degenerate angles that only the symbolic engine gives.
@@ -522,82 +491,6 @@ fn the_banner_is_kept_among_several() {
     assert!(stderr(&run(&["analyze", scheme])).is_empty());
 }
 
-/// Files are told apart by what they say, whatever command reads them; `-` is stdin, and stdout.
-#[test]
-fn one_way_to_name_files() {
-    let (scheme, model) = ("examples/pole/scheme.toml", "examples/sir/model.toml");
-    let plain = |arguments: &[&str]| stdout(&run(arguments));
-    let off = ["--solutions", "off", "--quiet"];
-    let alone = |file| plain(&[&["analyze", file], &off[..]].concat());
-    assert_eq!(alone(scheme), plain(&[&["analyze", "--scheme", scheme], &off[..]].concat()));
-    assert_eq!(alone(model), plain(&[&["analyze", "--model", model], &off[..]].concat()));
-    let mut piped = obsdeg(&[&["analyze", "-", "-o", "-"], &off[..]].concat());
-    piped
-        .stdin(std::fs::File::open(Path::new(env!("CARGO_MANIFEST_DIR")).join(scheme)).expect("it is there"));
-    assert_eq!(String::from_utf8_lossy(&piped.output().expect("it runs").stdout), alone(scheme));
-    refused(&["analyze", "-", scheme, "-"], &["- is given twice"]);
-    // several: one after another
-    let both = plain(&[&["analyze", scheme, model], &off[..]].concat());
-    let (a, b) = (alone(scheme), alone(model));
-    let lines =
-        |text: &str| text.lines().skip(1).filter(|l| !l.is_empty()).map(String::from).collect::<Vec<_>>();
-    let all = lines(&both);
-    assert!(lines(&a).iter().chain(&lines(&b)).all(|l| all.contains(l)), "{both}");
-    assert!(both.contains(&format!("{scheme}: ")) && both.contains(&format!("{model}: ")), "{both}");
-    let list = json(&[&["analyze", scheme, model, "--format", "json"], &off[..]].concat());
-    let one = json(&[&["analyze", model, "--format", "json"], &off[..]].concat());
-    assert_eq!((&list[1]["file"], &list[1]["answer"]), (&Value::from(model), &one));
-    // options of the one kind beside a file of the other
-    refused(&["analyze", model, "--carry", "inertial"], &["--carry is about schemes", model]);
-    refused(&["analyze", scheme, "--order", "3"], &["--order is about models", scheme]);
-    refused(&["analyze", "--angles", "NUE", "--order", "3"], &["--order is about models"]);
-    refused(&["simulate", scheme, scheme], &["no more were expected"]);
-    refused(&["report", model, "-o", "x.html", "--carry", "reset"], &["--carry is about schemes"]);
-    refused(&["calibrate", scheme], &["no record"]);
-    refused(&["design", scheme], &["--candidates"]);
-}
-
-/// The format follows the ending, `--format` wins, and CSV is one of the lists of the JSON.
-#[test]
-fn formats_follow_the_ending() {
-    let (folder, _) = scratch();
-    let at = |name: &str| folder.path().join(name).display().to_string();
-    let off = ["--solutions", "off"];
-    for (name, format) in
-        [("a.json", "json"), ("a.md", "markdown"), ("a.CSV", "csv"), ("a.tex", "latex"), ("a.txt", "table")]
-    {
-        let path = at(name);
-        assert!(run(&[&P1P2[..], &off, &["-o", &path]].concat()).status.success());
-        let expected = stdout(&run(&[&P1P2[..], &off, &["--format", format]].concat()));
-        assert_eq!(std::fs::read_to_string(&path).expect("written"), expected, "{name}");
-    }
-    let path = at("b.csv");
-    assert!(run(&[&P1P2[..], &["-o", &path, "--format", "json"]].concat()).status.success());
-    assert!(std::fs::read_to_string(&path).expect("written").starts_with('{'));
-    refused(&[&P1P2[..], &["-o", &at("c.html")]].concat(), &["no format for .html", "obsdeg report"]);
-    let positions = stdout(&run(&[&P1P2[..], &off, &["--table", "positions"]].concat()));
-    assert_eq!(positions.lines().nth(1), Some("p1,0.0; 0.0; 0.0,NUE,,0.0; -1.0; 0.0"), "{positions}");
-    refused(&[&P1P2[..], &["--table", "latitude_deg"]].concat(), &["error: no table `latitude_deg`"]);
-    refused(&[&P1P2[..], &["--table", "x"]].concat(), &["error: no table `x`", "quantities", "combinations"]);
-    refused(&[&P1P2[..], &["--table", "x", "--format", "json"]].concat(), &["--table x is about CSV"]);
-    refused(&["simulate", "--angles", "NUE", "-o", "-"], &["-o - is stdout; expected a folder"]);
-    // where there may be a folder, an ending says that there is not
-    let path = at("run.json");
-    assert!(run(&["simulate", "--angles", "NUE", "-o", &path]).status.success());
-    let alone = stdout(&run(&["simulate", "--angles", "NUE", "--format", "json"]));
-    assert_eq!(std::fs::read_to_string(&path).expect("written"), alone);
-    refused(&["simulate", "--angles", "NUE", "-o", &path], &["run.json exists; --force"]);
-    // a list with nothing in it is no error
-    let none = [
-        "calibrate",
-        "examples/bench-day/scheme.toml",
-        "examples/bench-day/record.csv",
-        "--table",
-        "outliers",
-    ];
-    assert_eq!(stdout(&run(&none)), "");
-}
-
 /// The positions of every scheme as pictures, in a folder of their own.
 #[test]
 fn positions_are_drawn() {
@@ -618,27 +511,6 @@ fn positions_are_drawn() {
     let to = ["--combination", "D_QQ", "--figures", none.to_str().expect("UTF-8")];
     refused(&[&P1P2[..], &to].concat(), &["D_QQ"]);
     assert!(!none.exists());
-}
-
-/// Nothing but ASCII where that is asked for, and where the locale has nothing else.
-#[test]
-fn tables_in_ascii() {
-    let off = [&P1P2[..], &["--solutions", "off"]].concat();
-    let usual = stdout(&run(&off));
-    assert!(!usual.is_ascii());
-    let asked = stdout(&run(&[&off[..], &["--ascii"]].concat()));
-    assert_eq!(asked, usual.replace('─', "-"));
-    let of = |key: &str, value: &str| {
-        let mut command = obsdeg(&off);
-        ["LC_ALL", "LC_CTYPE", "LANG"].iter().for_each(|k| {
-            command.env_remove(k);
-        });
-        String::from_utf8(command.env(key, value).output().expect("it runs").stdout).expect("UTF-8")
-    };
-    assert_eq!(of("LANG", "C"), asked);
-    assert_eq!(of("LC_ALL", "de_DE.ISO-8859-1"), asked);
-    assert_eq!(of("LANG", "C.UTF-8"), usual);
-    assert_eq!(of("LANG", ""), usual);
 }
 
 /// A scheme on the command line and the same scheme in a file are one scheme.

@@ -7,6 +7,7 @@ mod browser;
 mod calibrate;
 mod cli;
 mod compare;
+mod conventions;
 mod crosscheck;
 mod design;
 mod engines;

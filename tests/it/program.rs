@@ -1,5 +1,6 @@
 //! The program as a process, in the root of the repository.
 
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
@@ -29,4 +30,21 @@ pub(crate) fn json(arguments: &[&str]) -> Value {
     let output = run(arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// Runs a command that is refused with a message that has all these parts, and nothing on stdout.
+pub(crate) fn refused(arguments: &[&str], expected: &[&str]) {
+    let output = run(arguments);
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    for part in expected {
+        assert!(message.contains(part), "{arguments:?}: {message}");
+    }
+}
+
+pub(crate) fn scratch() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("verdicts.json");
+    (folder, file)
 }

@@ -3,14 +3,13 @@
 use crate::{ReportError, visible};
 
 /// A field: a text that a spreadsheet would take for a formula has an apostrophe before it, as one types it there.
-/// Numbers are left alone, and so is what begins with a minus and holds nothing but what formulas of ours do: no
-/// function with a text, no other program.
+/// Numbers are left alone, and so is what begins with a sign and holds nothing but what formulas and directions of ours do (`-D_FX`,
+/// `+x,-z`): no function with a text, no other program.
 fn field(text: &str) -> String {
     let text = visible(text);
     let ours = |c: char| c.is_alphanumeric() || " _+-*/^()[].,'@".contains(c);
     let formula = match text.chars().next() {
-        Some('-') => !text.chars().all(ours),
-        Some('+') => text.parse::<f64>().is_err(),
+        Some('-' | '+') => !text.chars().all(ours),
         Some(c) => "=@\u{ff1d}\u{ff0b}\u{ff0d}\u{ff20}".contains(c),
         None => false,
     };

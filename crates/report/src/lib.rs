@@ -48,6 +48,7 @@ pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use poses::position_figure;
 pub use series::{series_csv, series_parquet};
 pub use system_calibration::{system_calibration_figures, system_residuals_csv};
+pub use table::in_ascii;
 pub use tables::Table;
 pub use visible::visible;
 

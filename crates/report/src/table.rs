@@ -18,33 +18,41 @@ fn heading(out: &mut String, text: &str, layout: Layout) {
     if !out.is_empty() {
         out.push('\n');
     }
-    let text = visible(text);
-    if layout.color {
-        out.push_str(&format!("\u{1b}[1m{text}\u{1b}[0m\n"));
-    } else {
-        out.push_str(&format!("{text}\n"));
+    for line in wrapped(text, layout, "", "  ") {
+        if layout.color {
+            out.push_str(&format!("\u{1b}[1m{line}\u{1b}[0m\n"));
+        } else {
+            out.push_str(&format!("{line}\n"));
+        }
     }
 }
 
-/// Adds lines that are wrapped to the width, with a hanging indent.
+/// Adds lines with a hanging indent.
 fn paragraph(out: &mut String, text: &str, layout: Layout) {
+    for line in wrapped(text, layout, "  ", "      ") {
+        out.push_str(&line);
+        out.push('\n');
+    }
+}
+
+/// Lines of the width, broken between words, behind an indent of the first and one of the others.
+fn wrapped(text: &str, layout: Layout, first: &str, others: &str) -> Vec<String> {
     let width = layout.width.map_or(usize::MAX, usize::from).max(20);
-    let (mut line, mut first) = (String::from("  "), true);
+    let (mut lines, mut line, mut empty) = (Vec::new(), String::from(first), true);
     for word in visible(text).split(' ') {
-        if !first && line.chars().count() + 1 + word.chars().count() > width {
-            out.push_str(line.trim_end());
-            out.push('\n');
-            line = String::from("      ");
-            first = true;
+        if !empty && line.chars().count() + 1 + word.chars().count() > width {
+            lines.push(line.trim_end().to_string());
+            line = String::from(others);
+            empty = true;
         }
-        if !first {
+        if !empty {
             line.push(' ');
         }
         line.push_str(word);
-        first = false;
+        empty = false;
     }
-    out.push_str(line.trim_end());
-    out.push('\n');
+    lines.push(line.trim_end().to_string());
+    lines
 }
 
 fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell>], layout: Layout) {
@@ -132,7 +140,11 @@ pub(crate) fn document(d: &Document, layout: Layout) -> String {
 }
 
 /// Lines drawn with ASCII, other characters by their numbers.
-fn in_ascii(text: &str) -> String {
+///
+/// ```
+/// assert_eq!(obsdeg_report::in_ascii("\u{2500} 5 \u{b5}g"), "- 5 \\u{b5}g");
+/// ```
+pub fn in_ascii(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -319,7 +319,7 @@ fn coefficients_that_are_not_known_are_refused() {
         ),
         ("exp(1)*D_FX", "expected sin or cos of an angle, or a square root"),
         ("sin(33 deg)*D_FX", "expected an angle that the scheme has, found `33 deg`"),
-        ("sin(alpha)*D_FX", "`alpha` is not known here"),
+        ("sin(alpha)*D_FX", "`alpha` is not known here; expected one of psi_x, "),
         ("(wN+wU)*D_FX", "expected coefficients that are numbers times powers of wN and wU"),
         ("D_FX*D_FY", "expected a linear combination of unknowns"),
     ] {

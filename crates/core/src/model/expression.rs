@@ -152,12 +152,12 @@ pub enum ExpressionError {
         span: Range<usize>,
     },
     /// A name without a meaning.
-    #[error("`{name}` is not known here{}", hint.as_ref().map(|h| format!("; did you mean `{h}`?")).unwrap_or_default())]
+    #[error("`{name}` is not known here; {hint}")]
     UnknownName {
         /// The name.
         name: String,
-        /// The nearest known name.
-        hint: Option<String>,
+        /// The nearest known name, or what there is.
+        hint: String,
         /// Where.
         span: Range<usize>,
     },
@@ -261,7 +261,7 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
         let span = || expression.spans[i].clone();
         let unknown = |name: &str| ExpressionError::UnknownName {
             name: name.into(),
-            hint: nearest(name, &env.known()),
+            hint: among(name, &env.known()),
             span: span(),
         };
         let inverse = |a: u64| match a {
@@ -400,6 +400,15 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
         .map(|(_, _, k)| k.clone())
 }
 
+/// What could have been meant by `name`: the nearest of the known names, or which there are (the first of very many).
+pub(crate) fn among(name: &str, known: &[String]) -> String {
+    match nearest(name, known) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if known.len() > 40 => format!("expected one of {}, ...", known[..20].join(", ")),
+        None => format!("expected one of {}", known.join(", ")),
+    }
+}
+
 /// Whether `longer` is `name` with more behind it, as `latitude_deg` is for `Latitude`.
 pub(crate) fn goes_on(name: &str, longer: &str) -> bool {
     let start = longer.get(..name.len()).filter(|_| name.len() > 2);
@@ -479,7 +488,10 @@ mod tests {
             |text: &str| evaluate(&parse(text).expect("parses"), &f, &Env).expect_err("wrong").to_string();
         assert_eq!(wrong("D_FZ"), "`D_FZ` is not known here; did you mean `D_FX`?");
         assert_eq!(wrong("1/(x-3)"), "division by zero");
-        assert_eq!(wrong("nothing_like_it"), "`nothing_like_it` is not known here");
+        assert_eq!(
+            wrong("nothing_like_it"),
+            "`nothing_like_it` is not known here; expected one of x, D_FX, psi_x@1, psi_x^n, alpha"
+        );
         let angle = "expected the name of an angle, or one such as `20 deg`, found something else";
         assert_eq!(wrong("sin(2)"), angle);
         assert_eq!(wrong("sin(2.5 deg)"), "expected an angle that the scheme has, found `2.5 deg`");

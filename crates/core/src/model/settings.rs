@@ -7,7 +7,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::expression::nearest;
+use super::expression::{among, nearest};
 use super::ranges::{self, Range, RangeError};
 use super::{PerGyro, Platform};
 
@@ -358,13 +358,7 @@ pub fn known(platform: &Platform, name: &str) -> String {
     families.dedup();
     let families = families.into_iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
     let names: Vec<String> = platform.names().iter().cloned().chain(families).collect();
-    match nearest(name, &names) {
-        Some(hint) => format!("did you mean `{hint}`?"),
-        None if names.len() > 40 => {
-            format!("expected one of {}, ... or a family such as D_F", names[..20].join(", "))
-        }
-        None => format!("expected one of {}", names.join(", ")),
-    }
+    among(name, &names)
 }
 
 #[cfg(test)]

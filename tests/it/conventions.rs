@@ -1,0 +1,198 @@
+//! What users of other programs expect of a command line: how files are named, formats, ASCII, the manual, words that are completed.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::program::{json, obsdeg, refused, run, scratch, stderr, stdout};
+
+const P1P2: [&str; 5] = ["analyze", "--angles", "0,0,0", "--angles", "180,0,0"];
+
+/// Files are told apart by what they say, whatever command reads them; `-` is stdin, and stdout.
+#[test]
+fn one_way_to_name_files() {
+    let (scheme, model) = ("examples/pole/scheme.toml", "examples/sir/model.toml");
+    let plain = |arguments: &[&str]| stdout(&run(arguments));
+    let off = ["--solutions", "off", "--quiet"];
+    let alone = |file| plain(&[&["analyze", file], &off[..]].concat());
+    assert_eq!(alone(scheme), plain(&[&["analyze", "--scheme", scheme], &off[..]].concat()));
+    assert_eq!(alone(model), plain(&[&["analyze", "--model", model], &off[..]].concat()));
+    let mut piped = obsdeg(&[&["analyze", "-", "-o", "-"], &off[..]].concat());
+    piped
+        .stdin(std::fs::File::open(Path::new(env!("CARGO_MANIFEST_DIR")).join(scheme)).expect("it is there"));
+    assert_eq!(String::from_utf8_lossy(&piped.output().expect("it runs").stdout), alone(scheme));
+    refused(&["analyze", "-", scheme, "-"], &["- is given twice"]);
+    // several: one after another
+    let both = plain(&[&["analyze", scheme, model], &off[..]].concat());
+    let (a, b) = (alone(scheme), alone(model));
+    let lines =
+        |text: &str| text.lines().skip(1).filter(|l| !l.is_empty()).map(String::from).collect::<Vec<_>>();
+    let all = lines(&both);
+    assert!(lines(&a).iter().chain(&lines(&b)).all(|l| all.contains(l)), "{both}");
+    assert!(both.contains(&format!("{scheme}: ")) && both.contains(&format!("{model}: ")), "{both}");
+    let list = json(&[&["analyze", scheme, model, "--format", "json"], &off[..]].concat());
+    let one = json(&[&["analyze", model, "--format", "json"], &off[..]].concat());
+    assert_eq!((&list[1]["file"], &list[1]["answer"]), (&Value::from(model), &one));
+    // options of the one kind beside a file of the other
+    refused(&["analyze", model, "--carry", "inertial"], &["--carry is about schemes", model]);
+    refused(&["analyze", scheme, "--order", "3"], &["--order is about models", scheme]);
+    refused(&["analyze", "--angles", "NUE", "--order", "3"], &["--order is about models"]);
+    refused(&["simulate", scheme, scheme], &["no more were expected"]);
+    refused(&["report", model, "-o", "x.html", "--carry", "reset"], &["--carry is about schemes"]);
+    refused(&["calibrate", scheme], &["no record"]);
+    refused(&["design", scheme], &["--candidates"]);
+    // the options of kinds everywhere
+    let compared = plain(&["compare", scheme, "examples/six-positions/scheme.toml"]);
+    assert_eq!(plain(&["compare", scheme, "--scheme", "examples/six-positions/scheme.toml"]), compared);
+    refused(&["compare", "--scheme", model], &["is a model file; expected a scheme file"]);
+    refused(&["compare", "--model", model], &["is a model file; expected scheme files"]);
+    refused(&["compare", "-", "--scheme", "-"], &["- is given twice"]);
+    refused(&["compare"], &["<FILE>..."]);
+    let (folder, _) = scratch();
+    let page = |arguments: &[&str], name: &str| {
+        let at = folder.path().join(name);
+        let to = ["--runs", "2", "-q", "-o", at.to_str().expect("UTF-8")];
+        assert!(run(&[&["report"], arguments, &to].concat()).status.success());
+        // the command that it says it was made by
+        let text = std::fs::read_to_string(at).expect("written");
+        text.replace("--scheme ", "").replace("--model ", "")
+    };
+    assert_eq!(page(&["--model", model], "a.md"), page(&[model], "a2.md").replace("a2_figures", "a_figures"));
+    refused(&["report", "--model", scheme, "-o", "x.html"], &["is a scheme file; expected a model file"]);
+    refused(
+        &["report", model, "--order", "3", "-o", "x.html"],
+        &["--order is an option of `obsdeg analyze`"],
+    );
+}
+
+/// The format follows the ending, `--format` wins, and CSV is one of the lists of the JSON.
+#[test]
+fn formats_follow_the_ending() {
+    let (folder, _) = scratch();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let off = ["--solutions", "off"];
+    for (name, format) in
+        [("a.json", "json"), ("a.md", "markdown"), ("a.CSV", "csv"), ("a.tex", "latex"), ("a.txt", "table")]
+    {
+        let path = at(name);
+        assert!(run(&[&P1P2[..], &off, &["-o", &path]].concat()).status.success());
+        let expected = stdout(&run(&[&P1P2[..], &off, &["--format", format]].concat()));
+        assert_eq!(std::fs::read_to_string(&path).expect("written"), expected, "{name}");
+    }
+    let path = at("b.csv");
+    assert!(run(&[&P1P2[..], &["-o", &path, "--format", "json"]].concat()).status.success());
+    assert!(std::fs::read_to_string(&path).expect("written").starts_with('{'));
+    refused(&[&P1P2[..], &["-o", &at("c.html")]].concat(), &["no format for .html", "obsdeg report"]);
+    // no other ending is passed over, whether there might be a folder or not
+    refused(&[&P1P2[..], &["-o", &at("c.xlsx")]].concat(), &["no format for .xlsx", ".csv", "--format"]);
+    refused(
+        &[&["simulate"], &P1P2[1..], &["-o", &at("c.xlsx")]].concat(),
+        &["no format for .xlsx", "--format"],
+    );
+    assert!(!folder.path().join("c.xlsx").exists());
+    let path = at("d.dat");
+    assert!(run(&[&P1P2[..], &["-o", &path, "--format", "csv"]].concat()).status.success());
+    assert!(std::fs::read_to_string(&path).expect("written").starts_with("name,unit"));
+    let positions = stdout(&run(&[&P1P2[..], &off, &["--table", "positions"]].concat()));
+    assert_eq!(positions.lines().nth(1), Some("p1,0.0; 0.0; 0.0,NUE,,0.0; -1.0; 0.0"), "{positions}");
+    refused(&[&P1P2[..], &["--table", "latitude_deg"]].concat(), &["error: no table `latitude_deg`"]);
+    refused(&[&P1P2[..], &["--table", "x"]].concat(), &["error: no table `x`", "quantities", "combinations"]);
+    refused(&[&P1P2[..], &["--table", "x", "--format", "json"]].concat(), &["--table x is about CSV"]);
+    refused(&["simulate", "--angles", "NUE", "-o", "-"], &["-o - is stdout; expected a folder"]);
+    // where there may be a folder, an ending says that there is not
+    let path = at("run.json");
+    assert!(run(&["simulate", "--angles", "NUE", "-o", &path]).status.success());
+    let alone = stdout(&run(&["simulate", "--angles", "NUE", "--format", "json"]));
+    assert_eq!(std::fs::read_to_string(&path).expect("written"), alone);
+    refused(&["simulate", "--angles", "NUE", "-o", &path], &["run.json exists; --force"]);
+    // a list with nothing in it is no error
+    let none = [
+        "calibrate",
+        "examples/bench-day/scheme.toml",
+        "examples/bench-day/record.csv",
+        "--table",
+        "outliers",
+    ];
+    assert_eq!(stdout(&run(&none)), "");
+}
+
+/// Nothing but ASCII where that is asked for, and where the locale has nothing else.
+#[test]
+fn tables_in_ascii() {
+    let off = [&P1P2[..], &["--solutions", "off"]].concat();
+    let usual = stdout(&run(&off));
+    assert!(!usual.is_ascii());
+    let asked = stdout(&run(&[&off[..], &["--ascii"]].concat()));
+    assert_eq!(asked, usual.replace('─', "-"));
+    let of = |key: &str, value: &str| {
+        let mut command = obsdeg(&off);
+        ["LC_ALL", "LC_CTYPE", "LANG"].iter().for_each(|k| {
+            command.env_remove(k);
+        });
+        String::from_utf8(command.env(key, value).output().expect("it runs").stdout).expect("UTF-8")
+    };
+    assert_eq!(of("LANG", "C"), asked);
+    assert_eq!(of("LC_ALL", "de_DE.ISO-8859-1"), asked);
+    assert_eq!(of("LANG", "C.UTF-8"), usual);
+    assert_eq!(of("LANG", ""), usual);
+    // messages too
+    let strange = |arguments: &[&str]| stderr(&run(&[&["analyze", "\u{e9}.toml"], arguments].concat()));
+    assert!(strange(&[]).contains("\u{e9}.toml"));
+    assert!(strange(&["--ascii"]).contains("\\u{e9}.toml"));
+    let wrong = stderr(&run(&["analyze", "--ascii", "--carry", "\u{e9}"]));
+    assert!(wrong.is_ascii() && wrong.contains("[possible values: platform, inertial, reset]"), "{wrong}");
+}
+
+/// Completions, and the pages of the manual.
+#[test]
+fn completions_and_manual() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = stdout(&run(&["completions", shell]));
+        // pages of the manual, and words that are not all there is
+        for words in ["cardinal", "grid", "crosscheck"] {
+            assert!(script.contains(words), "{shell}: {words}");
+        }
+    }
+    let bash = stdout(&run(&["completions", "bash"]));
+    assert!(bash.contains(r#"compgen -W "cardinal free grid:""#), "{bash}");
+    assert!(bash.contains("--output --force --help analyze simulate crosscheck"), "{bash}");
+    let missing = ["design", "--positions", "5", "--candidates", "foo"];
+    refused(&missing, &["--candidates foo", "cardinal", "free", "grid:45", "a scheme file that exists"]);
+    let manual = stdout(&run(&["man"]));
+    assert!(manual.contains(".TH obsdeg") && manual.contains("obsdeg\\-analyze"), "{manual}");
+    assert!(!manual.contains("obsdeg\\-help") && manual.contains("obsdeg\\-man"), "{manual}");
+    let page = stdout(&run(&["man", "analyze"]));
+    // an example a line, not filled
+    let example = ".SH EXAMPLES\n.nf\n  obsdeg analyze \\-\\-angles 0,0,0 \\-\\-angles 180,0,0 ";
+    assert!(page.contains(example) && page.contains("\n  obsdeg analyze model.toml "), "{page}");
+    assert!(page.contains(".TH obsdeg-analyze") && page.contains(".SH \"EXIT STATUS\""), "{page}");
+    let (folder, _) = scratch();
+    let at = folder.path().join("man1");
+    let write = ["man", "-o", at.to_str().expect("UTF-8")];
+    assert!(run(&write).status.success());
+    assert_eq!(std::fs::read_to_string(at.join("obsdeg-analyze.1")).expect("written"), page);
+    assert_eq!(std::fs::read_to_string(at.join("obsdeg.1")).expect("written"), manual);
+    refused(&write, &["exists; --force"]);
+    refused(&["man", "nothing"], &["possible values: analyze, simulate"]);
+}
+
+/// A whole number that is none, or is out of range, is told with the range and what was found.
+#[test]
+fn whole_numbers() {
+    let seeds = ["analyze", "simulate", "crosscheck", "calibrate", "compare", "design", "report", "paper"];
+    for command in seeds {
+        refused(&[command, "--seed", "-1"], &["--seed", "expected a whole number 0 to 2^64-1, found -1"]);
+    }
+    refused(&["design", "--positions", "x"], &["expected a whole number 1 to 100, found x"]);
+    refused(&["design", "--positions", "5", "--front", "3,0"], &["1 to 100, found 0"]);
+    refused(&["crosscheck", "--runs", "1"], &["expected a whole number 2 to 10000000, found 1"]);
+    refused(&[&P1P2[..], &["--order", "99999999999999999999"]].concat(), &["0 to 1000, found 9999"]);
+}
+
+/// What `--axes` is about is said where there are no terms, and of a model.
+#[test]
+fn axes_without_terms() {
+    refused(&[&P1P2[..], &["--axes", "body"]].concat(), &["--axes body does nothing here", "--terms"]);
+    let model = ["analyze", "examples/sir/model.toml", "--axes", "body"];
+    refused(&model, &["--axes is about schemes", "is a model file"]);
+}
