@@ -70,6 +70,23 @@ pub enum Finding {
         record: String,
         /// Its mean length, in g.
         length_g: f64,
+        /// Whether it is as long at all positions.
+        alike: bool,
+        /// Where it is shortest.
+        least: ForceLength,
+        /// Where it is longest.
+        most: ForceLength,
+        /// Each of these alone makes it one g long: none where several axes are off, or all alike.
+        causes: Vec<ForceCause>,
+    },
+    /// The clock of a record does not go as fast as that of the scheme, or as the earth turns.
+    Clock {
+        /// The record.
+        record: String,
+        /// By which part it is fast, as positions begin and end.
+        by_durations: Option<f64>,
+        /// The same by the rate of the earth, where that is beyond chance.
+        by_earth: Option<ClockByEarth>,
     },
     /// A position fits worse than its measurements allow.
     Position {
@@ -140,6 +157,40 @@ pub enum Finding {
         /// Chi-square per degree of freedom.
         chi_square: f64,
     },
+}
+
+/// How long the specific force is at a position.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ForceLength {
+    /// The position.
+    pub position: String,
+    /// In g.
+    pub length_g: f64,
+}
+
+/// What one axis may be off by, so that the specific force is not one g long.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ForceCause {
+    /// What it is an error of.
+    pub error: ForceError,
+    /// The output of the accelerometer: fx, fy, fz.
+    pub axis: String,
+    /// What is recorded is larger by this: as a part (scale), or in g (zero).
+    pub by: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// The part by which the force is longer besides, at all positions alike.
+    pub besides: Option<f64>,
+}
+
+/// What an axis is off in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceError {
+    /// Its scale.
+    Scale,
+    /// Its zero.
+    Zero,
 }
 
 /// An unknown or a combination.
@@ -223,6 +274,8 @@ pub struct PositionFit {
     pub start_s: f64,
     /// To when.
     pub end_s: f64,
+    /// How long the specific force is there, in g, where the record has it: a median, which single samples do not move.
+    pub force_g: Option<f64>,
     /// Measurements: components of Z of bins.
     pub measurements: usize,
     /// Chi-square per degree of freedom.
@@ -330,6 +383,26 @@ pub struct RecordReport {
     pub force_g: Option<f64>,
     /// How far the gimbals are from the attitudes of the scheme at most, in deg, where the record has their angles.
     pub gimbals_deg: Option<f64>,
+    /// Its clock.
+    pub clock: Clock,
+}
+
+/// How right the clock of a record is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Clock {
+    /// By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme that was run so.
+    pub by_durations: Option<f64>,
+    /// By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part.
+    pub by_earth: Option<ClockByEarth>,
+}
+
+/// A clock by the rate of the earth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ClockByEarth {
+    /// The part by which it is fast.
+    pub fast: f64,
+    /// Its standard deviation: a part that is not much larger does not show.
+    pub sigma: f64,
 }
 
 /// What says where a sample was taken.

@@ -387,8 +387,11 @@ impl Record {
     }
 
     /// Goes through all rows: of each the `wanted` numbers and the text of the `label` column. The first wanted is the time, which must be there and
-    /// increase; it may begin anew with another label where `anew` says so. Gives the digest of these numbers, by which two records are the same: the first half
-    /// of SHA-256 (FIPS 180-4), in hexadecimal.
+    /// increase; it may begin anew with another label where `anew` says so.
+    ///
+    /// Gives the digest by which two records are the same, the first half of SHA-256 (FIPS 180-4) in hexadecimal. It is of the `wanted` numbers alone, in the units
+    /// of the caller and row by row: neither other columns nor labels, names, comments or the kind of file are in it, so that a record to which somebody adds a
+    /// column of notes, or which he saves in another format, is still the same.
     ///
     /// # Errors
     /// [`RecordError`], and what `each` refuses.

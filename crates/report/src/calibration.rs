@@ -2,7 +2,8 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    CovarianceTable, Estimated, Finding, PositionFit, PositionsBy, RecordReport, ResidualSeries,
+    Clock, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit, PositionsBy,
+    RecordReport, ResidualSeries,
 };
 
 use crate::document::{
@@ -30,15 +31,101 @@ fn of(record: &str, records: &[RecordReport]) -> String {
     if records.len() > 1 { format!(" of {record}") } else { String::new() }
 }
 
+/// What one axis is off by.
+fn cause(c: &ForceCause) -> String {
+    let besides = c.besides.map_or_else(String::new, |b| {
+        format!(", beside {} too long at all positions alike (scale or gravity)", number(b))
+    });
+    let sigma = number(c.sigma);
+    match c.error {
+        ForceError::Scale if c.by < 0.0 => {
+            format!("{} is {} too short (scale, sigma {sigma}; K1){besides}", c.axis, number(-c.by))
+        }
+        ForceError::Scale => {
+            format!("{} is {} too long (scale, sigma {sigma}; K1){besides}", c.axis, number(c.by))
+        }
+        ForceError::Zero => {
+            let by = format!("{}{}", if c.by < 0.0 { "" } else { "+" }, number(c.by));
+            format!("{} has a zero of {by} g (sigma {sigma} g; K0){besides}", c.axis)
+        }
+    }
+}
+
+/// A part by which a clock is fast.
+fn part(fast: f64) -> String {
+    format!("{:.2} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
+}
+
+/// From this part on an error of the clock is large.
+const CLOCK: f64 = 0.1;
+
+/// What is known of the clock of a record.
+fn clock(c: &Clock) -> String {
+    let held = c.by_durations.map_or_else(String::new, |fast| {
+        format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
+    });
+    match &c.by_earth {
+        Some(e) if 3.0 * e.sigma < CLOCK => format!(
+            "; by the rates of the earth and of turns its clock is {} (sigma {} %){held}",
+            part(e.fast),
+            number(100.0 * e.sigma)
+        ),
+        Some(e) => format!(
+            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong by as much{held}",
+            (300.0 * e.sigma).min(100.0)
+        ),
+        None => format!("; a wrong clock does not show in it, and would make drifts wrong by as much{held}"),
+    }
+}
+
 fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
         Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up".into(),
-        Finding::Force { record, length_g } => format!(
-            "the specific force{} is {length_g:.6} g long on average: a scale error of {}, or another gravity, which no unknown of the scheme explains (K1 would)",
-            of(record, records),
-            number(length_g - 1.0)
-        ),
+        Finding::Force { record, length_g, alike, least, most, causes } => {
+            let of = of(record, records);
+            if *alike {
+                let or =
+                    causes.iter().map(|c| format!(" (or of {} alone: these positions do not tell)", c.axis));
+                return format!(
+                    "the specific force{of} is {length_g:.6} g long at all positions alike: a scale error of {}{}, or another gravity, which no unknown of the scheme explains (K1 would)",
+                    number(length_g - 1.0),
+                    or.collect::<String>()
+                );
+            }
+            let lengths = format!(
+                "the specific force{of} is {:.6} g long at {} and {:.6} g at {}",
+                least.length_g, least.position, most.length_g, most.position
+            );
+            if causes.is_empty() {
+                return format!(
+                    "{lengths}: no scale or zero of one axis makes such lengths (they are among the positions), and no unknown of the scheme explains them (K0 and K1 would)"
+                );
+            }
+            let each: Vec<String> = causes.iter().map(cause).collect();
+            let told = if causes.len() > 1 { " (these positions do not tell which)" } else { "" };
+            format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
+        }
+        Finding::Clock { record, by_durations, by_earth } => {
+            let mut says = Vec::new();
+            if let Some(fast) = by_durations {
+                says.push(format!("positions begin and end as by a clock that is {}", part(*fast)));
+            }
+            if let Some(e) = by_earth {
+                says.push(format!(
+                    "by the rates of the earth and of turns it is {} (sigma {} %)",
+                    part(e.fast),
+                    number(100.0 * e.sigma)
+                ));
+            }
+            let rest = match by_earth {
+                Some(_) => "drifts are off by that part",
+                None => {
+                    "the rates of the earth and of turns do not tell a clock from positions that were held so much longer or shorter: by a clock drifts are off by that part, else the scheme has other times than its run"
+                }
+            };
+            format!("the clock{}: {}; {rest}", of(record, records), says.join(", "))
+        }
         Finding::Position { record, position, chi_square, factor } => format!(
             "the model does not explain position {position}{} (chi-square {} per degree of freedom): {} there",
             of(record, records),
@@ -124,16 +211,24 @@ fn row(e: &Estimated) -> Vec<String> {
     ]
 }
 
-fn position(p: &PositionFit, record: Option<usize>) -> Vec<String> {
-    vec![
+/// The column of the force among those of a position.
+const FORCE: usize = 4;
+
+fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> {
+    let mut out = vec![
         format!("{}{}", p.position, record.map_or_else(String::new, |r| format!(" (record {})", r + 1))),
         format!("{:.1}", p.start_s),
         format!("{:.1}", p.end_s),
         p.measurements.to_string(),
+        p.force_g.map_or_else(|| "-".into(), |f| format!("{f:.6}")),
         number(p.chi_square),
         p.moves.as_ref().map_or_else(|| "-".into(), |m| format!("{} by {:+.1} sigma", m.name, m.sigmas)),
         if p.loses.is_empty() { "-".into() } else { p.loses.join(", ") },
-    ]
+    ];
+    if !force {
+        out.remove(FORCE);
+    }
+    out
 }
 
 /// What was read, a sentence for each record.
@@ -166,6 +261,7 @@ fn records(c: &Calibration) -> Vec<String> {
         if let Some(off) = r.gimbals_deg {
             out += &format!("; the gimbals are within {} deg of the scheme", number(off));
         }
+        out += &clock(&r.clock);
         if !r.ignored.is_empty() {
             out += &format!("; nothing was made of the columns {}", r.ignored.join(", "));
         }
@@ -330,22 +426,27 @@ impl Answer for Calibration {
         }
         blocks.push(Block::list("Fit", fit(self)));
         let each = self.positions.len() / self.records.len().max(1);
-        let columns = [
+        let force = self.positions.iter().any(|p| p.force_g.is_some());
+        let mut columns = vec![
             left("position"),
             right("from [s]"),
             right("to [s]"),
             right("measured"),
+            right("force [g]"),
             right("chi-square"),
             left("without it moves most"),
             left("without it not determined"),
         ];
+        if !force {
+            columns.remove(FORCE);
+        }
         blocks.push(Block::table(
             "Positions (times of the record; chi-square per degree of freedom)",
             columns,
             self.positions
                 .iter()
                 .enumerate()
-                .map(|(i, p)| position(p, (self.records.len() > 1).then(|| i / each))),
+                .map(|(i, p)| position(p, (self.records.len() > 1).then(|| i / each), force)),
         ));
         let columns = [
             left("component"),

@@ -13,9 +13,9 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
 use super::observe::{By, channel_name};
 use super::run::Key;
-use super::{CalibrationError, Options};
+use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
     PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
@@ -23,8 +23,6 @@ use crate::setup::{Basis, Setup};
 
 /// How many times wider than the prior that of the filter is.
 const WIDE: f64 = 100.0;
-/// The probability with which a right record is in its bands.
-pub(super) const STRICT: f64 = 0.999;
 /// A pull ten times as weak leaves the sigma of what is determined.
 const DETERMINED: f64 = 1.05;
 /// Without a position sigma of what it alone determines grows by this at least.
@@ -376,6 +374,7 @@ impl Parts<'_> {
                     position: position.name.clone(),
                     start_s: run.reading.origin + start_s,
                     end_s: run.reading.origin + end_s,
+                    force_g: run.reading.lengths.get(p).copied().flatten().map(|l| l.length),
                     measurements,
                     chi_square: chi / free.max(f64::MIN_POSITIVE),
                     degrees_of_freedom: free,
@@ -440,7 +439,11 @@ impl Parts<'_> {
     }
 
     fn records(&self) -> Vec<RecordReport> {
-        let of = |run: &super::run::Run| RecordReport {
+        let of = |(r, run): (usize, &super::run::Run)| RecordReport {
+            clock: Clock {
+                by_durations: run.reading.by_durations(self.planned),
+                by_earth: self.clock(r).ok().flatten(),
+            },
             name: run.reading.name.clone(),
             samples: run.reading.samples,
             unused: run.reading.unused,
@@ -456,7 +459,7 @@ impl Parts<'_> {
             ignored: run.reading.ignored.clone(),
             force_g: run.reading.force,
         };
-        self.problem.runs.iter().map(of).collect()
+        self.problem.runs.iter().enumerate().map(of).collect()
     }
 
     /// What joining the records adds to what each leaves alone.

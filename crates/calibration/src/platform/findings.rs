@@ -1,16 +1,17 @@
 //! What speaks against a model and its sigmas, the gravest first.
 
-use obsdeg_ekf::consistency::chi_square_band;
+use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
-use super::diagnose::{MapBoth, Parts, STRICT};
-use crate::answer::{Calibration, Finding, PositionFit};
+use super::STRICT;
+use super::diagnose::{MapBoth, Parts};
+use super::length::wrong;
+use super::run::Run;
+use crate::answer::{Calibration, Finding, ForceLength, PositionFit, RecordReport};
 
 /// The paths agree to this, in sigma.
 const AGREE: f64 = 1e-6;
 /// A position that fits this many times worse than the others in the middle is named by itself.
 const APART: f64 = 2.0;
-/// The specific force may be off one g by this where nothing unknown explains it.
-const FORCE: f64 = 3e-4;
 
 impl Parts<'_> {
     /// What speaks against all of it.
@@ -22,12 +23,9 @@ impl Parts<'_> {
             out.push(Finding::NotSettled);
         }
         if !self.planned.platform.observed().accelerometers {
-            for record in &c.records {
-                if let Some(length_g) = record.force_g.filter(|f| (f - 1.0).abs() > FORCE) {
-                    out.push(Finding::Force { record: record.name.clone(), length_g });
-                }
-            }
+            out.extend(self.problem.runs.iter().filter_map(|run| self.force(run)));
         }
+        out.extend(c.records.iter().filter_map(|record| clock(record, c)));
         out.extend(self.fits(c));
         for (r, record) in c.records.iter().enumerate() {
             let tests = (c.records.len() * c.channels.len()) as f64;
@@ -60,6 +58,24 @@ impl Parts<'_> {
             out.push(Finding::SecondPath { difference });
         }
         out
+    }
+
+    /// What is wrong with the length of the specific force of a run.
+    fn force(&self, run: &Run) -> Option<Finding> {
+        let reading = &run.reading;
+        let wrong = wrong(&reading.lengths)?;
+        let end = |p: usize| ForceLength {
+            position: self.scheme.positions[p].name.clone(),
+            length_g: reading.lengths[p].map_or(f64::NAN, |l| l.length),
+        };
+        Some(Finding::Force {
+            record: reading.name.clone(),
+            length_g: reading.force.unwrap_or(f64::NAN),
+            alike: wrong.alike,
+            least: end(wrong.ends[0]),
+            most: end(wrong.ends[1]),
+            causes: wrong.causes,
+        })
     }
 
     /// Positions, or noise, or components.
@@ -118,4 +134,19 @@ impl Parts<'_> {
         let chi = left.norm_squared() / dof;
         (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
     }
+}
+
+/// What is wrong with the clock of a record: the rate of the earth says so where it is beyond chance, sigmas as the fit has them. Where it says that the clock is
+/// right, positions were held longer or shorter than in the scheme, which is no matter.
+fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
+    let most = chi_square_quantile(1.0, 1.0 - (1.0 - STRICT) / c.records.len() as f64).sqrt();
+    let (by_durations, by_earth) = (record.clock.by_durations, record.clock.by_earth.as_ref());
+    let beyond =
+        |from: f64| by_earth.is_some_and(|e| (e.fast - from).abs() > most * e.sigma * c.fit.factor.max(1.0));
+    let (wrong, held) = (beyond(0.0), by_durations.is_some_and(&beyond));
+    (wrong || by_durations.is_some() && !held).then(|| Finding::Clock {
+        record: record.name.clone(),
+        by_durations,
+        by_earth: by_earth.filter(|_| wrong).cloned(),
+    })
 }

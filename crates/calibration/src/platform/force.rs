@@ -5,6 +5,9 @@ use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::apply;
 
 use super::CalibrationError;
+use super::clock;
+use super::length::Length;
+use super::mistaken::Mistaken;
 
 /// The specific force of a position of the scheme is no further from the vertical than this, in deg.
 const TILT_DEG: f64 = 20.0;
@@ -24,81 +27,14 @@ const FEWEST: usize = 20;
 const HELD_DEG: f64 = 0.3;
 const DRIFTS_DEG_S: f64 = 0.03;
 const NOISE: f64 = 8.0;
-
-/// A record that is not what it says it is.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Mistaken {
-    /// Numbers of another unit.
-    #[error(
-        "{record}: line {line}, columns {columns}: at {position} the specific force is {length_g} g long by what the header says, expected about 1; with the numbers as {units} it is"
-    )]
-    ForceUnit {
-        /// The record.
-        record: String,
-        /// The first line of the position.
-        line: u64,
-        /// The columns.
-        columns: String,
-        /// Where it is furthest from 1 g.
-        position: String,
-        /// What it is there.
-        length_g: String,
-        /// The units that the numbers are as of.
-        units: String,
-    },
-    /// A force that is none of gravity.
-    #[error(
-        "{record}: line {line}: at {position} the specific force is {length_g} g long; expected about 1, and no unit of forces makes it that"
-    )]
-    ForceLength {
-        /// The record.
-        record: String,
-        /// The first line of the position.
-        line: u64,
-        /// Where it is furthest from 1 g.
-        position: String,
-        /// What it is there.
-        length_g: String,
-    },
-    /// Times of another unit.
-    #[error(
-        "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the scheme {expected} s, and all others alike; with the numbers as [{unit}] they agree"
-    )]
-    TimeUnit {
-        /// The record.
-        record: String,
-        /// The column.
-        column: String,
-        /// How long the first position lasts, in s.
-        found: String,
-        /// How long it does in the scheme.
-        expected: String,
-        /// The unit that the numbers are as of.
-        unit: &'static str,
-    },
-    /// The platform leaves a position while samples are still said to be of it, or comes later.
-    #[error(
-        "{record}: between lines {from} and {to} the platform {what} {position}: the samples of {position} {side} that are up to {off_deg} deg from the others, as at {like}; expected positions (by label or by time) that begin and end where the platform does"
-    )]
-    Shifted {
-        /// The record.
-        record: String,
-        /// It happens after this line.
-        from: u64,
-        /// And before this one.
-        to: u64,
-        /// The position.
-        position: String,
-        /// What happens.
-        what: &'static str,
-        /// Which samples are not of it.
-        side: &'static str,
-        /// How far the first or the last of them is from the others.
-        off_deg: String,
-        /// What position has such a force.
-        like: String,
-    },
-}
+/// So many samples that are far from one g are looked at one by one.
+const SUSPECTS: usize = 64;
+/// A sample is within this of those beside it, in g, or within this of the attitude of the scheme where there are none.
+const BESIDE: f64 = 0.03;
+const ALONG: f64 = 0.35;
+/// Of normal errors: sigma over the median of their sizes, and sigma of a median over that of a mean.
+const MEDIAN_TO_SIGMA: f64 = 1.4826;
+const SIGMA_OF_MEDIAN: f64 = 1.2533;
 
 /// The force of some samples in a row, in platform axes: the median of each component.
 #[derive(Debug, Clone)]
@@ -110,6 +46,8 @@ struct Piece {
     samples: usize,
     /// In g.
     force: [f64; 3],
+    /// The median of its lengths, in g.
+    length: f64,
 }
 
 /// The forces of a record, by position.
@@ -122,6 +60,10 @@ pub(crate) struct Forces {
     position: usize,
     seen: usize,
     pieces: Vec<Vec<Piece>>,
+    /// By position: the variances of the lengths as they are known, their sum and number.
+    variances: Vec<(f64, usize)>,
+    /// The first samples that are far from one g: position, line, force.
+    suspects: Vec<(usize, u64, [f64; 3])>,
 }
 
 /// A column of the force: as it is written, and what one of its numbers was taken for, in g.
@@ -159,15 +101,21 @@ fn tilt(c: &Matrix3<f64>, force: &[f64; 3]) -> f64 {
 impl Forces {
     /// Of a record of so many positions, in pieces of at most `longest` s.
     pub(crate) fn new(positions: usize, longest: f64) -> Self {
-        Self { longest, now: Vec::new(), position: 0, seen: 0, pieces: vec![Vec::new(); positions] }
+        let (pieces, variances) = (vec![Vec::new(); positions], vec![(0.0, 0); positions]);
+        Self { longest, now: Vec::new(), position: 0, seen: 0, pieces, variances, suspects: Vec::new() }
     }
 
-    /// Takes a sample of a position.
-    pub(crate) fn push(&mut self, position: usize, line: u64, t: f64, force: [f64; 3]) {
+    /// Takes a sample of a position; the length of its force has the standard deviation `sigma`.
+    pub(crate) fn push(&mut self, position: usize, line: u64, t: f64, force: [f64; 3], sigma: f64) {
         if position != self.position {
             self.end();
         }
         self.position = position;
+        self.variances[position].0 += sigma * sigma;
+        self.variances[position].1 += 1;
+        if (length(&force) - 1.0).abs() > UNIT && self.suspects.len() < SUSPECTS {
+            self.suspects.push((position, line, force));
+        }
         let first = self.now.first().map(|(_, t, _)| *t);
         if self.now.len() == MOST || first.is_some_and(|first| t - first >= self.longest) {
             let now = std::mem::take(&mut self.now);
@@ -196,7 +144,23 @@ impl Forces {
             t: first.1,
             samples: of.len(),
             force: std::array::from_fn(|i| median(of.iter().map(|s| s.2[i]))),
+            length: median(of.iter().map(|s| length(&s.2))),
         });
+    }
+
+    /// By position: how long the force is, whatever single samples are. Its standard deviation is that of a median, by what is known of the samples and by how its
+    /// pieces scatter, whichever is greater.
+    pub(crate) fn lengths(&self) -> Vec<Option<Length>> {
+        let mut out = vec![None; self.pieces.len()];
+        for (p, _, force) in self.usual() {
+            let (pieces, (sum, count)) = (&self.pieces[p], self.variances[p]);
+            let length = median(pieces.iter().map(|x| x.length));
+            let spread = MEDIAN_TO_SIGMA * median(pieces.iter().map(|x| (x.length - length).abs()));
+            let known = sum.sqrt() / count.max(1) as f64;
+            let sigma = SIGMA_OF_MEDIAN * known.max(spread / (pieces.len() as f64).sqrt());
+            out[p] = Some(Length { length, sigma: sigma.max(f64::EPSILON), force });
+        }
+        out
     }
 
     /// Of every position that has samples: its first line and its force.
@@ -208,31 +172,70 @@ impl Forces {
         self.pieces.iter().enumerate().filter_map(of)
     }
 
-    /// Refuses numbers that are of other units than the header has: `units` with what one of each is in g.
+    /// The position whose force is furthest from one g, with its first line and by how much.
+    fn worst(&self) -> Option<(usize, u64, [f64; 3], f64)> {
+        let off = |(p, line, f): (usize, u64, [f64; 3])| (p, line, f, (length(&f) - 1.0).abs());
+        self.usual().map(off).max_by(|a, b| a.3.total_cmp(&b.3))
+    }
+
+    /// Refuses numbers that are of other units than the header has: whole columns, then single rows; `units` with what one of each is in g.
     pub(crate) fn check_units(
         &self,
         record: &str,
         names: &[&str],
+        attitudes: &[Matrix3<f64>],
         columns: Option<&[ForceColumn; 3]>,
         units: &[(&str, f64)],
     ) -> Result<(), Box<Mistaken>> {
-        let all: Vec<(usize, u64, [f64; 3])> = self.usual().collect();
-        let off = |f: &[f64; 3]| (length(f) - 1.0).abs();
-        let Some(&(p, line, worst)) = all.iter().max_by(|a, b| off(&a.2).total_cmp(&off(&b.2))) else {
-            return Ok(());
-        };
-        if off(&worst) <= UNIT {
-            return Ok(());
-        }
-        let length_g = format!("{:.4}", length(&worst));
-        let (record, position) = (record.to_string(), names[p].to_string());
-        if let Some((columns, units)) = columns.and_then(|own| other_units(&all, own, units)) {
+        let record = record.to_string();
+        let all: Vec<[f64; 3]> = self.usual().map(|(.., f)| f).collect();
+        let worst = self.worst().filter(|(.., off)| *off > UNIT);
+        if let (Some((p, line, force, _)), Some(own)) = (worst, columns)
+            && let Some((columns, units)) =
+                other_units(&all, own, units, &|f| (length(f) - 1.0).abs() <= CLOSE)
+        {
+            let (position, length_g) = (names[p].to_string(), format!("{:.4}", length(&force)));
             return Err(Box::new(Mistaken::ForceUnit { record, line, columns, position, length_g, units }));
         }
-        if off(&worst) <= GROSS {
-            return Ok(());
+        let mut rows = self.suspects.iter().filter_map(|suspect| {
+            let like = |f: &[f64; 3]| self.is_beside(suspect, f, attitudes);
+            let (columns, units) = other_units(&[suspect.2], columns?, units, &like)?;
+            Some((suspect.1, columns, units, format!("{:.4}", length(&suspect.2))))
+        });
+        if let Some((line, columns, units, length_g)) = rows.next() {
+            let more = match rows.count() {
+                0 => String::new(),
+                n => format!(" (and so it is with {n} more rows at least)"),
+            };
+            return Err(Box::new(Mistaken::RowUnit { record, line, columns, length_g, units, more }));
         }
-        Err(Box::new(Mistaken::ForceLength { record, line, position, length_g }))
+        match worst.filter(|(.., off)| *off > GROSS) {
+            Some((p, line, force, _)) => Err(Box::new(Mistaken::ForceLength {
+                record,
+                line,
+                position: names[p].into(),
+                length_g: format!("{:.4}", length(&force)),
+            })),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether `force` is that of the samples of one g that are nearest to a suspect in the record.
+    fn is_beside(
+        &self,
+        &(p, line, _): &(usize, u64, [f64; 3]),
+        force: &[f64; 3],
+        attitudes: &[Matrix3<f64>],
+    ) -> bool {
+        let right = self.pieces[p].iter().filter(|x| (x.length - 1.0).abs() <= CLOSE);
+        let nearest = right.min_by_key(|x| x.lines.0.abs_diff(line).min(x.lines.1.abs_diff(line)));
+        let (beside, within) = nearest.map_or_else(
+            // the specific force of a platform that is where the scheme has it
+            || (attitudes[p][1], ALONG),
+            |x| (x.force, BESIDE),
+        );
+        let off: [f64; 3] = std::array::from_fn(|i| force[i] - beside[i]);
+        length(&off) <= within && (length(force) - 1.0).abs() <= CLOSE
     }
 
     /// Refuses positions whose force is far from where the scheme has it.
@@ -261,12 +264,13 @@ impl Forces {
     }
 
     /// Refuses positions at whose beginning or end the platform is not there yet, or no longer. One sample is an outlier where bins have so many that it is left out of
-    /// them, unless other positions have one too.
+    /// them, unless other positions have one too. `timeline` says when positions begin and end, where that is all there is.
     pub(crate) fn check_ends(
         &self,
         record: &str,
         names: &[&str],
         attitudes: &[Matrix3<f64>],
+        timeline: Option<&[(f64, f64)]>,
     ) -> Result<(), Box<Mistaken>> {
         let all: Vec<(usize, [f64; 3], [usize; 2])> =
             self.usual().map(|(p, _, force)| (p, force, away(&self.pieces[p], &force))).collect();
@@ -308,9 +312,46 @@ impl Forces {
                 side: if begins { "before" } else { "after" },
                 off_deg: format!("{own:.1}"),
                 like: like.map_or_else(|| "no position (it turns)".into(), |(q, _)| names[q].into()),
+                clock: timeline.and_then(|bounds| self.clock(&all, bounds)).unwrap_or_default(),
             }));
         }
         Ok(())
+    }
+}
+
+impl Forces {
+    /// How the turns of the record lie beside those of the timeline: by a clock that is fast or slow, or all as late.
+    fn clock(&self, all: &[(usize, [f64; 3], [usize; 2])], bounds: &[(f64, f64)]) -> Option<String> {
+        let mut between: f64 = 0.0;
+        let mut middle = |a: &Piece, b: &Piece| {
+            between = between.max(b.t - a.t);
+            (a.t + b.t) / 2.0
+        };
+        let turn = |pair: &[(usize, [f64; 3], [usize; 2])]| {
+            let [(p, _, before), (q, _, after)] = pair else { return (0.0, 0.0) };
+            let (left, come) = (&self.pieces[*p], &self.pieces[*q]);
+            match (before[1], after[0]) {
+                (0, 0) => (bounds[*p].1, bounds[*p].1),
+                (0, late) => (bounds[*q].0, middle(&come[late - 1], &come[late])),
+                (early, _) => {
+                    let first = left.len() - early;
+                    (bounds[*p].1, middle(&left[first - 1], &left[first]))
+                }
+            }
+        };
+        let points: Vec<(f64, f64)> = all.windows(2).map(turn).collect();
+        let line = clock::line(&points)?;
+        let whole = points.last()?.0 - points.first()?.0;
+        if line.within > 1.5 * between {
+            None
+        } else if line.fast.abs() * whole > 2.0 * between {
+            Some(format!("; all turns are where {} has them", clock::words(line.fast)))
+        } else {
+            Some(format!(
+                "; all turns are {:+.1} s from where the timeline of the scheme has them",
+                line.at_zero
+            ))
+        }
     }
 }
 
@@ -342,11 +383,13 @@ fn away(pieces: &[Piece], force: &[f64; 3]) -> [usize; 2] {
     [run(&mut pieces[..start].iter().rev()), run(&mut pieces[start + 1..].iter())]
 }
 
-/// The columns whose numbers are of another unit, and that: with it the force is one g long at all positions. Of several ways that with the fewest columns.
+/// The columns whose numbers are of another unit, and that: with it all these forces are `right`. Of several ways that with the fewest columns, then that with lengths
+/// nearest to one g.
 fn other_units(
-    all: &[(usize, u64, [f64; 3])],
+    all: &[[f64; 3]],
     own: &[ForceColumn; 3],
     units: &[(&str, f64)],
+    right: &dyn Fn(&[f64; 3]) -> bool,
 ) -> Option<(String, String)> {
     // of every column its own unit, or another
     let choices: Vec<Option<usize>> = std::iter::once(None).chain((0..units.len()).map(Some)).collect();
@@ -358,15 +401,13 @@ fn other_units(
         if (0..3).any(same) {
             continue;
         }
-        let scaled = |f: &[f64; 3]| {
-            let x: [f64; 3] =
-                std::array::from_fn(|j| of[j].map_or(f[j], |u| f[j] * units[u].1 / own[j].scale));
-            (length(&x) - 1.0).abs()
+        let scaled = |f: &[f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|j| of[j].map_or(f[j], |u| f[j] * units[u].1 / own[j].scale))
         };
-        let off = all.iter().map(|(_, _, f)| scaled(f)).fold(0.0, f64::max);
+        let off = all.iter().map(|f| (length(&scaled(f)) - 1.0).abs()).fold(0.0, f64::max);
         let changed = of.iter().flatten().count();
         let better = found.as_ref().is_none_or(|(c, o, _)| (changed, off) < (*c, *o));
-        if off <= CLOSE && better {
+        if better && all.iter().all(|f| right(&scaled(f))) {
             found = Some((changed, off, of));
         }
     }

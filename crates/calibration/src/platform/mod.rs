@@ -1,9 +1,13 @@
 //! A torquing scheme calibrated from the records of its runs.
 
+mod clock;
 mod diagnose;
+mod earth;
 mod estimate;
 mod findings;
 mod force;
+mod length;
+mod mistaken;
 mod observe;
 mod residuals;
 mod run;
@@ -27,7 +31,7 @@ use diagnose::Diagnosed;
 use estimate::{Problem, Unknowns};
 use run::Run;
 
-pub use force::Mistaken;
+pub use mistaken::Mistaken;
 
 /// Why a scheme cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -130,7 +134,7 @@ pub enum CalibrationError {
     },
     /// A gap that is too short.
     #[error(
-        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the scheme takes {slew_s:.3} s"
+        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the scheme takes {slew_s:.3} s{clock}"
     )]
     Slew {
         /// The record.
@@ -141,6 +145,8 @@ pub enum CalibrationError {
         gap_s: f64,
         /// The slew.
         slew_s: f64,
+        /// What the clock of the record has to do with it.
+        clock: String,
     },
     /// Turning positions.
     #[error(
@@ -222,6 +228,8 @@ impl Default for Options {
     }
 }
 
+/// The probability with which a right record is in its bands.
+const STRICT: f64 = 0.999;
 /// Rounds in which outliers are looked for, or the noise is estimated.
 const ROUNDS: usize = 6;
 /// More than this part of all measurements are no outliers.

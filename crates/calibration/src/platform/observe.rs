@@ -5,7 +5,10 @@ use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
-use super::force::{ForceColumn, Forces, Mistaken};
+use super::clock::{bounds, by_durations};
+use super::force::{ForceColumn, Forces};
+use super::length::Length;
+use super::mistaken::Mistaken;
 use crate::Going;
 use crate::bins::{Bin, Binner, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
@@ -76,10 +79,22 @@ pub(crate) struct Reading {
     pub ignored: Vec<String>,
     /// The mean length of the specific force, in g, where the record has it.
     pub force: Option<f64>,
+    /// By position: that length, there.
+    pub lengths: Vec<Option<Length>>,
     /// How far the gimbals are off at most, in deg, where the record has their angles.
     pub gimbals: Option<f64>,
     /// The digest of its numbers.
     pub digest: String,
+}
+
+impl Reading {
+    /// The part by which its clock is fast as positions begin and end, where the record says that.
+    pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
+        let used = self.samples.saturating_sub(self.unused).max(1) as f64;
+        let between = self.stays.iter().map(|(from, to)| to - from).sum::<f64>() / used;
+        let own = matches!(self.by, By::Label | By::Static);
+        if own { by_durations(&self.stays, between, plan) } else { None }
+    }
 }
 
 /// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations of the three, gimbal angles, temperature.
@@ -256,6 +271,8 @@ struct Taking<'a> {
     /// The forces, and the sum of their lengths with their number.
     forces: Forces,
     length: (f64, usize),
+    /// The noise of a sample, in g.
+    noise: f64,
     /// Finds the positions, where the file says how.
     detector: Option<Detector<Kept>>,
     told: Vec<Told<Kept>>,
@@ -383,7 +400,9 @@ impl Taking<'_> {
         if let ([Some(x), Some(y), Some(z), _], true) = (in_n, self.layout.observed != Observed::Geographic) {
             let f = [x, y + 1.0, z];
             let own = std::array::from_fn(|j| (0..3).map(|i| c[i][j] * f[i]).sum());
-            self.forces.push(p, line, time, own);
+            // the length is what goes up
+            let up = self.layout.sigmas_in_n(numbers, c).and_then(|s| s[1]);
+            self.forces.push(p, line, time, own, up.unwrap_or(self.noise));
             self.length.0 += (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt();
             self.length.1 += 1;
         }
@@ -420,14 +439,11 @@ impl Taking<'_> {
 
 /// Refuses times in another unit than that of the header: all positions then last so many times as long as the scheme has them.
 fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) -> Result<(), Box<Mistaken>> {
-    let dwell = |p: usize| -> f64 {
-        let of = plan.segments.iter().filter(|s| s.position == p && !matches!(s.kind, SegmentKind::Slew(_)));
-        of.map(|s| s.dt * s.steps as f64).sum()
-    };
+    let dwells: Vec<f64> = bounds(plan).iter().map(|(from, to)| to - from).collect();
     let lasts: Vec<f64> = reading.stays.iter().map(|(from, to)| to - from).collect();
     let ratio = |unit: f64| scale / unit;
     let like = |unit: f64| {
-        let mut each = lasts.iter().enumerate().map(|(p, lasts)| lasts / dwell(p) / ratio(unit));
+        let mut each = lasts.iter().enumerate().map(|(p, lasts)| lasts / dwells[p] / ratio(unit));
         (ratio(unit).ln().abs() > 1.0) && each.all(|x| (x - 1.0).abs() < 0.1)
     };
     match TIMES.iter().find(|(_, unit)| !lasts.is_empty() && like(*unit)) {
@@ -435,7 +451,7 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
             record: reading.name.clone(),
             column: column.clone(),
             found: format!("{:.6}", lasts[0]),
-            expected: format!("{:.6}", dwell(0)),
+            expected: format!("{:.6}", dwells[0]),
             unit,
         })),
         None => Ok(()),
@@ -480,9 +496,12 @@ pub(crate) fn observe(
         span: (0.0, 0.0),
         ignored: layout.ignored.clone(),
         force: None,
+        lengths: vec![None; positions],
         gimbals: None,
         digest: String::new(),
     };
+    let of_force = plan.components.iter().zip(&sigmas).find(|(k, _)| **k != AZIMUTH);
+    let noise = of_force.map_or(0.0, |(_, sigma)| *sigma);
     let binner = Binner::new(bin_s, sigmas);
     let mut taking = Taking {
         layout: &layout,
@@ -494,6 +513,7 @@ pub(crate) fn observe(
         agrees: true,
         forces: Forces::new(positions, bin_s),
         length: (0.0, 0),
+        noise,
         detector: still.map(Detector::new),
         told: Vec::new(),
         rests: Vec::new(),
@@ -526,12 +546,13 @@ pub(crate) fn observe(
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
     let units = FORCES.map(|(u, g)| (u, g.unwrap_or(1.0 / gravity)));
-    taking.forces.check_units(&taking.out.name, &names, layout.forces.as_ref(), &units)?;
+    taking.forces.check_units(&taking.out.name, &names, &plan.attitudes, layout.forces.as_ref(), &units)?;
     taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes)?;
     if matches!(by, By::Label | By::Static) {
         check_times(&taking.out, plan, &layout.time)?;
     }
-    taking.forces.check_ends(&taking.out.name, &names, &plan.attitudes)?;
+    let timeline = (by == By::Timeline).then(|| bounds(plan));
+    taking.forces.check_ends(&taking.out.name, &names, &plan.attitudes, timeline.as_deref())?;
     if let Some((p, off, line)) = taking.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
         return Err(CalibrationError::Gimbals {
             record: taking.out.name.clone(),
@@ -544,7 +565,9 @@ pub(crate) fn observe(
     let force = (layout.observed == Observed::Force && count > 0).then(|| length / count as f64);
     let (agrees, begin) = (taking.agrees, taking.begin);
     let gimbals = taking.gimbals.map(|(_, off, _)| off);
+    let lengths = force.map(|_| taking.forces.lengths());
     let mut out = taking.out;
+    out.lengths = lengths.unwrap_or(out.lengths);
     (out.force, out.gimbals, out.digest) = (force, gimbals, digest);
     out.origin = if matches!(by, By::Label | By::Static) { begin } else { 0.0 };
     if out.by == By::Label && agrees {

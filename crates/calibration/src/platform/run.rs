@@ -7,6 +7,7 @@ use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage, Update};
 use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind};
 
 use super::CalibrationError;
+use super::clock::words;
 use super::observe::{By, Reading};
 use crate::bins::{Bin, Mean};
 use crate::least_squares::Linearised;
@@ -93,6 +94,9 @@ impl Run {
                         position: position.name.clone(),
                         gap_s: first - left,
                         slew_s: turned,
+                        clock: reading.by_durations(planned).map_or_else(String::new, |fast| {
+                            format!("; positions lie as by {}", words(fast))
+                        }),
                     });
                 }
                 let dwell = (last - begins[p]).max(2.0 * CLOSEST * (1.0 + reading.bins[p].len() as f64));

@@ -1,6 +1,7 @@
 //! Records that are not what they say they are: each is refused by name. And what an estimate says of itself, against other ways to it.
 
 use nalgebra::DMatrix;
+use obsdeg_calibration::answer::{Finding, ForceError};
 use obsdeg_calibration::platform::Mistaken;
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Before, Calibration, CalibrationError, Options, calibrate};
@@ -14,7 +15,8 @@ fn bench() -> Bench {
 }
 
 fn refused(bench: &Bench, text: String) -> String {
-    of_csv(bench, "F,I,O,S", text).expect_err("refused").to_string()
+    let found = of_csv(bench, "F,I,O,S", text);
+    found.map(|c| c.findings).expect_err("refused").to_string()
 }
 
 fn mistaken(found: Result<Calibration, CalibrationError>) -> Mistaken {
@@ -68,6 +70,201 @@ fn units_are_named() {
         let right = scaled(&samples, [unit, g, g, g], [by, 1.0, 1.0, 1.0]);
         assert!(of_csv(&bench, "F,I,O,S", right).expect("calibrated").consistent);
     }
+}
+
+/// One axis of the specific force that is too long, or off its zero, is named with its figure; another gravity is not taken for it, nor two axes for one.
+#[test]
+fn an_axis_is_named() {
+    let found = |k0: [f64; 3], k1: [f64; 3], scale: f64| {
+        // drifts so small that positions stay where they are
+        let drift = [[0.1; 3], [0.05; 3], [0.05; 3], [0.05; 3]];
+        let bench = Bench { accelerometers: [k0, k1, [0.0; 3]], scale, drift, ..bench() };
+        let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
+        let forces: Vec<f64> = c.positions.iter().filter_map(|p| p.force_g).collect();
+        let force = |f: &Finding| matches!(f, Finding::Force { .. });
+        (c.findings.into_iter().find(force), forces)
+    };
+    let none = [0.0; 3];
+    assert_eq!(found(none, none, 1.0).0, None);
+    for (axis, name) in ["fx", "fy", "fz"].into_iter().enumerate() {
+        for by in [5e-4, -2e-4] {
+            let mut one = none;
+            one[axis] = by;
+            for (k0, k1, error, within) in
+                [(none, one, ForceError::Scale, 2e-5), (one, none, ForceError::Zero, 2e-5)]
+            {
+                let Some(Finding::Force { alike, causes, .. }) = found(k0, k1, 1.0).0 else { panic!("{by}") };
+                let [cause] = &causes[..] else { panic!("{name} {by}: {causes:?}") };
+                assert_eq!((alike, cause.axis.as_str(), cause.error), (false, name, error));
+                assert!((cause.by - by).abs() < within && cause.besides.is_none(), "{cause:?}");
+            }
+        }
+    }
+    let (all, _) = found(none, none, 1.001);
+    let Some(Finding::Force { alike, length_g, causes, .. }) = all else { panic!("{all:?}") };
+    assert!(alike && causes.is_empty() && (length_g - 1.001).abs() < 1e-5, "{length_g}");
+    let (two, forces) = found(none, [5e-4, -4e-4, 0.0], 1.0);
+    let Some(Finding::Force { alike, causes, least, most, .. }) = two else { panic!("{two:?}") };
+    assert!(!alike && causes.is_empty() && least.length_g < most.length_g, "{causes:?}");
+    // lengths by hand, from the attitudes: 1 + s_x f_x^2 + s_y f_y^2
+    for ((_, angles, _), length) in bench().positions.iter().zip(forces) {
+        let q = attitude(angles);
+        let f = turned(&[q[0], -q[1], -q[2], -q[3]], &[0.0, 1.0, 0.0]);
+        let expected = 1.0 + 5e-4 * f[0] * f[0] - 4e-4 * f[1] * f[1];
+        // psi is a tenth of a degree at first
+        assert!((length - expected).abs() < 4e-6, "{length} {expected}");
+    }
+}
+
+/// A record by a clock that is fast by a part.
+fn by_clock(bench: &Bench, fast: f64) -> Vec<Sample> {
+    bench.record().into_iter().map(|s| Sample { t: s.t * (1.0 + fast), ..s }).collect()
+}
+
+/// What is said of its clock.
+fn clock_of(c: &Calibration) -> Option<(Option<f64>, Option<f64>)> {
+    c.findings.iter().find_map(|f| match f {
+        Finding::Clock { by_durations, by_earth, .. } => {
+            Some((*by_durations, by_earth.as_ref().map(|e| e.fast)))
+        }
+        _ => None,
+    })
+}
+
+/// A clock that is off by a part is told by when positions begin and end, and by the earth; positions that were held longer by a right clock are not taken for one.
+#[test]
+fn a_clock_is_named() {
+    let slower = bench().drift.map(|d| d.map(|x| 0.1 * x));
+    for (fast, drift) in [(0.01, bench().drift), (-0.01, bench().drift), (0.01, slower), (0.03, slower)] {
+        let bench = Bench { drift, ..bench() };
+        let c = of_csv(&bench, "F,I,O,S", csv(&by_clock(&bench, fast))).expect("calibrated");
+        let Some((Some(by_durations), Some(by_earth))) = clock_of(&c) else {
+            panic!("{fast}: {:?}", c.findings)
+        };
+        // a sample at either end of a run
+        assert!((by_durations - fast).abs() < 2.0 * 4.0 / 6000.0, "{by_durations}");
+        let sigma = c.records[0].clock.by_earth.as_ref().map_or(f64::NAN, |e| e.sigma);
+        assert!(
+            (by_earth - fast).abs() < 3.0 * sigma + 0.1 * fast.abs() && sigma < 0.003,
+            "{by_earth} {sigma}"
+        );
+        // drifts are too small by that part
+        let d = c.unknowns.iter().find(|u| u.name == "D_FY").expect("there").estimate.expect("determined");
+        assert!((d / drift[0][1] * (1.0 + fast) - 1.0).abs() < 0.7 * fast.abs(), "{d}");
+    }
+    // a scheme of positions that are one part in fifty shorter than they were held
+    let mut held = bench();
+    held.positions.iter_mut().for_each(|p| p.2 = 980.0);
+    let c = of_csv(&held, "F,I,O,S", csv(&bench().record())).expect("calibrated");
+    assert!(c.consistent && clock_of(&c).is_none(), "{:?}", c.findings);
+    let clock = &c.records[0].clock;
+    let earth = clock.by_earth.as_ref().expect("there");
+    assert!(clock.by_durations.is_some_and(|d| (d - 0.0204).abs() < 2e-3), "{clock:?}");
+    assert!(earth.fast.abs() < 4.0 * earth.sigma && earth.sigma < 1e-3, "{earth:?}");
+    // positions that are labelled after they have settled are as long as they are
+    let samples = bench().record();
+    let settled: Vec<Sample> = samples
+        .iter()
+        .enumerate()
+        .map(|(k, s)| {
+            let late = k >= 8 && samples[k - 8].label == s.label;
+            Sample { label: if late { s.label } else { "" }, ..s.clone() }
+        })
+        .collect();
+    let c = of_csv(&bench(), "F,I,O,S", csv(&settled)).expect("calibrated");
+    assert!(c.consistent && c.records[0].clock.by_durations.is_none(), "{:?}", c.records[0].clock);
+    // two positions at once and the drifts of good gyros: nothing tells, and that is said
+    let quiet =
+        Bench { psi: [1e-5; 3], drift: [[0.01; 3], [0.005; 3], [0.005; 3], [0.005; 3]], ..Bench::default() };
+    let c = of_csv(&quiet, "F,I,O,S", csv(&quiet.record())).expect("calibrated");
+    assert!(c.records[0].clock.by_earth.as_ref().is_none_or(|e| e.sigma > 0.05), "{:?}", c.records[0].clock);
+}
+
+/// Without labels the turns lie where the clock has them: a fast one, a slow one, a record that begins late.
+#[test]
+fn a_clock_shows_in_the_timeline() {
+    let bench = bench();
+    let bare = |samples: Vec<Sample>| csv(&samples).replace("position", "note");
+    for (fast, words) in [
+        (0.01, "a clock that is 1.00 % fast has them"),
+        (-0.01, "a clock that is 1.00 % slow has them"),
+        (0.004, "a clock that is 0.40 % fast has them"),
+    ] {
+        let e = refused(&bench, bare(by_clock(&bench, fast)));
+        let found: f64 = e
+            .split("a clock that is ")
+            .nth(1)
+            .expect(&e)
+            .split(' ')
+            .next()
+            .expect("a number")
+            .parse()
+            .expect("one");
+        assert!((found / 100.0 - fast.abs()).abs() < 2e-3, "{words}: {e}");
+        assert!(e.ends_with(if fast < 0.0 { "slow has them" } else { "fast has them" }), "{e}");
+    }
+    let late = bench.record().into_iter().map(|s| Sample { t: s.t + 24.0, ..s }).collect();
+    let e = refused(&bench, bare(late));
+    let by: f64 =
+        e.split("all turns are ").nth(1).expect(&e).split(' ').next().expect("one").parse().expect("one");
+    assert!(
+        (by - 24.0).abs() < 6.0 && e.ends_with("s from where the timeline of the scheme has them"),
+        "{e}"
+    );
+    let c = of_csv(&bench, "F,I,O,S", bare(bench.record())).expect("calibrated");
+    assert!(
+        c.consistent && c.records[0].clock.by_earth.as_ref().is_some_and(|e| e.sigma < 1e-3),
+        "{:?}",
+        c.records
+    );
+}
+
+/// A cell, or a row, of another unit than the others is named with its line and column, however dense the rows are.
+#[test]
+fn a_cell_of_another_unit_is_named() {
+    const G: f64 = 9.80665;
+    for step_s in [0.5, 4.0, 10.0] {
+        let bench = Bench { step_s, ..bench() };
+        let samples = bench.record();
+        let end = samples.iter().rposition(|s| s.label == "p3").expect("there");
+        for (row, columns, by, said, unit) in [
+            (7, vec![0], G, "`fx [g]`", "[m/s^2]"),
+            (60, vec![1], G, "`fy [g]`", "[m/s^2]"),
+            (end, vec![2], 1e3, "`fz [g]`", "[mg]"),
+            (50, vec![0, 1, 2], G, "`fx [g]`, `fy [g]`, `fz [g]`", "[m/s^2]"),
+            (0, vec![0, 1, 2], 1e6, "`fx [g]`, `fy [g]`, `fz [g]`", "[ug]"),
+        ] {
+            let mut own = samples.clone();
+            columns.iter().for_each(|&j| own[row].f[j] *= by);
+            let line = row + 2;
+            let e = refused(&bench, csv(&own));
+            assert!(
+                e.starts_with(&format!("run.csv: line {line}, columns {said}: the specific force is "))
+                    && e.contains(&format!("with these numbers as {unit} it is as in the rows beside it;")),
+                "{e}"
+            );
+            own[row + 3].f = samples[row + 3].f.map(|x| x * G);
+            if row != end {
+                let e = refused(&bench, csv(&own));
+                assert!(e.contains("beside it (and so it is with 1 more rows at least)"), "{e}");
+            }
+        }
+    }
+    // one row for each position, a mean
+    let bench = bench();
+    let samples = bench.record();
+    let mut text = "t [s],position,fx [g],fy [g],fz [g],sigma_fx [g],sigma_fy [g],sigma_fz [g]\n".to_string();
+    for (p, (name, ..)) in bench.positions.iter().enumerate() {
+        for s in samples.iter().filter(|s| s.label == *name).step_by(60).take(3) {
+            let by = if p == 3 { G } else { 1.0 };
+            text += &format!("{},{},{},{},{},1e-5,1e-5,1e-5\n", s.t, s.label, s.f[0], s.f[1] * by, s.f[2]);
+        }
+    }
+    let e = refused(&bench, text);
+    assert!(
+        e.contains("run.csv: line 11, columns `fy [g]`") && e.contains("(and so it is with 2 more rows"),
+        "{e}"
+    );
 }
 
 /// Labels that come some rows late or early are found, with the lines between which the platform moves.
@@ -133,6 +330,12 @@ fn a_record_counts_once() {
     let bench = bench();
     let e = with(&bench, &[("a.csv", &a), ("b.csv", &a)], None).expect_err("twice").to_string();
     assert!(e.starts_with("b.csv has the same numbers as a.csv; expected records of different runs"), "{e}");
+    // with a column of numbers that nobody asked for, with comments
+    let noted: String = a.lines().enumerate().map(|(i, l)| format!("{l},{i}\n# {i}\n")).collect();
+    for other in [noted.replacen(",0\n", ",volts [V]\n", 1), a.replacen("position", "position ", 1)] {
+        let e = with(&bench, &[("a.csv", &a), ("b.csv", &other)], None).expect_err("twice").to_string();
+        assert!(e.starts_with("b.csv has the same numbers as a.csv"), "{e}");
+    }
     let first = with(&bench, &[("a.csv", &a)], None).expect("calibrated");
     let second = with(&bench, &[("b.csv", &b)], Some(&first)).expect("calibrated");
     for (name, text) in [("a again.csv", &a), ("b.csv", &b)] {

@@ -121,6 +121,7 @@ fn real(seed: u64) -> Bench {
 /// The mean NEES of so many records lies where it does with a probability of 99.9 %.
 fn round_trips(records: u64, bench: impl Fn(u64) -> Bench, terms: &str) {
     let (mut sum, mut count, mut inconsistent) = (0.0, 0, 0);
+    let mut clocks: Vec<f64> = Vec::new();
     for seed in 0..records {
         let bench = bench(seed);
         let c = of_csv(&bench, terms, csv(&bench.record())).expect("calibrated");
@@ -132,7 +133,12 @@ fn round_trips(records: u64, bench: impl Fn(u64) -> Bench, terms: &str) {
         let (nees, n) = normalised(&bench, &c);
         (sum, count) = (sum + nees, n);
         inconsistent += u64::from(!c.consistent);
+        clocks.extend(c.records[0].clock.by_earth.as_ref().map(|e| (e.fast / e.sigma).powi(2)));
     }
+    let of_clock: f64 = clocks.iter().sum::<f64>() / clocks.len().max(1) as f64;
+    let clock_band = chi_square_band(1.0, clocks.len() as f64, 0.999);
+    println!("{terms}: {} clocks, mean square {of_clock:.3}, band {clock_band:.3?}", clocks.len());
+    assert!((clock_band.0..=clock_band.1).contains(&of_clock), "{of_clock}: {clock_band:?}");
     let (low, high) = chi_square_band(count as f64, records as f64, 0.999);
     let mean = sum / records as f64;
     println!(

@@ -1,0 +1,61 @@
+//! Whether the clock of a record is right, by the rates of the earth and of turns.
+//!
+//! A clock that runs fast by a part `e` makes every rate of a record smaller by that part. Rates of drift are unknown, so of them nothing shows; the rate of the earth is
+//! known, and shows where psi is large enough for `w x psi` to matter, or where torquers are unknown that are driven with it; those of turns show by the drift meanwhile.
+
+use obsdeg_evidence::simulation::Plan;
+
+use super::CalibrationError;
+use super::clock::bounds;
+use super::diagnose::Parts;
+use super::estimate::WEAK;
+use super::observe::By;
+use super::run::Run;
+use crate::answer::ClockByEarth;
+use crate::least_squares::Information;
+
+/// By this part the rates are moved to see what that does.
+const MOVED: f64 = 0.005;
+/// A clock of which so little shows may be off by twice as much as it goes.
+const FLAT: f64 = 1e-5;
+
+impl Parts<'_> {
+    /// The part by which the clock of run `r` is fast, by the rates of the earth and of turns that fit its measurements best when all unknowns follow: of the sum of
+    /// squares at three rates, the lowest point of a parabola; `None` where they are all the same.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn clock(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
+        let own = &self.problem.runs[r];
+        let mut reading = own.reading.clone();
+        if matches!(reading.by, By::Timeline | By::Both) {
+            // as by labels, so that turns may take less time
+            let ends = bounds(self.planned).into_iter().map(|(_, end)| end);
+            reading.by = By::Label;
+            reading.stays.iter_mut().zip(ends).for_each(|(stay, end)| stay.1 = end);
+        }
+        let left = |by: f64| -> Result<f64, CalibrationError> {
+            let rate = |rate: &mut Option<f64>| rate.iter_mut().for_each(|rate| *rate *= 1.0 + by);
+            let (mut scheme, mut conditions) = (self.scheme.clone(), self.problem.conditions.clone());
+            rate(&mut conditions.slew_rate_deg_s);
+            scheme.positions.iter_mut().filter_map(|p| p.slew.as_mut()).for_each(|s| rate(&mut s.rate_deg_s));
+            let planned = Plan::derived(&scheme, &conditions)?;
+            let mut run = Run::new(reading.clone(), &scheme, &planned, &conditions)?;
+            run.counts.clone_from(&own.counts);
+            run.plan.point.w_n *= 1.0 + by;
+            run.plan.point.w_u *= 1.0 + by;
+            let (sigmas, at) = (&self.problem.sigmas, &self.estimate.at);
+            let (along, _) = run.along(&conditions, sigmas, &at.x[r], run.len())?;
+            let information = Information::of(&along)?;
+            Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
+        };
+        // turns that take longer may not fit between two samples: of faster ones alone
+        let [same, fast, faster] = [left(0.0)?, left(MOVED)?, left(2.0 * MOVED)?];
+        let curvature = same - 2.0 * fast + faster;
+        // a fast clock makes all rates small
+        Ok((curvature > FLAT).then(|| ClockByEarth {
+            fast: -MOVED * (3.0 * same - 4.0 * fast + faster) / (2.0 * curvature),
+            sigma: MOVED * (2.0 / curvature).sqrt(),
+        }))
+    }
+}

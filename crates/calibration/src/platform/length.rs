@@ -1,0 +1,218 @@
+//! Why the specific force of a record is not one g long: all axes alike (scale, gravity), one axis (its scale, its zero), or neither.
+//!
+//! An output `f_i = (1 + s) t_i + b` of a force `t` that is one g long makes `|f|^2 - 1 = (1 - (1 + s)^-2) f_i^2` of a scale error s alone, and `2 b f_i - b^2` of a
+//! zero b alone: straight lines over `f_i^2` and `f_i` of the positions.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_ekf::consistency::chi_square_band;
+
+use super::STRICT;
+use crate::answer::{ForceCause, ForceError};
+
+/// The length is off one g by this before gravity or a scale of all axes is doubted.
+const ALIKE: f64 = 3e-4;
+/// Lengths of positions that differ by less do not matter, in g.
+const DIFFER: f64 = 1e-5;
+/// What leaves less than this part of what there was explains it, however small sigmas are.
+const PART: f64 = 0.1;
+/// What leaves so many times as much as the best does not explain it as well.
+const WORSE: f64 = 3.0;
+/// The outputs of the accelerometers.
+const AXES: [&str; 3] = ["fx", "fy", "fz"];
+
+/// The specific force of a position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Length {
+    /// In g, and its standard deviation.
+    pub length: f64,
+    pub sigma: f64,
+    /// In platform axes, in g.
+    pub force: [f64; 3],
+}
+
+/// What is wrong with the lengths, by position.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Wrong {
+    /// The positions with the least and the greatest length.
+    pub ends: [usize; 2],
+    /// Whether all are alike.
+    pub alike: bool,
+    /// Each of these alone explains them.
+    pub causes: Vec<ForceCause>,
+}
+
+/// A straight line through the squares of the lengths.
+struct Line {
+    coefficients: DVector<f64>,
+    /// The standard deviation of the last.
+    sigma: f64,
+    /// What it leaves, in sigma, and the root of its mean square in g^2.
+    chi_square: f64,
+    left: f64,
+    free: usize,
+}
+
+/// Least squares of `|f|^2 - 1` by `columns`.
+fn line(all: &[Length], columns: &[Vec<f64>]) -> Option<Line> {
+    let (m, n) = (all.len(), columns.len());
+    let weights: Vec<f64> = all.iter().map(|l| 1.0 / (2.0 * l.length * l.sigma)).collect();
+    let y = DVector::from_fn(m, |i, _| all[i].length.powi(2) - 1.0);
+    let a = DMatrix::from_fn(m, n, |i, j| columns[j][i]);
+    let whitened = DMatrix::from_fn(m, n, |i, j| a[(i, j)] * weights[i]);
+    // columns that are nearly the same decide nothing
+    let unit = DMatrix::from_columns(&whitened.column_iter().map(|c| c.normalize()).collect::<Vec<_>>());
+    let gram = unit.transpose() * &unit;
+    if m <= n || !gram.iter().all(|x| x.is_finite()) || gram.determinant() < 1e-6 {
+        return None;
+    }
+    let inverse = (whitened.transpose() * &whitened).try_inverse()?;
+    let right = whitened.transpose() * DVector::from_fn(m, |i, _| y[i] * weights[i]);
+    let coefficients = &inverse * right;
+    let left = y - a * &coefficients;
+    let chi_square = left.iter().zip(&weights).map(|(e, w)| (e * w).powi(2)).sum();
+    let sigma = inverse[(n - 1, n - 1)].max(0.0).sqrt();
+    Some(Line { coefficients, sigma, chi_square, left: (left.norm_squared() / m as f64).sqrt(), free: m - n })
+}
+
+impl Line {
+    fn fits(&self) -> bool {
+        let free = self.free as f64;
+        free > 0.0 && self.chi_square <= chi_square_band(free, 1.0, STRICT).1
+    }
+
+    /// The scale error or the zero of an axis that the last coefficient is, with its standard deviation.
+    fn cause(&self, error: ForceError, axis: usize, offset: bool) -> Option<ForceCause> {
+        let k = *self.coefficients.iter().next_back()?;
+        let (by, sigma) = match error {
+            ForceError::Scale => {
+                let root = (1.0 - k).sqrt();
+                (1.0 / root - 1.0, self.sigma / (2.0 * root.powi(3)))
+            }
+            ForceError::Zero => (k, self.sigma),
+        };
+        let besides = offset.then(|| (1.0 + self.coefficients[0]).sqrt() - 1.0);
+        by.is_finite().then(|| ForceCause { error, axis: AXES[axis].into(), by, sigma, besides })
+    }
+}
+
+/// What is wrong with the lengths of the force at the positions of a record; `None` where nothing is.
+pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
+    let places: Vec<usize> = (0..lengths.len()).filter(|&p| lengths[p].is_some()).collect();
+    let all: Vec<Length> = lengths.iter().copied().flatten().collect();
+    let by_length = |a: &usize, b: &usize| all[*a].length.total_cmp(&all[*b].length);
+    let least = (0..all.len()).min_by(by_length)?;
+    let most = (0..all.len()).max_by(by_length)?;
+    let ends = [places[least], places[most]];
+    let ones = vec![1.0; all.len()];
+    let mean = all.iter().map(|l| l.length).sum::<f64>() / all.len() as f64;
+    let same = line(&all, std::slice::from_ref(&ones));
+    let differ = all[most].length - all[least].length > DIFFER && same.as_ref().is_some_and(|l| !l.fits());
+    if !differ && (mean - 1.0).abs() <= ALIKE {
+        return None;
+    }
+    // what one axis makes of them, alone, or beside what all have in common
+    let explain = |offset: bool| -> Vec<(f64, ForceCause)> {
+        let before = same.as_ref().map_or(0.0, |l| if offset { l.left } else { rms(&all) });
+        let mut found = Vec::new();
+        for error in [ForceError::Scale, ForceError::Zero] {
+            for axis in 0..3 {
+                let of = |l: &Length| match error {
+                    ForceError::Scale => l.force[axis].powi(2),
+                    ForceError::Zero => 2.0 * l.force[axis],
+                };
+                let own: Vec<f64> = all.iter().map(of).collect();
+                let columns = if offset { vec![ones.clone(), own] } else { vec![own] };
+                let Some(line) = line(&all, &columns) else { continue };
+                if line.fits() || line.left <= PART * before {
+                    found.extend(line.cause(error, axis, offset).map(|cause| (line.left, cause)));
+                }
+            }
+        }
+        let best = found.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
+        let noise = all.iter().map(|l| 2.0 * l.sigma).fold(0.0, f64::max);
+        found.retain(|f| f.0 <= WORSE * best.max(noise));
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
+    };
+    let mut found = explain(false);
+    if found.is_empty() && differ {
+        found = explain(true);
+    }
+    Some(Wrong { ends, alike: !differ, causes: found.into_iter().map(|f| f.1).collect() })
+}
+
+/// The root of the mean square of what is beyond one g^2.
+fn rms(all: &[Length]) -> f64 {
+    let squares: f64 = all.iter().map(|l| (l.length.powi(2) - 1.0).powi(2)).sum();
+    (squares / all.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Directions by hand, with what an output of each axis makes of them: scale errors and zeros.
+    fn lengths(scale: [f64; 3], zero: [f64; 3], directions: &[[f64; 3]]) -> Vec<Option<Length>> {
+        let of = |d: &[f64; 3]| {
+            let n = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            let force: [f64; 3] = std::array::from_fn(|i| d[i] / n * (1.0 + scale[i]) + zero[i]);
+            let length = force.iter().map(|x| x * x).sum::<f64>().sqrt();
+            Some(Length { length, sigma: 1e-6, force })
+        };
+        directions.iter().map(of).collect()
+    }
+
+    const SIX: [[f64; 3]; 6] = [
+        [1.0, 2.0, 3.0],
+        [-2.0, 1.0, 0.5],
+        [0.3, -1.0, 2.0],
+        [1.5, 0.2, -0.7],
+        [-0.4, 3.0, 0.1],
+        [0.9, -0.8, -1.1],
+    ];
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        assert_eq!(wrong(&lengths([0.0; 3], [0.0; 3], &SIX)), None);
+        // gravity by a tenth of what is doubted, and four times it
+        assert_eq!(wrong(&lengths([3e-5; 3], [0.0; 3], &SIX)), None);
+        let all = wrong(&lengths([1.2e-3; 3], [0.0; 3], &SIX)).expect("wrong");
+        assert!(all.alike && all.causes.is_empty(), "{all:?}");
+        for axis in 0..3 {
+            let (mut scale, mut zero) = ([0.0; 3], [0.0; 3]);
+            (scale[axis], zero[axis]) = (5e-4, -5e-4);
+            for (found, error, by) in [
+                (wrong(&lengths(scale, [0.0; 3], &SIX)), ForceError::Scale, 5e-4),
+                (wrong(&lengths([0.0; 3], zero, &SIX)), ForceError::Zero, -5e-4),
+            ] {
+                let found = found.expect("wrong");
+                let [cause] = &found.causes[..] else { panic!("{found:?}") };
+                assert_eq!((cause.error, cause.axis.as_str(), found.alike), (error, AXES[axis], false));
+                assert!((cause.by / by - 1.0).abs() < 1e-2 && cause.besides.is_none(), "{cause:?}");
+            }
+        }
+        // one axis beside another gravity
+        let both = wrong(&lengths([2e-3, 1e-3, 1e-3], [0.0; 3], &SIX)).expect("wrong");
+        let [cause] = &both.causes[..] else { panic!("{both:?}") };
+        assert_eq!((cause.error, cause.axis.as_str()), (ForceError::Scale, "fx"));
+        assert!((cause.by / 1e-3 - 1.0).abs() < 1e-2, "{cause:?}");
+        assert!((cause.besides.expect("there") / 1e-3 - 1.0).abs() < 1e-2, "{cause:?}");
+        // two axes are none
+        let two = wrong(&lengths([5e-4, -4e-4, 0.0], [0.0; 3], &SIX)).expect("wrong");
+        assert!(!two.alike && two.causes.is_empty() && two.ends == [4, 3], "{two:?}");
+    }
+
+    /// Where y is vertical throughout, its scale is as good a reason as that of all.
+    #[test]
+    fn what_is_not_told_is_not() {
+        let two = wrong(&lengths([0.0, 5e-4, 0.0], [0.0; 3], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
+        let two = two.expect("wrong");
+        let [cause] = &two.causes[..] else { panic!("{two:?}") };
+        assert_eq!((two.alike, cause.error, cause.axis.as_str()), (true, ForceError::Scale, "fy"));
+        // a zero of y makes one longer and one shorter
+        let two = wrong(&lengths([0.0; 3], [0.0, 5e-4, 0.0], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
+        let two = two.expect("wrong");
+        assert_eq!((two.alike, two.causes.len()), (false, 1), "{two:?}");
+        assert_eq!(two.causes[0].error, ForceError::Zero);
+    }
+}
