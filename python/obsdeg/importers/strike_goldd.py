@@ -33,12 +33,20 @@ def models(text: str) -> list[str]:
     return [name for name, _ in _saved(text)]
 
 
-def load(path: str | Path, *, model: str | int = 1, unknown_inputs: str | int = "arbitrary", starts: str = "unknown") -> System:
+def load(
+    path: str | Path,
+    *,
+    model: str | int = 1,
+    known_inputs: str | int = "generic",
+    unknown_inputs: str | int = "arbitrary",
+    starts: str = "unknown",
+) -> System:
     """A system of a script.
 
     Arguments:
         path: The file.
         model: Which of the models that it saves: the name, or a number from 1 on.
+        known_inputs: What `u` does: anything (`generic`), or a polynomial in time of this degree (`nnzDerU` of the options).
         unknown_inputs: What is known of `w`: nothing (`arbitrary`), or the degree of its polynomial in time (`nnzDerW` of the options).
         starts: `unknown`, as the options of STRIKE-GOLDD have it by default; `given`: those that `known_ics` marks are those of `ics`.
 
@@ -47,12 +55,19 @@ def load(path: str | Path, *, model: str | int = 1, unknown_inputs: str | int = 
     """
     try:
         text = Path(path).read_text(encoding="utf-8", errors="replace")
-        return read(text, model=model, unknown_inputs=unknown_inputs, starts=starts)
+        return read(text, model=model, known_inputs=known_inputs, unknown_inputs=unknown_inputs, starts=starts)
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
 
 
-def read(text: str, *, model: str | int = 1, unknown_inputs: str | int = "arbitrary", starts: str = "unknown") -> System:
+def read(
+    text: str,
+    *,
+    model: str | int = 1,
+    known_inputs: str | int = "generic",
+    unknown_inputs: str | int = "arbitrary",
+    starts: str = "unknown",
+) -> System:
     """A system of a script's text; as `load`."""
     saved = _saved(text)
     names = [name for name, _ in saved]
@@ -93,7 +108,7 @@ def read(text: str, *, model: str | int = 1, unknown_inputs: str | int = "arbitr
         if s.start is not None:
             s.start = None if s.start == symbol(n) else expand(s.start, fixed, f"the start of {n}")
     # [u, w] and symbols of a state that is no state
-    system.known_inputs = {n: "generic" for n in symbols("u") if n not in states}
+    system.known_inputs = {n: known_inputs for n in symbols("u") if n not in states}
     system.unknown_inputs = {n: unknown_inputs for n in symbols("w")}
     system.parameters = {n: "" for n in symbols("p")}
     system.outputs = {f"y{i + 1}": y for i, y in enumerate(outputs)}

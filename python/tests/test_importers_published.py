@@ -1,0 +1,168 @@
+"""Published verdicts: of systems in STRIKE-GOLDD's syntax, and what a simulator says of unknowns of PEtab problems that are not observable."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import scripts
+from conftest import references, shared, statuses
+from petab_oracle import Model, Tables, observed, prepared
+
+from obsdeg.importers import strike_goldd, to_toml
+
+C2M = """
+syms x1 x2 k1e k12 k21 b v
+x = [x1; x2]; h = x1;
+{inputs}
+f = [-(k1e + k12)*x1 + k21*x2 + b*v;  % the measured one
+     k12*x1 - k21*x2];
+p = [{unknown}].';
+save('C2M','x','p','h','f','u','w');
+"""
+VAJDA = """
+% S. Vajda et al., Math. Biosciences 93 (1989) 217: two states, one input
+syms x1 x2 t1 t2 t3 t4 w
+x = [x1 x2].'; p = [t1;t2;t3;t4]; u = []; h = x1;
+f = [t1*x1^2 + t2*x1*x2 + w;
+     t3*x1^2 + t4*x1*x2];
+save('Vajda','x','p','w','u','h','f');
+"""
+BIG = """
+% beta cells, insulin, glucose: B. Topp et al., J. Theor. Biol. 206 (2000) 605; O. Karin et al., Mol. Syst. Biol. 12 (2016) 886
+syms G B I
+x = [G, B, I];
+syms v u0 secrete si gamma c alpha
+p = [secrete si gamma c alpha]; u = v;
+up = 0.021/(24*60); down = 0.025/(24*60);   % per minute
+grow = up/(1 + (8.4/G)^1.7);
+die  = down/(1 + (G/4.8)^8.5);
+h = G;
+f = [u0 + v - (c + si*I)*G; B*(grow - die); secrete*B*G^2/(alpha^2 + G^2) - gamma*I];
+save('BIG','x','p','h','u','f');
+"""
+MANUAL = "STRIKE-GOLDD manual 4.3"
+REPAIR = "G. Massonis, J. R. Banga, A. F. Villaverde, AutoRepar: supplementary information"
+
+
+def c2m(unknown: str, known: bool) -> str:
+    inputs = "u = [v]; w = [];" if known else "w = v; u = [];"
+    return C2M.format(unknown=unknown, inputs=inputs)
+
+
+#: Texts, options, what is not observable, and where that is published.
+PUBLISHED: dict[str, tuple[str, dict[str, Any], set[str], str]] = {
+    "two compartments, any input": (c2m("k1e k12 k21 b", True), {}, set(), MANUAL),
+    "two compartments, constant input": (c2m("k1e k12 k21 b", True), {"known_inputs": 0}, {"x2", "k1e", "k12", "k21", "b"}, MANUAL),
+    "two compartments, a ramp": (c2m("k1e k12 k21 b", True), {"known_inputs": 1}, set(), MANUAL),
+    "two compartments, unknown input": (c2m("k1e, k12, k21", False), {"unknown_inputs": 0}, {"x2", "v", "k1e", "k12", "k21"}, MANUAL),
+    "two compartments, unknown ramp": (c2m("k1e, k12, k21", False), {"unknown_inputs": 1}, {"x2", "v", "v'", "k1e", "k12", "k21"}, MANUAL),
+    "two compartments, elimination known": (c2m("k12 k21", False), {"unknown_inputs": 0}, set(), MANUAL),
+    "two compartments, elimination known, ramp": (c2m("k12 k21", False), {"unknown_inputs": 1}, set(), MANUAL),
+    "Vajda": (VAJDA, {"unknown_inputs": 1}, {"t2", "t3", "x2"}, REPAIR),
+    "glucose alone": (BIG, {}, {"secrete", "si", "B", "I"}, REPAIR),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_verdicts_are_those_that_are_published(name: str) -> None:
+    text, options, lost, _ = PUBLISHED[name]
+    found = statuses(to_toml(strike_goldd.read(text, **options)))
+    assert {n for n, s in found.items() if s != "observable"} == lost
+
+
+def test_pharmacokinetics_with_an_unknown_input() -> None:
+    """B. Merkt et al., Phys. Rev. E 92 (2015) 012920; verdict in the same supplement."""
+    model = scripts.renamed(references()["pk_merkt_known_input"])
+    system = strike_goldd.read(scripts.matlab({**model, "known_inputs": [], "unknown_inputs": model["known_inputs"]}), unknown_inputs=1)
+    lost = {n for n, s in statuses(to_toml(system)).items() if s != "observable"}
+    signal = model["known_inputs"][0]
+    assert lost == {"k1", "k2", "k3", "k7", "s2", "s3", "x1", "x2", "x3", "x4", signal, f"{signal}'"}
+
+
+def scaled(*factors: tuple[int, str]) -> Callable[[dict[str, float], float], dict[str, float]]:
+    """A change that multiplies each of the names (apart by blanks) by c^power."""
+
+    def change(values: dict[str, float], c: float) -> dict[str, float]:
+        powers = {n: k for k, names in factors for n in names.split()}
+        return {n: v * c ** powers.get(n, 0) for n, v in values.items()}
+
+    return change
+
+
+def sneyd(number: str, other: str) -> Callable[[dict[str, float], float], dict[str, float]]:
+    """k_i + l_-j, l_j/l_-j and k_-i/k_i are all that is seen of these four."""
+
+    def change(values: dict[str, float], c: float) -> dict[str, float]:
+        v = values
+        low = v[f"l_{other}"] * c
+        back = v[f"k_{number}"] + v[f"l_{other}"] - low
+        return v | {
+            f"l_{other}": low,
+            f"k_{number}": back,
+            f"l{other}": v[f"l{other}"] * c,
+            f"k{number}": v[f"k{number}"] * back / v[f"k_{number}"],
+        }
+
+    return change
+
+
+mrna, proteins = "init_X_mRNA init_Y_mRNA init_Z_mRNA tps_active tps_repr", "init_X_protein init_Y_protein init_Z_protein"
+#: Changes that no output sees.
+UNSEEN = {
+    "Bachmann": [scaled((1, "init_EpoRJAK2"))],
+    "Borghans": [
+        scaled((1, "Vp v1"), (-1, "beta_par")),
+        scaled((1, "Ka Kp Vd Vp init_A_state")),
+        scaled((1, "K2 Kd Ky Kz Vm2 Vm3 init_Y_state init_Z_state v0 v1"), (-1, "scale")),
+    ],
+    "Elowitz": [scaled((1, "eff_GFP"), (-1, "init_GFP_mRNA")), scaled((1, f"KM eff {proteins}")), scaled((1, "eff scale"), (-1, f"eff_GFP init_GFP {mrna}"))],
+    "Oliveira": [scaled((1, "beta_2"))],
+    "Raia": [scaled((1, "CD274mRNA_production"), (-1, "scaling_CD274mRNA")), scaled((1, "SOCS3_accumulation SOCS3mRNA_production"), (-1, "scaling_SOCS3mRNA"))],
+    "Sneyd": [sneyd("1", "2"), sneyd("4", "6")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(UNSEEN))
+def test_what_is_not_observable_can_be_changed_and_no_simulation_sees_it(name: str) -> None:
+    tables = Tables.read(min(shared("data/petab").glob(f"{name}_*/*.yaml")))
+    nominal = {n: float(row["nominalValue"]) for n, row in tables.parameters.items()}
+    measured: dict[str, dict[str, dict[str, str]]] = {}
+    for row in tables.measurements:
+        key = f"{row['observableId']} {row.get('observableParameters')}"
+        measured.setdefault(row["simulationConditionId"], {})[key] = row
+    rng = random.Random(name)
+    if name == "Sneyd":
+        # those of the table are so far apart that single ones are hardly seen
+        nominal = {n: rng.uniform(0.5, 1.5) for n in nominal}
+    conditions = rng.sample(sorted(measured), min(4, len(measured)))
+
+    def run(values: dict[str, float]) -> list[float]:
+        out = []
+        for condition in conditions:
+            end = max(float(r["time"]) for r in tables.measurements if r["simulationConditionId"] == condition)
+            model = Model.of(prepared(tables, condition, values), tables.sbml)
+            model.simulator.integrator.relative_tolerance = 1e-11
+            # a number for all is scaled by the starts, which may be zero
+            model.simulator.integrator.absolute_tolerance = [1e-13] * len(model.states)
+            before = 0.0
+            for time in (0.1 * end, 0.4 * end, end):
+                model.simulator.simulate(before, time, 2)
+                before = time
+                out += [float(observed(model, tables, row, values, time)) for row in measured[condition].values()]
+        return out
+
+    first = run(nominal)
+    assert any(abs(y) > 1e-9 for y in first)
+    for change in UNSEEN[name]:
+        changed = change(nominal, 1.3)
+        assert sum(changed[n] != v for n, v in nominal.items()) >= 1
+        for a, b in zip(first, run(changed), strict=True):
+            assert abs(a - b) <= 1e-6 * max(abs(a), abs(b)) + 1e-9
+        # and it is seen when one of them changes alone, where there are several
+        parts = [n for n, v in nominal.items() if changed[n] != v]
+        if len(parts) > 1:
+            alone = (run(nominal | {n: changed[n]}) for n in parts)
+            assert any(abs(a - b) > 1e-4 * max(abs(a), abs(b)) for other in alone for a, b in zip(first, other, strict=True))
