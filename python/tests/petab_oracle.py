@@ -88,6 +88,18 @@ def prepared(tables: Tables, condition: str, values: Mapping[str, float]) -> roa
     return roadrunner.RoadRunner(libsbml.writeSBMLToString(document))
 
 
+def written(folder: Path, sbml: str, tables: Mapping[str, str]) -> Path:
+    """A problem of a model and of tables (`parameters`, `conditions`, `observables`, `measurements`), whose columns stand apart by blanks; `-` is nothing."""
+    (folder / "model.xml").write_text(sbml)
+    for name, text in tables.items():
+        rows = [["" if cell == "-" else cell for cell in line.split()] for line in text.strip().splitlines()]
+        (folder / f"{name}.tsv").write_text("".join("\t".join(row) + "\n" for row in rows))
+    part = {f"{n.rstrip('s')}_files": [f"{n}.tsv"] for n in ("conditions", "observables", "measurements")} | {"sbml_files": ["model.xml"]}
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump({"format_version": 1, "parameter_file": "parameters.tsv", "problems": [part]}))
+    return path
+
+
 @dataclass
 class Model:
     """A simulator with the names of its states as the model means them: concentrations, or amounts."""

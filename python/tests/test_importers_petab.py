@@ -146,6 +146,8 @@ class Imported:
         for n, s in self.numbers.states.items():
             if n.startswith("exp_"):
                 names[n] = value(s["description"], names)
+                slope = mpmath.diff(lambda t, n=n, s=s: value(s["description"], dict(names) | {"t": t, "exp": mpmath.exp}), time)
+                assert abs(value(s["equation"], names) - slope) < 1e-15 * (1 + abs(slope)), n
         return self.plain(self.numbers.rates(names), experiment), self.plain(self.numbers.outputs(names), experiment)
 
 
@@ -156,7 +158,12 @@ class Imported:
 def test_equations_outputs_and_starts_are_those_of_a_simulator(name: str) -> None:
     name, _, exact = name.partition(" ")
     text = load(problem(name)).text if exact else imported(name)
-    tables, rng = Tables.read(problem(name)), random.Random(name)
+    says_the_problem(problem(name), text, TIMES.get(name, (0.7,)))
+
+
+def says_the_problem(path: Path, text: str, times: tuple[float, ...]) -> None:
+    """Holds that every condition is an experiment of the text, at random points at a time in every segment; and every experiment a condition."""
+    tables, rng = Tables.read(path), random.Random(path.name)
     values = drawn(tables, Numbers(text), rng)
     mine = Imported(text, values)
     used: dict[str, list[dict[str, str]]] = {}
@@ -170,17 +177,14 @@ def test_equations_outputs_and_starts_are_those_of_a_simulator(name: str) -> Non
         point = {n: rng.uniform(0.5, 1.5) for n in model.states}
         fits = set(range(mine.experiments))
         settled = any(row.get("preequilibrationConditionId") for row in used[condition])
-        for segment, time in enumerate(TIMES.get(name, (0.7,))):
+        for segment, time in enumerate(times):
             model.move(point, time)
             rates = {n: (model.rate(n), model.size(n)) for n in model.states}
-            seen = [
-                (row, observed(model, tables, row, values, time))
-                for row in {str(sorted(r.items())): r for r in _observations(used[condition])}.values()
-            ]
+            rows = {str(sorted(r.items())): r for r in _observations(used[condition])}.values()
+            seen = [(row, observed(model, tables, row, values, time)) for row in rows]
             for experiment in sorted(fits):
                 found, outputs = mine.at(point, experiment, segment, time)
-                own = {n for n in found if not n.startswith("exp_")}
-                assert own == set(rates), "the states"
+                assert {n for n in found if not n.startswith("exp_")} == set(rates), "the states"
                 same = all(close(found[n], *rates[n]) for n in rates)
                 heard = all(any(close(y, z, 0.0) for n, y in outputs.items() if n.startswith(row["observableId"])) for row, z in seen)
                 begun = settled or all(close(x, start[n], 0.0) for n, x in mine.starts(experiment).items() if n in start)

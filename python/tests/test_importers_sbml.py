@@ -289,6 +289,13 @@ REFUSED = {
         "a condition on the state `A`",
         "until_events",
     ),
+    "a constant without a value": (
+        document({"A": CONC}, parameters={"k": 1}, reactions=reaction("r", "k*A", {"A": 1}, {})).replace('value="1"', ""),
+        {"unknown": []},
+        "",
+        "`k`, which has no value",
+        "",
+    ),
     "no SBML": ("<?xml version='1.0'?><svg/>", {}, "", "XML that is no SBML", ""),
     "broken SBML": (KINDS["a boundary species"][0].replace("</model>", ""), {}, "line", "", ""),
     "an unknown element": (

@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy  # type: ignore[import-untyped]
 
-from .formula import TIME, Expr, exact, expand, names_in, parse, put, text_of
+from .formula import TIME, Expr, exact, expand, parse, put, text_of
 from .problem import ImportProblem
 from .system import State, System
 
@@ -231,4 +231,3 @@ def _plain(system: System) -> None:
         raise ImportProblem(what, "one run from a free start")
     if system.carry and any(system.carry):
         raise ImportProblem("jumps", "one run")
-    names_in(*system.outputs.values())

@@ -155,8 +155,9 @@ class _Problem:
             known = [*self.k.rates, *self.k.values, *self.k.assigned]
             if target in known:
                 out[target] = value
-            elif target in self.k.rules:
-                raise ImportProblem(f"`{target}`, which a rule defines", "a state or a constant", place=f"condition {name}")
+            else:
+                what = "which a rule defines" if target in self.k.rules else "which the model does not have"
+                raise ImportProblem(f"`{target}`, {what}", "a state or a constant of the model", place=f"condition {name}")
         return out
 
     def _runs(self) -> list[_Run]:
@@ -227,6 +228,7 @@ class _Problem:
         roots_as_unknowns(out)
         out.drop_unused()
         self._left_out(starts == "given")
+        self._priors()
         return out
 
     def _starts(self, steps: Timeline) -> None:
@@ -291,7 +293,7 @@ class _Problem:
                 places = {f"observableParameter{j + 1}_{name}": [row[j] for row in rows] for j in range(len(other))}
                 values = {n: steps.spread([self._number(v) for v in column], n) for n, column in places.items()}
                 found = put(formula, values)
-                if lost := [n for n in names_in(found) if n.startswith("observableParameter")]:
+                if lost := [n for n in names_in(formula) - places.keys() if n.startswith("observableParameter")]:
                     raise ImportProblem(f"no value of `{lost[0]}`", "one with every measurement", place=f"observable {name}")
                 known = {*self.out.names(), *steps.definitions, *steps.tables.values()}
                 if lost := sorted(names_in(found) - known):
@@ -302,6 +304,14 @@ class _Problem:
 
     def _number(self, value: Expr) -> Expr:
         return self.fixed.get(value.name, value) if value.is_Symbol else value
+
+    def _priors(self) -> None:
+        table = self.problem.parameter_df
+        if "objectivePriorType" not in table:
+            return
+        named = [n for n in self.out.parameters if n in table.index and isinstance(table.loc[n, "objectivePriorType"], str)]
+        if named:
+            self.out.notes.append("priors are no outputs, those of: " + ", ".join(named))
 
     def _left_out(self, given: bool) -> None:
         out = self.out

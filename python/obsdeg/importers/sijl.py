@@ -79,7 +79,7 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
             system.outputs[label] = expression
     if not outputs:
         raise ImportProblem("no output", "y(t) = ...")
-    system.known_inputs = {n: "generic" for n in of_time if n not in rates and n not in outputs}
+    system.known_inputs = {n: "generic" for n in of_time if n not in rates}
     everything = names_in(*(s.rate for s in system.states.values()), *system.outputs.values())
     order = [m for right, _ in [*rates.values(), *outputs.values()] for m in re.findall(r"[^\W\d][\w!]*", right)]
     named_once = dict.fromkeys(n for n in order if n in everything and n not in rates and n not in system.known_inputs)

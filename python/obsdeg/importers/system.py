@@ -118,6 +118,18 @@ class System:
                 open_ |= names_in(value)
         return needed
 
+    def check(self) -> None:
+        """Holds that every name means something.
+
+        Raises:
+            ImportProblem: names given twice, or never.
+        """
+        listed = self.names()
+        if twice := sorted({n for n in listed if listed.count(n) > 1}):
+            raise ImportProblem(f"`{twice[0]}` for two things", "names of their own")
+        if lost := sorted(self.used() - set(listed)):
+            raise ImportProblem(f"`{lost[0]}`, which has no value", "a value, or one of the unknowns")
+
     def drop_unused(self) -> None:
         """Drops definitions and constants that nothing needs."""
         needed = self.used()
@@ -148,14 +160,12 @@ def to_toml(system: System) -> str:
     """The model file of a system.
 
     Raises:
-        ImportProblem: too many experiments, names given twice, functions without a counterpart.
+        ImportProblem: too many experiments, names given twice or never, functions without a counterpart.
     """
     if system.experiments > MAX_EXPERIMENTS:
         raise ImportProblem(f"{system.experiments} experiments", f"at most {MAX_EXPERIMENTS}")
     names = renamed(system)
-    listed = system.names()
-    if twice := sorted({n for n in listed if listed.count(n) > 1}):
-        raise ImportProblem(f"`{twice[0]}` for two things", "names of their own")
+    system.check()
 
     def text(expression: Expr, place: str) -> str:
         try:
