@@ -37,7 +37,7 @@ noise lin 0.01 10 0.1 1
 """,
     "conditions": """
 conditionId dose off later g A B
-one 2 2 0 g_1 1.5 B_0
+one 2 V 0 g_1 1.5 B_0
 two 0.5 9 0 g_2 - B_0
 three 0.5 9 4 g_2 2.5 0.25
 """,
@@ -72,7 +72,7 @@ def test_conditions_parameters_and_segments(tmp_path: Path) -> None:
 
 
 def test_more_conditions_than_experiments_are_copies_of_the_states(tmp_path: Path) -> None:
-    doses = "\n".join(f"c{i} {i + 1} 9 0 g_{1 + i % 2} - B_0" for i in range(24))
+    doses = "\n".join(f"c{i} {i + 1} 9 0 g_{1 + i % 2} {2 + i % 3} B_0" for i in range(24))
     rows = "\n".join(
         f"{'z' if i % 3 else 'y'} c{i} 0.5 0.1 {'-' if i % 3 else f's_{1 + i % 2};0.5'} {'0.2' if i % 3 else '-'}" for i in range(24)
     )
@@ -138,6 +138,12 @@ def test_a_steady_state_keeps_what_reactions_keep(tmp_path: Path) -> None:
         )
     lost = {n for n, s in statuses(found.text).items() if s != "observable"}
     assert lost == {"make", "lose", "on", "A_ss"}
+
+
+def test_a_condition_may_start_elsewhere_than_in_the_steady_state_before(tmp_path: Path) -> None:
+    tables = STEADY_TABLES | {"conditions": "conditionId push A\nrest 1 -\nrun 3 2.5\n"}
+    numbers = Numbers(load(written(tmp_path, STEADY, tables)).text)
+    assert [numbers.states[n]["initial"] for n in "ABC"] == ["2.5", "B_ss", "C_ss"]
 
 
 def test_what_is_measured_at_the_end_of_time_is_a_steady_state(tmp_path: Path) -> None:

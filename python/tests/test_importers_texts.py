@@ -133,6 +133,14 @@ def test_vectors_are_numbered_chosen_and_filled() -> None:
     assert str(system.states["x3"].rate) == "k2*x2 - 3*x3/2"
 
 
+def test_what_is_saved_counts() -> None:
+    """An input may be a symbol of this name; what is not saved is no part of the model."""
+    text = "syms x1 a u w v\nx = x1; p = a; f = -a*x1 + u + w + v; h = x1;\nsave('m','x','p','h','f','u','w')\nu = v;\nsave('n','x','p','h','f')"
+    first, second = strike_goldd.read(text), strike_goldd.read(text, model="n")
+    assert (list(first.known_inputs), list(first.unknown_inputs), list(first.constants)) == (["u"], ["w"], ["v"])
+    assert (list(second.known_inputs), list(second.unknown_inputs), list(second.constants)) == ([], [], ["u", "v", "w"])
+
+
 JULIA = """\
 # two models; x'(t) = 1 in a comment is none
 using StructuralIdentifiability
@@ -164,8 +172,8 @@ LINES: list[tuple[Any, str, str, str]] = [
     (strike_goldd.read, "syms a\nx = a;\nf = besselj(a, 2);\nsave('m','x')", "line 3", "the function `besselj`"),
     (strike_goldd.read, "syms a b\nx = [a; b];\nf = [1 2; 3 4]*x;\nsave('m','x')", "line 3", "`[1 2; 3 4]*x`"),
     (strike_goldd.read, "syms a b\nx = [a; b];\nf = x + 1;\nsave('m','x')", "line 3", "the vector `x`"),
-    (strike_goldd.read, "syms a b\nx = [a; b]; h = a;\nf = a;\nsave('m','x','h')", "the vector f", "1 equations for 2 states"),
-    (strike_goldd.read, "syms a\nx = a; f = a;\nsave('m','x')", "the vector h", "no output"),
+    (strike_goldd.read, "syms a b\nx = [a; b]; h = a;\nf = a;\nsave('m','x','h','f')", "the vector f", "1 equations for 2 states"),
+    (strike_goldd.read, "syms a\nx = a; f = a;\nsave('m','x','f')", "the vector h", "no output"),
     (strike_goldd.read, "syms a\nx = [a; b](3);\nsave('m')", "line 2", "[a; b](3)"),
     (strike_goldd.read, "x = 1", "", "0 models that are saved"),
     (strike_goldd.read, "syms a\nx = a + ;\nsave('m')", "line 2", "`a +`"),

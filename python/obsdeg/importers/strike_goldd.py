@@ -126,6 +126,7 @@ def read(
 def _saved(text: str) -> list[tuple[str, dict[str, Value]]]:
     """What a script saves: names, and the variables as they are then."""
     values: dict[str, Value] = {}
+    declared: set[str] = set()
     out: list[tuple[str, dict[str, Value]]] = []
     # functions of time: C(t) is C
     timed = re.compile(r"\b(" + "|".join(re.findall(r"([A-Za-z]\w*)\(t\)", text)) + r")\(t\)") if "(t)" in text else None
@@ -134,13 +135,17 @@ def _saved(text: str) -> list[tuple[str, dict[str, Value]]]:
         try:
             if _IGNORED.match(statement):
                 if statement.startswith("clear") and len(statement.split()) <= 2:
-                    values = {}
+                    values, declared = {}, set()
             elif statement.startswith("syms"):
                 for word in re.split(r"[\s,]+", statement[4:].strip()):
                     values.pop(word, None)
+                    declared.add(word)
             elif found := _SAVE.match(statement):
-                name = re.search(r"['\"]?([\w .-]+?)['\"]?\s*(?:,|\)|$)", found.group(1).strip().lstrip("(").strip())
-                out.append((name.group(1) if name else "model", dict(values)))
+                name, *listed = re.findall(r"[\w.-]+", found.group(1)) or ["model"]
+                saved = {n: v for n, v in values.items() if n in listed or not listed}
+                # a symbol that is saved as it is: `syms u`
+                own = {n: symbol(n) for n in listed if n in declared and n not in values}
+                out.append((name, {**saved, **own}))
             elif found := _PLACE.match(statement):
                 vector = values.get(found.group(1))
                 if not isinstance(vector, list):
@@ -150,10 +155,7 @@ def _saved(text: str) -> list[tuple[str, dict[str, Value]]]:
                 changed[int(found.group(2)) - 1] = _value(found.group(3), values)
                 values[found.group(1)] = changed
             elif found := _ASSIGN.match(statement):
-                value = _value(found.group(2), values)
-                # a symbol that is worth itself
-                if value != symbol(found.group(1)):
-                    values[found.group(1)] = value
+                values[found.group(1)] = _value(found.group(2), values)
             else:
                 raise ImportProblem(f"`{statement[:60]}`", "syms, assignments of formulas and vectors, save")
         except ImportProblem as problem:
