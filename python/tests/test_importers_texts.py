@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -291,6 +293,22 @@ def test_load_refuses_what_it_does_not_know(tmp_path: Path) -> None:
         load(tmp_path / "s.m", model_number=2)
     with pytest.raises(FileNotFoundError):
         load(tmp_path / "none.xml")
+
+
+def test_a_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.xml"
+    path.write_text('<sbml level="3">')
+    monkeypatch.setitem(sys.modules, "libsbml", None)
+    for module in ("sbml", "sbml_math"):
+        monkeypatch.delitem(sys.modules, f"obsdeg.importers.{module}", raising=False)
+    with pytest.raises(ImportError, match="SBML is read with the package `python-libsbml`"):
+        load(path)
+
+
+def test_own_files_need_no_package() -> None:
+    script = "import sys; sys.path[:0] = sys.argv[1:2]; from obsdeg.importers import load; load(sys.argv[2]); assert not {'sympy', 'libsbml', 'petab'} & sys.modules.keys()"
+    scheme = ROOT / "examples" / "six-positions" / "scheme.toml"
+    subprocess.run([sys.executable, "-c", script, str(Path(strike_goldd.__file__).parents[2]), str(scheme)], check=True)
 
 
 def test_petab_problems_say_what_is_missing(tmp_path: Path) -> None:

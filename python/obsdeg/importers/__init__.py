@@ -6,14 +6,16 @@ models and schemes. What has no counterpart is refused with an `ImportProblem`, 
 
 from __future__ import annotations
 
+import importlib
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .problem import ImportProblem
-from .system import System, to_toml
+
+if TYPE_CHECKING:
+    from .system import System, to_toml
 
 __all__ = ["ImportProblem", "Imported", "System", "load", "to_toml"]
 
@@ -45,60 +47,68 @@ def load(path: str | Path, **options: Any) -> Imported:
     Raises:
         ImportProblem: a construct without a counterpart, or a file of no known kind.
         FileNotFoundError: there is none.
+        ImportError: the package that reads this kind is not installed; it is named.
     """
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8", errors="replace").lstrip("\ufeff")
     except IsADirectoryError:
         raise ImportProblem("a folder", "a file, as problem.yaml", file=str(path)) from None
-    source, reader = _kind(text, path)
-    if reader is None:
+    source, module = _kind(text, path)
+    if not module:
         if options:
             raise ImportProblem(f"`{next(iter(options))}`", "no options for obsdeg's own files", file=str(path))
         return Imported(text, source, "obsdeg")
+    reader = _needed(module, source)
     try:
-        system = reader(path, **options)
+        system = reader.load(path, **options)
     except TypeError as error:
         if "keyword argument" not in str(error):
             raise
         raise ImportProblem(f"the option in `{error}`", f"those of the reader of {source}", file=str(path)) from None
     try:
-        return Imported(to_toml(system), "model", source, tuple(system.notes))
+        return Imported(_needed("system", source).to_toml(system), "model", source, tuple(system.notes))
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
 
 
-def _kind(text: str, path: Path) -> tuple[str, Callable[..., System] | None]:
-    """What a file is, and who reads it; a model or scheme of obsdeg's own has no reader."""
+def __getattr__(name: str) -> Any:
+    # SymPy is loaded when something is read
+    if name in ("System", "to_toml"):
+        return getattr(importlib.import_module(".system", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def _needed(module: str, source: str) -> Any:
+    try:
+        return importlib.import_module(f".{module}", __name__)
+    except ModuleNotFoundError as error:
+        packages = {"libsbml": "python-libsbml", "yaml": "pyyaml"}
+        message = f"{source} is read with the package `{packages.get(error.name or '', error.name)}`, which is not installed"
+        raise ImportError(message, name=error.name) from None
+
+
+def _kind(text: str, path: Path) -> tuple[str, str]:
+    """What a file is, and the module that reads it; a model or scheme of obsdeg's own needs none."""
     ending = path.suffix.lower()
     head = text.lstrip()
     if head.startswith("<"):
         if re.search(r"<(\w+:)?sbml[\s>]", head[:4000]):
-            from . import sbml
-
-            return "SBML", sbml.load
+            return "SBML", "sbml"
         raise ImportProblem("XML that is no SBML", "<sbml ...>", file=str(path))
     if re.search(r"^format_version\s*:", text, re.MULTILINE):
-        from . import petab
-
-        return "PEtab", petab.load
+        return "PEtab", "petab"
     if "@ODEmodel" in text:
-        from . import sijl
-
-        return "SI.jl", sijl.load
+        return "SI.jl", "sijl"
     if ending == ".m" or (re.search(r"^\s*syms\s", text, re.MULTILINE) and re.search(r"^\s*save\b", text, re.MULTILINE)):
-        from . import strike_goldd
-
-        return "STRIKE-GOLDD", strike_goldd.load
+        return "STRIKE-GOLDD", "strike_goldd"
     if ending == ".py" and re.search(r"^rates\s*=", text, re.MULTILINE):
-        from . import sympy_system
-
-        return "SymPy", sympy_system.load
+        return "SymPy", "sympy_system"
     if head.startswith("{"):
-        return ("model" if '"equations"' in text else "scheme"), None
+        return ("model" if '"equations"' in text else "scheme"), ""
     if re.search(r"^\s*\[(states|outputs)\b", text, re.MULTILINE):
-        return "model", None
+        return "model", ""
     if ending == ".toml" or re.search(r"^\s*(\[\[position\]\]|positions?\s*=|angles\s*=)", text, re.MULTILINE):
-        return "scheme", None
+        return "scheme", ""
     expected = "SBML, PEtab (its YAML), @ODEmodel, a script of STRIKE-GOLDD, SymPy, or a model or scheme of obsdeg"
     raise ImportProblem(f"a file of no known kind (`{ending or path.name}`)", expected, file=str(path))

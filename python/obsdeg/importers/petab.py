@@ -15,6 +15,8 @@ from typing import Any
 
 import sympy  # type: ignore[import-untyped]
 import yaml
+from petab import v1  # type: ignore[import-untyped]
+from petab.v1.math import sympify_petab  # type: ignore[import-untyped]
 
 from .copies import unrolled
 from .formula import TIME, Expr, exact, exactly, expand, names_in, put, symbol
@@ -61,8 +63,6 @@ def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", unt
     Raises:
         ImportProblem: a construct without a counterpart.
     """
-    from petab import v1  # type: ignore[import-untyped]
-
     file = str(path)
     if numbers not in ("exact", "generic") or starts not in ("given", "unknown"):
         raise ImportProblem(f"numbers=`{numbers}`, starts=`{starts}`", "`exact` or `generic`, `given` or `unknown`", file=file)
@@ -118,10 +118,10 @@ class _Problem:
             k.assigned.pop(n, None)
         self.observables, self.noise = self._observables()
         self.runs = self._runs()
+        self.steady: dict[Any, dict[str, Expr]] = {}
+        self.switching: set[str] = set()
 
     def _observables(self) -> tuple[dict[str, Expr], set[str]]:
-        from petab.v1.math import sympify_petab  # type: ignore[import-untyped]
-
         table = self.problem.observable_df
         formulas: dict[str, Expr] = {}
         noise: set[str] = set()
@@ -267,8 +267,6 @@ class _Problem:
         values = {**assigned, **k.values, **self.fixed, **{n: v for n, v in run.before.items() if n not in k.rates}}
         begin = {n: start(run.before.get(n, k.starts.get(n)), f"the start of {n}") for n in k.rates}
         key = (tuple(sorted(values.items(), key=str)), tuple(begin.items()))
-        if not hasattr(self, "steady"):
-            self.steady: dict[Any, dict[str, Expr]] = {}
         if key not in self.steady:
             suffix = "_ss" if not self.steady else f"_ss{len(self.steady) + 1}"
             found = SteadyState(k, values, begin, suffix)
