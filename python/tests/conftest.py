@@ -23,8 +23,9 @@ except ModuleNotFoundError:
 
 
 def _program() -> str:
-    built = [ROOT / "target" / profile / "obsdeg" for profile in ("release", "debug")]
-    found = os.environ.get("OBSDEG_PROGRAM") or next((str(p) for p in built if p.exists()), None) or shutil.which("obsdeg")
+    built = [p for p in (ROOT / "target" / profile / "obsdeg" for profile in ("release", "debug")) if p.exists()]
+    newest = str(max(built, key=lambda p: p.stat().st_mtime)) if built else shutil.which("obsdeg")
+    found = os.environ.get("OBSDEG_PROGRAM") or newest
     if found is None:
         pytest.fail("no program `obsdeg`: build it (cargo build), or name it in OBSDEG_PROGRAM")
     return found
