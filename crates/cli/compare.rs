@@ -1,14 +1,10 @@
 //! `obsdeg compare`: schemes side by side.
 
-use std::path::Path;
-
 use clap::{Arg, Args};
-use obsdeg_evidence::compare::{Entry, compare};
+use obsdeg_commands::{Compare, Source, compare};
 
-use crate::arguments::{ANY, Assumptions, FileArguments, whole};
-use crate::conditions::{GyroNoiseArguments, MeasurementArguments};
+use crate::arguments::AllFiles;
 use crate::failure::Failure;
-use crate::input::{Input, title};
 use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Spinner;
@@ -26,24 +22,14 @@ Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 interna
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, override_usage = "obsdeg compare [OPTIONS] <FILE>...", mut_args(words))]
 pub(crate) struct Arguments {
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
-    seed: u64,
+    #[command(flatten)]
+    asked: Compare,
 
     #[command(flatten)]
-    files: FileArguments,
-
-    #[command(flatten)]
-    assumptions: Assumptions,
+    files: AllFiles,
 
     #[command(flatten)]
     output: Output,
-
-    #[command(flatten)]
-    measurement: MeasurementArguments,
-
-    #[command(flatten)]
-    gyro_noise: GyroNoiseArguments,
 }
 
 /// What shared options say here.
@@ -61,22 +47,9 @@ fn words(arg: Arg) -> Arg {
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.check()?;
-    let mut entries = Vec::new();
-    for (path, input) in a.files.read()? {
-        let Input::Scheme(mut scheme) = input else {
-            return Err(Failure::input(format!(
-                "{path} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge models side by side)"
-            )));
-        };
-        a.assumptions.apply(&mut scheme);
-        let mut conditions = a.measurement.conditions(&scheme);
-        conditions.apply(&a.gyro_noise.settings());
-        entries.push(Entry { name: title(Path::new(&path)), scheme: *scheme, conditions });
-    }
-    a.measurement.concern(entries.iter().map(|e| &e.scheme))?;
+    let read = a.files.read()?.into_iter().map(Source::read).collect::<Result<_, _>>()?;
     let spinner = Spinner::start("judging schemes", a.output.target.quiet);
-    let compared = compare(&entries, a.seed);
+    let comparison = compare(&a.asked, read);
     drop(spinner);
-    let comparison = compared.map_err(|(name, e)| Failure::from(e).in_file(&name))?;
-    a.output.write(&comparison)
+    a.output.write(&comparison?)
 }

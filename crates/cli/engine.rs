@@ -1,9 +1,9 @@
 //! The symbolic engine as the commands use it.
 
 use clap::Args;
+use obsdeg_commands::whole;
 use obsdeg_symbolic::{Worker, WorkerConfig};
 
-use crate::arguments::whole;
 use crate::failure::{Failure, say};
 use crate::progress::Spinner;
 

@@ -6,7 +6,6 @@ mod arguments;
 mod calibrate;
 mod compare;
 mod completions;
-mod conditions;
 mod crosscheck;
 mod design;
 mod engine;
@@ -30,8 +29,9 @@ use clap::builder::PossibleValuesParser;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use arguments::Given;
+use arguments::given;
 use failure::{Failure, say};
+use obsdeg_commands::Given;
 use obsdeg_report::visible;
 
 const AFTER_HELP: &str = "\
@@ -125,7 +125,7 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
     let command = command();
     let parsed = command.clone().try_get_matches().and_then(|matches| {
         let of = matches.subcommand().and_then(|(name, of)| Some((command.find_subcommand(name)?, of)));
-        let given = of.map(|(command, of)| Given::of(command, of)).unwrap_or_default();
+        let given = of.map(|(command, of)| given(command, of)).unwrap_or_default();
         Ok((Cli::from_arg_matches(&matches)?, given))
     });
     parsed.map_err(|mut e| {
@@ -152,13 +152,13 @@ fn run() -> Result<(), ExitCode> {
     }
     let (cli, given) = arguments()?;
     let done = match cli.command {
-        Command::Analyze(a) => analyze::run(&a, &given),
-        Command::Simulate(a) => simulate::run(&a, &given),
-        Command::Crosscheck(a) => crosscheck::run(&a, &given),
-        Command::Calibrate(a) => calibrate::run(&a, &given),
+        Command::Analyze(a) => analyze::run(a, given),
+        Command::Simulate(a) => simulate::run(a, given),
+        Command::Crosscheck(a) => crosscheck::run(a, given),
+        Command::Calibrate(a) => calibrate::run(a, given),
         Command::Compare(a) => compare::run(&a),
         Command::Design(a) => design::run(&a),
-        Command::Report(a) => report::run(&a, &given),
+        Command::Report(a) => report::run(a, given),
         Command::Paper(a) => paper::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man(a) => completions::man(&a),

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, Args};
 use obsdeg_report::{Answer, File, Format, Layout, csv, written};
 
-use crate::arguments::{Word, one_of};
 use crate::failure::Failure;
 use crate::files;
 use crate::progress::Spinner;
+use obsdeg_commands::{Word, one_of};
 
 /// Columns of a table that does not go to a terminal.
 const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false };

@@ -1,9 +1,8 @@
 //! `obsdeg paper`: the paper against the algebra.
 
 use clap::Args;
-use obsdeg_evidence::audit::audit;
+use obsdeg_commands::{Paper, paper};
 
-use crate::arguments::{ANY, whole};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Output;
@@ -23,9 +22,8 @@ Exit codes: 0 done (whatever the findings), 2 bad input, 3 internal error, 130 i
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub(crate) struct Arguments {
-    /// Seed of the random points and of the noise
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
-    seed: u64,
+    #[command(flatten)]
+    asked: Paper,
 
     #[command(flatten)]
     output: Output,
@@ -34,6 +32,5 @@ pub(crate) struct Arguments {
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.check()?;
-    let audit = audit(a.seed).map_err(|e| Failure::internal(e.to_string()))?;
-    a.output.write(&audit)
+    a.output.write(&paper(&a.asked)?)
 }

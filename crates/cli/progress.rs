@@ -5,8 +5,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use obsdeg_calibration::Going;
-use obsdeg_design::design::Progress;
+use obsdeg_commands::Now;
 use obsdeg_report::visible;
 
 /// What a spinner goes through, in characters that every terminal has.
@@ -50,46 +49,44 @@ impl Drop for Spinner {
     }
 }
 
-/// A bar on a terminal for work of known length, once it has taken a second.
+/// A bar on a terminal, once the work has taken a second.
 pub(crate) struct Bar {
     bar: ProgressBar,
     started: Instant,
     quiet: bool,
 }
 
+/// A bar of work of known length.
+const KNOWN: &str = "{msg} [{bar:40}] {pos}/{len}, {eta} left";
+/// Where nobody knows how much there is.
+const UNKNOWN: &str = "{spinner} {msg}: {human_pos}, {elapsed}";
+
 impl Bar {
-    /// A bar of `total` steps; silent when `quiet`.
-    pub(crate) fn start(total: u64, message: &'static str, quiet: bool) -> Self {
-        let bar =
-            ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()).with_message(message);
-        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {pos}/{len}, {eta} left") {
-            bar.set_style(style.progress_chars("=> "));
-        }
+    /// A bar; silent when `quiet`.
+    pub(crate) fn start(quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
         Self { bar, started: Instant::now(), quiet }
     }
 
-    /// How far a search is, with its rate and the best so far.
-    pub(crate) fn search(&self, now: &Progress) {
-        self.bar.set_length(now.total);
-        let rate = now.examined as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
-        let best = if now.best.is_finite() { format!(", best {:.4}", now.best) } else { String::new() };
-        self.bar.set_message(format!("searching, {}/s{best}", HumanCount(rate as u64)));
-        self.at(now.done);
-    }
-
-    /// How far a calibration is: nobody knows how much there is.
-    pub(crate) fn calibrates(&self, now: Going<'_>) {
-        let (what, done) = match now {
-            Going::Reads { record, samples } => (format!("reading {record}"), samples),
-            Going::Passes(passes) => ("calibrating, linearisations".into(), passes),
-        };
-        if self.bar.message() != visible(&what) {
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}: {human_pos}, {elapsed}") {
-                self.bar.set_style(style.tick_chars(TURNS));
-            }
-            self.says(&what);
+    /// How far the work is; of a search its rate and the best so far.
+    pub(crate) fn shows(&self, now: &Now) {
+        let mut what = visible(&now.what).into_owned();
+        if let Some(examined) = now.examined {
+            let rate = examined as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
+            let best = now.best.map_or_else(String::new, |best| format!(", best {best:.4}"));
+            what = format!("{what}, {}/s{best}", HumanCount(rate as u64));
         }
-        self.at(done as u64);
+        if self.bar.message() != what {
+            let template = if now.total.is_some() { KNOWN } else { UNKNOWN };
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                self.bar.set_style(style.progress_chars("=> ").tick_chars(TURNS));
+            }
+            self.bar.set_message(what);
+        }
+        if let Some(total) = now.total {
+            self.bar.set_length(total);
+        }
+        self.at(now.done);
     }
 
     /// What is being done.
@@ -98,7 +95,7 @@ impl Bar {
     }
 
     /// So much is done.
-    pub(crate) fn at(&self, done: u64) {
+    fn at(&self, done: u64) {
         if !self.quiet && self.bar.is_hidden() && self.started.elapsed() > Duration::from_secs(1) {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }

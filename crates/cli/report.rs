@@ -3,19 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use obsdeg_calibration::{Calibration, Setup};
-use obsdeg_core::system::SystemModel;
-use obsdeg_design::review::{ReviewError, ReviewOptions, review};
-use obsdeg_evidence::compare::Entry;
+use obsdeg_commands::{CalibrationFile, Given, Host, Report, Source, Word, one_of, origin, report};
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
-use crate::arguments::{ANY, Assumptions, FileArguments, Given, Word, one_of, whole};
-use crate::conditions::ConditionArguments;
+use crate::arguments::AllFiles;
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
-use crate::input::{Input, ModelFile, Source, title};
+use crate::input::read;
 use crate::interrupt;
-use crate::origin::origin;
+use crate::origin::command;
 use crate::output::Target;
 use crate::progress::Bar;
 
@@ -43,12 +39,11 @@ const FORMATS: [Word<ReviewFormat>; 4] = [
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, override_usage = "obsdeg report [OPTIONS] <FILE>... -o <FILE>", mut_args(words))]
 pub(crate) struct Arguments {
-    /// Seed of all random choices
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(ANY))]
-    seed: u64,
+    #[command(flatten)]
+    asked: Report,
 
     #[command(flatten)]
-    files: FileArguments,
+    files: AllFiles,
 
     /// The format (default: by the ending of the file)
     #[arg(long, value_name = "FORMAT", help_heading = "Output", value_parser = one_of(FORMATS))]
@@ -57,22 +52,12 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     target: Target,
 
-    #[command(flatten)]
-    assumptions: Assumptions,
-
     /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several times
     #[arg(long, value_name = "FOLDER")]
     calibration: Vec<PathBuf>,
 
-    /// Monte Carlo runs of the evidence
-    #[arg(long = "runs", value_name = "N", default_value_t = 100, value_parser = whole::<u32>(2..=10_000_000))]
-    monte_carlo: u32,
-
     #[command(flatten)]
     engine: EngineArguments,
-
-    #[command(flatten)]
-    conditions: ConditionArguments,
 }
 
 /// What shared options say here.
@@ -88,7 +73,7 @@ fn words(arg: Arg) -> Arg {
     }
 }
 
-pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
+pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     interrupt::ends()?;
     let path = a.target.path().unwrap_or(Path::new("-"));
     let format = format(a.format, path)?;
@@ -97,80 +82,34 @@ pub(crate) fn run(a: &Arguments, given: &Given) -> Result<(), Failure> {
     if matches!(format, ReviewFormat::Markdown | ReviewFormat::Latex) {
         a.target.check_beside(&folder)?;
     }
-    let mut entries: Vec<Entry> = Vec::new();
-    let mut files: Vec<ModelFile> = Vec::new();
-    let read = a.files.read()?;
-    given.concern(&read)?;
-    for (path, input) in read {
-        match input {
-            Input::Model(file) => files.push(*file),
-            Input::Scheme(mut scheme) => {
-                let title = title(Path::new(&path));
-                a.assumptions.apply(&mut scheme);
-                let conditions = a.conditions.conditions(&scheme);
-                let name = if scheme.name.is_empty() { title } else { scheme.name.clone() };
-                entries.push(Entry { name, scheme: *scheme, conditions });
-            }
-        }
-    }
-    let calibration = |path: &PathBuf| calibration(path, &entries);
-    let calibrations = a.calibration.iter().map(calibration).collect::<Result<Vec<_>, _>>()?;
-    if !entries.is_empty() {
-        a.conditions.concern(entries.iter().map(|e| &e.scheme))?;
-    }
-    let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
+    a.asked.given = given;
+    let sources = a.files.read()?;
+    let read = sources.iter().cloned().map(Source::read).collect::<Result<Vec<_>, _>>()?;
+    let calibrations = a.calibration.iter().map(|path| calibration(path));
+    let calibrations = calibrations.collect::<Result<Vec<_>, _>>()?;
+    let origin = origin(command(), sources.iter().chain(calibrations.iter().map(|c| &c.source)));
     let mut worker = a.engine.worker(a.target.quiet)?;
-    let bar = Bar::start(1000, "", a.target.quiet);
-    let options = ReviewOptions { runs: a.monte_carlo as usize, seed: a.seed };
-    let reviewed = review(&entries, &models, options, worker.as_mut(), &|what, share| {
-        bar.says(what);
-        bar.at((share * 900.0) as u64);
+    let bar = Bar::start(a.target.quiet);
+    let going = |now| {
+        bar.shows(&now);
         true
-    });
-    let reviewed = reviewed.map_err(|e| match e {
-        ReviewError::Simulation { name, error } => Failure::from(error).in_file(&name),
-        ReviewError::Model { model, error } => files[model].wrong(&error),
-        e @ (ReviewError::Analysis { .. } | ReviewError::Interrupted) => Failure::input(e.to_string()),
-    })?;
-    let calibrated: Vec<PathBuf> = a.calibration.iter().map(|path| calibration_file(path)).collect();
-    let origin = origin(a.files.paths().chain(&calibrated))?;
+    };
+    let mut host = Host { worker: worker.as_mut(), going: &going };
+    let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
     bar.says("writing");
-    let written = obsdeg_report::review(&reviewed, &calibrations, &origin, format, &folder)?;
+    let written = reviewed.files(&origin, format, &folder)?;
+    drop(bar);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
     notice(worker.as_ref().map_or(&[], |w| w.banner()), a.target.quiet);
     Ok(())
 }
 
-/// Where a calibration is.
-fn calibration_file(path: &Path) -> PathBuf {
-    if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() }
-}
-
-/// A calibration of one of the schemes, and what it is called: its folder.
-fn calibration(path: &Path, entries: &[Entry]) -> Result<(String, Calibration), Failure> {
-    let file = calibration_file(path);
-    let source = Source::read(&file, "calibration")?;
-    let wrong = |found: &str| {
-        let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";
-        Failure::input(format!("{}: {found}; {expected}", file.display()))
-    };
-    let of_model = source.text().contains("\"obsdeg.system-calibration/");
-    let found: Calibration = serde_json::from_str(source.text()).map_err(|e| match of_model {
-        true => wrong("the calibration of a model"),
-        false => wrong(&e.to_string()),
-    })?;
-    let differences = entries.iter().map(|e| (&e.name, Setup::of(&e.scheme).differences(&found.setup)));
-    let nearest = differences.min_by_key(|(_, d)| d.len());
-    match nearest {
-        None => return Err(wrong("no scheme is reviewed that it could be of")),
-        Some((_, d)) if d.is_empty() => {}
-        Some((name, d)) => {
-            return Err(wrong(&format!("the calibration of another scheme than {name} ({})", d.join("; "))));
-        }
-    }
+/// A calibration, and what it is called: its folder.
+fn calibration(path: &Path) -> Result<CalibrationFile, Failure> {
+    let file = if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() };
     let named = if path.is_dir() { Some(path) } else { path.parent() };
     let name = named.and_then(Path::file_name).map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    Ok((name, found))
+    Ok(CalibrationFile { name, source: read(&file, "calibration")? })
 }
 
 /// The format that is asked for, or that of the file's ending.

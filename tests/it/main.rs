@@ -6,6 +6,7 @@ mod book;
 mod browser;
 mod calibrate;
 mod cli;
+mod commands;
 mod compare;
 mod conventions;
 mod crosscheck;

@@ -65,7 +65,18 @@ fn modules() -> Imports {
 
 /// Crates of the workspace and what they import from it.
 fn crates() -> Imports {
-    let names = ["exact", "ekf", "symbolic", "core", "evidence", "calibration", "design", "report", "cli"];
+    let names = [
+        "exact",
+        "ekf",
+        "symbolic",
+        "core",
+        "evidence",
+        "calibration",
+        "design",
+        "report",
+        "commands",
+        "cli",
+    ];
     let imports = |name: &&str| {
         let place = root().join("crates").join(name);
         let place = if place.join("src").is_dir() { place.join("src") } else { place };

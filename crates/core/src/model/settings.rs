@@ -189,6 +189,13 @@ pub struct AssignmentError {
     pub found: String,
 }
 
+impl fmt::Display for Assignment {
+    /// `D_FX=11`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.name, self.value)
+    }
+}
+
 impl FromStr for Assignment {
     type Err = AssignmentError;
     fn from_str(text: &str) -> Result<Self, AssignmentError> {

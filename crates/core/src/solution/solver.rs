@@ -4,7 +4,7 @@
 use obsdeg_exact::Radical;
 use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::problem::Problem;
 use super::turning::motion_rows;
@@ -28,7 +28,7 @@ pub(super) const PRINTABLE: usize = 1000;
 const FLOAT_RATES: (f64, f64) = (1.0, 1.0);
 
 /// The axes in which Z is printed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Frame {
     /// Local geographic axes, as in the paper: `Z1` and `Z3` (`Z2` is zero).

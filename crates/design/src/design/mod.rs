@@ -54,6 +54,7 @@ use certify::excess;
 use obsdeg_core::model::{Euler, Path, Scheme, c_n_f64};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, latitude_of};
 use rounding::Free;
+use serde::{Deserialize, Serialize};
 use task::Task;
 use ties::TIE;
 
@@ -134,7 +135,8 @@ impl Default for DesignOptions {
 }
 
 /// The name of a criterion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum CriterionName {
     /// The largest sigma.
     #[default]

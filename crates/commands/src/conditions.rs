@@ -1,5 +1,7 @@
 //! The conditions of a run, shared by the commands that simulate.
 
+use std::ops::RangeInclusive;
+
 use clap::Args;
 use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{
@@ -7,9 +9,14 @@ use obsdeg_core::model::settings::{
 };
 use obsdeg_core::model::{PerGyro, Platform, Scheme};
 use obsdeg_evidence::simulation::{Conditions, general_first};
+use serde::{Deserialize, Serialize};
 
 use crate::arguments::{Word, one_of};
-use crate::failure::Failure;
+use crate::problem::Problem;
+use crate::text;
+
+/// Numbers of Monte Carlo runs.
+pub(crate) const RUNS: RangeInclusive<u64> = 2..=10_000_000;
 
 /// Reads a number of a range.
 pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
@@ -30,65 +37,72 @@ pub(crate) fn assigned(
 }
 
 /// What is measured, and how well it is to be known: all that a prediction by information needs.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
 #[command(next_help_heading = "Measurement")]
-pub(crate) struct MeasurementArguments {
+pub struct MeasurementOptions {
     /// Dwell of positions that do not say theirs, in s (default: 1000; 0.001 to 1e6 s)
     #[arg(long, value_name = "S", value_parser = within(ranges::DWELL_S))]
-    dwell: Option<f64>,
+    pub dwell: Option<f64>,
 
     /// Largest sampling step, in s (default: 10; 1e-6 to 1e6 s)
     #[arg(long, value_name = "S", value_parser = within(ranges::STEP_S))]
-    step: Option<f64>,
+    pub step: Option<f64>,
 
     /// White noise of Z per sample and axis, in g (default: 1e-5; 1e-15 to 1000 g)
     #[arg(long, value_name = "G", value_parser = within(ranges::NOISE_G))]
-    noise: Option<f64>,
+    pub noise: Option<f64>,
 
     /// Bias instability of the accelerometers in ug: B, a first-order Gauss-Markov process of each that goes on from position to position, as
     /// --bias-instability of gyros (default: none; 1e-9 to 1e9 ug)
     #[arg(long, value_name = "B", value_parser = within(ranges::INSTABILITY_UG))]
-    accelerometer_instability: Option<f64>,
+    pub accelerometer_instability: Option<f64>,
 
     /// Its correlation time, in s (default: 3600; 1 to 1e9 s)
     #[arg(long, value_name = "S", value_parser = within(ranges::CORRELATION_S))]
-    accelerometer_correlation_time: Option<f64>,
+    pub accelerometer_correlation_time: Option<f64>,
 
     /// Noise of a measured azimuth per sample, in deg (default: 0.001; 1e-12 to 1000 deg)
     #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
-    azimuth_noise: Option<f64>,
+    pub azimuth_noise: Option<f64>,
 
     /// Largest standard deviation allowed for an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D=0.05, D_FX=0.01, K1=5
     /// (default: psi 0.01, D 0.1; 1e-12 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
-    requirement: Vec<Assignment>,
+    #[serde(with = "text::list")]
+    pub requirement: Vec<Assignment>,
 }
 
 /// The datasheet of the gyros; a scheme file may give it too.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
 #[command(next_help_heading = "Gyro noise")]
-pub(crate) struct GyroNoiseArguments {
+pub struct GyroNoiseOptions {
     /// Angle random walk in deg/sqrt(h), one number for all gyros or X,Y,Z; without --drift-noise it is all the white drift there is
     /// (default: none; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "N[,N,N]")]
-    angle_random_walk: Option<PerGyro>,
+    #[serde(with = "text")]
+    pub angle_random_walk: Option<PerGyro>,
 
     /// Rate random walk in deg/h/sqrt(h), likewise: a state of each gyro (default: none; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "K[,K,K]")]
-    rate_random_walk: Option<PerGyro>,
+    #[serde(with = "text")]
+    pub rate_random_walk: Option<PerGyro>,
 
     /// Bias instability in deg/h, likewise: B of IEEE Std 952, a first-order Gauss-Markov state of each gyro whose Allan peak is 0.664 B
     /// (default: none; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "B[,B,B]")]
-    bias_instability: Option<PerGyro>,
+    #[serde(with = "text")]
+    pub bias_instability: Option<PerGyro>,
 
     /// Its correlation time, in s (default: 3600; 1 to 1e9 s)
     #[arg(long, value_name = "S", value_parser = within(ranges::CORRELATION_S))]
-    correlation_time: Option<f64>,
+    pub correlation_time: Option<f64>,
 }
 
-impl GyroNoiseArguments {
-    pub(crate) fn settings(&self) -> Settings {
+impl GyroNoiseOptions {
+    /// What they say of a run.
+    pub fn settings(&self) -> Settings {
         Settings {
             angle_random_walk_deg_sqrt_h: self.angle_random_walk,
             rate_random_walk_dph_sqrt_h: self.rate_random_walk,
@@ -100,53 +114,61 @@ impl GyroNoiseArguments {
 }
 
 /// A run's conditions; a scheme file may give them too, options come last.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
 #[command(next_help_heading = "Conditions of the run")]
-pub(crate) struct ConditionArguments {
+pub struct ConditionOptions {
+    /// What is measured, and how well it is to be known.
     #[command(flatten)]
-    measurement: MeasurementArguments,
+    #[serde(flatten)]
+    pub measurement: MeasurementOptions,
 
     /// What the simulated truth is (default: linear)
     #[arg(long, value_name = "LEVEL", value_parser = one_of(TRUTHS))]
-    truth: Option<Truth>,
+    pub truth: Option<Truth>,
 
     /// The filter (default: linear where its model holds, else iterated)
     #[arg(long, value_name = "FILTER", value_parser = one_of(FilterKind::ALL.map(|f| (f.name(), filter_words(f), f))))]
-    filter: Option<FilterKind>,
+    pub filter: Option<FilterKind>,
 
     /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
     /// 0.001 to 10000 deg/s)
     #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
-    slew_rate: Option<f64>,
+    pub slew_rate: Option<f64>,
 
     /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
     /// (default: 0.01 deg/h; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "NOISE")]
-    drift_noise: Option<DriftNoise>,
+    pub drift_noise: Option<DriftNoise>,
 
+    /// The datasheet of the gyros.
     #[command(flatten)]
-    gyro_noise: GyroNoiseArguments,
+    #[serde(flatten)]
+    pub gyro_noise: GyroNoiseOptions,
 
     /// Transition matrix of the filter (default: exponential)
     #[arg(long, value_name = "HOW", value_parser = one_of(PROPAGATIONS))]
-    propagation: Option<Propagation>,
+    pub propagation: Option<Propagation>,
 
     /// True value of an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_FX=11, D_I=5, psi=0.1 (the paper's;
     /// -1e6 to 1e6)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
-    value: Vec<Assignment>,
+    #[serde(with = "text::list")]
+    pub value: Vec<Assignment>,
 
     /// Initial standard deviation, likewise (default: psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
-    prior: Vec<Assignment>,
+    #[serde(with = "text::list")]
+    pub prior: Vec<Assignment>,
 
     /// Initial estimate, likewise (default: 0; -1e6 to 1e6)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
-    estimate: Vec<Assignment>,
+    #[serde(with = "text::list")]
+    pub estimate: Vec<Assignment>,
 
     /// Factor on the true drifts and their priors (default: 1; 1e-6 to 1e6)
     #[arg(long, value_name = "X", value_parser = within(ranges::DRIFT_SCALE))]
-    drift_scale: Option<f64>,
+    pub drift_scale: Option<f64>,
 }
 
 /// The words of `--truth`.
@@ -170,15 +192,18 @@ fn filter_words(filter: FilterKind) -> &'static str {
 }
 
 /// Refuses an assignment that concerns an unknown of none of the schemes: nothing would hear of it.
+///
+/// # Errors
+/// The assignment, and what it might mean.
 pub(crate) fn concern_some<'a>(
     option: &str,
     given: &[Assignment],
     schemes: impl Iterator<Item = &'a Scheme> + Clone,
-) -> Result<(), Failure> {
+) -> Result<(), Problem> {
     for a in given {
         let mut hint = None;
         for scheme in schemes.clone() {
-            let platform = Platform::new(scheme.clone()).map_err(|e| Failure::input(e.to_string()))?;
+            let platform = Platform::new(scheme.clone()).map_err(|e| Problem::input(e.to_string()))?;
             if platform.names().iter().any(|name| concerns(&a.name, name)) {
                 hint = None;
                 break;
@@ -188,33 +213,33 @@ pub(crate) fn concern_some<'a>(
         if let Some(hint) = hint {
             let message =
                 format!("`{option} {}={}`: no unknown here is `{}`; {hint}", a.name, a.value, a.name);
-            return Err(Failure::input(message));
+            return Err(Problem::input(message));
         }
     }
     Ok(())
 }
 
-impl MeasurementArguments {
+impl MeasurementOptions {
     /// Checks that every assignment concerns an unknown of some scheme.
-    pub(crate) fn concern<'a>(
-        &self,
-        schemes: impl Iterator<Item = &'a Scheme> + Clone,
-    ) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// The assignment that does not, and what it might mean.
+    pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
         // without such noise of its own or of a scheme the time is of nothing
         let states = |s: &Scheme| s.simulation.accelerometer_bias_instability_ug.is_some();
         if self.accelerometer_correlation_time.is_some()
             && self.accelerometer_instability.is_none()
             && !schemes.clone().any(states)
         {
-            return Err(Failure::input(
-                "--accelerometer-correlation-time does nothing here: expected --accelerometer-instability with it".into(),
+            return Err(Problem::input(
+                "--accelerometer-correlation-time does nothing here: expected --accelerometer-instability with it",
             ));
         }
         concern_some("--requirement", &self.requirement, schemes)
     }
 
     /// The options that are given.
-    pub(crate) fn given(&self) -> impl Iterator<Item = &'static str> {
+    pub fn given(&self) -> impl Iterator<Item = &'static str> {
         let all = [
             ("--dwell", self.dwell.is_some()),
             ("--step", self.step.is_some()),
@@ -228,7 +253,7 @@ impl MeasurementArguments {
     }
 
     /// The paper's conditions, with what the scheme and the options say.
-    pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
+    pub fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::of(scheme);
         out.apply(&Settings {
             step_s: self.step,
@@ -244,12 +269,12 @@ impl MeasurementArguments {
     }
 }
 
-impl ConditionArguments {
+impl ConditionOptions {
     /// Checks that every assignment concerns an unknown of some scheme.
-    pub(crate) fn concern<'a>(
-        &self,
-        schemes: impl Iterator<Item = &'a Scheme> + Clone,
-    ) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// The assignment that does not, and what it might mean.
+    pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
         self.measurement.concern(schemes.clone())?;
         for (option, given) in
             [("--value", &self.value), ("--prior", &self.prior), ("--estimate", &self.estimate)]
@@ -260,7 +285,7 @@ impl ConditionArguments {
     }
 
     /// The paper's run, with what the scheme and the options say.
-    pub(crate) fn conditions(&self, scheme: &Scheme) -> Conditions {
+    pub fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = self.measurement.conditions(scheme);
         out.apply(&Settings {
             truth: self.truth,

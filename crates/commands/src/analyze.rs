@@ -1,0 +1,174 @@
+//! The degree tables of schemes and models.
+
+use std::ops::RangeInclusive;
+
+use clap::{ArgAction, Args};
+use obsdeg_core::analysis::{Analysis, AnalysisOptions};
+use obsdeg_core::solution::Frame;
+use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
+use obsdeg_report::{Answer, Document, Several, Table};
+use serde::{Deserialize, Serialize};
+
+use crate::arguments::{ANY, InputOptions, SEED, Word, check_whole, one_of, whole};
+use crate::host::{Host, Now};
+use crate::problem::Problem;
+use crate::source::{Input, Named};
+
+/// What `analyze` is asked.
+#[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Analyze {
+    /// Seed of all random choices
+    #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
+    pub seed: u64,
+
+    /// What is judged.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+
+    /// The highest order of derivatives to look at in a model that has no proven end
+    #[arg(long, value_name = "K", help_heading = "Models", value_parser = whole::<u16>(ORDERS))]
+    pub order: Option<u16>,
+
+    /// Limit of the work of counting the solutions of a model: millions of products at each of two points (30 ms each) [default: 3]
+    #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
+    pub count_limit: Option<u64>,
+
+    /// Solving expressions and numbers of solutions
+    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(SOLUTIONS))]
+    pub solutions: bool,
+
+    /// Axes of Z in solutions
+    #[arg(long, value_name = "FRAME", help_heading = "Solutions", default_value = "n", value_parser = one_of(FRAMES))]
+    pub frame: Frame,
+
+    /// Print Z and its derivatives, and psi and eps at each position, as formulas
+    #[arg(long, help_heading = "Solutions")]
+    pub formulas: bool,
+}
+
+/// The orders that may be asked for.
+const ORDERS: RangeInclusive<u64> = 0..=1000;
+
+impl Default for Analyze {
+    fn default() -> Self {
+        Self {
+            seed: SEED,
+            input: InputOptions::default(),
+            order: None,
+            count_limit: None,
+            solutions: true,
+            frame: Frame::default(),
+            formulas: false,
+        }
+    }
+}
+
+/// The words of `--solutions`.
+const SOLUTIONS: [Word<bool>; 2] =
+    [("on", "all that there are", true), ("off", "none; never starts the symbolic engine", false)];
+
+/// The words of `--frame`.
+const FRAMES: [Word<Frame>; 2] = [
+    ("n", "North-Up-East, as in the paper", Frame::N),
+    ("platform", "those of the platform", Frame::Platform),
+];
+
+/// The answer on a scheme or a model.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Judged {
+    /// On a scheme.
+    Scheme(Box<Analysis>),
+    /// On a model.
+    Model(Box<SystemAnalysis>),
+}
+
+impl Answer for Judged {
+    fn document(&self) -> Document {
+        match self {
+            Self::Scheme(a) => a.document(),
+            Self::Model(a) => a.document(),
+        }
+    }
+}
+
+/// The answers on all that was asked about: one alone is as it is, several are a list by their names.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub enum Judgements {
+    /// On one.
+    One(Judged),
+    /// On several, or none.
+    Several(Several<Judged>),
+}
+
+impl Answer for Judgements {
+    fn document(&self) -> Document {
+        match self {
+            Self::One(one) => one.document(),
+            Self::Several(several) => several.document(),
+        }
+    }
+
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        match self {
+            Self::One(one) => one.tables(),
+            Self::Several(several) => several.tables(),
+        }
+    }
+
+    fn main_table(&self) -> &'static str {
+        match self {
+            Self::One(one) => one.main_table(),
+            Self::Several(several) => several.main_table(),
+        }
+    }
+}
+
+/// Judges schemes and models, as [`InputOptions::read`] gives them.
+///
+/// # Errors
+/// What is wrong with one of them; with several its name.
+pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result<Judgements, Problem> {
+    if let Some(order) = options.order {
+        check_whole("--order", order, &ORDERS)?;
+    }
+    let several = read.len() > 1;
+    let mut judged = Vec::with_capacity(read.len());
+    for (i, (name, input)) in read.iter().enumerate() {
+        let what = if name.is_empty() { "judging".into() } else { format!("judging {name}") };
+        if several && !(host.going)(Now::of(what, i as u64, read.len() as u64)) {
+            return Err(Problem::interrupted());
+        }
+        // what is wrong in a model has its place in its file
+        let of_scheme = several && matches!(input, Input::Scheme(_));
+        let one = judge(options, input, host).map_err(|e| if of_scheme { e.in_file(name) } else { e })?;
+        judged.push((name.clone(), one));
+    }
+    Ok(match judged.pop() {
+        Some((_, one)) if judged.is_empty() => Judgements::One(one),
+        last => {
+            judged.extend(last);
+            Judgements::Several(Several(judged))
+        }
+    })
+}
+
+fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
+    let &Analyze { seed, solutions, formulas, frame, count_limit, order, .. } = options;
+    let worker = host.worker.as_deref_mut();
+    Ok(match input {
+        Input::Scheme(scheme) => {
+            let options = AnalysisOptions { seed, solutions, formulas, frame };
+            Judged::Scheme(Box::new(obsdeg_core::analysis::analyze(scheme, options, worker)?))
+        }
+        Input::Model(file) => {
+            let count_limit = count_limit.unwrap_or(COUNT_LIMIT);
+            let options = SystemOptions { seed, solutions, count_limit, order: order.map(Into::into) };
+            let found = analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))?;
+            Judged::Model(Box::new(found))
+        }
+    })
+}

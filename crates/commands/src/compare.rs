@@ -1,0 +1,67 @@
+//! Schemes side by side.
+
+use clap::Args;
+use obsdeg_evidence::compare::{Comparison, Entry};
+use serde::{Deserialize, Serialize};
+
+use crate::arguments::{ANY, Assumptions, SEED, whole};
+use crate::conditions::{GyroNoiseOptions, MeasurementOptions};
+use crate::problem::Problem;
+use crate::source::{Input, Named, title};
+
+/// What `compare` is asked.
+#[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Compare {
+    /// Seed of all random choices
+    #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
+    pub seed: u64,
+
+    /// What holds of schemes, whatever their files say.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub assumptions: Assumptions,
+
+    /// What is measured, and how well it is to be known.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub measurement: MeasurementOptions,
+
+    /// The datasheet of the gyros.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub gyro_noise: GyroNoiseOptions,
+}
+
+impl Default for Compare {
+    fn default() -> Self {
+        Self {
+            seed: SEED,
+            assumptions: Assumptions::default(),
+            measurement: MeasurementOptions::default(),
+            gyro_noise: GyroNoiseOptions::default(),
+        }
+    }
+}
+
+/// Judges schemes side by side.
+///
+/// # Errors
+/// What is wrong with one of them, with its name; models.
+pub fn compare(options: &Compare, read: Vec<Named>) -> Result<Comparison, Problem> {
+    let mut entries = Vec::with_capacity(read.len());
+    for (name, input) in read {
+        let Input::Scheme(mut scheme) = input else {
+            return Err(Problem::input(format!(
+                "{name} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge models side by side)"
+            )));
+        };
+        options.assumptions.apply(&mut scheme);
+        let mut conditions = options.measurement.conditions(&scheme);
+        conditions.apply(&options.gyro_noise.settings());
+        entries.push(Entry { name: title(&name), scheme: *scheme, conditions });
+    }
+    options.measurement.concern(entries.iter().map(|e| &e.scheme))?;
+    obsdeg_evidence::compare::compare(&entries, options.seed)
+        .map_err(|(name, e)| Problem::from(e).in_file(&name))
+}

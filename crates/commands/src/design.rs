@@ -1,0 +1,603 @@
+//! The fewest positions, and the best of a number of positions.
+
+use std::fmt;
+use std::str::FromStr;
+
+use std::ops::RangeInclusive;
+
+use clap::{ArgGroup, Args};
+use obsdeg_core::model::ranges::{PRIOR, SLEW_RATE_DEG_S, TURN_DEG};
+use obsdeg_core::model::scheme_file::write;
+use obsdeg_core::model::settings::Assignment;
+use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
+use obsdeg_design::design::{
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions, Walks,
+    design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
+};
+use obsdeg_evidence::simulation::{Conditions, general_first};
+use obsdeg_report::{Answer, Document, File, Table, design_figures, position_figure, visible};
+use serde::{Deserialize, Serialize};
+
+use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
+use crate::conditions::{MeasurementOptions, assigned, concern_some, within};
+use crate::host::{Host, Now};
+use crate::problem::Problem;
+use crate::source::Source;
+use crate::text;
+
+/// Numbers of positions.
+const POSITIONS: RangeInclusive<u64> = 1..=100;
+/// Numbers of schemes that are listed.
+const KEPT: RangeInclusive<u64> = 1..=1000;
+/// Restarts of the exchange.
+const RESTARTS: RangeInclusive<u64> = 1..=1_000_000;
+
+/// The words of `--candidates`; whatever else it says is a file.
+const CANDIDATES: [(&str, &str); 3] = [
+    (CARDINAL, "the 24 attitudes along North, Up, East, South, Down, West"),
+    ("free", "the attitudes that weights on all attitudes need, reset carry"),
+    ("grid:", "and a step in degrees, as in grid:45: Euler angles in steps"),
+];
+
+/// The words of `--criterion`.
+const CRITERIA: [Word<CriterionName>; 5] = [
+    ("worst", "the largest sigma", CriterionName::Worst),
+    ("a", "the trace of the covariance", CriterionName::A),
+    ("d", "the determinant of the covariance", CriterionName::D),
+    ("e", "its largest eigenvalue", CriterionName::E),
+    ("margin", "the largest sigma over its requirement, as for --meet", CriterionName::Margin),
+];
+
+/// What `design` is asked.
+#[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[command(group(ArgGroup::new("asked").required(true).args(["positions", "minimum"])))]
+#[serde(default)]
+pub struct Search {
+    /// Seed of all random choices; the result does not depend on the number of threads
+    #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
+    pub seed: u64,
+
+    /// Find the best scheme of so many positions
+    #[arg(long, value_name = "K", required_unless_present = "minimum")]
+    pub positions: Option<usize>,
+
+    /// Only find the fewest positions that make every required coefficient observable, with the proof
+    #[arg(long)]
+    pub minimum: bool,
+
+    /// What to choose from, or a scheme file: its positions, with carry, latitude, geometry, terms, conditions and gimbal limits of the file
+    #[arg(long, value_name = "WHAT", default_value = CARDINAL, value_parser = WordOr(CANDIDATES))]
+    pub candidates: String,
+
+    /// With --candidates free: angles are rounded to multiples of so many degrees, and schemes evaluated as they are rounded; the cardinal
+    /// attitudes may be chosen too (default: 5)
+    #[arg(long, value_name = "DEG")]
+    #[serde(with = "text")]
+    pub round: Option<String>,
+
+    /// What holds of schemes, whatever their files say.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub assumptions: Assumptions,
+
+    /// What is unknown.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub terms: TermOptions,
+
+    /// With --minimum and torquer errors (GS, GM, GM3): the largest turn from one position to the next, in degrees
+    /// (default: 90)
+    #[arg(long, value_name = "DEG", value_parser = within(TURN_DEG))]
+    pub max_turn: Option<f64>,
+
+    /// How many schemes are listed (default: 10)
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(KEPT))]
+    pub keep: Option<u16>,
+
+    /// Restarts of the exchange (default: 200)
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(RESTARTS))]
+    pub restarts: Option<u64>,
+
+    /// Under reset carry, where many sequences would have to be searched: a scheme found by exchange is enough when it is within so many percent
+    /// of what is possible at all. 0: all sequences are searched, however long that takes, under any carry (beyond
+    /// 5 million sets of candidates: exchange; default: 0.01)
+    #[arg(long, value_name = "PERCENT", value_parser = percent)]
+    pub within: Option<f64>,
+
+    /// Move the angles of the best scheme continuously, to hundredths of a degree
+    #[arg(long)]
+    pub refine: bool,
+
+    /// Divide the total time among the positions of the best scheme: dwells of their own, in steps of the samples
+    #[arg(long)]
+    pub divide: bool,
+
+    /// Other numbers of positions for the front of total time against the criterion
+    #[arg(long, value_name = "K", value_delimiter = ',', value_parser = whole::<usize>(POSITIONS))]
+    pub front: Vec<usize>,
+
+    /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
+    /// interrupted part goes on when the same command is given again
+    #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
+    pub part: Option<[usize; 2]>,
+
+    /// What a scheme must be.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub wanted: WantedOptions,
+
+    /// What is measured, and how well it is to be known.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub measurement: MeasurementOptions,
+
+    /// What is known of an unknown or family beforehand, as standard deviation in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_F=0.1, psi=0.05. It counts in the
+    /// criterion, in sigmas and in the bound, not in what is observable; priors that a scheme file states count too (default: none; 1e-9 to 1e9)
+    #[arg(long, value_name = "NAME=X", help_heading = "Measurement", value_parser = assigned(PRIOR))]
+    #[serde(with = "text::list")]
+    pub prior: Vec<Assignment>,
+}
+
+/// What a scheme must be.
+#[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
+#[command(next_help_heading = "What is wanted")]
+#[serde(default)]
+pub struct WantedOptions {
+    /// Coefficients or families that must be observable and that the criterion is about, such as D_F,D_IX (default: all)
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub observable: Vec<String>,
+
+    /// Largest degree, of all required coefficients or of one or a family: 1, D_F=1
+    #[arg(long, value_name = "[NAME=]K")]
+    #[serde(with = "text::list")]
+    pub max_degree: Vec<DegreeCap>,
+
+    /// What makes one scheme better; a smaller worst degree comes before it. psi is estimated with the coefficients but counts in margin and
+    /// --meet only (default: worst)
+    #[arg(long, value_name = "HOW", value_parser = one_of(CRITERIA))]
+    pub criterion: Option<CriterionName>,
+
+    /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
+    /// coefficients; by prediction: no prior but --prior, no drift noise, psi at the start (`simulate` the winner for the rest)
+    #[arg(long)]
+    pub meet: bool,
+
+    /// Largest total time with slews, in s
+    #[arg(long, value_name = "S")]
+    pub max_time: Option<f64>,
+
+    /// Longest slew between successive positions, in s (with a slew rate)
+    #[arg(long, value_name = "S")]
+    pub max_slew: Option<f64>,
+
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous; 0.001 to 10000 deg/s)
+    #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
+    pub slew_rate: Option<f64>,
+
+    /// How far a gimbal turns in degrees, as alpha=-180:180, beta=-80:80; attitudes beyond are left out
+    #[arg(long, value_name = "ANGLE=LOW:HIGH", allow_hyphen_values = true)]
+    pub gimbal: Vec<String>,
+}
+
+impl Default for Search {
+    /// Nothing is asked for yet: a number of positions, or the minimum.
+    fn default() -> Self {
+        Self {
+            seed: SEED,
+            positions: None,
+            minimum: false,
+            candidates: CARDINAL.into(),
+            round: None,
+            assumptions: Assumptions::default(),
+            terms: TermOptions::default(),
+            max_turn: None,
+            keep: None,
+            restarts: None,
+            within: None,
+            refine: false,
+            divide: false,
+            front: Vec::new(),
+            part: None,
+            wanted: WantedOptions::default(),
+            measurement: MeasurementOptions::default(),
+            prior: Vec::new(),
+        }
+    }
+}
+
+/// The largest degree of a coefficient or family, or of all that are required: `D_F=1`, `1`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DegreeCap {
+    /// The coefficient or family; none: all.
+    pub name: Option<String>,
+    /// The degree.
+    pub cap: usize,
+}
+
+impl fmt::Display for DegreeCap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.name {
+            Some(name) => write!(f, "{name}={}", self.cap),
+            None => write!(f, "{}", self.cap),
+        }
+    }
+}
+
+impl FromStr for DegreeCap {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, cap) = text.split_once('=').map_or((None, text), |(name, cap)| (Some(name.trim()), cap));
+        let cap =
+            cap.trim().parse().map_err(|_| format!("expected a degree, as in 1 or D_F=1, found `{text}`"))?;
+        Ok(Self { name: name.map(Into::into), cap })
+    }
+}
+
+fn part(text: &str) -> Result<[usize; 2], String> {
+    let found =
+        text.split_once('/').and_then(|(i, n)| Some([i.trim().parse().ok()?, n.trim().parse().ok()?]));
+    found
+        .filter(|[i, n]| (1..=*n).contains(i))
+        .ok_or_else(|| format!("expected a part such as 2/7, found `{text}`"))
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    let found = text.trim().parse().ok().filter(|x: &f64| (0.0..=100.0).contains(x));
+    found.ok_or_else(|| format!("expected 0 to 100 percent, found `{text}`"))
+}
+
+/// What a search reads.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SearchFiles {
+    /// The scheme whose positions are chosen from.
+    pub candidates_file: Option<Source>,
+    /// Parts that are put together.
+    pub merge: Vec<Source>,
+    /// The part that goes on.
+    pub resume: Option<Source>,
+}
+
+/// What a search finds.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Designed {
+    /// Schemes.
+    Schemes(Box<Searched>),
+    /// The fewest positions where the way between them counts.
+    Walks(Box<Walked>),
+    /// A part of a search.
+    Part(Box<Part>),
+}
+
+/// Schemes, with what they were searched under.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct Searched {
+    /// What was found.
+    pub found: Design,
+    #[serde(skip)]
+    base: Scheme,
+    #[serde(skip)]
+    conditions: Conditions,
+}
+
+/// Walks, with what they were searched under.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct Walked {
+    /// What was found.
+    pub found: Walks,
+    #[serde(skip)]
+    base: Scheme,
+}
+
+impl Answer for Searched {
+    fn document(&self) -> Document {
+        self.found.document()
+    }
+
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        self.found.tables()
+    }
+
+    fn main_table(&self) -> &'static str {
+        self.found.main_table()
+    }
+}
+
+impl Answer for Walked {
+    fn document(&self) -> Document {
+        self.found.document()
+    }
+
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        self.found.tables()
+    }
+
+    fn main_table(&self) -> &'static str {
+        self.found.main_table()
+    }
+}
+
+/// Searches schemes.
+///
+/// # Errors
+/// Options that are wrong or do nothing; a search in which nothing was found.
+pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Designed, Problem> {
+    match (a.positions, a.minimum) {
+        (None, false) => {
+            return Err(Problem::input("nothing to search; expected --positions K or --minimum"));
+        }
+        (Some(_), true) => {
+            return Err(Problem::input("found --positions beside --minimum; expected one of them"));
+        }
+        _ => {}
+    }
+    if let Some([i, n]) = a.part.filter(|[i, n]| !(1..=*n).contains(i)) {
+        return Err(Problem::input(format!("--part {i}/{n}: expected a part such as 2/7")));
+    }
+    if let Some(within) = a.within.filter(|x| !(0.0..=100.0).contains(x)) {
+        return Err(Problem::input(format!("--within {within}: expected 0 to 100 percent")));
+    }
+    for k in a.positions.iter().chain(&a.front) {
+        check_whole("--positions", *k as u64, &POSITIONS)?;
+    }
+    a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
+    a.restarts.map_or(Ok(()), |restarts| check_whole("--restarts", restarts, &RESTARTS))?;
+    let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
+    a.assumptions.apply(&mut base);
+    if let Some(terms) = a.terms.unknowns()? {
+        base.unknowns = terms;
+    }
+    for limit in &a.wanted.gimbal {
+        base.gimbals.limit(limit).map_err(|e| Problem::input(format!("--gimbal: {e}")))?;
+    }
+    // any position has the unknowns that count
+    let any = std::array::from_fn(|_| Angle::from_degrees(0));
+    let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
+    a.measurement.concern(std::iter::once(&with_any))?;
+    concern_some("--prior", &a.prior, std::iter::once(&with_any))?;
+    let mut conditions = a.measurement.conditions(&base);
+    conditions.priors.extend(general_first(a.prior.clone()));
+    conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
+    idle(a, &base, &conditions)?;
+    let round = a.round.as_deref().unwrap_or("5");
+    let step = parse_decimal(round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
+    let step = step.ok_or_else(|| {
+        Problem::input(format!("--round {round}: expected degrees above 0 and up to 90, as in 5"))
+    })?;
+    let options = DesignOptions {
+        candidates,
+        positions: a.positions,
+        required: a.wanted.observable.clone(),
+        degree_caps: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
+        meet: a.wanted.meet,
+        total_s: a.wanted.max_time,
+        slew_s: a.wanted.max_slew,
+        criterion: a.wanted.criterion.unwrap_or_default(),
+        keep: a.keep.unwrap_or(10).into(),
+        restarts: a.restarts.unwrap_or(200),
+        refine: a.refine,
+        divide: a.divide,
+        front: a.front.clone(),
+        within: a.within.unwrap_or(0.01) / 100.0,
+        everywhere: true,
+        free: (a.candidates == "free").then_some(step),
+        seed: a.seed,
+    };
+    if a.max_turn.is_some() && !(a.minimum && is_walk(&base)) {
+        return Err(Problem::input(
+            "--max-turn is for --minimum with torquer errors (GS, GM, GM3) under inertial carry",
+        ));
+    }
+    if a.minimum && is_walk(&base) {
+        return fewest_of_walks(a, base, options, host);
+    }
+    let parts = files.merge.iter().map(|part| Ok((part.name.clone(), read_part(part)?)));
+    let parts: Vec<(String, Part)> = parts.collect::<Result<_, Problem>>()?;
+    let progress = |now: Progress| (host.going)(now.into());
+    if let Some(number) = a.part {
+        let going_on = files.resume.as_ref().map(read_part).transpose()?;
+        let done = design_part(&base, &conditions, &options, number, going_on, &progress)?;
+        return Ok(Designed::Part(Box::new(done)));
+    }
+    let found = if parts.is_empty() {
+        obsdeg_design::design::design(&base, &conditions, &options, &progress)
+    } else {
+        design_merged(&base, &conditions, &options, &parts, &progress)
+    }?;
+    Ok(Designed::Schemes(Box::new(Searched { found, base, conditions })))
+}
+
+/// Refuses options that would do nothing, each with what it needs.
+fn idle(a: &Search, base: &Scheme, conditions: &Conditions) -> Result<(), Problem> {
+    let (w, free) = (&a.wanted, a.candidates == "free");
+    if a.minimum {
+        let of_positions = [
+            ("--keep", a.keep.is_some()),
+            ("--restarts", a.restarts.is_some()),
+            ("--within", a.within.is_some()),
+            ("--refine", a.refine),
+            ("--divide", a.divide),
+            ("--front", !a.front.is_empty()),
+            ("--round", a.round.is_some()),
+            ("--max-degree", !w.max_degree.is_empty()),
+            ("--criterion", w.criterion.is_some()),
+            ("--meet", w.meet),
+            ("--max-time", w.max_time.is_some()),
+            ("--max-slew", w.max_slew.is_some()),
+            ("--slew-rate", w.slew_rate.is_some()),
+            ("--prior", !a.prior.is_empty()),
+        ];
+        let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
+        if let Some(option) = given.chain(a.measurement.given()).next() {
+            return Err(Problem::input(format!(
+                "{option} does nothing with --minimum, which asks what positions determine at all, with any noise; it is for --positions"
+            )));
+        }
+    }
+    let others = [
+        ("--round", a.round.is_some() && !free, "--candidates free with it"),
+        (
+            "--within",
+            a.within.is_some_and(|within| within > 0.0) && base.carry != Carry::Reset,
+            "--carry reset with it, or --within 0, by which all sequences are searched",
+        ),
+        (
+            "--within",
+            a.within.is_some() && free,
+            "given candidates with it; free attitudes are never all searched",
+        ),
+        (
+            "--max-slew",
+            w.max_slew.is_some() && conditions.slew_rate_deg_s.is_none(),
+            "slews that take time, by --slew-rate or the file of --candidates",
+        ),
+        (
+            "--azimuth-noise",
+            a.measurement.given().any(|option| option == "--azimuth-noise") && !base.measured_azimuth,
+            "a measured azimuth, by --measured-azimuth or the file of --candidates",
+        ),
+    ];
+    match others.into_iter().find(|(_, idle, _)| *idle) {
+        Some((option, _, needed)) => {
+            Err(Problem::input(format!("{option} does nothing here: expected {needed}")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// A part of a search from its file.
+fn read_part(part: &Source) -> Result<Part, Problem> {
+    serde_json::from_str(&part.text)
+        .map_err(|e| Problem::input(format!("{}: it is no part of a search: {e}", part.name)))
+}
+
+/// The fewest positions where the way between them counts.
+fn fewest_of_walks(
+    a: &Search,
+    base: Scheme,
+    options: DesignOptions,
+    host: &Host<'_>,
+) -> Result<Designed, Problem> {
+    if !base.gimbals.are_free() {
+        let text = "--gimbal is not taken where torquer errors make a scheme a walk; expected --max-turn, --observable";
+        return Err(Problem::input(text));
+    }
+    let options = WalkOptions {
+        candidates: options.candidates,
+        required: options.required,
+        most_turn_deg: a.max_turn.unwrap_or(90.0),
+        seed: options.seed,
+    };
+    let found = walks(&base, &options, &|| (host.going)(Now::of("searching walks", 0, 1)))?;
+    Ok(Designed::Walks(Box::new(Walked { found, base })))
+}
+
+/// What to choose from where nothing is said.
+const CARDINAL: &str = "cardinal";
+
+/// What to choose from, and the scheme whose assumptions hold.
+fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates), Problem> {
+    if let Some(file) = file {
+        let scheme = file.scheme()?;
+        let candidates = Candidates::of_scheme(&scheme)?;
+        return Ok((scheme, candidates));
+    }
+    if text == CARDINAL {
+        return Ok((Scheme::default(), Candidates::cardinals()));
+    }
+    if text == "free" {
+        // where the search for attitudes begins
+        return Ok((Scheme::default(), Candidates::grid(45_000_000_000)?));
+    }
+    if let Some(step) = text.strip_prefix("grid:") {
+        let wrong =
+            || Problem::input(format!("--candidates {text}: expected a step in degrees, as in grid:45"));
+        let step = parse_decimal(step.trim()).map_err(|_| wrong())?;
+        return Ok((Scheme::default(), Candidates::grid(step)?));
+    }
+    Err(Problem::input(format!(
+        "--candidates {text}: there is no such file; expected cardinal, free, a grid such as grid:45, or a scheme file that exists"
+    )))
+}
+
+/// Whether `--candidates` says what it is by a word, and is no file.
+pub fn is_word(candidates: &str) -> bool {
+    candidates == CARDINAL || candidates == "free" || candidates.starts_with("grid:")
+}
+
+impl Walked {
+    /// What goes into a folder beside the JSON: the scheme that was found.
+    pub fn files(&self) -> Vec<File> {
+        let scheme = scheme_of_walk(&self.found, &self.base);
+        let file = |s: Scheme| File { name: "winner.toml".into(), bytes: write(&s).into_bytes() };
+        scheme.map(file).into_iter().collect()
+    }
+}
+
+impl Searched {
+    /// What goes into a folder beside the JSON: the best scheme, its positions, the front.
+    ///
+    /// # Errors
+    /// What cannot be drawn.
+    pub fn files(&self) -> Result<Vec<File>, Problem> {
+        let Self { found, base, conditions } = self;
+        let mut files = Vec::new();
+        if let Some(best) = found.found.first() {
+            let bytes = scheme_file(found, best, base, conditions)?.into_bytes();
+            files.push(File { name: "winner.toml".into(), bytes });
+            files.push(position_figure(&scheme_found(best, base, conditions)?));
+        }
+        files.extend(design_figures(found)?);
+        Ok(files)
+    }
+}
+
+/// A scheme that was found, as a file that `obsdeg analyze --scheme` reads.
+fn scheme_file(
+    found: &Design,
+    best: &Found,
+    base: &Scheme,
+    conditions: &Conditions,
+) -> Result<String, DesignError> {
+    let as_searched = !best.refined && best.dwells_s.is_empty();
+    let proven = found.search.as_ref().is_some_and(|s| s.proven) && as_searched;
+    let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| as_searched);
+    let proven = match (proven, certificate) {
+        (true, _) => "proven best".into(),
+        (false, Some(c)) => {
+            format!("within {} of the best possible", obsdeg_report::percent(c.within_percent))
+        }
+        (false, None) => "best found".to_string(),
+    };
+    let positions = best.positions.iter().enumerate().map(|(i, name)| format!("p{} {name}", i + 1));
+    let positions = positions.collect::<Vec<_>>().join(", ");
+    let scheme = scheme_found(best, base, conditions)?;
+    let all = found.required.len() + 3 >= best.rank[1];
+    let what = if all { "all coefficients".into() } else { found.required.join(", ") };
+    let search = found.search.as_ref();
+    let unit = search.and_then(|s| s.unit.as_deref());
+    let prior = search.and_then(|s| s.prior.as_ref());
+    let prior = prior.map_or_else(|| "no prior".into(), |p| format!("prior {}", visible(p)));
+    let name = search.map_or("", |s| s.criterion.as_str());
+    let largest = |sigma: f64| format!("largest sigma of {what} {sigma:.3e} deg/h (per g)");
+    let reached = match (unit, best.worst_sigma_dph) {
+        (Some("deg/h"), Some(sigma)) if name == "worst" => largest(sigma),
+        (unit, sigma) => {
+            let own = unit.map_or_else(String::new, |u| format!(" {u}"));
+            let sigma = sigma.filter(|_| unit == Some("deg/h")).map(|s| format!("; {}", largest(s)));
+            format!("criterion {name} of {what} {:.3e}{own}{}", best.value, sigma.unwrap_or_default())
+        }
+    };
+    Ok(format!(
+        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, no drift noise, seed {}\n# {}\n{}",
+        found.candidates.len(),
+        best.total_s,
+        found.seed,
+        visible(&positions),
+        write(&scheme)
+    ))
+}

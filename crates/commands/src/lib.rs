@@ -1,0 +1,47 @@
+//! The commands of obsdeg as functions: options and texts in, answers out. The command line, Python and a browser ask here and
+//! nowhere else, so that they give the same answers.
+//!
+//! Every command has its options as a struct, which reads itself from a command line and from JSON (the names of options in snake
+//! case), and a function. Nothing here reads files, prints, or knows who asks, but for [`Host`].
+//!
+//! ```
+//! use obsdeg_commands::{Host, call};
+//!
+//! let asked = r#"{"angles": ["0,0,0", "180,0,0"], "carry": "inertial", "solutions": false}"#;
+//! let answer = call("analyze", asked, &mut Host::silent()).map_err(|e| e.message)?;
+//! assert!(answer.text.contains("\"rank\""));
+//! # Ok::<(), String>(())
+//! ```
+
+mod analyze;
+mod arguments;
+mod calibrate;
+mod call;
+mod compare;
+mod conditions;
+mod crosscheck;
+mod design;
+mod host;
+mod paper;
+mod problem;
+mod report;
+mod simulate;
+mod source;
+mod text;
+
+pub use analyze::{Analyze, Judged, Judgements, analyze};
+pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions, Word, one_of, whole};
+pub use calibrate::{Calibrate, Calibrated, calibrate};
+pub use call::{Answered, COMMANDS, call};
+pub use compare::{Compare, compare};
+pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions};
+pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};
+pub use design::{
+    DegreeCap, Designed, Search, SearchFiles, Searched, Walked, WantedOptions, design, is_word,
+};
+pub use host::{Host, Now};
+pub use paper::{Paper, paper};
+pub use problem::{Kind, Place, Problem};
+pub use report::{CalibrationFile, Report, Reviewed, origin, report};
+pub use simulate::{Run, Simulate, files as simulation_files, simulate};
+pub use source::{Expected, Input, ModelFile, Named, Source, title};

@@ -1,0 +1,165 @@
+//! Why there is no answer: what is wrong, whose fault it is, and where.
+
+use std::ops::Range;
+
+use obsdeg_calibration::CalibrationError;
+use obsdeg_core::analysis::AnalysisError;
+use obsdeg_core::solution::CombinationError;
+use obsdeg_design::design::DesignError;
+use obsdeg_evidence::prediction::PredictionError;
+use obsdeg_evidence::simulation::SimulationError;
+use obsdeg_report::ReportError;
+use serde::Serialize;
+
+/// Whose fault it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// The input is wrong.
+    Input,
+    /// A defect of the program.
+    Internal,
+    /// Whoever asked did not want to wait.
+    Interrupted,
+}
+
+/// A place of a text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// What the text is called.
+    pub name: String,
+    /// All of it.
+    pub text: String,
+    /// The bytes that are meant.
+    pub span: Range<usize>,
+}
+
+impl Place {
+    /// A place, within its text.
+    fn new(name: &str, text: &str, span: Range<usize>) -> Self {
+        let end = span.end.min(text.len());
+        Self { name: name.into(), text: text.into(), span: span.start.min(end)..end }
+    }
+
+    /// Line and column of its beginning, counted from 1; columns are characters.
+    pub fn line_and_column(&self) -> (usize, usize) {
+        let before = self.text.get(..self.span.start).unwrap_or_default();
+        let line = before.rsplit('\n').next().unwrap_or_default();
+        (before.matches('\n').count() + 1, line.chars().count() + 1)
+    }
+}
+
+/// Why there is no answer. Options are written in it as on the command line, `--slew-rate`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct Problem {
+    /// Whose fault it is.
+    pub kind: Kind,
+    /// What is wrong: place, expected, found.
+    pub message: String,
+    /// Where, if it is in a text.
+    pub place: Option<Place>,
+}
+
+impl Problem {
+    /// The input is wrong.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self { kind: Kind::Input, message: message.into(), place: None }
+    }
+
+    /// The program is wrong.
+    pub fn internal(message: impl Into<String>) -> Self {
+        Self { kind: Kind::Internal, message: message.into(), place: None }
+    }
+
+    /// Whoever asked did not want to wait, and there is nothing to show.
+    pub fn interrupted() -> Self {
+        Self { kind: Kind::Interrupted, message: "interrupted; nothing was written".into(), place: None }
+    }
+
+    /// The input is wrong at a place of a text.
+    pub fn at(message: impl Into<String>, name: &str, text: &str, span: Range<usize>) -> Self {
+        Self { place: Some(Place::new(name, text, span)), ..Self::input(message) }
+    }
+
+    /// The same, with the scheme it came from.
+    #[must_use]
+    pub fn in_file(mut self, name: &str) -> Self {
+        self.message = format!("{} (in {name})", self.message);
+        self
+    }
+}
+
+/// What is wrong with the input, or with the program.
+impl From<AnalysisError> for Problem {
+    fn from(e: AnalysisError) -> Self {
+        match e {
+            AnalysisError::Combination(CombinationError { text, reason, span }) => {
+                Self::at(format!("combination: {reason}"), "--combination", &text, span)
+            }
+            AnalysisError::Scheme(e) => Self::input(e.to_string()),
+            AnalysisError::Verdict(e) => Self::internal(e.to_string()),
+        }
+    }
+}
+
+impl From<SimulationError> for Problem {
+    fn from(e: SimulationError) -> Self {
+        match e {
+            SimulationError::Prediction(PredictionError::Analysis(e)) => e.into(),
+            // accuracy orders beyond the series
+            SimulationError::Prediction(PredictionError::Accuracy(_)) => Self::input(e.to_string()),
+            SimulationError::Filter(e) if e.is_numeric() => Self::input(format!(
+                "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
+            )),
+            SimulationError::Filter(_) => Self::internal(e.to_string()),
+            _ => Self::input(e.to_string()),
+        }
+    }
+}
+
+impl From<CalibrationError> for Problem {
+    fn from(e: CalibrationError) -> Self {
+        match e {
+            CalibrationError::Simulation(e) => e.into(),
+            CalibrationError::Interrupted => Self { kind: Kind::Interrupted, ..Self::input(e.to_string()) },
+            _ => Self::input(e.to_string()),
+        }
+    }
+}
+
+impl From<DesignError> for Problem {
+    fn from(e: DesignError) -> Self {
+        match e {
+            DesignError::Verdict(_) => Self::internal(e.to_string()),
+            DesignError::Filter(e) => SimulationError::from(e).into(),
+            DesignError::Conditions(e) => e.into(),
+            DesignError::Interrupted => Self::interrupted(),
+            _ => Self::input(e.to_string()),
+        }
+    }
+}
+
+impl From<ReportError> for Problem {
+    fn from(e: ReportError) -> Self {
+        match e {
+            ReportError::NoPdf | ReportError::NoTable { .. } => Self::input(e.to_string()),
+            e => Self::internal(e.to_string()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_columns_are_counted_in_characters_from_one() {
+        let text = "a = 1\nψ = \"x\"\n";
+        let at = |span| Problem::at("wrong", "file", text, span).place.map(|p| p.line_and_column());
+        assert_eq!(at(0..1), Some((1, 1)));
+        assert_eq!(at(text.find('"').unwrap_or(0)..text.len()), Some((2, 5)));
+        // beyond its end
+        assert_eq!(at(1000..2000), Some((3, 1)));
+    }
+}

@@ -1,0 +1,164 @@
+//! The design review of schemes and models.
+
+use clap::Args;
+use obsdeg_calibration::{Calibration, Setup};
+use obsdeg_core::system::SystemModel;
+use obsdeg_design::review::{DesignReview, ReviewError, ReviewOptions, review};
+use obsdeg_evidence::compare::Entry;
+use obsdeg_report::{File, Origin, ReviewFormat};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
+use crate::conditions::{ConditionOptions, RUNS};
+use crate::host::{Host, Now};
+use crate::problem::Problem;
+use crate::source::{Input, ModelFile, Named, Source, title};
+
+/// What `report` is asked.
+#[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Report {
+    /// Seed of all random choices
+    #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
+    pub seed: u64,
+
+    /// What holds of schemes, whatever their files say.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub assumptions: Assumptions,
+
+    /// Monte Carlo runs of the evidence
+    #[arg(id = "monte_carlo", long = "runs", value_name = "N", default_value_t = DEFAULT_RUNS, value_parser = whole::<u32>(RUNS))]
+    pub runs: u32,
+
+    /// A run's conditions.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub conditions: ConditionOptions,
+
+    /// Which options were given
+    #[arg(skip)]
+    #[serde(skip)]
+    pub given: Given,
+}
+
+/// Monte Carlo runs where nothing is said.
+const DEFAULT_RUNS: u32 = 100;
+
+impl Default for Report {
+    fn default() -> Self {
+        Self {
+            seed: SEED,
+            assumptions: Assumptions::default(),
+            runs: DEFAULT_RUNS,
+            conditions: ConditionOptions::default(),
+            given: Given::default(),
+        }
+    }
+}
+
+/// A review, with the calibrations that are part of it.
+#[derive(Debug)]
+pub struct Reviewed {
+    review: DesignReview,
+    calibrations: Vec<(String, Calibration)>,
+}
+
+/// A calibration that is part of a review: what it is called, and its JSON.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CalibrationFile {
+    /// What it is called, such as the folder it is in.
+    pub name: String,
+    /// The file.
+    pub source: Source,
+}
+
+/// Reviews schemes and models.
+///
+/// # Errors
+/// What is wrong with one of them.
+pub fn report(
+    a: &Report,
+    read: Vec<Named>,
+    calibrations: &[CalibrationFile],
+    host: &mut Host<'_>,
+) -> Result<Reviewed, Problem> {
+    check_whole("--runs", a.runs, &RUNS)?;
+    a.given.concern(&read)?;
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut files: Vec<ModelFile> = Vec::new();
+    for (name, input) in read {
+        match input {
+            Input::Model(file) => files.push(*file),
+            Input::Scheme(mut scheme) => {
+                a.assumptions.apply(&mut scheme);
+                let conditions = a.conditions.conditions(&scheme);
+                let name = if scheme.name.is_empty() { title(&name) } else { scheme.name.clone() };
+                entries.push(Entry { name, scheme: *scheme, conditions });
+            }
+        }
+    }
+    let calibration = |file: &CalibrationFile| Ok((file.name.clone(), calibration(&file.source, &entries)?));
+    let calibrations = calibrations.iter().map(calibration).collect::<Result<Vec<_>, Problem>>()?;
+    if !entries.is_empty() {
+        a.conditions.concern(entries.iter().map(|e| &e.scheme))?;
+    }
+    let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
+    let options = ReviewOptions { runs: a.runs as usize, seed: a.seed };
+    let going = host.going;
+    let reviewed = review(&entries, &models, options, host.worker.as_deref_mut(), &|what, share| {
+        going(Now::of(what, (share * 900.0) as u64, 1000))
+    });
+    let review = reviewed.map_err(|e| match e {
+        ReviewError::Simulation { name, error } => Problem::from(error).in_file(&name),
+        ReviewError::Model { model, error } => files[model].wrong(&error),
+        ReviewError::Interrupted => Problem::interrupted(),
+        e @ ReviewError::Analysis { .. } => Problem::input(e.to_string()),
+    })?;
+    Ok(Reviewed { review, calibrations })
+}
+
+impl Reviewed {
+    /// Its files: the text first, then the pictures that it refers to, in `folder` beside it.
+    ///
+    /// # Errors
+    /// What cannot be drawn.
+    pub fn files(&self, origin: &Origin, format: ReviewFormat, folder: &str) -> Result<Vec<File>, Problem> {
+        Ok(obsdeg_report::review(&self.review, &self.calibrations, origin, format, folder)?)
+    }
+}
+
+/// What a review was made by and of: a command that gives the same answer, and the digest of every file.
+pub fn origin<'a>(command: String, sources: impl Iterator<Item = &'a Source>) -> Origin {
+    Origin { command, inputs: sources.map(digest).collect() }
+}
+
+/// `sha256 of scheme.toml: ...`
+fn digest(source: &Source) -> String {
+    let hex: String = Sha256::digest(source.text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect();
+    format!("sha256 of {}: {hex}", source.name)
+}
+
+/// A calibration of one of the schemes.
+fn calibration(source: &Source, entries: &[Entry]) -> Result<Calibration, Problem> {
+    let wrong = |found: &str| {
+        let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";
+        Problem::input(format!("{}: {found}; {expected}", source.name))
+    };
+    let of_model = source.text.contains("\"obsdeg.system-calibration/");
+    let found: Calibration = serde_json::from_str(&source.text).map_err(|e| match of_model {
+        true => wrong("the calibration of a model"),
+        false => wrong(&e.to_string()),
+    })?;
+    let differences = entries.iter().map(|e| (&e.name, Setup::of(&e.scheme).differences(&found.setup)));
+    let nearest = differences.min_by_key(|(_, d)| d.len());
+    match nearest {
+        None => return Err(wrong("no scheme is reviewed that it could be of")),
+        Some((_, d)) if d.is_empty() => {}
+        Some((name, d)) => {
+            return Err(wrong(&format!("the calibration of another scheme than {name} ({})", d.join("; "))));
+        }
+    }
+    Ok(found)
+}

@@ -1,0 +1,104 @@
+//! One run of the filter against a simulated truth.
+
+use clap::Args;
+use obsdeg_evidence::simulation::{Simulation, Traces};
+use obsdeg_evidence::system::{SystemRun, simulate_system};
+use obsdeg_report::{
+    Answer, Document, File, ReportError, Table, series_csv, series_parquet, simulation_figures,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::arguments::{ANY, InputOptions, SEED, whole};
+use crate::conditions::ConditionOptions;
+use crate::problem::Problem;
+use crate::source::Input;
+
+/// What `simulate` is asked.
+#[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Simulate {
+    /// Seed of the noise
+    #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
+    pub seed: u64,
+
+    /// What is judged.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub input: InputOptions,
+
+    /// A run's conditions.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub conditions: ConditionOptions,
+}
+
+impl Default for Simulate {
+    fn default() -> Self {
+        Self { seed: SEED, input: InputOptions::default(), conditions: ConditionOptions::default() }
+    }
+}
+
+/// A run, of a scheme or of a model.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Run {
+    /// Of a scheme.
+    Scheme(Box<Simulation>),
+    /// Of a model.
+    Model(Box<SystemRun>),
+}
+
+impl Answer for Run {
+    fn document(&self) -> Document {
+        match self {
+            Self::Scheme(a) => a.document(),
+            Self::Model(a) => a.document(),
+        }
+    }
+
+    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
+        match self {
+            Self::Scheme(a) => a.tables(),
+            Self::Model(a) => a.tables(),
+        }
+    }
+
+    fn main_table(&self) -> &'static str {
+        match self {
+            Self::Scheme(a) => a.main_table(),
+            Self::Model(a) => a.main_table(),
+        }
+    }
+}
+
+/// Simulates a run, with its series.
+///
+/// # Errors
+/// What is wrong with the scheme, the model or the conditions.
+pub fn simulate(options: &Simulate, input: &Input) -> Result<(Run, Traces), Problem> {
+    match input {
+        Input::Scheme(scheme) => {
+            options.conditions.concern(std::iter::once(&**scheme))?;
+            let conditions = options.conditions.conditions(scheme);
+            let (summary, record) = obsdeg_evidence::simulation::simulate(scheme, &conditions, options.seed)?;
+            Ok((Run::Scheme(Box::new(summary)), record.traces))
+        }
+        Input::Model(file) => {
+            let (run, traces) = simulate_system(&file.model, options.seed).map_err(|e| file.wrong_run(&e))?;
+            Ok((Run::Model(Box::new(run)), traces))
+        }
+    }
+}
+
+/// What goes into a folder beside the summary: the series, and the figures.
+///
+/// # Errors
+/// What cannot be drawn.
+pub fn files(run: &Run, traces: &Traces) -> Result<Vec<File>, ReportError> {
+    let mut files = vec![
+        File { name: "series.csv".into(), bytes: series_csv(traces)?.into_bytes() },
+        File { name: "series.parquet".into(), bytes: series_parquet(traces, run)? },
+    ];
+    files.extend(simulation_figures(traces)?);
+    Ok(files)
+}
