@@ -58,7 +58,7 @@ pub struct Search {
     pub seed: u64,
 
     /// Find the best scheme of so many positions
-    #[arg(long, value_name = "K", required_unless_present = "minimum")]
+    #[arg(long, value_name = "K", value_parser = whole::<usize>(POSITIONS))]
     pub positions: Option<usize>,
 
     /// Only find the fewest positions that make every required coefficient observable, with the proof
