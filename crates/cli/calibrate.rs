@@ -8,7 +8,7 @@ use obsdeg_calibration::record::Record;
 use obsdeg_commands::{Calibrate, Expected, Given, Host, Source, calibrate};
 
 use crate::failure::Failure;
-use crate::input::{is_stdin, open, read, read_as};
+use crate::input::{Kind, is_stdin, open, read, read_as};
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
@@ -22,12 +22,12 @@ Examples:
   obsdeg calibrate examples/influenza/model.toml examples/influenza/data.csv --profile beta
   gzip -dc examples/handheld/record.csv.gz | obsdeg calibrate examples/handheld/accelerometers.toml -
 
-A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well), \
+A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well; increments of velocity since the row before, as pulses are, in m/s, cm/s, mm/s, um/s), \
 `Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the \
 scheme (empty while the platform turns); without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a mean with a sigma of \
 its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts \
-instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv (with the whole \
-covariance), residuals.csv and figures.
+instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv, \
+covariance.csv, residuals.csv and figures.
 
 Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are \
 read).";
@@ -96,6 +96,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 impl Arguments {
     /// The scheme or the model, with its file, and the records of its runs.
     fn read(&self) -> Result<(Source, &[PathBuf]), Failure> {
+        self.check_kinds()?;
         let (source, records) = if let Some(path) = &self.model {
             (read_as(path, Expected::Model)?, &self.files[..])
         } else if let Some(path) = &self.scheme {
@@ -112,6 +113,56 @@ impl Arguments {
         match records {
             [] => Err(Failure::input(format!("no record; expected records of the run of {}", source.name))),
             records => Ok((source, records)),
+        }
+    }
+
+    /// Refuses files in the place of others, with the command in the right order where it can be told.
+    fn check_kinds(&self) -> Result<(), Failure> {
+        let given = self.model.as_ref().or(self.scheme.as_ref());
+        let (first, records) = match (given, &self.files[..]) {
+            (Some(first), records) => (first, records),
+            (None, [first, records @ ..]) => (first, records),
+            (None, []) => return Ok(()),
+        };
+        let runs_of = |kind| matches!(kind, Some(Kind::Scheme | Kind::Model));
+        let other = records.iter().find(|path| runs_of(Kind::of(path)));
+        let name = first.display();
+        match (Kind::of(first), other) {
+            (Some(Kind::Record), Some(file)) => {
+                let records: Vec<String> = std::iter::once(first)
+                    .chain(records.iter().filter(|path| *path != file))
+                    .map(|path| path.display().to_string())
+                    .collect();
+                let kind = Kind::of(file).map_or_else(String::new, |k| k.to_string());
+                Err(Failure::input(format!(
+                    "{name} is a record and {file} {kind}; expected `obsdeg calibrate {file} {}`",
+                    records.join(" "),
+                    file = file.display()
+                )))
+            }
+            (Some(kind @ Kind::Record), None) => Err(Failure::input(format!(
+                "{name} is {kind}; expected a scheme or model file, then records: `obsdeg calibrate scheme.toml {name}`"
+            ))),
+            (Some(kind @ Kind::Calibration), _) => Err(Failure::input(format!(
+                "{name} is {kind}, which `obsdeg calibrate` wrote; expected a scheme or model file (`--prior {name}` takes it for what was known before)"
+            ))),
+            _ => {
+                let wrong = |path: &&PathBuf| Kind::of(path).is_some_and(|kind| kind != Kind::Record);
+                let Some((path, kind)) = records.iter().find(wrong).and_then(|p| Some((p, Kind::of(p)?)))
+                else {
+                    return Ok(());
+                };
+                let hint = match kind {
+                    Kind::Calibration => {
+                        format!("`--prior {}` takes it for what was known before", path.display())
+                    }
+                    _ => format!("one scheme or model, which is {name}"),
+                };
+                Err(Failure::input(format!(
+                    "{} is {kind}; expected a record, in CSV or Parquet ({hint})",
+                    path.display()
+                )))
+            }
         }
     }
 }

@@ -4,11 +4,61 @@ use std::io::{Error, ErrorKind, Read, Result as Io};
 use std::path::{Path, PathBuf};
 
 use obsdeg_commands::{Expected, Source};
+use obsdeg_core::model::scheme_file;
+use obsdeg_core::system::model_file;
 
 use crate::failure::Failure;
 
 /// Largest input file, in bytes.
 const MAX_FILE: u64 = 50_000_000;
+
+/// What a file is meant as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Scheme,
+    Model,
+    Calibration,
+    Record,
+}
+
+impl Kind {
+    /// What the file at `path` is meant as, by how it begins; nothing is said of stdin, pipes and what cannot be read.
+    pub(crate) fn of(path: &Path) -> Option<Self> {
+        const BEGINNING: u64 = 1 << 16;
+        if is_stdin(path) || !path.metadata().is_ok_and(|m| m.is_file()) {
+            return None;
+        }
+        let mut bytes = Vec::new();
+        open(path).ok()?.take(BEGINNING).read_to_end(&mut bytes).ok()?;
+        let text = String::from_utf8_lossy(&bytes);
+        let header = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#'));
+        if bytes.starts_with(b"PAR1") {
+            Some(Self::Record)
+        } else if text.contains("\"obsdeg.calibration/") || text.contains("\"obsdeg.system-calibration/") {
+            Some(Self::Calibration)
+        } else if scheme_file::is_scheme(&text) {
+            Some(Self::Scheme)
+        } else if text.trim_start().starts_with('{') || model_file::is_model(&text) {
+            Some(Self::Model)
+        } else {
+            // no line of TOML has commas without an equals sign before them, but within brackets
+            header
+                .filter(|h| h.contains([',', ';', '\t']) && !h.contains(['=', '{', '}']))
+                .map(|_| Self::Record)
+        }
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Scheme => "a scheme",
+            Self::Model => "a model",
+            Self::Calibration => "a calibration",
+            Self::Record => "a record",
+        })
+    }
+}
 
 /// Whether a path stands for stdin.
 pub(crate) fn is_stdin(path: &Path) -> bool {

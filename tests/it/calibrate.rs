@@ -36,6 +36,7 @@ fn a_day_at_the_bench() {
             "allan.svg",
             "calibration.json",
             "coefficients.csv",
+            "covariance.csv",
             "estimates.png",
             "estimates.svg",
             "residuals.csv",
@@ -53,7 +54,23 @@ fn a_day_at_the_bench() {
     assert_eq!((n, covariance["covariance"].as_array().expect("rows").len()), (15, 15));
     let csv = fs::read_to_string(format!("{at}/coefficients.csv")).expect("written");
     assert_eq!(csv.lines().count(), 16);
+    assert!(csv.starts_with("name,unit,status,degree,determined,estimate,sigma,sigma_rescaled,"), "{csv}");
+    assert_eq!(stdout(&run(&["calibrate", SCHEME, RECORD, "--format", "csv"])), csv);
+    // a row is what the JSON has of an unknown
+    let row: Vec<&str> = csv.lines().nth(4).expect("a row").split(',').collect();
+    let of = |key: &str| found["unknowns"][3][key].clone();
+    assert_eq!((row[0], row[2], row[3]), ("D_FX", "observable", "1"));
+    assert_eq!([row[5], row[6]], ["estimate", "sigma"].map(|k| of(k).to_string()));
+    let csv = fs::read_to_string(format!("{at}/covariance.csv")).expect("written");
+    assert_eq!(stdout(&run(&["calibrate", SCHEME, RECORD, "--format", "csv", "--table", "covariance"])), csv);
     assert!(csv.starts_with("name,unit,estimate,sigma,covariance with psi_x,"), "{csv}");
+    let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    for (i, row) in rows.iter().enumerate() {
+        let number = |i: usize, j: usize| rows[i][j].parse::<f64>().expect("a number");
+        assert_eq!(row.len(), 19);
+        assert!((number(i, 3).powi(2) / number(i, 4 + i) - 1.0).abs() < 1e-12, "{row:?}");
+        assert!((0..15).all(|j| number(i, 4 + j) == covariance["covariance"][i][j]), "{row:?}");
+    }
     let residuals = fs::read_to_string(format!("{at}/residuals.csv")).expect("written");
     assert_eq!(residuals.lines().count(), 601);
     // a second run with what the first says before: sigmas are smaller by about the root of two
@@ -116,6 +133,18 @@ fn a_review_of_the_run() {
             assert!(text.contains(words), "{file}: {words}");
         }
     }
+    // the small angles are those of what was estimated: rates of the axes of 3.2, 4.1 and 3.2 deg/h at most (with all terms of one sign) for 3942 s
+    let largest = |more: &[&str]| -> f64 {
+        let to = path("d.md");
+        let line = [&["report", SCHEME, "--runs", "2", "-o", &to, "-q", "--force"], more].concat();
+        assert!(run(&line).status.success());
+        let text = fs::read_to_string(to).expect("written");
+        let after = text.split("psi").find_map(|t| t.split_once(" reaches ")).expect("the check").1;
+        after.split(' ').next().and_then(|x| x.parse().ok()).expect("a number")
+    };
+    let (stated, estimated) = (largest(&[]), largest(&["--calibration", &at]));
+    let bound = (3.2f64 * 3.2 + 4.1 * 4.1 + 3.2 * 3.2).sqrt() * 3942.0 / 3600.0 + 0.1;
+    assert!((0.5..bound / 2.0).contains(&estimated) && stated > bound, "{stated} {estimated} {bound}");
     // what the picture has is what the file has
     let v: Value =
         serde_json::from_str(&fs::read_to_string(format!("{at}/calibration.json")).expect("written"))
@@ -450,6 +479,70 @@ fn parquet(text: &str) -> Vec<u8> {
     }
     group.close().expect("closed");
     writer.into_inner().expect("closed")
+}
+
+/// Files in the place of others are told by name, with the command in the right order.
+#[test]
+fn files_in_the_place_of_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let out = path("out");
+    assert!(run(&["calibrate", SCHEME, RECORD, "-o", &out, "-q"]).status.success());
+    let calibration = format!("{out}/calibration.json");
+    let parquet_at = path("record.parquet");
+    fs::write(&parquet_at, parquet(&fs::read_to_string(crate_root(RECORD)).expect("the record")))
+        .expect("written");
+    let (model, data) = ("examples/influenza/model.toml", "examples/influenza/data.csv");
+    for (args, message) in [
+        (
+            vec![RECORD, SCHEME],
+            format!(
+                "{RECORD} is a record and {SCHEME} a scheme; expected `obsdeg calibrate {SCHEME} {RECORD}`"
+            ),
+        ),
+        (
+            vec![RECORD, SCHEME, &parquet_at],
+            format!("expected `obsdeg calibrate {SCHEME} {RECORD} {parquet_at}`"),
+        ),
+        (vec![&parquet_at, SCHEME], format!("{parquet_at} is a record and {SCHEME} a scheme; expected")),
+        (
+            vec![data, model],
+            format!("{data} is a record and {model} a model; expected `obsdeg calibrate {model} {data}`"),
+        ),
+        (
+            vec![RECORD],
+            format!(
+                "{RECORD} is a record; expected a scheme or model file, then records: `obsdeg calibrate scheme.toml"
+            ),
+        ),
+        (
+            vec![&calibration, RECORD],
+            format!(
+                "{calibration} is a calibration, which `obsdeg calibrate` wrote; expected a scheme or model"
+            ),
+        ),
+        (
+            vec![SCHEME, &calibration],
+            format!(
+                "{calibration} is a calibration; expected a record, in CSV or Parquet (`--prior {calibration}`"
+            ),
+        ),
+        (
+            vec![SCHEME, model],
+            format!(
+                "{model} is a model; expected a record, in CSV or Parquet (one scheme or model, which is {SCHEME})"
+            ),
+        ),
+        (vec!["--scheme", RECORD, SCHEME], format!("expected `obsdeg calibrate {SCHEME} {RECORD}`")),
+        (vec!["--scheme", &calibration, RECORD], format!("{calibration} is a calibration, which")),
+        (vec!["--scheme", model, data], format!("{model} is a model file; expected a scheme file")),
+        (vec!["--model", SCHEME, data], format!("{SCHEME} is a scheme file; expected a model file")),
+    ] {
+        let output = run(&[&["calibrate"], &args[..]].concat());
+        let found = stderr(&output);
+        assert!(output.status.code() == Some(2) && found.contains(&message), "{args:?}: {message}: {found}");
+        assert!(output.stdout.is_empty());
+    }
 }
 
 /// A bad record is refused with its place, and nothing is written.

@@ -1,6 +1,7 @@
 //! What a calibration says: plain data.
 
 use obsdeg_core::degree::Status;
+use obsdeg_core::model::settings::Assignment;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +55,17 @@ pub struct Calibration {
     #[serde(skip)]
     #[schemars(skip)]
     pub residuals: Vec<Residual>,
+}
+
+impl Calibration {
+    /// Its platform as true values of another run: what is determined, psi that of the first record.
+    pub fn values(&self) -> Vec<Assignment> {
+        let first = |e: &Estimated| {
+            let name = e.name.strip_suffix(" (record 1)").unwrap_or(&e.name).to_string();
+            Some(Assignment { value: e.estimate.filter(|_| !name.contains(" (record "))?, name })
+        };
+        self.unknowns.iter().filter_map(first).collect()
+    }
 }
 
 /// What speaks against the model or its sigmas.

@@ -16,8 +16,8 @@ use obsdeg_core::model::ranges;
 use obsdeg_core::model::settings::{DriftNoise, Settings};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{
-    Answer, Document, File, Format, Layout, ReportError, Table, calibration_figures, residuals_csv,
-    system_calibration_figures, system_residuals_csv,
+    Answer, Document, File, Format, Layout, ReportError, Table, calibration_figures, covariance_csv,
+    residuals_csv, system_calibration_figures, system_residuals_csv,
 };
 use serde::{Deserialize, Serialize};
 
@@ -184,18 +184,19 @@ impl Calibrated {
         }
     }
 
-    /// What goes into a folder beside the JSON: coefficients, residuals, figures.
+    /// What goes into a folder beside the JSON: coefficients, their covariance, residuals, figures.
     ///
     /// # Errors
     /// What cannot be drawn.
     pub fn files(&self) -> Result<Vec<File>, ReportError> {
         let coefficients = obsdeg_report::written(self, Format::Csv, Layout::default())?;
-        let residuals = match self {
-            Self::Platform(c) => residuals_csv(c)?,
-            Self::Model(c) => system_residuals_csv(c)?,
+        let (covariance, residuals) = match self {
+            Self::Platform(c) => (&c.covariance, residuals_csv(c)?),
+            Self::Model(c) => (&c.covariance, system_residuals_csv(c)?),
         };
         let mut files = vec![
             File { name: "coefficients.csv".into(), bytes: coefficients.into_bytes() },
+            File { name: "covariance.csv".into(), bytes: covariance_csv(covariance)?.into_bytes() },
             File { name: "residuals.csv".into(), bytes: residuals.into_bytes() },
         ];
         files.extend(match self {

@@ -99,8 +99,16 @@ pub fn report(
             }
         }
     }
-    let calibration = |file: &CalibrationFile| Ok((file.name.clone(), calibration(&file.source, &entries)?));
-    let calibrations = calibrations.iter().map(calibration).collect::<Result<Vec<_>, Problem>>()?;
+    let mut read = Vec::new();
+    for file in calibrations {
+        let (found, of) = calibration(&file.source, &entries)?;
+        // what was stated gives way to what was found, as it is
+        let own = &mut entries[of].conditions;
+        own.drift_scale = 1.0;
+        own.values.extend(found.values());
+        read.push((file.name.clone(), found));
+    }
+    let calibrations = read;
     if !entries.is_empty() {
         a.conditions.concern(entries.iter().map(|e| &e.scheme))?;
     }
@@ -140,8 +148,8 @@ fn digest(source: &Source) -> String {
     format!("sha256 of {}: {hex}", source.name)
 }
 
-/// A calibration of one of the schemes.
-fn calibration(source: &Source, entries: &[Entry]) -> Result<Calibration, Problem> {
+/// A calibration of one of the schemes, and of which.
+fn calibration(source: &Source, entries: &[Entry]) -> Result<(Calibration, usize), Problem> {
     let wrong = |found: &str| {
         let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";
         Problem::input(format!("{}: {found}; {expected}", source.name))
@@ -152,13 +160,12 @@ fn calibration(source: &Source, entries: &[Entry]) -> Result<Calibration, Proble
         false => wrong(&e.to_string()),
     })?;
     let differences = entries.iter().map(|e| (&e.name, Setup::of(&e.scheme).differences(&found.setup)));
-    let nearest = differences.min_by_key(|(_, d)| d.len());
+    let nearest = differences.enumerate().min_by_key(|(_, (_, d))| d.len());
     match nearest {
-        None => return Err(wrong("no scheme is reviewed that it could be of")),
-        Some((_, d)) if d.is_empty() => {}
-        Some((name, d)) => {
-            return Err(wrong(&format!("the calibration of another scheme than {name} ({})", d.join("; "))));
+        None => Err(wrong("no scheme is reviewed that it could be of")),
+        Some((of, (_, d))) if d.is_empty() => Ok((found, of)),
+        Some((_, (name, d))) => {
+            Err(wrong(&format!("the calibration of another scheme than {name} ({})", d.join("; "))))
         }
     }
-    Ok(found)
 }

@@ -506,21 +506,43 @@ impl Answer for Calibration {
         }
     }
 
-    /// Everything that has an estimate, with the covariance of all.
+    /// The lists of the JSON; the coefficients and the covariance of all that has an estimate.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
-        let mut tables = crate::tables::of_json(&serde_json::to_value(self)?);
-        tables.push(covariance_table(&self.covariance));
-        Ok(tables)
+        Ok(with_coefficients(crate::tables::of_json(&serde_json::to_value(self)?), &self.covariance))
     }
 
-    /// Estimates and sigmas with the covariance of all.
+    /// Unknowns and combinations.
     fn main_table(&self) -> &'static str {
-        "covariance"
+        COEFFICIENTS
     }
 }
 
+/// The table of unknowns and combinations.
+pub(crate) const COEFFICIENTS: &str = "coefficients";
+
+/// The tables of a calibration with two more: unknowns and combinations one below the other, and the covariance.
+pub(crate) fn with_coefficients(mut tables: Vec<Table>, covariance: &CovarianceTable) -> Vec<Table> {
+    let of = |name: &str| tables.iter().find(|t| t.name == name);
+    // both are lists of the same objects
+    let both: Vec<&Table> = ["unknowns", "combinations"].into_iter().filter_map(of).collect();
+    let columns = both.first().map(|t| t.columns.clone()).unwrap_or_default();
+    let rows = both.iter().flat_map(|t| t.rows.clone()).collect();
+    tables.push(Table { name: COEFFICIENTS.into(), columns, rows });
+    tables.push(covariance_table(covariance));
+    tables
+}
+
+/// The covariance of all that has an estimate, as CSV: a row and a column for each, after name, unit, estimate and sigma.
+///
+/// # Errors
+/// [`ReportError::Csv`].
+pub fn covariance_csv(t: &CovarianceTable) -> Result<String, ReportError> {
+    let Table { columns, rows, .. } = covariance_table(t);
+    crate::csv_text::write(std::iter::once(columns).chain(rows))
+}
+
 /// Estimates and sigmas with the covariance of all.
-pub(crate) fn covariance_table(t: &CovarianceTable) -> Table {
+fn covariance_table(t: &CovarianceTable) -> Table {
     let head = ["name", "unit", "estimate", "sigma"].map(String::from).into_iter();
     let columns = head.chain(t.names.iter().map(|n| format!("covariance with {n}"))).collect();
     let row = |i: usize| {

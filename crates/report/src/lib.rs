@@ -41,7 +41,7 @@ mod visible;
 mod walks;
 mod words;
 
-pub use calibration::{calibration_figures, residuals_csv};
+pub use calibration::{calibration_figures, covariance_csv, residuals_csv};
 pub use document::Document;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};

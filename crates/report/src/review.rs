@@ -20,6 +20,10 @@ use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
 use crate::{Answer, Origin, calibration, compare, latex, simulation, words};
 
+/// What a calibration changes of the review of its scheme.
+const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
+    values that the scheme states (of several calibrations those of the last); what is not determined has the values of the scheme.";
+
 /// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections; of several the comparison first, and
 /// every part folded below it.
 pub(crate) fn document(
@@ -81,6 +85,7 @@ pub(crate) fn document(
     }
     for (i, (name, c)) in calibrations.iter().enumerate() {
         blocks.push(section(1, format!("Calibration {name}")));
+        blocks.push(Block::Text(CALIBRATED.into()));
         blocks.extend(calibration::section(c, &format!("c{}", i + 1)));
     }
     blocks.push(section(1, "Notation"));

@@ -2,6 +2,7 @@
 
 use obsdeg_calibration::system::{SystemCalibration, SystemEstimated, SystemFinding};
 
+use crate::calibration::{COEFFICIENTS, with_coefficients};
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
@@ -183,15 +184,14 @@ impl Answer for SystemCalibration {
         Document { title: format!("Calibration: {}", self.name), lead, blocks }
     }
 
+    /// The lists of the JSON; the coefficients and the covariance of all that has an estimate.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
-        let mut tables = crate::tables::of_json(&serde_json::to_value(self)?);
-        tables.push(crate::calibration::covariance_table(&self.covariance));
-        Ok(tables)
+        Ok(with_coefficients(crate::tables::of_json(&serde_json::to_value(self)?), &self.covariance))
     }
 
-    /// Estimates and sigmas with the covariance of all.
+    /// Unknowns and combinations.
     fn main_table(&self) -> &'static str {
-        "covariance"
+        COEFFICIENTS
     }
 }
 

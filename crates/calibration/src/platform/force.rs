@@ -178,7 +178,8 @@ impl Forces {
         self.usual().map(off).max_by(|a, b| a.3.total_cmp(&b.3))
     }
 
-    /// Refuses numbers that are of other units than the header has: whole columns, then single rows; `units` with what one of each is in g.
+    /// Refuses numbers that are of other units than the header has: whole columns, then single rows; `units` with what one of each is in g, those of the other kind (forces
+    /// or increments of velocity) for whole columns.
     pub(crate) fn check_units(
         &self,
         record: &str,
@@ -186,13 +187,15 @@ impl Forces {
         attitudes: &[Matrix3<f64>],
         columns: Option<&[ForceColumn; 3]>,
         units: &[(&str, f64)],
+        others: &[(&str, f64)],
     ) -> Result<(), Box<Mistaken>> {
+        let all_units = [units, others].concat();
         let record = record.to_string();
         let all: Vec<[f64; 3]> = self.usual().map(|(.., f)| f).collect();
         let worst = self.worst().filter(|(.., off)| *off > UNIT);
         if let (Some((p, line, force, _)), Some(own)) = (worst, columns)
             && let Some((columns, units)) =
-                other_units(&all, own, units, &|f| (length(f) - 1.0).abs() <= CLOSE)
+                other_units(&all, own, &all_units, &|f| (length(f) - 1.0).abs() <= CLOSE)
         {
             let (position, length_g) = (names[p].to_string(), format!("{:.4}", length(&force)));
             return Err(Box::new(Mistaken::ForceUnit { record, line, columns, position, length_g, units }));

@@ -17,6 +17,12 @@ use crate::still::{Detector, Told};
 /// Units of forces, and what they are of g where gravity is as it is (`None`: that of a metre per second squared).
 const FORCES: [(&str, Option<f64>); 4] =
     [("g", Some(1.0)), ("mg", Some(1e-3)), ("ug", Some(1e-6)), ("m/s^2", None)];
+/// Units of the increments of velocity over the time since the sample before, and what they are of m/s: their quotient is the mean of the force meanwhile.
+const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("um/s", 1e-6)];
+/// An interval so many times as long as the one before is a gap, in which increments may be lost.
+const GAP: f64 = 1.5;
+/// So many intervals between the first samples say how long one usually is.
+const FIRST: usize = 101;
 const ANGLES: [(&str, f64); 4] = [
     ("rad", 1.0),
     ("mrad", 1e-3),
@@ -107,6 +113,8 @@ struct Layout {
     wanted: Vec<Wanted>,
     azimuth: bool,
     sigmas: bool,
+    /// Whether forces are increments of velocity, which are read in g s.
+    increments: bool,
     /// The first of the three gimbal angles among what is wanted.
     gimbals: Option<usize>,
     temperature: Option<usize>,
@@ -114,9 +122,16 @@ struct Layout {
     ignored: Vec<String>,
 }
 
+/// Units of the force, or of increments of velocity, with what they are of g, or of g s.
+fn units_of_force(increments: bool, gravity: f64) -> [(&'static str, f64); 4] {
+    match increments {
+        true => INCREMENTS.map(|(u, size)| (u, size / gravity)),
+        false => FORCES.map(|(u, g)| (u, g.unwrap_or(1.0 / gravity))),
+    }
+}
+
 impl Layout {
     fn of(record: &Record, plan: &Plan, gravity: f64) -> Result<Self, CalibrationError> {
-        let forces = FORCES.map(|(u, g)| (u, g.unwrap_or(1.0 / gravity)));
         let time = record.find("t").ok_or_else(|| record.missing("`t [s]`"))?;
         let mut wanted = vec![record.wanted(time, &TIMES)?];
         let families = [
@@ -132,6 +147,10 @@ impl Layout {
             let also = format!("either {}, {}, {} or {}", names[0], names[1], names[2], others.join(", "));
             return Err(record.missing(&also).into());
         }
+        let unit = |name: &&str| record.columns()[record.find(name)?].unit.as_deref();
+        let increment = |unit: &str| INCREMENTS.iter().any(|(u, _)| *u == unit);
+        let increments = observed == Observed::Force && names.iter().filter_map(unit).any(increment);
+        let forces = units_of_force(increments, gravity);
         let needed = |i: usize| observed != Observed::Geographic || plan.components.contains(&(i + 1));
         let mut own = Vec::new();
         for (i, name) in names.iter().enumerate() {
@@ -194,11 +213,21 @@ impl Layout {
             wanted,
             azimuth,
             sigmas,
+            increments,
             gimbals,
             temperature,
             label,
             ignored,
         })
+    }
+
+    /// Makes mean forces of the increments of a row, those over `dt` s; nothing of them where it is not known over which time they are.
+    fn divide(&self, numbers: &mut [Option<f64>], dt: Option<f64>) {
+        let first = if self.azimuth { 5 } else { 4 };
+        let sigmas = if self.sigmas { first..first + 3 } else { 0..0 };
+        for i in (1..4).chain(sigmas) {
+            numbers[i] = numbers[i].and_then(|dv| Some(dv / dt?));
+        }
     }
 
     /// Components 1, 2, 3 of Z in n, and the azimuth, of a row taken where `C_c^n` is `c`.
@@ -253,8 +282,8 @@ fn at_time(plan: &Plan, t: f64) -> Option<usize> {
     (!matches!(found.kind, SegmentKind::Slew(_))).then_some(found.position)
 }
 
-/// A row that is kept: its line and its numbers.
-type Kept = (u64, Vec<Option<f64>>);
+/// A row that is kept: its line, its numbers, and how long before it the one before was.
+type Kept = (u64, Vec<Option<f64>>, Option<f64>);
 
 /// What happens to a sample.
 struct Taking<'a> {
@@ -273,6 +302,10 @@ struct Taking<'a> {
     length: (f64, usize),
     /// The noise of a sample, in g.
     noise: f64,
+    /// The time of the sample before, and how long before it the one before that was.
+    before: Option<(f64, Option<f64>)>,
+    /// The first intervals between samples.
+    intervals: Vec<f64>,
     /// Finds the positions, where the file says how.
     detector: Option<Detector<Kept>>,
     told: Vec<Told<Kept>>,
@@ -328,11 +361,16 @@ impl Taking<'_> {
         }
         self.out.span.1 = time;
         self.out.samples += 1;
+        let mut numbers = row.numbers.to_vec();
+        let dt = self.interval(time);
+        if self.layout.increments {
+            self.layout.divide(&mut numbers, dt);
+        }
         if let Some(mut detector) = self.detector.take() {
             // a row without forces says nothing of rest
-            if let [Some(x), Some(y), Some(z)] = row.numbers[1..4] {
+            if let [Some(x), Some(y), Some(z)] = numbers[1..4] {
                 let mut told = std::mem::take(&mut self.told);
-                detector.push(time, vec![x, y, z], (row.line, row.numbers.to_vec()), &mut told);
+                detector.push(time, vec![x, y, z], (row.line, numbers, dt), &mut told);
                 told.drain(..).try_for_each(|one| self.at_rest(&one))?;
                 self.told = told;
             } else {
@@ -342,13 +380,28 @@ impl Taking<'_> {
             return Ok(());
         }
         let found = self.position(row, time - if self.out.by == By::Label { self.begin } else { 0.0 })?;
-        self.put(row.line, row.numbers, time, found)
+        if self.layout.increments && found != self.now {
+            // a part of it is of the way here
+            self.layout.divide(&mut numbers, None);
+        }
+        self.put(&(row.line, numbers, dt), time, found)
+    }
+
+    /// How long before `time` the sample before was, unless there is a gap between them.
+    fn interval(&mut self, time: f64) -> Option<f64> {
+        let dt = self.before.map(|(t, _)| time - t);
+        let regular =
+            dt.filter(|dt| self.before.and_then(|(_, last)| last).is_none_or(|last| *dt <= GAP * last));
+        if let Some(dt) = dt.filter(|_| self.intervals.len() < FIRST) {
+            self.intervals.push(dt);
+        }
+        self.before = Some((time, dt));
+        regular
     }
 
     /// A sample of which it is known whether it is at rest.
     fn at_rest(&mut self, told: &Told<Kept>) -> Result<(), CalibrationError> {
-        let (line, numbers) = &told.sample;
-        let Some(time) = numbers[0] else { return Ok(()) };
+        let Some(time) = told.sample.1[0] else { return Ok(()) };
         if let Some(k) = told.interval {
             if k == self.rests.len() {
                 self.rests.push((time, time));
@@ -356,17 +409,17 @@ impl Taking<'_> {
             self.rests[k].1 = time;
         }
         let positions = self.plan.attitudes.len();
-        self.put(*line, numbers, time, told.interval.filter(|k| *k < positions))
+        self.put(&told.sample, time, told.interval.filter(|k| *k < positions))
     }
 
     /// Puts a sample where it was taken.
     fn put(
         &mut self,
-        line: u64,
-        numbers: &[Option<f64>],
+        (line, numbers, dt): &Kept,
         time: f64,
         found: Option<usize>,
     ) -> Result<(), CalibrationError> {
+        let line = *line;
         let own_time = matches!(self.out.by, By::Label | By::Static);
         if found != self.now {
             self.end();
@@ -423,6 +476,8 @@ impl Taking<'_> {
             sigma = Some(all);
         }
         let temperature = self.layout.temperature.and_then(|i| numbers[i]);
+        // a mean is of the middle
+        let t = t - dt.filter(|_| self.layout.increments).map_or(0.0, |dt| dt / 2.0);
         let bin = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
         if let Some(bin) = bin {
             self.out.bins[p].push(bin);
@@ -456,6 +511,12 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
         })),
         None => Ok(()),
     }
+}
+
+/// The median of some intervals; one second of none.
+fn median(of: &mut [f64]) -> f64 {
+    let middle = of.len() / 2;
+    if of.is_empty() { 1.0 } else { *of.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// The name of a component of Z.
@@ -514,6 +575,8 @@ pub(crate) fn observe(
         forces: Forces::new(positions, bin_s),
         length: (0.0, 0),
         noise,
+        before: None,
+        intervals: Vec::new(),
         detector: still.map(Detector::new),
         told: Vec::new(),
         rests: Vec::new(),
@@ -545,8 +608,19 @@ pub(crate) fn observe(
     taking.forces.end();
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
-    let units = FORCES.map(|(u, g)| (u, g.unwrap_or(1.0 / gravity)));
-    taking.forces.check_units(&taking.out.name, &names, &plan.attitudes, layout.forces.as_ref(), &units)?;
+    // forces that are increments of velocity by what the header says, or the other way round
+    let between = median(&mut taking.intervals);
+    let per =
+        |(u, size): (&'static str, f64)| (u, size * between.powi(if layout.increments { 1 } else { -1 }));
+    let others = units_of_force(!layout.increments, gravity).map(per);
+    taking.forces.check_units(
+        &taking.out.name,
+        &names,
+        &plan.attitudes,
+        layout.forces.as_ref(),
+        &units_of_force(layout.increments, gravity),
+        &others,
+    )?;
     taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes)?;
     if matches!(by, By::Label | By::Static) {
         check_times(&taking.out, plan, &layout.time)?;

@@ -267,6 +267,87 @@ fn a_cell_of_another_unit_is_named() {
     );
 }
 
+/// A record of pulses: counts of increments of velocity over the time since the row before, with a weight, by sums of a force that is sampled eight times as often.
+fn pulses(bench: &Bench, weight: f64) -> (String, String) {
+    const G: f64 = 9.80665;
+    let fine = bench.record();
+    let (mut counts, mut mean) = (String::from("t [s],position,X,Y,Z\n"), String::new());
+    let mut sums = [0.0; 3];
+    let mut before = [0.0; 3];
+    for (k, s) in fine.iter().enumerate() {
+        if k > 0 {
+            let dt = s.t - fine[k - 1].t;
+            (0..3).for_each(|i| sums[i] += G * dt * (s.f[i] + fine[k - 1].f[i]) / 2.0);
+        }
+        if k % 8 == 7 {
+            let whole = sums.map(|v| (v / weight).floor());
+            let of: [f64; 3] = std::array::from_fn(|i| whole[i] - before[i]);
+            before = whole;
+            // the label of the whole interval, or none
+            let label = if k >= 8 && fine[k - 8].label == s.label { s.label } else { "" };
+            counts += &format!("{},{label},{},{},{}\n", s.t, of[0], of[1], of[2]);
+            mean += &format!("{},{label},{},{},{}\n", s.t, of[0] * weight, of[1] * weight, of[2] * weight);
+        }
+    }
+    (counts, format!("t [s],position,fx [m/s],fy [m/s],fz [m/s]\n{mean}"))
+}
+
+/// Increments of velocity over the time between samples are mean forces in the middle; the estimate is what the bench had, and that of the forces.
+#[test]
+fn pulses_are_mean_forces() {
+    // noise of a sum of eight is that of a sample over the root of eight
+    let fine = Bench { step_s: 0.5, dropped: 0, noise_g: 1e-5 * 8f64.sqrt(), ..bench() };
+    let coarse = Bench { noise_g: 1e-5, ..fine.clone() };
+    let (counts, increments) = pulses(&fine, 1e-5);
+    let by_force = of_csv(&fine, "F,I,O,S", csv(&fine.record())).expect("calibrated");
+    let mut scheme = scheme(&coarse, "F,I,O,S");
+    let map = |list: &[(&str, &str)]| list.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
+    scheme.recording.columns = map(&[("fx", "X"), ("fy", "Y"), ("fz", "Z")]);
+    scheme.recording.units = map(&[("fx", "1e-5 m/s"), ("fy", "1e-2 mm/s"), ("fz", "1e-3 cm/s")]);
+    let read = |text: String| {
+        let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
+        calibrate(&scheme, &conditions(&coarse), vec![record], &Options::default(), &|_| true)
+    };
+    let by_counts = read(counts).expect("calibrated");
+    let by_increments = of_csv(&coarse, "F,I,O,S", increments.clone()).expect("calibrated");
+    for c in [&by_counts, &by_increments] {
+        assert!(
+            c.consistent && (c.records[0].force_g.expect("there") - 1.0).abs() < 1e-6,
+            "{:?}",
+            c.findings
+        );
+        for (a, b) in by_force.unknowns.iter().zip(&c.unknowns) {
+            let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
+            let t = b.sigma.expect("there");
+            assert!((x - y).abs() < 0.7 * s && (t / s - 1.0).abs() < 0.1, "{}: {x} {y} +- {s} {t}", a.name);
+        }
+        let d = c.unknowns.iter().find(|u| u.name == "D_FX").expect("there");
+        let off = d.estimate.expect("there") - coarse.drift[0][0];
+        assert!(off.abs() < 3.5 * d.sigma.expect("there"), "{off}");
+    }
+    // rows at whole fours of seconds are of the middle between them
+    let first: Vec<f64> =
+        by_counts.residuals.iter().filter(|r| r.position == 0).map(|r| (r.t_s - 2.0) % 4.0).collect();
+    let middle = first.iter().filter(|off| off.abs() < 1e-9).count();
+    assert!(middle > 150 && first.len() - middle < 5, "{middle} of {}", first.len());
+    // a row that is lost takes its increment along: the next is not over twice the time
+    let lost: String =
+        increments.lines().enumerate().filter(|(i, _)| i % 50 != 20).map(|(_, l)| format!("{l}\n")).collect();
+    let c = of_csv(&coarse, "F,I,O,S", lost).expect("calibrated");
+    assert!(c.consistent && c.outlier_count == 0, "{:?} {:?}", c.findings, c.outliers);
+    // increments that the header has as forces, and forces that it has as increments
+    let e = refused(&coarse, increments.replace("[m/s]", "[m/s^2]"));
+    assert!(
+        e.contains("columns `fx [m/s^2]`, `fy [m/s^2]`, `fz [m/s^2]`")
+            && e.ends_with("with the numbers as [m/s] it is"),
+        "{e}"
+    );
+    let e = refused(&fine, csv(&fine.record()).replace("[g]", "[m/s]"));
+    assert!(e.ends_with("with the numbers as [g] it is"), "{e}");
+    let e = refused(&coarse, increments.replace("fy [m/s]", "fy [g]"));
+    assert!(e.contains("column `fy [g]`: expected a unit, `fy [m/s]` or `fy [cm/s]`"), "{e}");
+}
+
 /// Labels that come some rows late or early are found, with the lines between which the platform moves.
 #[test]
 fn shifted_labels_are_found() {

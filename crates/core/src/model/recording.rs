@@ -41,7 +41,8 @@ pub(crate) struct SchemeRecord {
     /// What a column is called in the record, by its name here, as in `fx = "AccX"`.
     #[serde(default)]
     columns: BTreeMap<String, String>,
-    /// The unit of a column whose header has none, or what one count of it is, by its name here: `fx = "2.44e-5 g"`.
+    /// The unit of a column whose header has none, or what one count of it is, by its name here: `fx = "2.44e-5 g"`; of pulses of an accelerometer the increment of
+    /// velocity that each is: `fx = "1e-5 m/s"`.
     #[serde(default)]
     units: BTreeMap<String, String>,
     /// Positions are intervals at rest, found by the scatter of the forces, where no column `position` says what is where.
