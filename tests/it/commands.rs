@@ -48,7 +48,7 @@ fn same(command: &str, request: &Value, arguments: &[&str]) {
     let (text, said, passed) = printed(arguments);
     match call(command, &request.to_string(), &mut Host::silent()) {
         Ok(answer) => {
-            assert!(answer.text == text, "{arguments:?}: other bytes than {said}{text}");
+            assert!(answer.text().expect("text") == text, "{arguments:?}: other bytes than {said}{text}");
             assert_eq!(answer.passed, passed, "{arguments:?}");
         }
         Err(problem) => {
@@ -193,13 +193,13 @@ fn a_review_is_the_same_page() {
     let command = "obsdeg report examples/paper-p1-p2/scheme.toml --runs 10 --symbolic-limit 0";
     let request = json!({ "sources": [source(file)], "runs": 10, "command": command });
     let answer = call("report", &request.to_string(), &mut Host::silent()).expect("a page");
-    assert!(answer.text == fs::read_to_string(&page).expect("the page"));
+    assert!(answer.text().expect("text") == fs::read_to_string(&page).expect("the page"));
 }
 
 #[test]
 fn wrong_requests_are_named() {
     let wrong = |command: &str, request: Value| {
-        let problem = call(command, &request.to_string(), &mut Host::silent()).expect_err("refused");
+        let problem = call(command, &request.to_string(), &mut Host::silent()).err().expect("refused");
         assert_eq!(problem.kind, Kind::Input);
         problem.message
     };
@@ -225,7 +225,7 @@ fn wrong_requests_are_named() {
         &json!({ "sources": [{ "name": "a.toml", "text": "\n\ncarry = 3\n" }] }).to_string(),
         &mut Host::silent(),
     );
-    let place = problem.expect_err("refused").place.expect("a place");
+    let place = problem.err().expect("refused").place.expect("a place");
     assert_eq!((place.name.as_str(), place.line_and_column().0), ("a.toml", 3));
 }
 

@@ -75,6 +75,7 @@ fn crates() -> Imports {
         "design",
         "report",
         "commands",
+        "python",
         "cli",
     ];
     let imports = |name: &&str| {

@@ -2,6 +2,8 @@
 //!
 //! `cargo run -p obsdeg-commands --example in_json`
 
+#![allow(clippy::print_stdout, reason = "an example shows what it found")]
+
 use obsdeg_commands::{Host, call};
 use serde_json::{Value, json};
 
@@ -9,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scheme = "carry = \"inertial\"\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
     let asked = json!({ "sources": [{ "name": "two.toml", "text": scheme }], "solutions": false });
     let answer = call("analyze", &asked.to_string(), &mut Host::silent())?;
-    let answer: Value = serde_json::from_str(&answer.text)?;
+    let answer: Value = serde_json::from_str(&answer.text()?)?;
     println!("two positions, {} carry: rank {}", answer["carry"], answer["rank"]);
 
     // what is wrong is said with its place

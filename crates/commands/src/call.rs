@@ -1,7 +1,9 @@
 //! A command by its name, its options and files as JSON: how other languages ask.
 
 use obsdeg_calibration::record::Record;
-use obsdeg_report::{Answer, Format, Layout, ReviewFormat, picture_folder, written};
+use obsdeg_report::{
+    Answer, File, Format, Layout, ReviewFormat, csv, fragment, picture_folder, position_figure, written,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -10,26 +12,128 @@ use crate::analyze::{Analyze, analyze};
 use crate::arguments::Given;
 use crate::calibrate::{Calibrate, calibrate};
 use crate::compare::{Compare, compare};
-use crate::crosscheck::{Crosscheck, crosscheck};
+use crate::crosscheck::{Crosscheck, crosscheck, files as crosscheck_files};
 use crate::design::{Designed, Search, SearchFiles, design};
 use crate::host::Host;
 use crate::paper::{Paper, paper};
 use crate::problem::Problem;
 use crate::report::{CalibrationFile, Report, origin, report};
-use crate::simulate::{Simulate, simulate};
-use crate::source::{Named, Source};
+use crate::simulate::{Simulate, files as simulation_files, simulate};
+use crate::source::{Input, Named, Source, title};
 
 /// The commands.
 pub const COMMANDS: [&str; 8] =
     ["analyze", "simulate", "crosscheck", "calibrate", "compare", "design", "report", "paper"];
 
+/// An answer, whatever it is of.
+pub trait Rendered: Send + Sync {
+    /// What the command line prints with `--format`, byte for byte; a report is a page in any format.
+    ///
+    /// # Errors
+    /// What cannot be written.
+    fn written(&self, format: Format) -> Result<String, Problem>;
+
+    /// One of the lists of the JSON as CSV (`--table`); the main one where none is named.
+    ///
+    /// # Errors
+    /// A table that there is not.
+    fn table(&self, name: Option<&str>) -> Result<String, Problem>;
+
+    /// A part of an HTML page: tables and formulas that read without scripts.
+    ///
+    /// # Errors
+    /// What cannot be written.
+    fn fragment(&self) -> Result<String, Problem>;
+
+    /// What goes into a folder beside the JSON: figures, series, schemes that were found.
+    ///
+    /// # Errors
+    /// What cannot be drawn.
+    fn files(&self) -> Result<Vec<File>, Problem>;
+}
+
 /// An answer to whoever asked in JSON.
-#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answered {
-    /// What the command line prints with `--format json`, byte for byte; of a report the page.
-    pub text: String,
+    /// The answer.
+    pub answer: Box<dyn Rendered>,
     /// Whether the command line would exit with 0: false where something disagrees or is not explained.
     pub passed: bool,
+}
+
+impl Answered {
+    /// What the command line prints with `--format json`, byte for byte; of a report the page, of a part of a search the file.
+    ///
+    /// # Errors
+    /// What cannot be written.
+    pub fn text(&self) -> Result<String, Problem> {
+        self.answer.written(Format::Json)
+    }
+}
+
+/// An answer, and the files that belong to it.
+struct Whole<A, F> {
+    answer: A,
+    files: F,
+}
+
+impl<A, F> Rendered for Whole<A, F>
+where
+    A: Answer + Send + Sync,
+    F: Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync,
+{
+    fn written(&self, format: Format) -> Result<String, Problem> {
+        Ok(written(&self.answer, format, Layout::default())?)
+    }
+
+    fn table(&self, name: Option<&str>) -> Result<String, Problem> {
+        Ok(csv(&self.answer, name)?)
+    }
+
+    fn fragment(&self) -> Result<String, Problem> {
+        Ok(fragment(&self.answer)?)
+    }
+
+    fn files(&self) -> Result<Vec<File>, Problem> {
+        (self.files)(&self.answer)
+    }
+}
+
+/// A text that is what it is: the page of a report, a part of a search.
+struct Text(String);
+
+impl Rendered for Text {
+    fn written(&self, _: Format) -> Result<String, Problem> {
+        Ok(self.0.clone())
+    }
+
+    fn table(&self, _: Option<&str>) -> Result<String, Problem> {
+        Err(Problem::input("there are no tables of this answer"))
+    }
+
+    fn fragment(&self) -> Result<String, Problem> {
+        Ok(self.0.clone())
+    }
+
+    fn files(&self) -> Result<Vec<File>, Problem> {
+        Ok(Vec::new())
+    }
+}
+
+/// No files belong to an answer.
+fn none<A>(_: &A) -> Result<Vec<File>, Problem> {
+    Ok(Vec::new())
+}
+
+fn whole<A: Answer + Send + Sync + 'static>(
+    answer: A,
+    passed: bool,
+    files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+) -> Result<Answered, Problem> {
+    Ok(Answered { answer: Box::new(Whole { answer, files }), passed })
+}
+
+fn text(text: String, passed: bool) -> Result<Answered, Problem> {
+    Ok(Answered { answer: Box::new(Text(text)), passed })
 }
 
 /// Answers a command. `request` is a JSON object with its options, named as on the command line in snake case, and with its files,
@@ -39,12 +143,7 @@ pub struct Answered {
 /// # Errors
 /// What is wrong with the request; options are named in snake case.
 pub fn call(command: &str, request: &str, host: &mut Host<'_>) -> Result<Answered, Problem> {
-    let request: Value =
-        serde_json::from_str(request).map_err(|e| Problem::input(format!("the request is no JSON: {e}")))?;
-    match request {
-        Value::Object(request) => answered(command, request, host).map_err(in_snake_case),
-        _ => Err(Problem::input("the request is no JSON object; expected options by their names")),
-    }
+    object(request).and_then(|request| answered(command, request, host)).map_err(in_snake_case)
 }
 
 fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> Result<Answered, Problem> {
@@ -53,49 +152,48 @@ fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> 
             let mut asked: Request<Analyze, Sources> = Request::read(request)?;
             asked.options.input.given = asked.given;
             let read = asked.options.input.read(asked.files.sources)?;
-            json(&analyze(&asked.options, &read, host)?, true)
+            let judged = analyze(&asked.options, &read, host)?;
+            whole(judged, true, move |_| Ok(position_figures(&read)))
         }
         "simulate" => {
             let mut asked: Request<Simulate, Sources> = Request::read(request)?;
             asked.options.input.given = asked.given;
             let input = asked.options.input.read_one(asked.files.sources)?;
-            json(&simulate(&asked.options, &input)?.0, true)
+            let (run, traces) = simulate(&asked.options, &input)?;
+            whole(run, true, move |run| Ok(simulation_files(run, &traces)?))
         }
         "crosscheck" => {
             let mut asked: Request<Crosscheck, Sources> = Request::read(request)?;
             asked.options.input.given = asked.given;
             let input = asked.options.input.read_one(asked.files.sources)?;
             let evidence = crosscheck(&asked.options, &input, host)?;
-            json(&evidence, evidence.passed())
+            let passed = evidence.passed();
+            whole(evidence, passed, |e| Ok(crosscheck_files(e)?))
         }
         "calibrate" => {
             let mut asked: Request<Calibrate, Records> = Request::read(request)?;
             asked.options.given = asked.given;
             let Records { sources, records, before } = asked.files;
-            let found = sources.len();
-            let Ok([source]) = <[Source; 1]>::try_from(sources) else {
-                return Err(Problem::input(format!("found {found} files; expected one scheme or model")));
-            };
+            let source = one(sources)?;
             let record = |r: Source| {
                 let bytes = std::io::Cursor::new(r.text.into_bytes());
                 Record::stream(&r.name, Box::new(bytes)).map_err(|e| Problem::input(e.to_string()))
             };
             let records = records.into_iter().map(record).collect::<Result<_, _>>()?;
-            let found = calibrate(&asked.options, source.read()?, records, before.as_ref(), host)?;
-            json(&found, found.passed())
+            calibrated(&asked.options, source, records, before.as_ref(), host)
         }
         "compare" => {
             let asked: Request<Compare, Sources> = Request::read(request)?;
-            json(&compare(&asked.options, read(asked.files.sources)?)?, true)
+            whole(compare(&asked.options, read(asked.files.sources)?)?, true, none)
         }
         "design" => {
             let asked: Request<Search, SearchFiles> = Request::read(request)?;
             match design(&asked.options, &asked.files, host)? {
-                Designed::Schemes(found) => json(&*found, true),
-                Designed::Walks(found) => json(&*found, true),
+                Designed::Schemes(found) => whole(*found, true, |f| f.files()),
+                Designed::Walks(found) => whole(*found, true, |f| Ok(f.files())),
                 Designed::Part(part) => {
-                    let text = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
-                    Ok(Answered { text: text + "\n", passed: part.complete })
+                    let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
+                    text(json + "\n", part.complete)
                 }
             }
         }
@@ -107,12 +205,11 @@ fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> 
             let reviewed = report(&asked.options, read(sources)?, &calibrations, host)?;
             let files = reviewed.files(&origin, ReviewFormat::Html, &picture_folder("review"))?;
             let page = files.into_iter().next().map(|page| page.bytes).unwrap_or_default();
-            let text = String::from_utf8(page).map_err(|e| Problem::internal(e.to_string()))?;
-            Ok(Answered { text, passed: true })
+            text(String::from_utf8(page).map_err(|e| Problem::internal(e.to_string()))?, true)
         }
         "paper" => {
             let asked: Request<Paper, NoFiles> = Request::read(request)?;
-            json(&paper(&asked.options)?, true)
+            whole(paper(&asked.options)?, true, none)
         }
         _ => {
             Err(Problem::input(format!("`{command}` is no command; expected one of {}", COMMANDS.join(", "))))
@@ -214,8 +311,61 @@ fn read(sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
     sources.into_iter().map(Source::read).collect()
 }
 
-fn json(answer: &impl Answer, passed: bool) -> Result<Answered, Problem> {
-    Ok(Answered { text: written(answer, Format::Json, Layout::default())?, passed })
+/// The positions of every scheme as a picture.
+fn position_figures(read: &[Named]) -> Vec<File> {
+    let mut files = Vec::new();
+    for (name, input) in read {
+        let Input::Scheme(scheme) = input else { continue };
+        let mut file = position_figure(scheme);
+        if read.len() > 1 {
+            file.name = format!("{}-{}", title(name), file.name);
+        }
+        files.push(file);
+    }
+    files
+}
+
+/// A calibration from records that are no texts, as [`call`] gives one of texts: `request` has all but `records`.
+///
+/// # Errors
+/// What is wrong with the request or a record.
+pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
+    let answer = || {
+        let mut asked: Request<Calibrate, Records> = Request::read(object(request)?)?;
+        asked.options.given = asked.given;
+        let source = one(asked.files.sources)?;
+        calibrated(&asked.options, source, records, asked.files.before.as_ref(), host)
+    };
+    answer().map_err(in_snake_case)
+}
+
+fn calibrated(
+    options: &Calibrate,
+    source: Source,
+    records: Vec<Record>,
+    before: Option<&Source>,
+    host: &Host<'_>,
+) -> Result<Answered, Problem> {
+    let found = calibrate(options, source.read()?, records, before, host)?;
+    let passed = found.passed();
+    whole(found, passed, |found| Ok(found.files()?))
+}
+
+fn one(sources: Vec<Source>) -> Result<Source, Problem> {
+    let found = sources.len();
+    match <[Source; 1]>::try_from(sources) {
+        Ok([source]) => Ok(source),
+        Err(_) => Err(Problem::input(format!("found {found} files; expected one scheme or model"))),
+    }
+}
+
+/// The object that a request is.
+fn object(request: &str) -> Result<Map<String, Value>, Problem> {
+    match serde_json::from_str(request) {
+        Ok(Value::Object(request)) => Ok(request),
+        Ok(_) => Err(Problem::input("the request is no JSON object; expected options by their names")),
+        Err(e) => Err(Problem::input(format!("the request is no JSON: {e}"))),
+    }
 }
 
 /// Options in words as JSON names them: `--slew-rate` is `slew_rate`.

@@ -8,9 +8,9 @@
 //! use obsdeg_commands::{Host, call};
 //!
 //! let asked = r#"{"angles": ["0,0,0", "180,0,0"], "carry": "inertial", "solutions": false}"#;
-//! let answer = call("analyze", asked, &mut Host::silent()).map_err(|e| e.message)?;
-//! assert!(answer.text.contains("\"rank\""));
-//! # Ok::<(), String>(())
+//! let answer = call("analyze", asked, &mut Host::silent())?;
+//! assert!(answer.text()?.contains("\"rank\""));
+//! # Ok::<(), obsdeg_commands::Problem>(())
 //! ```
 
 mod analyze;
@@ -32,7 +32,7 @@ mod text;
 pub use analyze::{Analyze, Judged, Judgements, analyze};
 pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions, Word, one_of, whole};
 pub use calibrate::{Calibrate, Calibrated, calibrate};
-pub use call::{Answered, COMMANDS, call};
+pub use call::{Answered, COMMANDS, Rendered, call, call_calibrate};
 pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};

@@ -16,6 +16,7 @@ use crate::figure::{Figure, Line, Stroke};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
+const FRAGMENT: &str = include_str!("../assets/fragment.html");
 const STYLE: &str = include_str!("../assets/page.css");
 const SCRIPT: &str = include_str!("../assets/page.js");
 const PLOT_SCRIPT: &str = include_str!("../assets/uPlot.iife.min.js");
@@ -29,13 +30,7 @@ pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
     let (front, rest) = d.blocks.split_at(first.unwrap_or(d.blocks.len()));
     let mut ids = 0;
     let [front, blocks] = [front, rest].map(|b| listed(b, &mut ids));
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment.set_formatter(|out, state, value| match value.as_str() {
-        Some(text) if !value.is_safe() => escape_formatter(out, state, &Value::from(visible(text))),
-        _ => escape_formatter(out, state, value),
-    });
-    environment.add_template("page", TEMPLATE)?;
+    let environment = environment()?;
     let interactive = has_curves(&d.blocks);
     let page = environment.get_template("page")?.render(context! {
         title => d.title.clone(),
@@ -51,6 +46,29 @@ pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
         font => STANDARD.encode(FONT),
     })?;
     Ok(page)
+}
+
+/// The templates, which escape whatever is no markup of their own.
+fn environment() -> Result<Environment<'static>, ReportError> {
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.set_formatter(|out, state, value| match value.as_str() {
+        Some(text) if !value.is_safe() => escape_formatter(out, state, &Value::from(visible(text))),
+        _ => escape_formatter(out, state, value),
+    });
+    environment.add_template("page", TEMPLATE)?;
+    environment.add_template("fragment", FRAGMENT)?;
+    Ok(environment)
+}
+
+/// The document as a part of somebody else's page: tables, lists and formulas that read without scripts and without a style of their own.
+pub(crate) fn fragment(d: &Document) -> Result<String, ReportError> {
+    let blocks = listed(&d.blocks, &mut 0);
+    Ok(environment()?.get_template("fragment")?.render(context! {
+        title => d.title.clone(),
+        lead => d.lead.clone(),
+        blocks => Value::from(Serde(&blocks)),
+    })?)
 }
 
 fn has_curves(blocks: &[Block]) -> bool {

@@ -226,6 +226,14 @@ pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<S
     })
 }
 
+/// A result as a part of an HTML page, such as a notebook: tables and formulas (MathML) that read without scripts.
+///
+/// # Errors
+/// [`ReportError`] when the template fails.
+pub fn fragment(answer: &impl Answer) -> Result<String, ReportError> {
+    html::fragment(&answer.document())
+}
+
 /// A table of a result as CSV; the main one where none is named. Of a list with nothing in it nothing is written.
 ///
 /// # Errors

@@ -1,0 +1,205 @@
+//! The extension module of the Python package `obsdeg`: commands by name, options as JSON. Everything else is Python.
+
+use std::fs::File;
+use std::io::Cursor;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use obsdeg_calibration::record::Record;
+use obsdeg_commands::{Answered, Host, Kind, Now, Problem, call, call_calibrate};
+use obsdeg_report::Format;
+use pyo3::create_exception;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+create_exception!(
+    obsdeg._obsdeg,
+    ProblemError,
+    PyValueError,
+    "What is wrong with a request: `message`, and where, if it is in a text: `file`, `line`, `column` (counted from 1)."
+);
+
+/// An answer; it is written when that is asked for.
+#[pyclass(frozen, module = "obsdeg._obsdeg")]
+struct Answer(Answered);
+
+#[pymethods]
+impl Answer {
+    /// Whether nothing disagrees, and the model explains the records.
+    #[getter]
+    fn passed(&self) -> bool {
+        self.0.passed
+    }
+
+    /// What the command line prints: `format` is table, json, markdown, csv or latex.
+    fn written(&self, py: Python<'_>, format: &str) -> PyResult<String> {
+        let format: Format = format.parse().map_err(|e| PyValueError::new_err(format!("{e}")))?;
+        py.detach(|| self.0.answer.written(format)).map_err(raised)
+    }
+
+    /// A list of the JSON as CSV.
+    #[pyo3(signature = (name=None))]
+    fn table(&self, py: Python<'_>, name: Option<&str>) -> PyResult<String> {
+        py.detach(|| self.0.answer.table(name)).map_err(raised)
+    }
+
+    /// A part of an HTML page.
+    fn fragment(&self, py: Python<'_>) -> PyResult<String> {
+        py.detach(|| self.0.answer.fragment()).map_err(raised)
+    }
+
+    /// Figures, series and schemes that were found, by their names.
+    fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let files = py.detach(|| self.0.answer.files()).map_err(raised)?;
+        let out = PyDict::new(py);
+        for file in files {
+            out.set_item(file.name, PyBytes::new(py, &file.bytes))?;
+        }
+        Ok(out)
+    }
+}
+
+/// Answers a command; `request` is JSON, `progress` is called with (what, done, total, examined, best) ten times a second at most, and ends the work with
+/// the best so far where it returns False. A keyboard interrupt does too; it is raised where there is nothing so far.
+#[pyfunction]
+#[pyo3(signature = (command, request, progress=None))]
+fn answer(py: Python<'_>, command: &str, request: &str, progress: Option<Py<PyAny>>) -> PyResult<Answer> {
+    heard(py, command, progress, |host| call(command, request, host))
+}
+
+/// Calibrates from records: each a name with the path of a file (CSV or Parquet), or with its bytes.
+#[pyfunction]
+#[pyo3(signature = (request, records, progress=None))]
+fn calibrate(
+    py: Python<'_>,
+    request: &str,
+    records: Vec<(String, Option<Vec<u8>>)>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Answer> {
+    let record = |(name, bytes): (String, Option<Vec<u8>>)| {
+        let unreadable = |e| Problem::input(format!("cannot read the record {name}: {e}"));
+        let record = match bytes {
+            Some(bytes) => Record::stream(&name, Box::new(Cursor::new(bytes))),
+            None => Record::file(&name, File::open(&name).map_err(unreadable)?),
+        };
+        record.map_err(|e| Problem::input(e.to_string()))
+    };
+    heard(py, "calibrate", progress, move |host| {
+        let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
+        call_calibrate(request, records, host)
+    })
+}
+
+/// Between two times that Python hears of progress, or is asked whether a key was pressed.
+const INTERVAL: Duration = Duration::from_millis(100);
+
+/// Commands that take as long as they are asked to, and can be ended.
+const LONG: [&str; 4] = ["crosscheck", "calibrate", "design", "report"];
+
+/// Works without the lock of the interpreter. What takes long has a thread of its own; this one, which may be the only one that hears of keys, tells
+/// whoever called how far it is, and may end it.
+fn heard(
+    py: Python<'_>,
+    command: &str,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&mut Host<'_>) -> Result<Answered, Problem> + Send,
+) -> PyResult<Answer> {
+    if !LONG.contains(&command) {
+        return py.detach(|| work(&mut Host::silent())).map(Answer).map_err(raised);
+    }
+    let goes_on = AtomicBool::new(true);
+    let last: Mutex<Option<Now>> = Mutex::new(None);
+    let going = |now: Now| {
+        // of several at once one is enough
+        if let Ok(mut last) = last.try_lock() {
+            *last = Some(now);
+        }
+        goes_on.load(Ordering::Relaxed)
+    };
+    let ask = || -> PyResult<bool> {
+        let now = last.lock().ok().and_then(|mut last| last.take());
+        Python::attach(|py| {
+            py.check_signals()?;
+            let (Some(progress), Some(now)) = (&progress, now) else { return Ok(true) };
+            let said = progress.call1(py, (now.what, now.done, now.total, now.examined, now.best))?;
+            Ok(!said.extract::<bool>(py).is_ok_and(|goes_on| !goes_on))
+        })
+    };
+    let (done, inside) = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (send, receive) = channel();
+            let going = &going;
+            scope.spawn(move || {
+                // nobody listens only if this function has ended
+                let _ = send.send(work(&mut Host { worker: None, going }));
+            });
+            let mut inside = None;
+            loop {
+                match receive.recv_timeout(INTERVAL) {
+                    Ok(done) => return (Some(done), inside),
+                    Err(RecvTimeoutError::Disconnected) => return (None, inside),
+                    Err(RecvTimeoutError::Timeout) if inside.is_some() => {}
+                    Err(RecvTimeoutError::Timeout) => match ask() {
+                        Ok(said) => goes_on.store(said && goes_on.load(Ordering::Relaxed), Ordering::Relaxed),
+                        Err(e) => {
+                            goes_on.store(false, Ordering::Relaxed);
+                            inside = Some(e);
+                        }
+                    },
+                }
+            }
+        })
+    });
+    match (done, inside) {
+        (None, _) => Err(PyRuntimeError::new_err("the work ended without an answer")),
+        (Some(Ok(answer)), None) => Ok(Answer(answer)),
+        // the best so far
+        (Some(Ok(answer)), Some(e)) if e.is_instance_of::<PyKeyboardInterrupt>(py) => Ok(Answer(answer)),
+        (Some(_), Some(e)) => Err(e),
+        (Some(Err(problem)), None) => Err(raised(problem)),
+    }
+}
+
+/// A problem as Python has it.
+fn raised(problem: Problem) -> PyErr {
+    match problem.kind {
+        Kind::Interrupted => PyKeyboardInterrupt::new_err(problem.message),
+        Kind::Internal => PyRuntimeError::new_err(problem.message),
+        Kind::Input => Python::attach(|py| {
+            let place = problem.place.as_ref().map(|p| (p.name.clone(), p.line_and_column()));
+            let text = match &place {
+                Some((name, (line, column))) => {
+                    format!("{} ({name}, line {line}, column {column})", problem.message)
+                }
+                None => problem.message.clone(),
+            };
+            let error = ProblemError::new_err(text);
+            let value = error.value(py);
+            let (file, at) = place.unzip();
+            let (line, column) = at.unzip();
+            let set = value
+                .setattr("message", problem.message)
+                .and_then(|()| value.setattr("file", file))
+                .and_then(|()| value.setattr("line", line))
+                .and_then(|()| value.setattr("column", column));
+            match set {
+                Ok(()) => error,
+                Err(e) => e,
+            }
+        }),
+    }
+}
+
+/// The extension module.
+#[pymodule]
+fn _obsdeg(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("ProblemError", m.py().get_type::<ProblemError>())?;
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("COMMANDS", obsdeg_commands::COMMANDS.to_vec())?;
+    m.add_class::<Answer>()?;
+    m.add_function(wrap_pyfunction!(answer, m)?)?;
+    m.add_function(wrap_pyfunction!(calibrate, m)?)
+}

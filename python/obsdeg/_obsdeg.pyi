@@ -1,0 +1,23 @@
+from collections.abc import Callable
+
+__version__: str
+COMMANDS: list[str]
+
+class ProblemError(ValueError):
+    message: str
+    file: str | None
+    line: int | None
+    column: int | None
+
+class Answer:
+    @property
+    def passed(self) -> bool: ...
+    def written(self, format: str) -> str: ...
+    def table(self, name: str | None = None) -> str: ...
+    def fragment(self) -> str: ...
+    def files(self) -> dict[str, bytes]: ...
+
+_Progress = Callable[[str, int, int | None, int | None, float | None], bool | None]
+
+def answer(command: str, request: str, progress: _Progress | None = None) -> Answer: ...
+def calibrate(request: str, records: list[tuple[str, bytes | None]], progress: _Progress | None = None) -> Answer: ...

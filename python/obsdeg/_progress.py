@@ -1,0 +1,25 @@
+"""Progress bars."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ._results import Progress
+
+
+def heard(progress: Progress | bool | None) -> tuple[Any, Any]:
+    """What the engine calls, and what is to be closed at the end: ``True`` stands for a bar of tqdm."""
+    if progress is not True:
+        return (progress or None), None
+    from tqdm.auto import tqdm
+
+    bar = tqdm(total=None, leave=False)
+
+    def show(what: str, done: int, total: int | None, examined: int | None, best: float | None) -> bool:
+        bar.set_description(what if best is None else f"{what}, best {best:.4g}")
+        if total is not None:
+            bar.total = total
+        bar.update(done - bar.n)
+        return True
+
+    return show, bar

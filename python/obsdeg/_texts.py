@@ -1,0 +1,78 @@
+"""Numbers as exact decimals, schemes as texts: what goes from Python into a request."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
+from typing import Any, Union
+
+#: A decimal number. A float goes through its shortest text, so that 28.2 is 28.2.
+Number = Union[int, float, str, Decimal]
+#: Three Euler angles in degrees, three direction letters (``"NUE"``), or a text as on the command line (``"0,0,0@X_p:360"``).
+Attitude = Union[str, Sequence[Number]]
+
+
+def decimal(x: Number) -> str:
+    """A number as an exact decimal.
+
+    Raises:
+        TypeError: not a number; a 32-bit or 16-bit float, whose shortest text is not what was written.
+        ValueError: not finite.
+    """
+    if isinstance(x, str):
+        return x.strip()
+    if isinstance(x, bool):
+        raise TypeError(f"found {x!r}; expected a number")
+    if isinstance(x, Decimal):
+        if not x.is_finite():
+            raise ValueError(f"found {x}; expected a finite number")
+        return format(x, "f")
+    if isinstance(x, float):
+        return decimal(Decimal(float.__repr__(x)))
+    kind = type(x).__name__
+    if kind.startswith("float"):
+        raise TypeError(
+            f"found {x!r} of type {kind}: it holds 28.2 as 28.2000007..., and angles are exact here; expected a str, int, Decimal or 64-bit float"
+        )
+    try:
+        return str(operator.index(x))
+    except TypeError:
+        raise TypeError(f"found {x!r} of type {kind}; expected a number") from None
+
+
+def attitude(angles: Attitude) -> str:
+    """An attitude as on the command line.
+
+    Raises:
+        ValueError: not three angles.
+    """
+    if isinstance(angles, str):
+        return angles
+    texts = [decimal(x) for x in angles]
+    if len(texts) != 3:
+        raise ValueError(f"found {len(texts)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
+    return ",".join(texts)
+
+
+def assignments(given: Mapping[str, Any] | Iterable[str]) -> list[str]:
+    """Numbers by the names of unknowns or families, ``{"D": 0.05}``, as on the command line."""
+    if isinstance(given, str):
+        return [given]
+    if isinstance(given, Mapping):
+        return [f"{name}={decimal(value)}" for name, value in given.items()]
+    return list(given)
+
+
+def toml(value: Any) -> str:
+    """A value as TOML."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = "".join(c if c >= " " and c not in '"\\' and c != "\x7f" else f"\\u{ord(c):04X}" for c in value)
+        return f'"{escaped}"'
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(toml(v) for v in value) + "]"
+    return decimal(value)

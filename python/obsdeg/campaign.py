@@ -1,0 +1,261 @@
+"""Searches and sweeps on as many machines as there are, through any executor of :mod:`concurrent.futures`.
+
+A search is cut into parts (``obsdeg design --part``), a sweep into chunks; each is a file in a folder, written whole or not at all and named by what was asked, so that a
+driver that was killed goes on where it was, and a worker that was killed costs what it had in hand. There is no scheduler here: that is the executor's.
+
+With Dask Distributed::
+
+    with distributed.Client("scheduler:8786") as client:
+        found = campaign.design("search", 40, executor=client.get_executor, positions=7, carry="inertial")
+
+With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: a pool of processes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from itertools import islice, product
+from pathlib import Path
+from typing import Any
+
+import obsdeg
+
+#: Makes an executor; one that is broken, because a worker was killed, is replaced by another.
+Executors = Callable[[], Executor]
+
+
+class CampaignError(RuntimeError):
+    """A task failed as often as it may: `task` says which."""
+
+    def __init__(self, task: Any, tries: int, cause: BaseException) -> None:
+        super().__init__(f"{task!r} failed {tries} times, last with {type(cause).__name__}: {cause}")
+        self.task = task
+
+
+def run(
+    function: Callable[[Any], Any],
+    tasks: Iterable[Any],
+    *,
+    executor: Executors = ProcessPoolExecutor,
+    retries: int = 2,
+    ahead: int = 64,
+) -> Iterator[tuple[Any, Any]]:
+    """Yields every task with its result, in the order in which they end.
+
+    Args:
+        function: what is done, importable by the workers.
+        tasks: hashable or not; at most ``ahead`` are handed out at a time, so that memory does not grow with them.
+        executor: makes the executor.
+        retries: how often a task is tried again when its worker was lost. An error that the function raises itself is not tried again where it is one
+            of input (:class:`obsdeg.ProblemError`).
+
+    Raises:
+        CampaignError: a task failed too often.
+    """
+    left = iter(enumerate(tasks))
+    again: list[tuple[int, Any]] = []
+    tries: dict[int, int] = {}
+    pool = executor()
+    waiting: dict[Future[Any], tuple[int, Any]] = {}
+    try:
+        while True:
+            try:
+                for i, task in [*again, *islice(left, ahead - len(waiting) - len(again))]:
+                    again = [a for a in again if a[0] != i]
+                    waiting[pool.submit(function, task)] = (i, task)
+            except RuntimeError:
+                # broken since: what it was not given comes again with another
+                again.append((i, task))
+                again.extend(waiting.values())
+                waiting.clear()
+                pool = _another(pool, executor)
+                continue
+            if not waiting:
+                return
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            lost = False
+            for future in done:
+                i, task = waiting.pop(future)
+                try:
+                    result = future.result()
+                except obsdeg.ProblemError:
+                    raise
+                except (Exception, CancelledError) as e:
+                    tries[i] = tries.get(i, 0) + 1
+                    if tries[i] > retries:
+                        raise CampaignError(task, tries[i], e) from e
+                    again.append((i, task))
+                    lost |= _is_broken(pool, e)
+                else:
+                    tries.pop(i, None)
+                    yield task, result
+            if lost:
+                again.extend(waiting.values())
+                waiting.clear()
+                pool = _another(pool, executor)
+    finally:
+        _close(pool)
+
+
+def _is_broken(pool: Executor, e: BaseException) -> bool:
+    return isinstance(pool, ProcessPoolExecutor) and "Broken" in type(e).__name__
+
+
+def _another(pool: Executor, executor: Executors) -> Executor:
+    _close(pool)
+    return executor()
+
+
+def _close(pool: Executor) -> None:
+    try:
+        pool.shutdown(wait=False, cancel_futures=True)
+    except TypeError:
+        # Dask's has no such option
+        pool.shutdown(wait=False)
+
+
+def _digest(asked: Any) -> str:
+    text = json.dumps([obsdeg.__version__, asked], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _place(path: Path, text: bytes) -> None:
+    """Writes a file whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(name, path)
+    except BaseException:
+        os.unlink(name)
+        raise
+
+
+def _search(task: tuple[dict[str, Any], int, int]) -> str:
+    options, number, of = task
+    return str(obsdeg.design(**options, part=(number, of)).json())
+
+
+def design(
+    folder: str | os.PathLike[str],
+    parts: int,
+    *,
+    executor: Executors = ProcessPoolExecutor,
+    retries: int = 2,
+    heard: Callable[[int, int], None] | None = None,
+    **options: Any,
+) -> obsdeg.Design:
+    """Searches in parts, and puts them together: the answer of ``obsdeg.design(**options)``, byte for byte.
+
+    Args:
+        folder: holds the parts that are done; the same search in the same folder goes on with them.
+        parts: how many.
+        heard: told how many parts are done, of how many.
+        options: those of :func:`obsdeg.design`.
+
+    Raises:
+        CampaignError: a part failed too often.
+        obsdeg.ProblemError: what is wrong with the options.
+    """
+    files = {i: Path(folder) / f"{_digest([options, parts])}-{i}-of-{parts}.json" for i in range(1, parts + 1)}
+    missing = [(options, i, parts) for i, file in files.items() if not file.exists()]
+    done = parts - len(missing)
+    for (_, i, _), text in run(_search, missing, executor=executor, retries=retries):
+        _place(files[i], text.encode())
+        done += 1
+        if heard is not None:
+            heard(done, parts)
+    merged: obsdeg.Design = obsdeg.design(**options, merge=[f.read_text(encoding="utf-8") for f in files.values()])
+    return merged
+
+
+def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
+    """Every combination of options: ``grid(angles=[...], latitude=range(0, 91), carry=["platform", "inertial"])``."""
+    names, values = list(axes), [list(v) for v in axes.values()]
+    return (dict(zip(names, chosen, strict=True)) for chosen in product(*values))
+
+
+def _verdicts(tasks: list[dict[str, Any]]) -> bytes:
+    import pyarrow
+    import pyarrow.parquet
+
+    rows: list[dict[str, Any]] = []
+    for task in tasks:
+        given = {name: str(value) for name, value in task.items() if name != "scheme"}
+        what = [obsdeg.Scheme.from_text(task["scheme"])] if "scheme" in task else []
+        answer = obsdeg.analyze(*what, solutions=False, **{k: v for k, v in task.items() if k != "scheme"}).to_dict()
+        for q in answer["quantities"]:
+            rows.append({**given, "rank": answer["rank"], "name": q["name"], "status": q["status"], "degree": q.get("degree")})
+    sink = pyarrow.BufferOutputStream()
+    table = pyarrow.Table.from_pylist(rows)
+    degree = table.schema.get_field_index("degree")
+    table = table.set_column(degree, "degree", table.column("degree").cast(pyarrow.int32()))
+    table = table.replace_schema_metadata({"obsdeg": obsdeg.__version__})
+    pyarrow.parquet.write_table(table, sink)
+    return bytes(sink.getvalue())
+
+
+def sweep(
+    folder: str | os.PathLike[str],
+    tasks: Iterable[Mapping[str, Any]],
+    *,
+    chunk: int = 500,
+    executor: Executors = ProcessPoolExecutor,
+    retries: int = 2,
+    heard: Callable[[int], None] | None = None,
+) -> Path:
+    """Judges many schemes: a row per unknown, in Parquet files that come as they are done.
+
+    Args:
+        folder: holds the files, one a chunk, named by what it asks; those that are there are not asked again. Read all with ``pandas.read_parquet(folder)``.
+        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is the text of a scheme file.
+        chunk: tasks that are judged together.
+        heard: told how many tasks are done.
+
+    Raises:
+        CampaignError: a chunk failed too often.
+        obsdeg.ProblemError: what is wrong with a task.
+    """
+    folder = Path(folder)
+    done = 0
+
+    def missing() -> Iterator[list[dict[str, Any]]]:
+        nonlocal done
+        rest = map(dict, tasks)
+        while some := list(islice(rest, chunk)):
+            if (folder / f"{_digest(some)}.parquet").exists():
+                done += len(some)
+            else:
+                yield some
+
+    for some, table in run(_verdicts, missing(), executor=executor, retries=retries):
+        _place(folder / f"{_digest(some)}.parquet", table)
+        done += len(some)
+        if heard is not None:
+            heard(done)
+    return folder
+
+
+class RayExecutor(Executor):
+    """Ray as an executor."""
+
+    def __init__(self, **options: Any) -> None:
+        import ray
+
+        self._ray = ray
+        if not ray.is_initialized():
+            ray.init(**options)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Hands a call to Ray."""
+        # what a lost worker had in hand is tried again here, not there
+        future: Future[Any] = self._ray.remote(max_retries=0)(fn).remote(*args, **kwargs).future()
+        return future

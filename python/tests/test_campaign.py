@@ -1,0 +1,126 @@
+"""Campaigns: parts are the whole, whoever works; workers and drivers are killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import obsdeg
+import pytest
+from obsdeg import campaign
+
+SEARCH: dict[str, Any] = {"positions": 3, "carry": "inertial", "observable": ["D_F"]}
+
+
+def _once_killed(folder: Path, task: int) -> int:
+    """Kills its worker the first time that it is asked for 5."""
+    mark = folder / "killed"
+    if task == 5 and not mark.exists():
+        mark.write_text(str(os.getpid()))
+        os.kill(os.getpid(), signal.SIGKILL)
+    return task * task
+
+
+def _always_wrong(task: int) -> int:
+    raise OSError(f"no {task}")
+
+
+def test_a_killed_worker_costs_what_it_had_in_hand(tmp_path: Path) -> None:
+    done = dict(campaign.run(partial(_once_killed, tmp_path), range(20)))
+    assert (tmp_path / "killed").exists()
+    assert done == {i: i * i for i in range(20)}
+
+
+def test_what_fails_too_often_is_named() -> None:
+    with pytest.raises(campaign.CampaignError, match="7 failed 3 times, last with OSError"):
+        list(campaign.run(_always_wrong, [7], executor=lambda: ThreadPoolExecutor(1)))
+
+
+def test_tasks_are_handed_out_as_they_are_needed() -> None:
+    asked = 0
+
+    def tasks() -> Any:
+        nonlocal asked
+        for i in range(1000):
+            asked += 1
+            yield i
+
+    results = campaign.run(abs, tasks(), executor=lambda: ThreadPoolExecutor(2), ahead=10)
+    next(results)
+    assert asked <= 20
+    assert sum(1 for _ in results) == 999
+
+
+def test_parts_are_the_whole(tmp_path: Path) -> None:
+    heard: list[tuple[int, int]] = []
+    found = campaign.design(tmp_path, 4, heard=lambda *now: heard.append(now), **SEARCH)
+    assert found.json() == obsdeg.design(**SEARCH).json()
+    assert heard == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    # nothing is done twice; another question has other files
+    again = campaign.design(tmp_path, 4, heard=lambda *_: pytest.fail("done already"), **SEARCH)
+    assert again.json() == found.json()
+    with pytest.raises(obsdeg.ProblemError):
+        campaign.design(tmp_path, 4, **{**SEARCH, "carry": "sideways"})
+
+
+DRIVER = """
+import sys, obsdeg
+from obsdeg import campaign
+tasks = campaign.grid(angles=[[(a, 0, 0), (180, b, 0)] for a in range(0, 60, 5) for b in range(0, 60, 5)], latitude=range(0, 90, 10))
+if __name__ == "__main__":
+    campaign.sweep(sys.argv[1], tasks, chunk=40, heard=lambda n: print(n, flush=True))
+"""
+
+
+def test_a_driver_that_was_killed_goes_on(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    script = tmp_path / "driver.py"
+    script.write_text(DRIVER)
+    folder = tmp_path / "sweep"
+    first = subprocess.Popen([sys.executable, str(script), str(folder)], stdout=subprocess.PIPE, text=True, start_new_session=True)
+    assert first.stdout is not None and int(first.stdout.readline()) > 0
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    there = {f: f.stat().st_mtime_ns for f in folder.glob("*.parquet")}
+    assert 0 < len(there) < 33
+    subprocess.run([sys.executable, str(script), str(folder)], check=True, stdout=subprocess.DEVNULL, timeout=300)
+    files = set(folder.glob("*.parquet"))
+    assert len(files) == 33 and all(f.stat().st_mtime_ns == t for f, t in there.items())
+    rows = pandas.read_parquet(sorted(files))
+    assert len(rows) == 144 * 9 * 15
+    # against the program's own, one by one
+    for angles, latitude in [("[(0, 0, 0), (180, 0, 0)]", "0"), ("[(35, 0, 0), (180, 50, 0)]", "40")]:
+        own = obsdeg.analyze(angles=eval(angles), latitude=latitude, solutions=False)  # noqa: S307
+        mine = rows[(rows["angles"] == angles) & (rows["latitude"] == latitude)]
+        assert dict(zip(mine["name"], mine["status"], strict=True)) == own.statuses
+        assert set(mine["rank"]) == {own.rank}
+
+
+def _slowly(task: int) -> int:
+    time.sleep(0.05)
+    return task + 1
+
+
+def test_dask_with_a_worker_killed(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, distributed.Client(cluster) as client:
+
+        def executor() -> Executor:
+            made: Executor = client.get_executor(retries=3)
+            return made
+
+        victim = next(iter(client.run(os.getpid).values()))
+        results = campaign.run(_slowly, range(60), executor=executor)
+        done = dict(next(results) for _ in range(5))
+        os.kill(victim, signal.SIGKILL)
+        done.update(results)
+        assert done == {i: i + 1 for i in range(60)}
+        found = campaign.design(tmp_path, 3, executor=executor, **SEARCH)
+        assert found.json() == obsdeg.design(**SEARCH).json()
