@@ -89,18 +89,30 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         Designed::Walks(found) => {
             a.output.write_folder(&*found, "walks.json", || Ok::<_, Failure>(found.files()))
         }
-        Designed::Part(part) => write_part(&part, &a.output),
+        Designed::Part(part) => write_part(&part, a),
     }
 }
 
-/// Writes a part to its file, whole or interrupted, and says which.
-fn write_part(part: &Part, output: &Output) -> Result<(), Failure> {
+/// Writes a part to its file, whole or interrupted, and says which; and which options act later.
+fn write_part(part: &Part, Arguments { asked, output, .. }: &Arguments) -> Result<(), Failure> {
     let text = serde_json::to_string(part).map_err(|e| Failure::internal(e.to_string()))?;
     output.target.replace(format!("{text}\n").as_bytes())?;
     let [number, of] = part.part;
     let [from, to, all] = part.starts;
     let examined: u64 = part.levels.iter().map(|level| level.best.examined).sum();
-    let what = format!("part {number} of {of}: {} of {all} starts, {examined} sequences", to - from);
+    let of_the_answer = [
+        ("--refine", asked.refine),
+        ("--divide", asked.divide),
+        ("--front", !asked.front.is_empty()),
+        ("--restarts", asked.restarts.is_some()),
+    ];
+    let of_the_answer = of_the_answer.into_iter().filter_map(|(option, given)| given.then_some(option));
+    let later = of_the_answer.chain(output.wording()).collect::<Vec<_>>().join(", ");
+    let later = match later.is_empty() {
+        true => later,
+        false => format!("; {later}: where the parts are merged"),
+    };
+    let what = format!("part {number} of {of}: {} of {all} starts, {examined} sequences{later}", to - from);
     match part.complete {
         true => print(format!("{what}\n").as_bytes()),
         false => {

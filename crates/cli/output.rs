@@ -118,6 +118,13 @@ pub(crate) fn plain_messages() -> bool {
 }
 
 impl Output {
+    /// The options that were given of how an answer is worded.
+    pub(crate) fn wording(&self) -> impl Iterator<Item = &'static str> {
+        let given =
+            [("--format", self.format.is_some()), ("--table", self.table.is_some()), ("--ascii", self.ascii)];
+        given.into_iter().filter_map(|(option, given)| given.then_some(option))
+    }
+
     /// Whether the ending says that the answer alone goes to a file, where there may be a folder with figures and series too.
     fn is_file(&self) -> bool {
         let path = self.target.path().filter(|path| !path.is_dir());

@@ -117,7 +117,8 @@ pub struct Search {
     pub front: Vec<usize>,
 
     /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
-    /// interrupted part goes on when the same command is given again
+    /// interrupted part goes on when the same command is given again. What only the answer has (--refine, --divide, --front, --restarts, --format and
+    /// what goes with it) acts where the parts are merged
     #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
     pub part: Option<[usize; 2]>,
 
@@ -362,7 +363,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let mut conditions = a.measurement.conditions(&base);
     conditions.priors.extend(general_first(a.prior.clone()));
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
-    idle(a, &base, &conditions)?;
+    idle(a, !files.merge.is_empty(), &base, &conditions)?;
     let round = a.round.as_deref().unwrap_or("5");
     let step = parse_decimal(round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
     let step = step.ok_or_else(|| {
@@ -412,7 +413,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
 }
 
 /// Refuses options that would do nothing, each with what it needs.
-fn idle(a: &Search, base: &Scheme, conditions: &Conditions) -> Result<(), Problem> {
+fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Result<(), Problem> {
     let (w, free) = (&a.wanted, a.candidates == "free");
     if a.minimum {
         let of_positions = [
@@ -434,7 +435,7 @@ fn idle(a: &Search, base: &Scheme, conditions: &Conditions) -> Result<(), Proble
         let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
         if let Some(option) = given.chain(a.measurement.given()).next() {
             return Err(Problem::input(format!(
-                "{option} does nothing with --minimum, which asks what positions determine at all, with any noise; it is for --positions"
+                "{option} does nothing with --minimum, which asks what positions determine at all, by any degree and with any noise; it is for --positions"
             )));
         }
     }
@@ -449,6 +450,11 @@ fn idle(a: &Search, base: &Scheme, conditions: &Conditions) -> Result<(), Proble
             "--within",
             a.within.is_some() && free,
             "given candidates with it; free attitudes are never all searched",
+        ),
+        (
+            "--within",
+            a.within.is_some_and(|within| within > 0.0) && (a.part.is_some() || merged),
+            "a search that is not in parts; these are of all sequences, as with --within 0",
         ),
         (
             "--max-slew",

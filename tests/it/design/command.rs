@@ -222,6 +222,7 @@ fn parts_are_files() {
     for (i, path) in [(1, &one), (2, &two)] {
         let said = stdout(&with(&["--part", &format!("{i}/2"), "-o", path]));
         assert!(said.starts_with(&format!("part {i} of 2: ")), "{said}");
+        assert!(said.ends_with(" sequences; --format: where the parts are merged\n"), "{said}");
         // done already
         assert_eq!(stdout(&with(&["--part", &format!("{i}/2"), "-o", path])), said);
     }
@@ -287,6 +288,14 @@ fn options_that_do_nothing_are_refused() {
         (
             &["--carry", "reset", "--candidates", "free", "--within", "0"],
             "--within does nothing here: expected given candidates",
+        ),
+        (
+            &["--carry", "reset", "--within", "1", "--part", "1/2", "-o", "part.json"],
+            "--within does nothing here: expected a search that is not in parts",
+        ),
+        (
+            &["--carry", "reset", "--within", "1", "--merge", "Cargo.toml"],
+            "expected a search that is not in parts",
         ),
     ] {
         let output = run(&[&["design", "--positions", "3"], arguments].concat());

@@ -126,6 +126,9 @@ pub struct Certificate {
     pub within_percent: f64,
     /// The square of the bound over that criterion: how much of the information that the best could have it has at least (for D the D-efficiency).
     pub efficiency: f64,
+    /// What rounding may hide of that criterion, as a part of it: it is added before the criterion is held against the bound. By the residual
+    /// of the inverse; null where what does not count is not determined, so that nothing is known of it and nothing added.
+    pub rounding: Option<f64>,
     /// The criterion that the weights would have as a scheme, exactly as they are listed; the bound cannot be larger.
     pub attained: f64,
     /// How the weights divide the time among the candidates: parts of their sum, rounded to two digits, or to as many as lose no
@@ -139,14 +142,16 @@ pub struct Certificate {
 }
 
 /// How good the best scheme of any attitudes can be, whatever the candidates and the gimbals are; requirements on psi left out. Attitudes are
-/// taken up where they add most; between the points of a net of 3 degrees what they add is bounded as a trigonometric polynomial, so that
-/// the bound holds for all, if rounding is less than 1e-8 of it (assumed).
+/// taken up where they add most; between the points of a net of 3 degrees what they add is bounded as a trigonometric polynomial, and rounding
+/// with it, so that the bound holds for all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EverywhereReport {
     /// No scheme of so many attitudes, equal dwells, has a smaller criterion.
     pub best_possible: f64,
     /// The criterion of the first scheme that is not refined is at most so much above, in percent of the bound.
     pub within_percent: f64,
+    /// What rounding may hide of that criterion, as a part of it: as above, that of the attitudes of the scheme with it.
+    pub rounding: Option<f64>,
     /// The criterion that the weights would have as a scheme, exactly as they and their angles are listed.
     pub attained: f64,
     /// The attitudes with weights, Euler angles in degrees: parts of their sum, rounded to two digits, or to as many as lose no more

@@ -4,23 +4,40 @@ use obsdeg_core::model::Euler;
 use rayon::prelude::*;
 
 use super::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
+use super::best::Scored;
 use super::certificate::{Bound, Everywhere};
 use super::information::Evaluator;
 use super::rounding::Moved;
 use super::task::{DWELLS, Task};
-
-/// Rounding of a criterion as the search computes it, as a part of it.
-const ROUNDING: f64 = 1e-10;
+use super::ways::Stop;
 
 /// How far a criterion is above a bound at most, as a part of it.
 pub(super) fn excess(value: f64, bound: f64) -> f64 {
-    (value * (1.0 + ROUNDING) / bound - 1.0).max(0.0)
+    (value / bound * (1.0 + 4.0 * f64::EPSILON) - 1.0).max(0.0)
+}
+
+/// A criterion, with what rounding may hide of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Value {
+    /// As the search computes it.
+    computed: f64,
+    /// What it is at most; where nothing is known of its rounding, as computed.
+    pub(super) at_most: f64,
+    /// What rounding may hide of it, as a part of it, where that is known.
+    rounding: Option<f64>,
+}
+
+impl Value {
+    fn new(computed: f64, at_most: Option<f64>) -> Self {
+        let rounding = at_most.map(|most| (most / computed - 1.0).max(0.0));
+        Self { computed, at_most: at_most.unwrap_or(computed).max(computed), rounding }
+    }
 }
 
 /// The bound over all attitudes in the light of the best scheme found, of this criterion.
 pub(super) fn everywhere(
     found: &Everywhere,
-    value: f64,
+    value: Value,
     rounded: Option<(i64, Option<&Moved>)>,
 ) -> EverywhereReport {
     let weight = |(euler, weight): &(Euler, f64)| Weight {
@@ -29,12 +46,13 @@ pub(super) fn everywhere(
     };
     EverywhereReport {
         best_possible: found.value,
-        within_percent: 100.0 * excess(value, found.value),
+        within_percent: 100.0 * excess(value.at_most, found.value),
+        rounding: value.rounding,
         attained: found.attained,
         weights: found.support.iter().map(weight).collect(),
         rounded: rounded.map(|(step, finer)| Rounded {
             step_deg: step as f64 / 1e9,
-            finer: finer.filter(|f| f.value < value).map(|f| Finer {
+            finer: finer.filter(|f| f.value < value.computed).map(|f| Finer {
                 value: f.value,
                 angles: f.scheme.iter().map(|e| e.each_ref().map(ToString::to_string).join(",")).collect(),
             }),
@@ -48,14 +66,27 @@ impl Task<'_> {
         evaluator.bound(&self.criterion, k, &self.symmetry.representatives(), going)
     }
 
+    /// The criterion of a scheme, of the information of its positions as it is evaluated.
+    pub(super) fn value(&self, evaluator: &Evaluator, of: &Scored) -> Value {
+        Value::new(of.worth.value, evaluator.at_most(&of.sequence, &self.criterion, None))
+    }
+
+    /// The same, of the information of its positions as that of all attitudes is bounded: without psi.
+    pub(super) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> Value {
+        let attitudes = |stop: &Stop| (stop.candidate, &self.candidates.attitudes[stop.candidate]);
+        let errors = evaluator.errors_of(of.sequence.iter().map(attitudes));
+        Value::new(of.worth.value, evaluator.at_most(&of.sequence, &self.criterion, Some(&errors)))
+    }
+
     /// The bound in the light of the best scheme found, of this criterion.
-    pub(super) fn certificate(&self, bound: &Bound, value: f64) -> Certificate {
-        let excess = excess(value, bound.value);
+    pub(super) fn certificate(&self, bound: &Bound, value: Value) -> Certificate {
+        let excess = excess(value.at_most, bound.value);
         let weights = self.candidates.names.iter().zip(&bound.listed.0).filter(|(_, w)| **w > 0.0);
         Certificate {
             best_possible: bound.value,
             within_percent: 100.0 * excess,
             efficiency: (1.0 + excess).powi(-2),
+            rounding: value.rounding,
             attained: bound.listed.1,
             weights: weights.map(|(name, &weight)| Weight { candidate: name.clone(), weight }).collect(),
             everywhere: None,

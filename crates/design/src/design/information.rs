@@ -1,7 +1,8 @@
 //! The information of a sequence of positions, built up position by position: what a search evaluates millions of
 //! times.
 
-use std::ops::Range;
+use std::ops::{Mul, Range};
+use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, W_IE};
@@ -17,6 +18,7 @@ use obsdeg_evidence::simulation::{
 
 use super::DesignError;
 use super::correlated::{Joint, OfDwell};
+use super::psi::OwnPsi;
 use super::ways::{Stop, Way};
 
 /// Most unknowns of a search: psi and the coefficients of all terms.
@@ -34,6 +36,8 @@ pub(super) struct Candidate {
     /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower triangle): what it
     /// adds to any scheme under reset carry; empty under the others.
     pub(super) own: Vec<f64>,
+    /// Its own psi under reset carry, as soon as that was asked for.
+    pub(super) psi: OnceLock<OwnPsi>,
     /// Which of the dwells of the evaluator it has.
     dwell: usize,
 }
@@ -224,7 +228,7 @@ impl Evaluator {
         let Candidate { c, effects, dwell, .. } = &self.candidates[candidate];
         self.dwells[*dwell].clone_from(dwelling);
         let own = self.information_alone(c, effects, dwelling);
-        self.candidates[candidate].own = own;
+        (self.candidates[candidate].own, self.candidates[candidate].psi) = (own, OnceLock::new());
     }
 
     /// What the dwell of a candidate is.
@@ -261,6 +265,7 @@ impl Evaluator {
                     own: self.information_alone(c, &effects, &self.dwells[0]),
                     effects,
                     c: *c,
+                    psi: OnceLock::new(),
                     dwell: 0,
                 }
             })
@@ -344,7 +349,12 @@ impl Evaluator {
 
     /// Rows on the coefficients in SI units, in the order and the units of the evaluator.
     pub(super) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
-        rows.map(|row| self.order.iter().zip(&self.scale).map(|(&c, scale)| row[c] * scale).collect())
+        rows.map(|row| self.in_order(&row))
+    }
+
+    /// One of these rows, of any numbers.
+    pub(super) fn in_order<X: Copy + Mul<f64, Output = X>>(&self, row: &[X]) -> Vec<X> {
+        self.order.iter().zip(&self.scale).filter_map(|(&c, scale)| Some(*row.get(c)? * *scale)).collect()
     }
 
     /// The same where nothing is known beforehand.

@@ -2,7 +2,7 @@
 //!
 //! Sets of candidates are first judged exactly (`observability`). Sequences of those that make the required
 //! coefficients observable, in every order where the carry makes order matter and by both ways of half turns (`ways`),
-//! are then ranked (`search`): constraints first, then the worst degree, then a criterion of optimal design
+//! are then ranked (`search`, `exhaust`, `exchange`): constraints first, then the worst degree, then a criterion of optimal design
 //! (`information`), up to turns of the platform axes (`symmetry`).
 
 pub(crate) mod answer;
@@ -15,6 +15,7 @@ pub(crate) mod criterion;
 mod divide;
 mod error;
 mod exchange;
+mod exhaust;
 pub(crate) mod information;
 pub(crate) mod observability;
 mod part;
@@ -23,6 +24,7 @@ mod refine;
 mod rounding;
 mod screen;
 pub(crate) mod search;
+mod sets;
 pub(crate) mod symmetry;
 mod task;
 pub(crate) mod ties;
@@ -36,10 +38,10 @@ pub use candidates::Candidates;
 pub use certificate::{Bound, Everywhere};
 pub use criterion::{Criterion, Limits};
 pub use error::DesignError;
+pub(crate) use exhaust::Pruning;
 pub use information::{Evaluator, State};
 pub use observability::{Patience, Rows};
 pub use part::{Level, PART_SCHEMA, Part, PartError, design_merged, design_part, design_starts};
-pub(crate) use search::Pruning;
 pub use search::{Constraints, Progress, Search};
 pub use symmetry::Symmetry;
 pub use ways::Stop;
@@ -272,7 +274,8 @@ impl<'a> Prepared<'a> {
         {
             let exchanged = exchanged();
             let enough = |f: &Scored| {
-                f.worth.degree == search.floor && excess(f.worth.value, bound.value) < options.within
+                f.worth.degree == search.floor
+                    && excess(task.value(&self.evaluator, f).at_most, bound.value) < options.within
             };
             if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
                 return (exchanged, None);
@@ -388,7 +391,7 @@ fn answered(
             });
         };
         out.front = task.all_found(evaluator, &best.front)?;
-        let mut certificate = bound.map(|bound| task.certificate(&bound, first.worth.value));
+        let mut certificate = bound.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {
             let of = (k, conditions.dwell_s);
             let wanted = certificate.is_some() && options.everywhere && free.is_none();
@@ -398,11 +401,10 @@ fn answered(
                 rayon::join(|| task.front(evaluator, &search, of, &best), || rayon::join(over_all, line));
             out.front.extend(front?);
             if let (Some(certificate), Some(line)) = (&mut certificate, line) {
-                let value = first.worth.value;
                 let every = free.as_ref().map(|f| &f.every).or(found.as_ref());
                 certificate.everywhere = every.map(|every| {
                     let rounded = options.free.zip(free.as_ref()).map(|(step, f)| (step, f.finer.as_ref()));
-                    certify::everywhere(every, value, rounded)
+                    certify::everywhere(every, task.value_among_all(evaluator, first), rounded)
                 });
                 certificate.front = line;
             }

@@ -31,8 +31,6 @@ pub struct Rows {
     required: Vec<usize>,
     /// Bound on the probability that one rank is too small in one field.
     miss: f64,
-    /// A key of every candidate; the key of a set is their exclusive or.
-    keys: Vec<u128>,
     platform: Platform,
 }
 
@@ -117,21 +115,18 @@ impl Rows {
             miss = error_bound(&claim, 1);
             fields.push(here);
         }
-        let mut rng = platform.scheme().random(seed, "keys of sets");
-        let mut key = || u128::from(rng.next_u64()) << 64 | u128::from(rng.next_u64());
         Ok(Self {
             fields,
             columns: platform.names().len() - first,
             required: required.iter().map(|c| c + 3 - first).collect(),
             miss,
-            keys: candidates.iter().map(|_| key()).collect(),
             platform,
         })
     }
 
     /// The number of candidates.
     pub fn candidates(&self) -> usize {
-        self.keys.len()
+        self.fields.first().map_or(0, |here| here.rows.len())
     }
 
     /// The number of fields.
@@ -159,7 +154,6 @@ impl Rows {
         });
         Self {
             fields: fields.collect(),
-            keys: order.iter().map(|&i| self.keys[i]).collect(),
             required: self.required.clone(),
             platform: self.platform.clone(),
             ..*self
@@ -179,12 +173,6 @@ impl Rows {
         let fields: Vec<(Field, &[Matrix3<u64>])> =
             self.fields.iter().map(|here| (here.field, &here.attitudes[..])).collect();
         Symmetry::new(&fields, &self.platform, same)
-    }
-
-    /// The key of a candidate: that of a set is the exclusive or of its members'. Two sets have the same with
-    /// probability 2^-128.
-    pub fn key(&self, candidate: usize) -> u128 {
-        self.keys[candidate]
     }
 
     /// The least number of positions that could do, by counting rows.
@@ -225,28 +213,15 @@ impl Rows {
     /// All sets of `size` candidates with every required coefficient observable, each ascending, in lexicographic
     /// order.
     pub fn observable_sets(&self, size: usize) -> Vec<Vec<usize>> {
-        self.observable_sets_while(size, &|| true).unwrap_or_default()
-    }
-
-    /// The same; `None` when it takes longer than `going` says.
-    pub(crate) fn observable_sets_while(
-        &self,
-        size: usize,
-        going: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Vec<Vec<usize>>> {
-        let firsts: Vec<usize> = (0..self.candidates()).collect();
-        let found: Option<Vec<Vec<Vec<usize>>>> = firsts
-            .par_iter()
-            .map(|&first| {
-                let (mut out, mut patience) = (Vec::new(), Patience::while_going(going));
-                self.each(&[first], size, false, &mut patience, &mut |set| {
-                    out.push(set.to_vec());
-                    true
-                });
-                (patience.budget > 0).then_some(out)
-            })
-            .collect();
-        Some(found?.into_iter().flatten().collect())
+        let behind = |first: usize| {
+            let mut out = Vec::new();
+            self.each(&[first], size, false, &mut Patience::while_going(&|| true), &mut |set| {
+                out.push(set.to_vec());
+                true
+            });
+            out
+        };
+        (0..self.candidates()).into_par_iter().flat_map_iter(behind).collect()
     }
 
     /// The first such set among those that begin with one of `firsts`, and whether all were examined otherwise: no more

@@ -19,17 +19,24 @@
 //! information, so that reset carry bounds nothing; with psi known before every dwell the drift between is known exactly; and one X
 //! for all that may follow (the mean, or its best weights) leaves most pairs of the best schemes (`crates/README.md`, with numbers).
 //!
-//! Rounding: `x^T M x` is bounded from above, each sum with the standard bound of its rounding (its number of terms times the
-//! precision times the sum of sizes); what is excluded is worse than the limit by more than [`SLACK`] besides, which is for
-//! the rounding of the criteria it is compared with.
+//! Rounding: what is left out must be worse than the limit *as the search would have computed it*. Cholesky's decomposition and the triangular
+//! systems of a criterion are exact for a matrix that differs from the computed M by at most `gamma_(3n+1) sqrt(m_ii m_jj)` in every entry (N. J. Higham,
+//! *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, theorems 8.5 and 10.3, each column of L being no longer than `sqrt(m_ii)`), and every bound
+//! above holds for that matrix too. So no condition number enters: the energy of x may be off by `gamma (sum_i |x_i| sqrt(m_ii))^2`. With the information
+//! of a position `L^T G L`, `|G_ab| <= sqrt(G_aa G_bb)`, what sums and products make of it is in the same way at most `gamma (sum_i |x_i| s_i)^2`,
+//! `s_i = sum_a sqrt(G_aa) |L_ai|` ([`Reach`]). Eigenvalues (E) are those of a matrix that is off by a small multiple of n u of its norm, as for any
+//! backward stable method (G. H. Golub, C. F. Van Loan, *Matrix Computations*, section 8.3); that of the library is taken to be [`EIGENVALUES`] n u at most. A pivot that the
+//! search passes over, as what rounding leaves of an undetermined direction, is taken for zero here as there.
 
+use obsdeg_core::model::LOCAL;
 use obsdeg_exact::SplitMix64;
 
+use super::certificate::rounding;
 use super::criterion::Criterion;
 use super::information::{Evaluator, MAX, State};
 
-/// Nothing is left out unless it is worse than the limit by more than this part.
-const SLACK: f64 = 1e-7;
+/// What eigenvalues are taken to be off by, in n u times the norm (an assumption).
+const EIGENVALUES: usize = 10;
 /// Directions that are tried, where every coefficient is one.
 const DIRECTIONS: usize = 2;
 /// The mean's part of what a test is made by.
@@ -51,12 +58,16 @@ pub(super) struct Screen<'a> {
     reach: Reach,
 }
 
-/// How large things may become: for bounds on rounding.
+/// How large things may become at any candidate: for bounds on rounding.
 struct Reach {
-    /// psi behind a dwell by psi, by the largest coefficient before.
-    psi: [f64; 2],
-    /// Sums over the information of a position: of psi, between psi and coefficients (both ways), of coefficients.
-    information: [f64; 3],
+    /// `sum_a sqrt(G_aa) |L_ai|` of psi, all components together.
+    psi: f64,
+    /// The same of every unknown (shape n); zero for psi.
+    own: Vec<f64>,
+    /// The largest component of psi behind a dwell by that before it.
+    grow: f64,
+    /// The same by every unknown (shape n); zero for psi.
+    gain: Vec<f64>,
 }
 
 /// Every candidate as a scheme of its own, by psi at its start, as it is carried, and the coefficients: of each entry a lane, of every
@@ -98,6 +109,8 @@ pub(super) struct Scratch {
     draw: SplitMix64,
     root: Vec<f64>,
     inverse: Vec<f64>,
+    /// Of every unknown, how large the root of what it adds to M becomes: in the prefix, and at two more positions.
+    sizes: Vec<[f64; 3]>,
     lanes: Lanes,
     energy: Vec<f64>,
 }
@@ -124,7 +137,7 @@ impl<'a> Screen<'a> {
             alone.push(one.clone());
         }
         mean.iter_mut().for_each(|x| *x /= (count * count) as f64);
-        let reach = Reach::of(evaluator, &alone);
+        let reach = Reach::of(&bare, &alone);
         Some(Self { evaluator, criterion, positions: Positions::of(&alone, n), mean, reach })
     }
 
@@ -145,6 +158,7 @@ impl<'a> Screen<'a> {
             draw: SplitMix64::new(1),
             root: Vec::new(),
             inverse: Vec::new(),
+            sizes: Vec::new(),
             lanes,
             energy: Vec::new(),
         }
@@ -154,6 +168,7 @@ impl<'a> Screen<'a> {
     /// there are pairs, and those that may not leave it.
     pub(super) fn pairs(&self, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) {
         self.with_mean(state, on);
+        self.reach.behind(state, &mut on.sizes);
         on.mixed.information.copy_from_slice(&on.mean);
         // what no vector excludes is looked at once
         on.tried.clear();
@@ -188,12 +203,12 @@ impl<'a> Screen<'a> {
 
     /// Takes out of `alive` what a test excludes: how many.
     fn apply(&self, test: &Test, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) -> usize {
-        let Scratch { energy, lanes, .. } = on;
+        let Scratch { energy, lanes, sizes, .. } = on;
         energy.clear();
         energy.resize(alive.len(), 0.0);
         let (mut known, count) = (0.0, self.evaluator.candidates.len());
         for x in &test.vectors {
-            let z = self.behind(state, x, &mut known);
+            let z = self.behind(state, x, sizes, &mut known);
             lanes.take(&self.positions, x);
             let rows = energy.chunks_exact_mut(count).zip(alive.chunks_exact(count)).enumerate();
             for (c, (energy, _)) in rows.filter(|(_, (_, alive))| alive.contains(&true)) {
@@ -212,34 +227,36 @@ impl<'a> Screen<'a> {
 
     /// Whether a scheme whose `x^T M x` come to `energy` has a criterion above `limit`; what is no number says nothing.
     fn is_worse(&self, most: f64, energy: f64, limit: f64) -> bool {
-        let limit = limit * self.evaluator.dph * (1.0 + SLACK);
+        // of n logarithms up to 100 (D), or n squares
+        let limit = limit * self.evaluator.dph * (1.0 + rounding(64 * self.evaluator.n));
         most > limit * limit * energy
     }
 
     /// `P x`; adds `x^T M_prefix x` and what rounding may hide of the whole energy to `known`.
-    fn behind(&self, state: &State, x: &[f64; MAX], known: &mut f64) -> [f64; 3] {
+    fn behind(&self, state: &State, x: &[f64; MAX], sizes: &[[f64; 3]], known: &mut f64) -> [f64; 3] {
         let n = self.evaluator.n;
-        let (mut sum, mut sizes) = (0.0, 0.0);
+        let mut sum = 0.0;
         for (i, xi) in x[..n].iter().enumerate() {
             let row = &state.information[i * n..=i * n + i];
-            let (mut line, mut size) = (0.0, 0.0);
-            for (m, xj) in row[..i].iter().zip(x) {
-                line += m * xj;
-                size += (m * xj).abs();
-            }
+            let line: f64 = row[..i].iter().zip(x).map(|(m, xj)| m * xj).sum();
             sum += xi * (2.0 * line + row[i] * xi);
-            sizes += xi.abs() * (2.0 * size + row[i] * xi.abs());
         }
-        let mut z = [0.0; 3];
-        let mut psi = 0.0f64;
-        for (z, row) in z.iter_mut().zip(&state.psi) {
-            let size: f64 = row.iter().zip(x).map(|(p, x)| (p * x).abs()).sum();
-            *z = row.iter().zip(x).map(|(p, x)| p * x).sum();
-            psi = psi.max(size);
+        let z = state.psi.each_ref().map(|row| row.iter().zip(x).map(|(p, x)| p * x).sum());
+        let (mut size, mut counting) = ([0.0; 3], [0.0; 2]);
+        for (i, (x, sizes)) in x.iter().zip(sizes).enumerate() {
+            (0..3).for_each(|k| size[k] += x.abs() * sizes[k]);
+            if i >= 3 + self.evaluator.nuisance {
+                counting[0] += x * x;
+                counting[1] += sizes.iter().map(|s| s * s).sum::<f64>();
+            }
         }
-        let coefficients = x[3..n].iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let terms = (4 * n + 64) as f64 * f64::EPSILON;
-        *known += sum + terms * (sizes + self.reach.of_two(psi, coefficients));
+        let eigenvalues = match self.criterion {
+            Criterion::E => rounding(3 * EIGENVALUES * n) * counting[0] * counting[1],
+            _ => 0.0,
+        };
+        // of each position its functionals, their products and sums, and those of x with them; then the decomposition, of which the
+        // root of each m_ii is at most the sum of the three
+        *known += sum + rounding(8 * n + 128) * size.iter().map(|s| s * s).sum::<f64>() + eigenvalues;
         z
     }
 
@@ -333,32 +350,39 @@ impl<'a> Screen<'a> {
 }
 
 impl Reach {
+    /// Of the candidates of an evaluator without priors, `alone` behind nothing.
     fn of(evaluator: &Evaluator, alone: &[State]) -> Self {
         let n = evaluator.n;
-        let sum = |row: &[f64]| row.iter().map(|x| x.abs()).sum::<f64>();
-        let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(1.0, f64::max);
-        let after = || alone.iter().flat_map(|a| &a.psi);
-        let grow = largest(&mut after().map(|row| sum(&row[..3])));
-        let gain = largest(&mut after().map(|row| sum(&row[3..])));
-        let part = |of: &dyn Fn(&[f64], usize) -> f64| {
-            let whole = |a: &State| (0..n).map(|i| of(&a.information[i * n..=i * n + i], i)).sum();
-            alone.iter().map(whole).fold(0.0, f64::max)
-        };
-        let information = [
-            part(&|row, i| if i < 3 { 2.0 * sum(row) } else { 0.0 }),
-            part(&|row, i| if i < 3 { 0.0 } else { 2.0 * sum(&row[..3]) }),
-            part(&|row, i| if i < 3 { 0.0 } else { 2.0 * sum(&row[3..]) }),
-        ];
-        Self { psi: [grow, gain], information }
+        let mut out = Self { psi: 0.0, own: vec![0.0; n], grow: 1.0, gain: vec![0.0; n] };
+        let start = evaluator.start();
+        for (c, state) in alone.iter().enumerate() {
+            let local = evaluator.functionals::<LOCAL, MAX>(&start, c.into());
+            let dwelling = evaluator.dwelling_of(c);
+            let size = |i: usize| -> f64 {
+                local.iter().enumerate().map(|(a, row)| dwelling.local[a][a].sqrt() * row[i].abs()).sum()
+            };
+            // psi is turned from the platform axes to n and back: two matrices whose rows have sizes up to sqrt(3)
+            let after = |row: &[f64]| 3.0 * row.iter().map(|x| x.abs()).sum::<f64>();
+            out.psi = out.psi.max((0..3).map(size).sum());
+            out.grow = state.psi.iter().fold(out.grow, |m, row| m.max(after(&row[..3])));
+            for i in 3..n {
+                out.own[i] = out.own[i].max(size(i));
+                out.gain[i] = state.psi.iter().fold(out.gain[i], |m, row| m.max(after(&row[i..=i])));
+            }
+        }
+        out
     }
 
-    /// The sum of the sizes of all that two positions add.
-    fn of_two(&self, psi: f64, coefficients: f64) -> f64 {
-        let [grow, gain] = self.psi;
-        let on = |psi: f64| grow * psi + gain * coefficients;
-        let psi = on(on(psi)).max(psi);
-        let [zz, zx, xx] = self.information;
-        2.0 * (zz * psi * psi + zx * psi * coefficients + xx * coefficients * coefficients)
+    /// Of every unknown the root of what it adds to M in the prefix and at two positions behind it, at most.
+    fn behind(&self, state: &State, sizes: &mut Vec<[f64; 3]>) {
+        let n = self.own.len();
+        sizes.clear();
+        sizes.extend((0..n).map(|i| {
+            let known = state.information[i * n + i].max(0.0).sqrt();
+            let psi = state.psi.iter().fold(0.0f64, |m, row| m.max(row[i].abs()));
+            let first = psi * self.psi + self.own[i];
+            [known, first, (self.grow * psi + self.gain[i]) * self.psi + self.own[i]]
+        }));
     }
 }
 

@@ -22,7 +22,7 @@ use super::walks::is_walk;
 use super::ways::Stop;
 use super::{CriterionName, DesignError, DesignOptions, EXHAUSTIVE, divide, refine, winner};
 
-/// Most sets whose keys are held.
+/// Most sets of which a bit is held for every degree.
 const MOST_SETS: u64 = 5_000_000;
 /// Most prefixes and sets that are looked at for the minimum, when it is not what was asked for.
 const MINIMUM_SETS: u64 = 1_000_000;

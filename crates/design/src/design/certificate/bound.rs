@@ -14,6 +14,8 @@
 
 use nalgebra::DMatrix;
 
+use super::bounded::rounding;
+
 /// What is to be small, of the inverse of an information matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Aim {
@@ -47,11 +49,6 @@ pub(super) struct Dual {
     pub(super) x: DMatrix<f64>,
     /// The weight of every column's aim, none below 0 (shape t, sum 1); empty where there are none.
     pub(super) shares: Vec<f64>,
-}
-
-/// Relative error of a sum of `terms` products, each rounded a few times.
-fn rounding(terms: usize) -> f64 {
-    (terms + 16) as f64 * f64::EPSILON
 }
 
 impl Additive {

@@ -5,13 +5,18 @@
 //! trigonometric polynomial of its angle, of degree n = 2, 4, 6 for drift terms of no, one, two factors of g; it is not
 //! negative. So with D its maximum over all attitudes, `d >= D (1 + cos(n a)) / 2` at an angle a <= pi / n from there (M.
 //! Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))` over a net that is never further than h.
+//!
+//! G, the information on drift and accelerometers that a dwell gives, is taken as double precision gives it; what is said is of `d` with this G
+//! and X at all rotations C. Rounding: d is evaluated at the nodes of an interpolation with a bound on its rounding, that of cosines included (`bounded`).
+//! Interpolation makes of errors r at the nodes at most `L^2 r`, L the largest sum of the sizes of its weights.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64};
+use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64, earth_rate_in, elementary, product};
 use rayon::prelude::*;
 
 use super::super::criterion::{Criterion, Limits};
 use super::super::information::Evaluator;
+use super::bounded::{Bounded, Bounds, rounding};
 use super::weights::{Weighed, listed, weigh};
 
 /// Step of the net of Euler angles on which attitudes are looked for, in degrees.
@@ -24,10 +29,10 @@ const TAKEN: usize = 24;
 const ROUNDS: usize = 25;
 /// What adds less than this part more is not taken up.
 const GAIN: f64 = 1e-5;
+/// A whole turn in 1e-9 degrees.
+const FULL: u64 = 360_000_000_000;
 /// Weights below are no support.
 const SUPPORT: f64 = 1e-7;
-/// The information of a position is evaluated in two ways that differ by rounding: assumed, not derived.
-const ROUNDING: f64 = 1e-8;
 
 /// What weights on all attitudes reach, and what nothing is below.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,11 +92,15 @@ impl Evaluator {
         }
         // h: rates of three angles, of which two axes may coincide, are a turn of at most sqrt(5) times the largest
         let h = 5f64.sqrt() * (FINE as f64 / 2.0).to_radians();
-        let n = self.degree() as f64;
-        let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
-        let on_net = on_net(FINE, self.degree(), &energy).map(|(_, d)| d).reduce(|| 0.0, f64::max);
+        let n = self.degree();
+        let g = self.information_of_effects();
+        let energy = |e: &Euler| self.energy_bounded(e, &g, &found.dual.x) * scale;
+        let on_net = on_net(FINE, n, &|e| energy(e).value).map(|(_, d)| d).reduce(|| 0.0, f64::max);
+        let (hidden, moved) = hidden(FINE, n, &energy);
+        let part = (1.0 + (n as f64 * h).cos()) / 2.0 * (1.0 - rounding(0));
+        let most = (on_net + hidden) / (part - moved) * (1.0 + rounding(0));
         let known = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
-        let most = (2.0 * on_net / (1.0 + (n * h).cos())).max(known) * (1.0 + ROUNDING);
+        let most = most.max(known);
         let value = problem.lower_bound_over(&found.dual, most).sqrt();
         let support = eulers.iter().zip(&here.candidates).zip(&found.weights).filter(|(_, w)| **w > SUPPORT);
         let (support, weights): (Vec<Euler>, Vec<f64>) =
@@ -120,6 +129,68 @@ impl Evaluator {
         sum
     }
 
+    /// The same at the rotation of these angles, G being `g`.
+    fn energy_bounded(&self, euler: &Euler, g: &[[f64; LOCAL - 3]; LOCAL - 3], x: &DMatrix<f64>) -> Bounded {
+        let rows = self.effects_bounded(euler);
+        let column = |column: nalgebra::DVectorView<'_, f64>| -> Bounded {
+            let y = rows
+                .each_ref()
+                .map(|row| row.iter().zip(column.iter()).map(|(a, b)| *a * *b).sum::<Bounded>());
+            let weighted = g.iter().map(|row| row.iter().zip(&y).map(|(g, y)| *y * *g).sum());
+            weighted.zip(&y).map(|(g, y): (Bounded, _)| g * *y).sum()
+        };
+        x.column_iter().map(column).sum()
+    }
+
+    /// What coefficients make of drift and accelerometers at the rotation of these angles.
+    fn effects_bounded(&self, euler: &Euler) -> [Vec<Bounded>; LOCAL - 3] {
+        let turn = |axis: usize| {
+            let (cos, sin) = euler[axis].turn().cos_sin_f64();
+            // an angle below a whole turn is rounded three times on its way to radians; nothing is at right angles
+            let radius = if cos * sin == 0.0 { 0.0 } else { 16.0 * f64::EPSILON };
+            elementary(&Bounds, axis, &(Bounded { value: cos, radius }, Bounded { value: sin, radius }))
+        };
+        let c = product(&Bounds, &product(&Bounds, &turn(0), &turn(1)), &turn(2));
+        let [w_u, w_n] = [self.w[1][2], -self.w[0][2]].map(Bounded::exact);
+        let errors = self.platform.errors();
+        let drift = errors.drift_rows(&Bounds, &c, || earth_rate_in(&Bounds, &c, &w_n, &w_u));
+        let of_z = match self.platform.observed().accelerometers {
+            true => errors.accelerometer_rows(&Bounds, &c),
+            false => Default::default(),
+        };
+        let mut rows = drift.into_iter().chain(of_z).map(|row| self.in_order(&row));
+        std::array::from_fn(|_| rows.next().unwrap_or_default())
+    }
+
+    /// How far the information of the positions of a sequence, as the search has it, is from that of the rotations of their angles with G as it is, at
+    /// most (m x m, sizes).
+    pub(in super::super) fn errors_of<'e>(
+        &self,
+        positions: impl Iterator<Item = (usize, &'e Euler)>,
+    ) -> DMatrix<f64> {
+        let (n, m) = (self.n, self.n - 3);
+        let g = self.information_of_effects();
+        let g = DMatrix::from_fn(LOCAL - 3, LOCAL - 3, |i, j| g[i][j]);
+        let mut sum = DMatrix::zeros(m, m);
+        for (candidate, euler) in positions {
+            let rows = self.effects_bounded(euler);
+            let of = |part: &dyn Fn(&Bounded) -> f64| {
+                DMatrix::from_fn(LOCAL - 3, m, |r, j| rows[r].get(j).map_or(0.0, part))
+            };
+            let (value, radius) = (of(&|y| y.value), of(&|y| y.radius));
+            let size = value.abs() + &radius;
+            let own = &self.candidates[candidate].own;
+            let own = DMatrix::from_fn(m, m, |i, j| own[(3 + i.max(j)) * n + 3 + i.min(j)]);
+            let half = size.transpose() * g.abs();
+            let moved = &half * &radius;
+            sum += (own - value.transpose() * &g * &value).abs()
+                + half * &size * rounding(2 * LOCAL)
+                + moved.transpose()
+                + moved;
+        }
+        sum * (1.0 + rounding(4 * LOCAL))
+    }
+
     /// Degree of `d` along a rotation.
     fn degree(&self) -> usize {
         let factors = self.platform.error_terms().iter().map(|t| t.factors.len()).max().unwrap_or(0);
@@ -127,31 +198,66 @@ impl Evaluator {
     }
 }
 
+/// The nodes that determine a trigonometric polynomial of degree n, and the weights of its values there at every `step` degrees.
+fn interpolation(step: usize, n: usize) -> (Vec<f64>, DMatrix<f64>) {
+    let count = 2 * n + 1;
+    let nodes: Vec<f64> = (0..count).map(|i| 360.0 * i as f64 / count as f64).collect();
+    let kernel = |x: f64| (1..=n).map(|k| 2.0 * (k as f64 * x).cos()).sum::<f64>() + 1.0;
+    let weights = DMatrix::from_fn(360_usize.div_ceil(step), count, |a, i| {
+        kernel(((a * step) as f64 - nodes[i]).to_radians()) / count as f64
+    });
+    (nodes, weights)
+}
+
+/// The nodes of alpha and gamma at one of beta, to 1e-9 degrees.
+fn at(alpha: f64, beta: f64, gamma: f64) -> Euler {
+    [alpha, beta, gamma].map(|x| Angle::from_nanodeg((x * 1e9).round() as i64))
+}
+
+/// A quarter of a turn down and up, in degrees.
+fn betas(step: usize) -> Vec<f64> {
+    (0..=180).step_by(step).map(|b| b as f64 - 90.0).collect()
+}
+
 /// A function of the attitude on a net of Euler angles in degrees. Along alpha and gamma, which turn about fixed axes, it is a trigonometric
 /// polynomial of degree n: 2 n + 1 values of each determine the others (the interpolation adds a few roundings to them).
 fn on_net(
     step: usize,
     n: usize,
-    energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync),
+    energy: &(dyn Fn(&Euler) -> f64 + Sync),
 ) -> impl ParallelIterator<Item = ([f64; 3], f64)> {
-    let nodes = 2 * n + 1;
-    let node = move |i: usize| 360.0 * i as f64 / nodes as f64;
-    let full: Vec<f64> = (0..360).step_by(step).map(f64::from).collect();
-    let kernel = |x: f64| (1..=n).map(|k| 2.0 * (k as f64 * x).cos()).sum::<f64>() + 1.0;
-    let weights =
-        DMatrix::from_fn(full.len(), nodes, |a, i| kernel((full[a] - node(i)).to_radians()) / nodes as f64);
-    let half: Vec<f64> = (0..=180).step_by(step).map(|b| f64::from(b) - 90.0).collect();
-    half.into_par_iter().flat_map_iter(move |b| {
-        let at =
-            |i: usize, j: usize| [node(i), b, node(j)].map(|x| Angle::from_nanodeg((x * 1e9).round() as i64));
-        let values = DMatrix::from_fn(nodes, nodes, |i, j| energy(&c_n_f64(&at(i, j))));
+    let (nodes, weights) = interpolation(step, n);
+    betas(step).into_par_iter().flat_map_iter(move |b| {
+        let count = nodes.len();
+        let values = DMatrix::from_fn(count, count, |i, j| energy(&at(nodes[i], b, nodes[j])));
         let all = &weights * values * weights.transpose();
-        let full = full.clone();
-        (0..full.len() * full.len()).map(move |k| {
-            let (i, j) = (k / full.len(), k % full.len());
-            ([full[i], b, full[j]], all[(i, j)])
+        let full = weights.nrows();
+        (0..full * full).map(move |k| {
+            let (i, j) = (k / full, k % full);
+            ([(i * step) as f64, b, (j * step) as f64], all[(i, j)])
         })
     })
+}
+
+/// What the values of [`on_net`] may be off by rounding, from what is known of those at the nodes; and what nodes that are no multiples of
+/// 1e-9 degrees add, as a part of the largest value of the function anywhere.
+fn hidden(step: usize, n: usize, energy: &(dyn Fn(&Euler) -> Bounded + Sync)) -> (f64, f64) {
+    let (nodes, weights) = interpolation(step, n);
+    let count = nodes.len();
+    let both = |b: f64| {
+        let all = nodes.iter().flat_map(|a| nodes.iter().map(move |c| energy(&at(*a, b, *c))));
+        all.fold((0.0, 0.0), |(size, radius): (f64, f64), x| (size.max(x.value.abs()), radius.max(x.radius)))
+    };
+    let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
+    let (size, radius) = betas(step).into_par_iter().map(both).reduce(|| (0.0, 0.0), larger);
+    // arguments up to 2 pi k are off by some 26 k u, cosines by u, and their sum by (n + 1) u of its size
+    let weight = (14 * n + 16) as f64 * f64::EPSILON;
+    let sizes = weights.row_iter().map(|row| row.iter().map(|w| w.abs()).sum::<f64>()).fold(0.0, f64::max);
+    let sizes = sizes + weight * count as f64;
+    let by_weights = 2.0 * weight * count as f64 * sizes + rounding(2 * count) * sizes * sizes;
+    // half a unit of each of two angles, where a slope is at most n / 2 of the largest value (S. N. Bernstein, of d - D / 2)
+    let off = if FULL.is_multiple_of(count as u64) { 0.0 } else { 1e-9f64.to_radians() };
+    (sizes * sizes * radius + by_weights * size, sizes * sizes * n as f64 / 2.0 * off)
 }
 
 fn matrix(degrees: [f64; 3]) -> Matrix3<f64> {
@@ -177,7 +283,7 @@ fn angles(c: &Matrix3<f64>) -> Euler {
 
 /// Attitudes where the energy is largest near the points of the coarse net that have most of it, largest first.
 fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
-    let mut points: Vec<([f64; 3], f64)> = on_net(COARSE, n, energy).collect();
+    let mut points: Vec<([f64; 3], f64)> = on_net(COARSE, n, &|e| energy(&c_n_f64(e))).collect();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut taken: Vec<([f64; 3], Matrix3<f64>)> = Vec::new();
     for (e, _) in points {
@@ -238,7 +344,7 @@ mod tests {
             let x = DMatrix::from_fn(evaluator.n - 3, 3, |_, _| draw());
             let energy = |c: &Matrix3<f64>| evaluator.energy(c, &x);
             let off = |n: usize| {
-                let all: Vec<_> = on_net(20, n, &energy).collect();
+                let all: Vec<_> = on_net(20, n, &|e| energy(&c_n_f64(e))).collect();
                 assert_eq!(all.len(), 18 * 10 * 18);
                 let largest = all.iter().map(|(_, d)| *d).fold(0.0, f64::max);
                 let far = all.iter().map(|(e, d)| (d - energy(&matrix(*e))).abs()).fold(0.0, f64::max);

@@ -2,9 +2,14 @@
 //! of every scheme of k candidates, from the optimal weights of the candidates (approximate design theory).
 
 mod bound;
+mod bounded;
+#[cfg(test)]
+mod exact;
 mod free;
+mod scheme;
 mod weights;
 
+pub(super) use bounded::rounding;
 pub use free::Everywhere;
 
 use nalgebra::{DMatrix, DVector};
@@ -97,14 +102,16 @@ impl Evaluator {
         for candidate in every.iter().map(Some).chain(every.is_empty().then_some(None)) {
             let (mut vectors, mut offsets) = (coefficients.clone(), none.clone());
             for (k, limit) in limits.psi.iter().enumerate().filter(|(_, l)| l.is_finite()) {
-                let Some((own, moved)) = candidate.and_then(|&c| self.psi_by_coefficients(c, k)) else {
+                let Some(psi) = candidate.map(|&c| self.own_psi(c)).filter(|p| p.variances[k].is_finite())
+                else {
                     continue;
                 };
                 let unit = 1f64.to_degrees() / limit;
                 let at = vectors.ncols();
                 vectors = vectors.insert_column(at, 0.0);
-                vectors.set_column(at, &(DVector::from_vec(moved) * (unit * self.dph)));
-                offsets.push(own * unit * unit);
+                let moved = psi.moved.iter().map(|moved| moved[k] * unit * self.dph);
+                vectors.set_column(at, &DVector::from_iterator(psi.moved.len(), moved));
+                offsets.push(psi.variances[k] * unit * unit);
             }
             let found = self.weighed(Aim::Largest(vectors, offsets), k, going)?;
             if least.as_ref().is_none_or(|l| found.value < l.value) {

@@ -1,0 +1,163 @@
+//! The same in balls of 512 bits, for tests: other arithmetic, by elimination.
+
+use obsdeg_core::model::Ring;
+use obsdeg_exact::Ball;
+
+use super::super::criterion::Criterion;
+use super::super::information::Evaluator;
+use super::super::ways::Stop;
+
+pub(super) type Real = Ball<8>;
+
+pub(super) fn real(x: f64) -> Real {
+    Real::from_f64(x)
+}
+
+/// The ring of balls.
+pub(super) struct Reals;
+
+impl Ring for Reals {
+    type Element = Real;
+    fn zero(&self) -> Real {
+        Real::ZERO
+    }
+    fn one(&self) -> Real {
+        real(1.0)
+    }
+    fn add(&self, a: &Real, b: &Real) -> Real {
+        a.add(b)
+    }
+    fn mul(&self, a: &Real, b: &Real) -> Real {
+        a.mul(b)
+    }
+    fn neg(&self, a: &Real) -> Real {
+        a.neg()
+    }
+    fn is_zero(&self, a: &Real) -> bool {
+        a.is_exactly_zero()
+    }
+}
+
+pub(super) fn square_root(x: &Real) -> f64 {
+    x.sqrt().expect("not negative").to_f64()
+}
+
+type Matrix = Vec<Vec<Real>>;
+
+/// The information of a scheme on the coefficients, the sum of that of its positions, and its inverse.
+pub(super) struct Exact {
+    /// (m x m)
+    inverse: Matrix,
+    nuisance: usize,
+    dph: f64,
+}
+
+impl Exact {
+    pub(super) fn of(evaluator: &Evaluator, sequence: &[Stop]) -> Self {
+        let (n, m) = (evaluator.n, evaluator.n - 3);
+        let start = evaluator.start().information;
+        let entry = |i: usize, j: usize| {
+            let place = (3 + i.max(j)) * n + 3 + i.min(j);
+            let own = sequence.iter().map(|s| real(evaluator.candidates[s.candidate].own[place]));
+            own.fold(real(start[place]), |sum, x| sum.add(&x))
+        };
+        let information: Matrix = (0..m).map(|i| (0..m).map(|j| entry(i, j)).collect()).collect();
+        Self { inverse: inverted(information), nuisance: evaluator.nuisance, dph: evaluator.dph }
+    }
+
+    fn counting(&self) -> std::ops::Range<usize> {
+        self.nuisance..self.inverse.len()
+    }
+
+    /// The square of a criterion but E's.
+    pub(super) fn squared(&self, criterion: &Criterion, evaluator: &Evaluator, sequence: &[Stop]) -> Real {
+        let unit = real(self.dph).mul(&real(self.dph)).inverse().expect("not zero");
+        let d = self.counting().len();
+        let variances: Vec<Real> = self.counting().map(|j| self.inverse[j][j].mul(&unit)).collect();
+        let largest = |list: Vec<Real>| {
+            list.into_iter().fold(Real::ZERO, |a, b| if b.sub(&a).is_positive() { b } else { a })
+        };
+        match criterion {
+            Criterion::A => {
+                let sum = variances.iter().fold(Real::ZERO, |sum, v| sum.add(v));
+                sum.div(&Real::from_i64(d as i64)).expect("some")
+            }
+            Criterion::D => {
+                // the determinant of the block, by elimination
+                let block: Matrix = self
+                    .counting()
+                    .map(|i| self.counting().map(|j| self.inverse[i][j].mul(&unit)).collect())
+                    .collect();
+                let logs = pivots(block).into_iter().map(|p| p.ln().expect("positive"));
+                let sum = logs.fold(Real::ZERO, |sum, x| sum.add(&x));
+                sum.div(&Real::from_i64(d as i64)).expect("some").exp().expect("finite")
+            }
+            Criterion::Margin(limits) => {
+                let over =
+                    |(v, limit): (&Real, &f64)| v.div(&real(*limit).mul(&real(*limit))).expect("a limit");
+                let mut all: Vec<Real> = variances.iter().zip(&limits.coefficients).map(over).collect();
+                let to_degrees = real(180.0).div(&Real::pi()).expect("not zero");
+                for stop in sequence {
+                    let own = evaluator.own_psi(stop.candidate);
+                    for k in (0..3).filter(|&k| limits.psi[k].is_finite()) {
+                        let moved: Vec<Real> = own.moved.iter().map(|x| real(x[k])).collect();
+                        let dot = |row: &Vec<Real>| Reals.dot(row.iter().zip(&moved));
+                        let through: Vec<Real> = self.inverse.iter().map(dot).collect();
+                        let variance = real(own.variances[k]).add(&Reals.dot(through.iter().zip(&moved)));
+                        let unit = to_degrees.div(&real(limits.psi[k])).expect("a limit");
+                        all.push(variance.mul(&unit).mul(&unit));
+                    }
+                }
+                largest(all)
+            }
+            _ => largest(variances),
+        }
+    }
+
+    /// Whether every principal sigma of what counts is below this.
+    pub(super) fn covariance_is_below(&self, sigma: f64) -> bool {
+        let limit = real(sigma).mul(&real(self.dph));
+        let limit = limit.mul(&limit);
+        let left = |i: usize, j: usize| {
+            let own = if i == j { limit } else { Real::ZERO };
+            own.sub(&self.inverse[i][j])
+        };
+        let left = self.counting().map(|i| self.counting().map(|j| left(i, j)).collect()).collect();
+        pivots(left).iter().all(Real::is_positive)
+    }
+}
+
+/// The pivots of a symmetric matrix, by elimination from the first on.
+fn pivots(mut a: Matrix) -> Vec<Real> {
+    let n = a.len();
+    for p in 0..n {
+        let row = a[p].clone();
+        let Some(inverse) = row[p].inverse() else { break };
+        for below in &mut a[p + 1..] {
+            let factor = below[p].mul(&inverse);
+            below.iter_mut().zip(&row).for_each(|(x, y)| *x = x.sub(&factor.mul(y)));
+        }
+    }
+    (0..n).map(|i| a[i][i]).collect()
+}
+
+/// The inverse of a positive matrix, by Gauss and Jordan.
+fn inverted(mut a: Matrix) -> Matrix {
+    let n = a.len();
+    let mut out: Matrix =
+        (0..n).map(|i| (0..n).map(|j| real(f64::from(u8::from(i == j)))).collect()).collect();
+    for p in 0..n {
+        let inverse = a[p][p].inverse().expect("not singular");
+        for x in a[p].iter_mut().chain(&mut out[p]) {
+            *x = x.mul(&inverse);
+        }
+        for i in (0..n).filter(|&i| i != p) {
+            let factor = a[i][p];
+            for of in [&mut a, &mut out] {
+                let row = of[p].clone();
+                of[i].iter_mut().zip(&row).for_each(|(x, y)| *x = x.sub(&factor.mul(y)));
+            }
+        }
+    }
+    out
+}
