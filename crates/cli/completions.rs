@@ -105,8 +105,5 @@ pub(crate) fn man(a: &ManArguments) -> Result<(), Failure> {
             "-o - is stdout; expected a folder for the pages (one goes to stdout without -o)".into(),
         ));
     }
-    // a home of one's own may have no manual yet
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::input(format!("cannot write {}: {e}", folder.display())))?;
     output::write_files(folder, &files, a.force)
 }

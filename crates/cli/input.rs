@@ -81,6 +81,9 @@ pub(crate) fn read(path: &Path, what: &str) -> Result<Source, Failure> {
     } else {
         let file = open(path).map_err(wrong)?;
         let metadata = file.metadata().map_err(wrong)?;
+        if metadata.is_dir() {
+            return Err(Failure::input(format!("{name} is a folder; expected a {what} file")));
+        }
         if metadata.is_file() && metadata.len() > MAX_FILE {
             return Err(too_large(&metadata.len().to_string()));
         }

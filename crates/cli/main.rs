@@ -25,7 +25,7 @@ mod simulate;
 
 use std::process::ExitCode;
 
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValuesParser, ValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -83,13 +83,17 @@ enum Command {
     Schema(schema::Arguments),
 }
 
-/// The command line as it is read: a negative number behind an option is its value, so that the option can say what it expects.
+/// The command line as it is read: a negative number behind an option is its value, so that the option can say what it expects. Behind an
+/// option that takes one any exponent counts (`-1e-5`); behind others only what cannot be an option.
 fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
+    let number = ValueParser::from(clap::value_parser!(f64)).type_id();
     let command = Cli::command().mut_subcommands(move |command| {
-        command.mut_args(|a| {
-            if takes(&a) && !a.is_allow_hyphen_values_set() { a.allow_negative_numbers(true) } else { a }
+        command.mut_args(|a| match takes(&a) && !a.is_allow_hyphen_values_set() {
+            true if a.get_value_parser().type_id() == number => a.allow_hyphen_values(true),
+            true => a.allow_negative_numbers(true),
+            false => a,
         })
     });
     let pages: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_string()).collect();
@@ -98,21 +102,33 @@ fn command() -> clap::Command {
     })
 }
 
-/// Where an argument belongs that a command does not know: the commands that have such an option, or where the positions of a scheme file
-/// go that was given to `design`.
+/// Where an argument belongs that a command does not know: the commands that have such an option, where a file goes that no command is named
+/// for, or where the positions of a scheme file go that was given to `design`.
 fn hint(e: &clap::Error) -> Option<String> {
+    let is_file =
+        |text: &str| std::path::Path::new(text).extension().is_some_and(|x| x == "toml" || x == "json");
+    if let (ErrorKind::InvalidSubcommand, Some(ContextValue::String(found))) =
+        (e.kind(), e.get(ContextKind::InvalidSubcommand))
+    {
+        return is_file(found).then(|| format!("a scheme or model is judged by `obsdeg analyze {found}`"));
+    }
     let Some(ContextValue::String(found)) = e.get(ContextKind::InvalidArg) else { return None };
     if e.kind() != ErrorKind::UnknownArgument {
         return None;
     }
     let command = command();
-    if let Some(option) = found.strip_prefix("--") {
-        let has = |c: &&clap::Command| c.get_arguments().any(|a| a.get_long() == Some(option));
+    if let Some(option) = found.strip_prefix('-') {
+        let has = |c: &&clap::Command| {
+            c.get_arguments().any(|a| match option.strip_prefix('-') {
+                Some(long) => a.get_long() == Some(long),
+                None => a.get_short().is_some_and(|short| option.starts_with(short)),
+            })
+        };
         let names: Vec<&str> = command.get_subcommands().filter(has).map(clap::Command::get_name).collect();
         let named = names.iter().map(|name| format!("`obsdeg {name}`")).collect::<Vec<_>>().join(", ");
         return (!names.is_empty()).then(|| format!("{found} is an option of {named}"));
     }
-    if !std::path::Path::new(found).extension().is_some_and(|x| x == "toml" || x == "json") {
+    if !is_file(found) {
         return None;
     }
     let asked = std::env::args().skip(1).find_map(|a| command.find_subcommand(a).cloned())?;
@@ -132,6 +148,9 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
         if let Some(hint) = hint(&e) {
             e.remove(ContextKind::SuggestedArg);
             e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint.into()]));
+        } else if e.kind() == ErrorKind::UnknownArgument {
+            // that it might be meant as a file whose name begins so
+            e.remove(ContextKind::Suggested);
         }
         let message = e.render().to_string();
         let text = message.lines().all(|line| visible(line) == line);

@@ -247,9 +247,7 @@ impl Target {
     }
 
     fn check_emptiness(&self, path: &Path) -> Result<(), Failure> {
-        if path.exists() && !path.is_dir() {
-            return Err(Failure::input(format!("{} is a file; expected a folder", path.display())));
-        }
+        check_is_folder(path)?;
         let occupied = std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
         if occupied && !self.force {
             return Err(Failure::input(format!(
@@ -284,11 +282,22 @@ fn cannot_write(path: &Path, e: &std::io::Error) -> Failure {
     Failure::input(format!("cannot write {}: {e}", path.display()))
 }
 
-/// Puts files into a folder; those that are there are replaced only when `force` says so.
+/// Refuses what is there and is no folder.
+fn check_is_folder(path: &Path) -> Result<(), Failure> {
+    match path.exists() && !path.is_dir() {
+        true => Err(Failure::input(format!("{} is a file; expected a folder", path.display()))),
+        false => Ok(()),
+    }
+}
+
+/// Puts files into a folder, which is made where there is none; those that are there are replaced only when `force` says so.
 pub(crate) fn write_files(folder: &Path, files: &[File], force: bool) -> Result<(), Failure> {
+    check_is_folder(folder)?;
     if let Some((path, _)) = below(folder, files).find(|(path, _)| path.exists() && !force) {
         return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
     }
+    // a home of one's own may have no manual yet
+    std::fs::create_dir_all(folder).map_err(|e| cannot_write(folder, &e))?;
     place(folder, &below(folder, files).collect::<Vec<_>>())
 }
 

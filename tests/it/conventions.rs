@@ -189,6 +189,32 @@ fn whole_numbers() {
     refused(&[&P1P2[..], &["--order", "99999999999999999999"]].concat(), &["0 to 1000, found 9999"]);
 }
 
+/// Wrong inputs of every kind: the place, what was expected, what was found, what to do instead.
+#[test]
+fn wrong_inputs_are_told_with_a_hint() {
+    let (folder, _) = scratch();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(at("file.txt"), "text").expect("written");
+    let scheme = "examples/pole/scheme.toml";
+    // a number with an exponent is a number
+    refused(&["simulate", scheme, "--noise", "-1e-5"], &["--noise", "'-1e-5'", "expected 1e-15 to 1000 g"]);
+    refused(&["simulate", scheme, "--noise", "--step", "5"], &["--noise", "'--step'", "expected 1e-15"]);
+    // folders and files
+    refused(&["analyze", "examples"], &["examples is a folder", "expected a scheme or model file"]);
+    for command in [&["man", "-o"][..], &[&["analyze", scheme, "--figures"][..]].concat()] {
+        refused(&[command, &[&at("file.txt")]].concat(), &["file.txt is a file; expected a folder"]);
+    }
+    // what another command wrote
+    let part = ["design", "--positions", "5", "--merge", scheme];
+    refused(&part, &["scheme.toml: it is no part", "expected the file that `obsdeg design --part` wrote"]);
+    let calibration = ["report", scheme, "-o", &at("x.html"), "--calibration", scheme];
+    refused(&calibration, &["scheme.toml: no JSON; expected what `obsdeg calibrate -o` wrote"]);
+    // options of other commands, and files without one
+    refused(&["schema", "model", "-o", "x"], &["-o is an option of `obsdeg analyze`"]);
+    refused(&[scheme], &["a scheme or model is judged by `obsdeg analyze examples/pole/scheme.toml`"]);
+    assert!(!stderr(&run(&["schema", "--kind", "model"])).contains("-- --kind"));
+}
+
 /// What `--axes` is about is said where there are no terms, and of a model.
 #[test]
 fn axes_without_terms() {

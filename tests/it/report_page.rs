@@ -1,10 +1,14 @@
 //! The page of a review: what it begins with, and how it works in a real browser where there is one.
 
-use scraper::Html;
+use std::path::Path;
+
+use obsdeg_core::degree::Status;
+use obsdeg_core::system::{Constant, StateStart, SystemModel, SystemOptions, analyze_system, model_file};
+use scraper::{Html, Selector};
 use serde_json::json;
 
 use crate::browser::Browser;
-use crate::program::run;
+use crate::program::{run, stderr};
 use crate::report::{MODEL, PAPER, assert_unique_ids, hostile, report, statuses, table, texts};
 
 /// The front of a review of several schemes, or of one.
@@ -236,4 +240,95 @@ fn a_browser_shows_it() {
             }
         }
     }
+}
+
+/// The recommended actions of a page, box by box.
+fn actions(page: &Html) -> Vec<Vec<String>> {
+    let parse = |s: &str| Selector::parse(s).expect("a selector");
+    let lines = |e: scraper::ElementRef<'_>| {
+        e.select(&parse(".actions li")).map(|l| l.text().collect::<String>()).collect()
+    };
+    page.select(&parse("body > .front .status")).map(lines).collect()
+}
+
+/// The model with an unknown of it known beforehand, at a generic value.
+fn knowing(model: &SystemModel, name: &str) -> SystemModel {
+    let mut out = model.clone();
+    if let Some(state) = out.states.iter_mut().find(|s| s.named.name == name) {
+        state.start = StateStart::Known;
+        return out;
+    }
+    let at = out.parameters.iter().position(|p| p.name == name).expect("a state or parameter");
+    let known = out.parameters.remove(at);
+    out.constants.push((known, Constant::Generic));
+    out
+}
+
+/// What the box of a model recommends is tried: one unknown of a group known beforehand, each in turn, makes the others observable; where no one
+/// does, that is not said.
+#[test]
+fn a_model_says_what_to_know_beforehand() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let written = |name: &str, text: &str| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, text).expect("written");
+        file.display().to_string()
+    };
+    let page = |file: &str| {
+        let (_, page) = report(folder.path(), "m.html", &[file, "--force"]);
+        actions(&Html::parse_document(&page)).remove(0)
+    };
+    let two = "name='two'\nparameters=['a','b','c','d']\n[states]\nx='-a*b*x'\nw='-c*d*w'\n[outputs]\ny='x'\nv='w'\n";
+    let examples = ["lotka-volterra", "sir", "two-compartment", "unicycle-range"];
+    let examples = examples.map(|name| format!("examples/{name}/model.toml"));
+    let mut groups = 0;
+    for file in examples.into_iter().chain([written("two.toml", two)]) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(&file);
+        let model = model_file::read(&std::fs::read_to_string(path).expect("read")).expect("a model");
+        for line in page(&file) {
+            let list = line.strip_prefix("one of ").and_then(|l| l.split_once(" known beforehand"));
+            let Some((list, _)) = list else { continue };
+            groups += 1;
+            let names: Vec<&str> = list.split(", ").collect();
+            for name in &names {
+                let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+                let found = analyze_system(&knowing(&model, name), options, None).expect("judged");
+                for other in names.iter().filter(|other| *other != name) {
+                    let q = found.quantities.iter().find(|q| q.name == *other).expect("there");
+                    assert_eq!(q.status, Status::Observable, "{file}: {other} with {name} known");
+                }
+            }
+        }
+    }
+    assert_eq!(groups, 6);
+    let three = "name='three'\nparameters=['a','b','c']\n[states]\nx='-a*b*c*x'\n[outputs]\ny='x'\n";
+    let all = page(&written("three.toml", three));
+    assert!(all[0].starts_with("some of a, b, c known beforehand, or another output"), "{all:?}");
+    let one = "name='one'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[simulation]\nduration=10\nstep=0.1\n\
+               values={x=1,k=0.5}\npriors={x=0.01,k=0.01}\nnoise={y=0.001}\n";
+    let all = page(&written("one.toml", one));
+    assert!(all.len() == 1 && all[0].starts_with("none: every unknown is observable"), "{all:?}");
+}
+
+/// The box of a calibration says what to do about what speaks against it, or that there is nothing.
+#[test]
+fn a_calibration_says_what_to_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = "examples/bench-day/record.csv";
+    let of = |scheme: &str, name: &str| {
+        let at = folder.path().join(name);
+        let path = at.display().to_string();
+        let done = run(&["calibrate", scheme, record, "-q", "-o", &path]);
+        assert!(done.status.code().is_some_and(|code| code < 2), "{}", stderr(&done));
+        let page = report(folder.path(), &format!("{name}.html"), &[scheme, "--calibration", &path]).1;
+        let json = std::fs::read_to_string(at.join("calibration.json")).expect("written");
+        (actions(&Html::parse_document(&page)).remove(1), json)
+    };
+    let (none, json) = of("examples/bench-day/scheme.toml", "right");
+    assert!(json.contains("\"findings\": []"));
+    assert!(none.len() == 1 && none[0].starts_with("none: every unknown is determined"), "{none:?}");
+    let (some, json) = of("examples/six-positions/scheme.toml", "wrong");
+    assert!(json.contains("\"kind\": \"position\""));
+    assert!(some.iter().any(|l| l.starts_with("a look at the record at ") && l.contains("p6")), "{some:?}");
+    assert!(!some.iter().any(|l| l.starts_with("none")), "{some:?}");
 }

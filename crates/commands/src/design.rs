@@ -477,8 +477,10 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
 
 /// A part of a search from its file.
 fn read_part(part: &Source) -> Result<Part, Problem> {
-    serde_json::from_str(&part.text)
-        .map_err(|e| Problem::input(format!("{}: it is no part of a search: {e}", part.name)))
+    serde_json::from_str(&part.text).map_err(|e| {
+        let expected = "expected the file that `obsdeg design --part` wrote";
+        Problem::input(format!("{}: it is no part of a search ({e}); {expected}", part.name))
+    })
 }
 
 /// The fewest positions where the way between them counts.

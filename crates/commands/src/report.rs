@@ -157,7 +157,8 @@ fn calibration(source: &Source, entries: &[Entry]) -> Result<(Calibration, usize
     let of_model = source.text.contains("\"obsdeg.system-calibration/");
     let found: Calibration = serde_json::from_str(&source.text).map_err(|e| match of_model {
         true => wrong("the calibration of a model"),
-        false => wrong(&e.to_string()),
+        false if !source.text.trim_start().starts_with('{') => wrong("no JSON"),
+        false => wrong(&format!("no calibration, or one of another version ({e})")),
     })?;
     let differences = entries.iter().map(|e| (&e.name, Setup::of(&e.scheme).differences(&found.setup)));
     let nearest = differences.enumerate().min_by_key(|(_, (_, d))| d.len());

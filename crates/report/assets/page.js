@@ -19,10 +19,10 @@
     const text = variable("--text");
     const line = variable("--line");
     const color = (c) => (names[c.toUpperCase()] ? variable(names[c.toUpperCase()]) : c);
-    const axis = (label, log, whole) => ({
+    const axis = (label, log, whole, space) => ({
       ...(whole ? { incrs: [1, 2, 5, 10, 20, 50] } : {}), label, stroke: text, grid: { stroke: line, width: 0.5 }, ticks: { stroke: line }, size: 64,
       values: (u, marks) => marks.map((v) => (v == null ? "" : shown(v))),
-      ...(log ? {} : { space: 60 }),
+      ...(log ? {} : { space }),
     });
     const scale = (log, range) => ({
       time: false, distr: log ? 3 : 1, ...(range && !log ? { range: (u, low, high) => (u.zoomed ? [low, high] : range) } : {}),
@@ -30,7 +30,7 @@
     const options = {
       title: spec.title, width: Math.max(240, holder.clientWidth), height: 320,
       scales: { x: scale(spec.log_x, null), y: scale(spec.log_y, spec.y_range && !spec.log_y ? spec.y_range : null) },
-      axes: [axis(spec.x, spec.log_x, spec.orders), axis(spec.y, spec.log_y, spec.orders)],
+      axes: [axis(spec.x, spec.log_x, spec.orders, 60), axis(spec.y, spec.log_y, spec.orders, 28)],
       series: [{ label: spec.x, value: (u, v) => shown(v) }].concat(spec.series.map((s) => ({
         label: s.label || "curve", stroke: color(s.color), width: s.width, dash: s.dash, spanGaps: true,
         points: { show: false }, value: (u, v) => shown(v),

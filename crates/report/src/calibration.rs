@@ -6,10 +6,7 @@ use obsdeg_calibration::answer::{
     RecordReport, ResidualSeries,
 };
 
-use crate::document::{
-    Block, Document, Drawing, Finding as StatusRow, Grade, Picture, Status, estimate, left, number, optional,
-    right,
-};
+use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, Table, words};
@@ -78,7 +75,7 @@ fn clock(c: &Clock) -> String {
     }
 }
 
-fn finding(f: &Finding, records: &[RecordReport]) -> String {
+pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
         Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up".into(),
@@ -601,7 +598,7 @@ pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
 }
 
 /// What is left of a component.
-fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figure {
+pub(crate) fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figure {
     let points: Vec<(f64, f64)> = series.points.iter().map(|p| (p.0, p.1)).collect();
     let band = series.points.iter().map(|p| (p.0, -3.0 * p.2, 3.0 * p.2));
     let own = c.positions.iter().filter(|p| p.record == series.record);
@@ -625,7 +622,7 @@ fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figure {
 }
 
 /// The Allan deviation of what is left, beside that of white noise.
-fn allan_figure(series: &ResidualSeries) -> Figure {
+pub(crate) fn allan_figure(series: &ResidualSeries) -> Figure {
     let curve = |of: fn(&(f64, f64, f64)) -> f64| series.allan.iter().map(|p| (p.0, 1e6 * of(p))).collect();
     Figure {
         title: format!("{}: Allan deviation", series.channel),
@@ -641,7 +638,7 @@ fn allan_figure(series: &ResidualSeries) -> Figure {
 }
 
 /// The correlation of what is left with itself, as a bar per lag, and where that of independent residuals lies.
-fn whiteness_figure(series: &ResidualSeries) -> Figure {
+pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
     let lags = series.autocorrelation.len();
     let mut bars = vec![(0.5, 0.0)];
     for (k, r) in series.autocorrelation.iter().enumerate() {
@@ -664,7 +661,7 @@ fn whiteness_figure(series: &ResidualSeries) -> Figure {
 }
 
 /// Estimates by family, each a bar of three sigma as the fit has it.
-fn estimate_figures(c: &Calibration) -> Vec<Figure> {
+pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
     let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
     for e in c.unknowns.iter().filter(|e| e.determined) {
         // D_FX, GM_XY, psi_x (record 2)
@@ -681,7 +678,7 @@ fn estimate_figures(c: &Calibration) -> Vec<Figure> {
     }
     let figure = |(family, own): &(String, Vec<&Estimated>)| {
         let last = own.len() as f64 + 0.5;
-        let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.5, 0.0), (last, 0.0)])];
+        let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.0, 0.0), (last + 0.5, 0.0)])];
         for (i, e) in own.iter().enumerate() {
             let (Some(x), Some(sigma)) = (e.estimate, e.sigma_rescaled) else { continue };
             let (at, half) = (i as f64 + 1.0, 3.0 * sigma);
@@ -706,90 +703,10 @@ fn estimate_figures(c: &Calibration) -> Vec<Figure> {
             x_label: if own.len() > 1 { names.collect::<Vec<_>>().join(", ") } else { String::new() },
             y_label: format!("estimate [{}]", own[0].unit),
             lines,
-            x_range: Some((0.5, last)),
+            x_range: Some((0.0, last + 0.5)),
+            whole_x: true,
             ..Figure::default()
         }
     };
     families.iter().map(figure).collect()
-}
-
-/// What a review has of a calibration: its answer, and its pictures; `id` begins their names.
-pub(crate) fn section(c: &Calibration, id: &str) -> Vec<Block> {
-    let Document { lead, blocks, .. } = c.document();
-    let mut out: Vec<Block> = lead.into_iter().map(Block::Text).collect();
-    let curves = |name: String, caption: String, figure: Figure| {
-        Block::Picture(Picture { name, caption, drawing: Drawing::Curves(Box::new(figure)) })
-    };
-    out.extend(blocks);
-    out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
-        Block::Picture(Picture {
-            name: format!("{id}_estimates_{}", i + 1),
-            caption: format!("Estimates of {}, with three sigma as the fit has it", figure.title),
-            drawing: Drawing::Still(figure.svg()),
-        })
-    }));
-    for (i, s) in c.series.iter().enumerate() {
-        let of = if c.records.len() > 1 { format!(" of {}", s.record) } else { String::new() };
-        let name = |kind: &str| format!("{id}_{kind}_{}", i + 1);
-        let what = &s.channel;
-        out.push(curves(
-            name("residuals"),
-            format!("What the estimate leaves of {what}{of}, with three sigma"),
-            residual_figure(c, s),
-        ));
-        if s.allan.len() > 1 {
-            let caption = format!(
-                "Allan deviation of what is left of {what}{of}: white noise falls with the root of the time, what rises is none of the model"
-            );
-            out.push(curves(name("allan"), caption, allan_figure(s)));
-        }
-        if !s.autocorrelation.is_empty() {
-            let caption = format!("Correlation of what is left of {what}{of} with what comes later");
-            out.push(Block::Picture(Picture {
-                name: name("whiteness"),
-                caption,
-                drawing: Drawing::Still(whiteness_figure(s).svg()),
-            }));
-        }
-    }
-    out
-}
-
-/// The answers that a review begins with.
-pub(crate) fn status(c: &Calibration, title: String) -> Status {
-    let row = |what, grade, text| StatusRow { what, grade, text };
-    let all = c.unknowns.len();
-    let determined = c.unknowns.iter().filter(|u| u.determined).count();
-    let first = c.findings.first().map(|f| finding(f, &c.records));
-    let f = &c.fit;
-    Status {
-        title,
-        rows: vec![
-            row(
-                "Consistent",
-                if c.consistent { Grade::Good } else { Grade::Missed },
-                first.unwrap_or_else(|| "model and sigmas explain the record".into()),
-            ),
-            row(
-                "Determined",
-                if determined == all { Grade::Good } else { Grade::Limited },
-                format!("{determined} of {all} unknowns"),
-            ),
-            row(
-                "Chi-square",
-                if (f.band.0..=f.band.1).contains(&(f.factor * f.factor)) {
-                    Grade::Good
-                } else {
-                    Grade::Limited
-                },
-                format!(
-                    "{:.3} per degree of freedom ({:.3} to {:.3})",
-                    f.factor * f.factor,
-                    f.band.0,
-                    f.band.1
-                ),
-            ),
-        ],
-        actions: Vec::new(),
-    }
 }

@@ -67,7 +67,7 @@ fn by_derivatives(c: &CrossCheck) -> Block {
             right("measured"),
             right("partners"),
             right("measured"),
-            left(""),
+            left("finding"),
         ],
         c.quantities.iter().map(row),
     )
@@ -95,10 +95,10 @@ fn by_unknown(c: &CrossCheck) -> Block {
             right("accuracy order"),
             right("slope predicted"),
             right("measured"),
-            left(""),
+            left("finding"),
             right("factor predicted"),
             right("measured"),
-            left(""),
+            left("finding"),
         ],
         c.quantities.iter().map(row),
     )
@@ -118,7 +118,13 @@ fn by_direction(c: &CrossCheck) -> Block {
     };
     Block::table(
         "b. directions that Z does not see (SI units)",
-        [left("direction"), right("part of it seen"), left(""), right("correlation, signed"), left("")],
+        [
+            left("direction"),
+            right("part of it seen"),
+            left("finding"),
+            right("correlation, signed"),
+            left("finding"),
+        ],
         c.null_space.iter().map(row),
     )
 }
@@ -182,7 +188,8 @@ fn whole(c: &CrossCheck) -> Block {
         let found = format!("{} of {}; {}", k.failed, k.checks, number(k.nis));
         vec![name, "fails".into(), found, format!("(99.9 %: {})", band(k.band)), mark(k.outcome)]
     }));
-    let columns = [left("evidence"), right("predicted"), right("measured"), left("band (95 %)"), left("")];
+    let columns =
+        [left("evidence"), right("predicted"), right("measured"), left("band (95 %)"), left("finding")];
     Block::table("The filter as a whole", columns, rows)
 }
 

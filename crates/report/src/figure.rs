@@ -78,6 +78,8 @@ pub(crate) struct Figure {
     pub(crate) log_y: bool,
     /// Both axes are those of whole numbers.
     pub(crate) orders: bool,
+    /// What is along x is counted: whole numbers.
+    pub(crate) whole_x: bool,
 }
 
 /// Width and height of one figure.
@@ -150,6 +152,9 @@ impl Figure {
         }
         if let Some((low, high)) = self.y_range {
             layout = layout.with_y_axis_min(low).with_y_axis_max(high);
+        }
+        if self.whole_x {
+            layout = layout.with_x_tick_step(1.0).with_x_tick_format(TickFormat::Integer);
         }
         if self.orders {
             let step = |range: Option<(f64, f64)>| {

@@ -1,5 +1,7 @@
 //! The design review: its sections in the order in which a review asks for them.
 
+mod actions;
+mod calibrated;
 mod first;
 mod generic;
 mod model;
@@ -18,7 +20,7 @@ use obsdeg_evidence::simulation::Outcome;
 use crate::analysis::null_vector;
 use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
-use crate::{Answer, Origin, calibration, compare, latex, simulation, words};
+use crate::{Answer, Origin, compare, latex, simulation, words};
 
 /// What a calibration changes of the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
@@ -38,7 +40,7 @@ pub(crate) fn document(
     if r.schemes.len() > 1 {
         first::comparison(&mut blocks, r);
     }
-    let run = calibrations.iter().map(|(name, c)| calibration::status(c, format!("Calibration {name}")));
+    let run = calibrations.iter().map(|(name, c)| calibrated::status(c, format!("Calibration {name}")));
     let all = (reviewed().map(|(s, review)| verdict::status(s, review)))
         .chain(r.generic.iter().map(generic::status))
         .chain(r.models.iter().map(model::status))
@@ -86,7 +88,7 @@ pub(crate) fn document(
     for (i, (name, c)) in calibrations.iter().enumerate() {
         blocks.push(section(1, format!("Calibration {name}")));
         blocks.push(Block::Text(CALIBRATED.into()));
-        blocks.extend(calibration::section(c, &format!("c{}", i + 1)));
+        blocks.extend(calibrated::section(c, &format!("c{}", i + 1)));
     }
     blocks.push(section(1, "Notation"));
     blocks.push(notation::notation(r));
@@ -481,7 +483,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
         .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)
         .map(|q| q.name.as_str())
         .collect();
-    blocks.extend(pictures::errors(&s.traces, &flat, id));
+    blocks.extend(pictures::errors(&s.traces, &flat, "last position", id));
 }
 
 fn checks(blocks: &mut Vec<Block>, c: &CrossCheck, id: &str) {

@@ -301,10 +301,10 @@ impl Answer for SystemEvidence {
                 left("status"),
                 right("degree"),
                 right("slope"),
-                right("measured"),
+                right("slope measured"),
                 right("prior x10"),
-                right("measured"),
-                left(""),
+                right("x10 measured"),
+                left("finding"),
             ],
             self.quantities.iter().map(row),
         )];

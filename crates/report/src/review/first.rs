@@ -4,10 +4,10 @@ use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::review::{DesignReview, GenericReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
-use obsdeg_evidence::requirements::{Miss, Requirements};
+use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
-use super::{fewest_of_all, joined, seconds};
+use super::{joined, seconds};
 use crate::document::{Block, Cell, Finding, Grade, Status, left, number};
 use crate::rows::{Chart, Row};
 use crate::{compare, words};
@@ -92,85 +92,6 @@ pub(super) fn model_degrees(a: &SystemAnalysis, id: &str) -> Block {
 pub(super) fn generic_degrees(g: &GenericReview, id: &str) -> Block {
     let all = &g.analysis.quantities;
     degrees(all.iter().map(|q| (q.name.as_str(), q.status, q.degree)), all.len(), id)
-}
-
-/// What follows from what was found, the gravest first.
-pub(super) fn actions(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
-    let mut out = Vec::new();
-    let missed = |why: Miss| -> Vec<&str> {
-        review.requirements.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).collect()
-    };
-    let unseen = missed(Miss::NotObservable);
-    if !unseen.is_empty() {
-        let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
-        out.push(format!("other positions: these do not determine {}{fewest}", words::names(unseen)));
-    }
-    let large = missed(Miss::TooLarge);
-    if !large.is_empty() {
-        out.push(longer(s, review, &large));
-    }
-    let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
-    let in_run = s.simulation.requirements.missed.iter().map(|m| m.name.as_str());
-    let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
-    if !only_there.is_empty() {
-        out.push(format!(
-            "a look at the run, which misses {} although the prediction does not: it has drift noise, the prior, and psi at the end",
-            words::names(only_there)
-        ));
-    }
-    if !s.simulation.validity.holds {
-        out.push(
-            "known drifts compensated before the run, or a filter with full attitudes (`obsdeg simulate --truth exact` shows what that gives): \
-             at these drifts the small-angle model does not hold"
-                .into(),
-        );
-    }
-    if !s.simulation.consistency.consistent {
-        out.push(
-            "no use of the filter's sigmas as they are: its run is not consistent with its truth".into(),
-        );
-    }
-    match &s.evidence {
-        Ok(e) if !e.passed => out
-            .push("the checks of the filter that fail to be understood first (Evidence by a filter)".into()),
-        _ => {}
-    }
-    let met = [&review.requirements, &s.simulation.requirements].iter().all(|r| r.all_met());
-    if out.is_empty() {
-        out.push(match (review.requirements.stated, met, &s.evidence) {
-            (0, ..) => "requirements to be stated: nothing says yet what is good enough".into(),
-            (_, false, _) => "the unknowns without a number to be looked at (Unknowns, Evidence by a filter)".into(),
-            (_, _, Ok(_)) => "none: every requirement is met by prediction and in the run, and no check fails".into(),
-            (_, _, Err(_)) => "none from what was computed: every requirement is met by prediction and in the run; evidence by a filter is not taken".into(),
-        });
-    }
-    out
-}
-
-/// Whether longer dwells meet what is too large.
-fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
-    let required = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.requirement);
-    let meets = |row: &[Option<f64>], name: &str| {
-        let sigma = s.dwells.names.iter().position(|n| n == name).and_then(|c| row[c]);
-        sigma.zip(required(name)).is_some_and(|(sigma, required)| sigma <= required)
-    };
-    let longer = || s.dwells.x.iter().zip(&s.dwells.sigmas).filter(|(x, _)| **x > 1.0);
-    let names = words::names(large.iter().copied());
-    match longer().find(|(_, row)| large.iter().all(|name| meets(row, name))) {
-        Some((factor, _)) => {
-            format!(
-                "dwells {} times as long: by prediction they meet the requirement of {names}",
-                number(*factor)
-            )
-        }
-        None => {
-            let most = s.dwells.x.last().copied().unwrap_or(1.0);
-            format!(
-                "other positions, less noise of Z or other requirements: dwells up to {} times as long do not meet those of {names}",
-                number(most)
-            )
-        }
-    }
 }
 
 /// Whether schemes are held against each other under the same conditions.

@@ -128,7 +128,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
     if !prior.is_empty() {
         rows.push(row("Resting on the prior", (Grade::Limited, words::names(prior))));
     }
-    Status { title: a.name.clone(), rows, actions: Vec::new() }
+    Status { title: a.name.clone(), rows, actions: super::actions::of_model(m) }
 }
 
 /// Verdict, unknowns, equations and evidence.
@@ -156,6 +156,6 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
             .filter(|e| e.status == Some(Exact::NotExcited) && e.outcome == Outcome::PriorOnly)
             .map(|e| e.name.as_str())
             .collect();
-        blocks.extend(pictures::errors(traces, &flat, id));
+        blocks.extend(pictures::errors(traces, &flat, "run", id));
     }
 }

@@ -247,13 +247,13 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
 }
 
 /// Errors of the estimate with the band of three sigma, a picture each.
-/// What is `flat` is not drawn: nothing moves it.
-pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<Block> {
+/// What is `flat` is not drawn: nothing moves it; `last` is what the last part of the run is called.
+pub(super) fn errors(traces: &Traces, flat: &[&str], last: &str, id: &str) -> Vec<Block> {
     let beside = traces.linear.as_ref().map_or("", |_| ", and of the linear filter on the same measurements");
     let of = |i: usize| {
         let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
         let caption = format!(
-            "Error of the estimate of {}, with +-3 sigma{beside}; the axis is that of the second half of the last position",
+            "Error of the estimate of {}, with +-3 sigma{beside}; the axis is that of the second half of the {last}",
             series_title(traces, i)
         );
         curves(&name, caption, error_figure(traces, i, POINTS))

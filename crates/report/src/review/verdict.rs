@@ -243,6 +243,6 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
                 if prior.is_empty() { "no estimate of the run".into() } else { words::names(prior) },
             ),
         ],
-        actions: super::first::actions(s, review),
+        actions: super::actions::of_scheme(s, review),
     }
 }

@@ -1,0 +1,276 @@
+//! What to do, by what was found: of a scheme, of a model, of a calibration.
+
+use obsdeg_calibration::Calibration;
+use obsdeg_calibration::answer::{Estimated, Finding, PositionFit};
+use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
+use obsdeg_design::review::{ModelReview, SchemeReview};
+use obsdeg_evidence::compare::ComparedScheme;
+use obsdeg_evidence::requirements::Miss;
+
+use super::fewest_of_all;
+use crate::document::number;
+use crate::words;
+
+/// What follows from what was found of a scheme, the gravest first.
+pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
+    let mut out = Vec::new();
+    let missed = |why: Miss| -> Vec<&str> {
+        review.requirements.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).collect()
+    };
+    let unseen = missed(Miss::NotObservable);
+    if !unseen.is_empty() {
+        let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
+        out.push(format!("other positions: these do not determine {}{fewest}", words::names(unseen)));
+    }
+    let large = missed(Miss::TooLarge);
+    if !large.is_empty() {
+        out.push(longer(s, review, &large));
+    }
+    let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
+    let in_run = s.simulation.requirements.missed.iter().map(|m| m.name.as_str());
+    let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
+    if !only_there.is_empty() {
+        out.push(format!(
+            "a look at the run, which misses {} although the prediction does not: it has drift noise, the prior, and psi at the end",
+            words::names(only_there)
+        ));
+    }
+    if !s.simulation.validity.holds {
+        out.push(
+            "known drifts compensated before the run, or a filter with full attitudes (`obsdeg simulate --truth exact` shows what that gives): \
+             at these drifts the small-angle model does not hold"
+                .into(),
+        );
+    }
+    if !s.simulation.consistency.consistent {
+        out.push(
+            "no use of the filter's sigmas as they are: its run is not consistent with its truth".into(),
+        );
+    }
+    match &s.evidence {
+        Ok(e) if !e.passed => out
+            .push("the checks of the filter that fail to be understood first (Evidence by a filter)".into()),
+        _ => {}
+    }
+    let met = [&review.requirements, &s.simulation.requirements].iter().all(|r| r.all_met());
+    if out.is_empty() {
+        out.push(match (review.requirements.stated, met, &s.evidence) {
+            (0, ..) => "requirements to be stated: nothing says yet what is good enough".into(),
+            (_, false, _) => "the unknowns without a number to be looked at (Unknowns, Evidence by a filter)".into(),
+            (_, _, Ok(_)) => "none: every requirement is met by prediction and in the run, and no check fails".into(),
+            (_, _, Err(_)) => "none from what was computed: every requirement is met by prediction and in the run; evidence by a filter is not taken".into(),
+        });
+    }
+    out
+}
+
+/// Whether longer dwells meet what is too large.
+fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
+    let required = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.requirement);
+    let meets = |row: &[Option<f64>], name: &str| {
+        let sigma = s.dwells.names.iter().position(|n| n == name).and_then(|c| row[c]);
+        sigma.zip(required(name)).is_some_and(|(sigma, required)| sigma <= required)
+    };
+    let longer = || s.dwells.x.iter().zip(&s.dwells.sigmas).filter(|(x, _)| **x > 1.0);
+    let names = words::names(large.iter().copied());
+    match longer().find(|(_, row)| large.iter().all(|name| meets(row, name))) {
+        Some((factor, _)) => {
+            format!(
+                "dwells {} times as long: by prediction they meet the requirement of {names}",
+                number(*factor)
+            )
+        }
+        None => {
+            let most = s.dwells.x.last().copied().unwrap_or(1.0);
+            format!(
+                "other positions, less noise of Z or other requirements: dwells up to {} times as long do not meet those of {names}",
+                number(most)
+            )
+        }
+    }
+}
+
+/// What follows from what was found of a model, the gravest first.
+pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
+    let a = &m.analysis;
+    let named = |of: &dyn Fn(&&SystemQuantity) -> bool| -> Vec<&str> {
+        a.quantities.iter().filter(of).map(|q| q.name.as_str()).collect()
+    };
+    let mut out = Vec::new();
+    if m.evidence.as_ref().is_some_and(|e| !e.passed) {
+        out.push("the checks of the filter that fail to be understood first (Evidence by a filter)".into());
+    }
+    out.extend(known_beforehand(a));
+    let silent = named(&|q| q.status == Exact::NotExcited);
+    if !silent.is_empty() {
+        out.push(format!(
+            "another output, or given values, for {}: no output moves with these",
+            words::names(silent)
+        ));
+    }
+    let unseen = named(&|q| q.status == Exact::NotSeen);
+    if !unseen.is_empty() {
+        out.push(format!(
+            "higher orders (`obsdeg analyze --order`, above {}) for {}: no end is proven",
+            a.last_order,
+            words::names(unseen)
+        ));
+    }
+    let several = named(&|q| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(k)) if k > 1));
+    if !several.is_empty() {
+        out.push(format!(
+            "a start near the truth, or knowledge that tells solutions apart, for {}: the outputs allow several",
+            words::names(several)
+        ));
+    }
+    match &m.run {
+        None => out.push(
+            "numbers for a run ([simulation] of the model file): no accuracy is predicted without".into(),
+        ),
+        Some((run, _)) if !run.consistency.consistent => out.push(
+            "no use of the filter's sigmas as they are: its run is not consistent with its truth".into(),
+        ),
+        Some(_) => {}
+    }
+    if out.is_empty() {
+        out.push(match &m.evidence {
+            Some(_) => {
+                "none: every unknown is observable, the run is consistent with its truth, and no check fails"
+                    .into()
+            }
+            None => {
+                "none from what was computed: every unknown is observable; evidence by a filter is not taken"
+                    .into()
+            }
+        });
+    }
+    out
+}
+
+/// What has to be known of unknowns that are not told apart: of a group with one direction any one, since without the column of that the rest is
+/// independent (a circuit of the matroid of columns); of more directions as many at least.
+fn known_beforehand(a: &SystemAnalysis) -> Vec<String> {
+    let mut groups: Vec<Vec<&str>> = Vec::new();
+    for q in a.quantities.iter().filter(|q| q.status == Exact::Inseparable) {
+        if !groups.iter().flatten().any(|name| *name == q.name) {
+            groups.push(std::iter::once(&q.name).chain(&q.partners).map(String::as_str).collect());
+        }
+    }
+    let silent = a.quantities.iter().filter(|q| q.status == Exact::NotExcited).count();
+    let all_shown = a.quantities.len() == a.unknowns;
+    let one_each = all_shown && a.unobservable_directions == groups.len() + silent;
+    let instead = || -> String {
+        let asked: Vec<_> = a.combinations.iter().filter(|c| c.degree.is_some()).collect();
+        let of = if asked.is_empty() { a.invariants.iter().collect() } else { asked };
+        let names: Vec<&str> = of.iter().map(|c| c.expression.as_str()).collect();
+        if names.is_empty() {
+            String::new()
+        } else {
+            format!("; observable without is {}", words::names(names))
+        }
+    };
+    let group = |names: &Vec<&str>| {
+        let list = words::names(names.iter().copied());
+        match one_each {
+            true => format!("one of {list} known beforehand: each then determines the others{}", instead()),
+            false => format!(
+                "some of {list} known beforehand, or another output: they are not told apart{}",
+                instead()
+            ),
+        }
+    };
+    groups.iter().map(group).collect()
+}
+
+/// What follows from what was found of a calibration, the gravest first.
+pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for f in &c.findings {
+        let line = of_finding(c, f);
+        // of several positions or components the same
+        if !out.contains(&line) {
+            out.push(line);
+        }
+    }
+    let without = |of: fn(&Estimated) -> bool| -> Vec<&str> {
+        c.unknowns.iter().filter(|u| !u.determined && of(u)).map(|u| u.name.as_str()).collect()
+    };
+    let by_scheme = without(|u| u.degree.is_none());
+    if !by_scheme.is_empty() {
+        out.push(format!(
+            "other positions for {}: the scheme does not determine them",
+            words::names(by_scheme)
+        ));
+    }
+    let by_record = without(|u| u.degree.is_some());
+    if !by_record.is_empty() {
+        out.push(format!(
+            "longer or more records for {}: these do not determine them",
+            words::names(by_record)
+        ));
+    }
+    if out.is_empty() {
+        out.push("none: every unknown is determined, and model and sigmas explain the record".into());
+    }
+    out
+}
+
+/// What to do about positions that do not fit.
+fn at_positions(c: &Calibration) -> String {
+    let unfit: Vec<&PositionFit> = (c.findings.iter())
+        .filter_map(|f| match f {
+            Finding::Position { record, position, .. } => {
+                c.positions.iter().find(|p| p.record == *record && p.position == *position)
+            }
+            _ => None,
+        })
+        .collect();
+    let names = words::names(unfit.iter().map(|p| p.position.as_str()));
+    let without = match unfit[..] {
+        [p] if p.loses.is_empty() => "; without it all that has an estimate keeps one".into(),
+        [p] => {
+            format!(
+                "; without it {} would have no estimate",
+                words::names(p.loses.iter().map(String::as_str))
+            )
+        }
+        _ if unfit.len() == c.positions.len() => {
+            "; where none fits it may be the record of another scheme".into()
+        }
+        _ => String::new(),
+    };
+    format!("a look at the record at {names}: attitudes, labels, whether it was at rest{without}")
+}
+
+/// What to do about what speaks against a calibration.
+fn of_finding(c: &Calibration, f: &Finding) -> String {
+    match f {
+        Finding::Interrupted => "the same command again, to its end".into(),
+        Finding::NotSettled => {
+            "a look at units, labels and times of the record, and first estimates near the truth ([simulation.estimates])".into()
+        }
+        Finding::Clock { .. } => {
+            "the times of the record set right: its clock is not that of the scheme or of the earth, and drifts are wrong by the same part".into()
+        }
+        Finding::Force { .. } => {
+            "scales and zeros of the accelerometers among the unknowns (K1, K0 in `terms`), or the gravity of the place (--gravity)".into()
+        }
+        Finding::Position { .. } => at_positions(c),
+        Finding::Noise { .. } | Finding::Channel { .. } => {
+            "the noise estimated (--estimate-noise), or the rescaled sigmas in place of those of the assumed noise".into()
+        }
+        Finding::Correlated { .. } => {
+            "noise with memory in the conditions (--drift-noise, --bias-instability), or an unknown for what drifts: sigmas of white noise are too small".into()
+        }
+        Finding::Temperature { .. } => "a run at a steady temperature: the residuals go with it".into(),
+        Finding::Outliers { .. } => "the noise of the record checked (--noise): too much of it is far off".into(),
+        Finding::Repeatability { .. } => {
+            "a calibration of each record alone: the coefficients changed between the runs, or sigmas are too small".into()
+        }
+        Finding::SecondPath { .. } => "no use of the estimates: two ways to compute them do not agree".into(),
+        Finding::Known { .. } => {
+            "a calibration without --prior: what was known before does not agree with these records".into()
+        }
+    }
+}

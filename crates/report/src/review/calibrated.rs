@@ -1,0 +1,89 @@
+//! The part of a calibration in a review.
+
+use obsdeg_calibration::Calibration;
+
+use crate::Answer;
+use crate::calibration::{allan_figure, estimate_figures, finding, residual_figure, whiteness_figure};
+use crate::document::{Block, Document, Drawing, Finding, Grade, Picture, Status};
+use crate::figure::Figure;
+
+/// What a review has of a calibration: its answer, and its pictures; `id` begins their names.
+pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
+    let Document { lead, blocks, .. } = c.document();
+    let mut out: Vec<Block> = lead.into_iter().map(Block::Text).collect();
+    let curves = |name: String, caption: String, figure: Figure| {
+        Block::Picture(Picture { name, caption, drawing: Drawing::Curves(Box::new(figure)) })
+    };
+    out.extend(blocks);
+    out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
+        Block::Picture(Picture {
+            name: format!("{id}_estimates_{}", i + 1),
+            caption: format!("Estimates of {}, with three sigma as the fit has it", figure.title),
+            drawing: Drawing::Still(figure.svg()),
+        })
+    }));
+    for (i, s) in c.series.iter().enumerate() {
+        let of = if c.records.len() > 1 { format!(" of {}", s.record) } else { String::new() };
+        let name = |kind: &str| format!("{id}_{kind}_{}", i + 1);
+        let what = &s.channel;
+        out.push(curves(
+            name("residuals"),
+            format!("What the estimate leaves of {what}{of}, with three sigma"),
+            residual_figure(c, s),
+        ));
+        if s.allan.len() > 1 {
+            let caption = format!(
+                "Allan deviation of what is left of {what}{of}: white noise falls with the root of the time, what rises is none of the model"
+            );
+            out.push(curves(name("allan"), caption, allan_figure(s)));
+        }
+        if !s.autocorrelation.is_empty() {
+            let caption = format!("Correlation of what is left of {what}{of} with what comes later");
+            out.push(Block::Picture(Picture {
+                name: name("whiteness"),
+                caption,
+                drawing: Drawing::Still(whiteness_figure(s).svg()),
+            }));
+        }
+    }
+    out
+}
+
+/// The answers that a review begins with.
+pub(super) fn status(c: &Calibration, title: String) -> Status {
+    let row = |what, grade, text| Finding { what, grade, text };
+    let all = c.unknowns.len();
+    let determined = c.unknowns.iter().filter(|u| u.determined).count();
+    let first = c.findings.first().map(|f| finding(f, &c.records));
+    let f = &c.fit;
+    Status {
+        title,
+        rows: vec![
+            row(
+                "Consistent",
+                if c.consistent { Grade::Good } else { Grade::Missed },
+                first.unwrap_or_else(|| "model and sigmas explain the record".into()),
+            ),
+            row(
+                "Determined",
+                if determined == all { Grade::Good } else { Grade::Limited },
+                format!("{determined} of {all} unknowns"),
+            ),
+            row(
+                "Chi-square",
+                if (f.band.0..=f.band.1).contains(&(f.factor * f.factor)) {
+                    Grade::Good
+                } else {
+                    Grade::Limited
+                },
+                format!(
+                    "{:.3} per degree of freedom ({:.3} to {:.3})",
+                    f.factor * f.factor,
+                    f.band.0,
+                    f.band.1
+                ),
+            ),
+        ],
+        actions: super::actions::of_calibration(c),
+    }
+}
