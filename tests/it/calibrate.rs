@@ -58,7 +58,7 @@ fn a_day_at_the_bench() {
     assert_eq!(stdout(&run(&["calibrate", SCHEME, RECORD, "--format", "csv"])), csv);
     // a row is what the JSON has of an unknown
     let row: Vec<&str> = csv.lines().nth(4).expect("a row").split(',').collect();
-    let of = |key: &str| found["unknowns"][3][key].clone();
+    let of = |key: &str| found["quantities"][3][key].clone();
     assert_eq!((row[0], row[2], row[3]), ("D_FX", "observable", "1"));
     assert_eq!([row[5], row[6]], ["estimate", "sigma"].map(|k| of(k).to_string()));
     let csv = fs::read_to_string(format!("{at}/covariance.csv")).expect("written");
@@ -80,12 +80,12 @@ fn a_day_at_the_bench() {
         .expect("written");
     let other = other.display().to_string();
     let again = json(&["calibrate", SCHEME, &other, "--format", "json", "--prior", &prior]);
-    for (k, u) in again["unknowns"].as_array().expect("unknowns").iter().enumerate().skip(3) {
+    for (k, u) in again["quantities"].as_array().expect("unknowns").iter().enumerate().skip(3) {
         let sigma = |u: &Value| u["sigma"].as_f64().expect("a number");
-        let factor = sigma(&found["unknowns"][k]) / sigma(u);
+        let factor = sigma(&found["quantities"][k]) / sigma(u);
         assert!((1.41..1.42).contains(&factor), "{u}: {factor}");
         let moved = u["estimate"].as_f64().expect("a number")
-            - found["unknowns"][k]["estimate"].as_f64().expect("a number");
+            - found["quantities"][k]["estimate"].as_f64().expect("a number");
         assert!(moved.abs() < 1e-3 * sigma(u), "{u}");
     }
     // the first says nothing twice, and other files are no calibration
@@ -229,7 +229,7 @@ fn the_same_from_everywhere() {
     let twice = run(&["calibrate", SCHEME, RECORD, &name, "--format", "json"]);
     let twice: Value = serde_json::from_slice(&twice.stdout).expect("JSON");
     let find = |v: &Value, name: &str| -> [f64; 2] {
-        let all = v["unknowns"].as_array().expect("unknowns");
+        let all = v["quantities"].as_array().expect("unknowns");
         let u = all.iter().find(|u| u["name"] == name).unwrap_or_else(|| panic!("{name}"));
         ["estimate", "sigma"].map(|k| u[k].as_f64().expect("a number"))
     };
@@ -254,8 +254,11 @@ fn the_same_from_everywhere() {
 
 /// The unknown or combination of this name: estimate and sigma as the fit has it.
 fn found(v: &Value, name: &str) -> [f64; 2] {
-    let all =
-        v["unknowns"].as_array().expect("unknowns").iter().chain(v["combinations"].as_array().expect("some"));
+    let all = v["quantities"]
+        .as_array()
+        .expect("unknowns")
+        .iter()
+        .chain(v["combinations"].as_array().expect("some"));
     let u = all.into_iter().find(|u| u["name"] == name).unwrap_or_else(|| panic!("{name}"));
     ["estimate", "sigma_rescaled"].map(|k| u[k].as_f64().unwrap_or(f64::NAN))
 }
@@ -429,7 +432,8 @@ fn a_profile_is_flat_where_the_verdict_says_so() {
         run(&["calibrate", "--model", file, &data, "--profile", "x2", "--profile", "a", "--format", "json"]);
     let v: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     for name in ["x2", "b"] {
-        let u = v["unknowns"].as_array().expect("unknowns").iter().find(|u| u["name"] == name).expect("one");
+        let u =
+            v["quantities"].as_array().expect("unknowns").iter().find(|u| u["name"] == name).expect("one");
         assert!(u["determined"] == false && u["estimate"].is_null() && u["status"] == "inseparable", "{u}");
     }
     let [product, sigma] = found(&v, "b*x2");

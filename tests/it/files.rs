@@ -127,7 +127,7 @@ fn input_from_anywhere_is_limited() {
         (at("pipe").as_str(), "nothing comes out of it"),
         ("/dev/null", "nothing comes out of it"),
         ("/dev/zero", "has more than 50000000 bytes; expected at most 50000000"),
-        (&at(""), "directory"),
+        (&at(""), "is a folder; expected a "),
     ] {
         for command in [
             &["analyze", "--scheme"][..],

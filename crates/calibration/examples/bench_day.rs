@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let records = vec![Record::file(&record, File::open(&record)?)?];
     let found = calibrate(&scheme, &conditions, records, &Options::default(), &|_| true)?;
     println!("consistent: {}", found.consistent);
-    for u in &found.unknowns {
+    for u in &found.quantities {
         match u.estimate.zip(u.sigma) {
             Some((estimate, sigma)) => println!("{:<6} {estimate:9.4} +- {sigma:.4} {}", u.name, u.unit),
             None => println!("{:<6} not determined", u.name),

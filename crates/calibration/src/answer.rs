@@ -22,7 +22,7 @@ pub struct Calibration {
     /// What speaks against that, the gravest first; empty when nothing does.
     pub findings: Vec<Finding>,
     /// Every unknown, psi of the start of each record.
-    pub unknowns: Vec<Estimated>,
+    pub quantities: Vec<Estimated>,
     /// Combinations of what is not told apart one by one, and those asked for.
     pub combinations: Vec<Estimated>,
     /// Of all that has an estimate.
@@ -64,7 +64,7 @@ impl Calibration {
             let name = e.name.strip_suffix(" (record 1)").unwrap_or(&e.name).to_string();
             Some(Assignment { value: e.estimate.filter(|_| !name.contains(" (record "))?, name })
         };
-        self.unknowns.iter().filter_map(first).collect()
+        self.quantities.iter().filter_map(first).collect()
     }
 }
 

@@ -17,7 +17,7 @@
 //! let model = model_file::read(model)?;
 //! let options = SystemOptions { starts: 4, profiles: vec![], prior: None, seed: 1 };
 //! let found = calibrate_system(&model, record, &options, &|_| true)?;
-//! let p = found.unknowns.iter().find(|u| u.name == "p").and_then(|u| u.estimate).expect("it is determined");
+//! let p = found.quantities.iter().find(|u| u.name == "p").and_then(|u| u.estimate).expect("it is determined");
 //! assert!((p - 0.5).abs() < 1e-4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

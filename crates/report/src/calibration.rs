@@ -305,7 +305,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
 /// What nothing determines, and which sigmas that is in.
 fn held(c: &Calibration) -> Vec<String> {
     let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
-    let all: Vec<&Estimated> = c.unknowns.iter().chain(&c.combinations).filter(shows).collect();
+    let all: Vec<&Estimated> = c.quantities.iter().chain(&c.combinations).filter(shows).collect();
     if c.assumed.held.is_empty() {
         return Vec::new();
     }
@@ -407,7 +407,7 @@ impl Answer for Calibration {
         let mut blocks = vec![Block::table(
             "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the scheme would do, in sigma and to sigma)",
             columns.clone(),
-            self.unknowns.iter().map(row),
+            self.quantities.iter().map(row),
         )];
         if !self.combinations.is_empty() {
             let rows = self.combinations.iter().map(row);
@@ -521,7 +521,7 @@ pub(crate) const COEFFICIENTS: &str = "coefficients";
 pub(crate) fn with_coefficients(mut tables: Vec<Table>, covariance: &CovarianceTable) -> Vec<Table> {
     let of = |name: &str| tables.iter().find(|t| t.name == name);
     // both are lists of the same objects
-    let both: Vec<&Table> = ["unknowns", "combinations"].into_iter().filter_map(of).collect();
+    let both: Vec<&Table> = ["quantities", "combinations"].into_iter().filter_map(of).collect();
     let columns = both.first().map(|t| t.columns.clone()).unwrap_or_default();
     let rows = both.iter().flat_map(|t| t.rows.clone()).collect();
     tables.push(Table { name: COEFFICIENTS.into(), columns, rows });
@@ -663,7 +663,7 @@ pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
 /// Estimates by family, each a bar of three sigma as the fit has it.
 pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
     let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
-    for e in c.unknowns.iter().filter(|e| e.determined) {
+    for e in c.quantities.iter().filter(|e| e.determined) {
         // D_FX, GM_XY, psi_x (record 2)
         let name = e.name.split(' ').next().unwrap_or(&e.name);
         let family = name.trim_end_matches(['X', 'Y', 'Z', 'x', 'y', 'z']).trim_end_matches('_');

@@ -85,7 +85,7 @@ impl Answer for SystemCalibration {
         let mut blocks = vec![Block::table(
             "Estimates (degree: exact verdict; states: at the start)",
             columns.clone(),
-            self.unknowns.iter().map(row),
+            self.quantities.iter().map(row),
         )];
         if !self.combinations.is_empty() {
             blocks.push(Block::table(
@@ -150,7 +150,7 @@ impl Answer for SystemCalibration {
             rows,
         ));
         if !self.others.is_empty() {
-            let names: Vec<&str> = self.unknowns.iter().map(|u| u.name.as_str()).collect();
+            let names: Vec<&str> = self.quantities.iter().map(|u| u.name.as_str()).collect();
             let of = |o: &obsdeg_calibration::system::OtherSolution| {
                 let values: Vec<String> =
                     names.iter().zip(&o.values).map(|(n, v)| format!("{n} = {}", number(*v))).collect();

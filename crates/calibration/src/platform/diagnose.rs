@@ -311,7 +311,7 @@ impl Parts<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             consistent: true,
             findings: Vec::new(),
-            unknowns: unknowns.iter().map(estimated).collect(),
+            quantities: unknowns.iter().map(estimated).collect(),
             combinations: combinations.iter().map(estimated).collect(),
             covariance,
             fit,

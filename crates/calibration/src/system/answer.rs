@@ -24,7 +24,7 @@ pub struct SystemCalibration {
     /// What speaks against it.
     pub findings: Vec<SystemFinding>,
     /// States at the start of every experiment, parameters, and what is unknown of inputs.
-    pub unknowns: Vec<SystemEstimated>,
+    pub quantities: Vec<SystemEstimated>,
     /// The combinations that the model asks for, and products and sums of what is not determined alone that it determines.
     pub combinations: Vec<SystemEstimated>,
     /// Of all unknowns that are determined.

@@ -334,7 +334,7 @@ impl<'a> Calibrating<'a> {
             name: self.model.name.clone(),
             consistent: (!all_estimated || !findings.is_empty()).then_some(findings.is_empty()),
             findings,
-            unknowns,
+            quantities: unknowns,
             combinations,
             covariance,
             chi_square: at.cost(),

@@ -149,7 +149,7 @@ fn a_clock_is_named() {
             "{by_earth} {sigma}"
         );
         // drifts are too small by that part
-        let d = c.unknowns.iter().find(|u| u.name == "D_FY").expect("there").estimate.expect("determined");
+        let d = c.quantities.iter().find(|u| u.name == "D_FY").expect("there").estimate.expect("determined");
         assert!((d / drift[0][1] * (1.0 + fast) - 1.0).abs() < 0.7 * fast.abs(), "{d}");
     }
     // a scheme of positions that are one part in fifty shorter than they were held
@@ -316,12 +316,12 @@ fn pulses_are_mean_forces() {
             "{:?}",
             c.findings
         );
-        for (a, b) in by_force.unknowns.iter().zip(&c.unknowns) {
+        for (a, b) in by_force.quantities.iter().zip(&c.quantities) {
             let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
             let t = b.sigma.expect("there");
             assert!((x - y).abs() < 0.7 * s && (t / s - 1.0).abs() < 0.1, "{}: {x} {y} +- {s} {t}", a.name);
         }
-        let d = c.unknowns.iter().find(|u| u.name == "D_FX").expect("there");
+        let d = c.quantities.iter().find(|u| u.name == "D_FX").expect("there");
         let off = d.estimate.expect("there") - coarse.drift[0][0];
         assert!(off.abs() < 3.5 * d.sigma.expect("there"), "{off}");
     }
@@ -430,7 +430,7 @@ fn a_record_counts_once() {
     let all = with(&bench, &[("a.csv", &a), ("b.csv", &b), ("c.csv", &c)], None).expect("calibrated");
     for name in ["D_FX", "D_IY", "D_SZ"] {
         let of = |c: &Calibration| {
-            let u = c.unknowns.iter().find(|u| u.name == name).expect("there");
+            let u = c.quantities.iter().find(|u| u.name == name).expect("there");
             (u.estimate.expect("determined"), u.sigma.expect("determined"))
         };
         let ((x, s), (y, t)) = (of(&third), of(&all));
@@ -474,7 +474,7 @@ fn what_is_predicted() {
             .collect();
         let j = DMatrix::from_fn(columns[0].len(), 15, |i, k| columns[k][i] / bench.noise_g);
         let covariance = (j.transpose() * &j).try_inverse().expect("determined");
-        for (k, u) in found.unknowns.iter().enumerate() {
+        for (k, u) in found.quantities.iter().enumerate() {
             let (own, predicted) = (covariance[(k, k)].sqrt(), u.predicted_sigma.expect("determined"));
             assert!((predicted / own - 1.0).abs() < 0.01, "{step_s} s, {}: {predicted}, {own}", u.name);
             let achieved = u.sigma.expect("determined") / predicted;
@@ -502,7 +502,7 @@ fn what_is_held_is_said() {
     let known = calibrate(&scheme(&bench, "F,I,O,S"), &own, vec![record], &Options::default(), &|_| true)
         .expect("calibrated");
     let mut largest: f64 = 1.0;
-    for (u, v) in c.unknowns.iter().zip(&known.unknowns).filter(|(u, _)| u.determined) {
+    for (u, v) in c.quantities.iter().zip(&known.quantities).filter(|(u, _)| u.determined) {
         let (s, t, factor) =
             (u.sigma.expect("there"), v.sigma.expect("there"), u.held_factor.expect("there"));
         // attitudes differ by degrees between the two

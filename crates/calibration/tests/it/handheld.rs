@@ -131,7 +131,7 @@ fn errors_of_a_unit_in_the_hand() {
     let second = calibrated("gyros.toml", &text, &SystemOptions { prior, ..options });
     assert_eq!(second.consistent, Some(true), "{:?}", second.findings);
     for c in [&first, &second] {
-        for u in &c.unknowns {
+        for u in &c.quantities {
             let (x, s) = (u.estimate.expect("determined"), u.sigma.expect("determined"));
             assert!((x - truth(&u.name)).abs() < 4.0 * s, "{}: {x} +- {s}", u.name);
         }

@@ -95,9 +95,9 @@ fn what_is_not_told_apart_has_its_product() {
     let plain = model.replace("s = {}\n", "").replace("s*x", "x").replace(", s = 2", "");
     let own = calibrated(&plain, &text, &options()).expect("calibrated");
     for name in ["x", "s"] {
-        assert_eq!(found(&c.unknowns, name).estimate, None);
+        assert_eq!(found(&c.quantities, name).estimate, None);
     }
-    let (product, x) = (&c.combinations[0], found(&own.unknowns, "x"));
+    let (product, x) = (&c.combinations[0], found(&own.quantities, "x"));
     assert!(
         ["x*s", "s*x"].contains(&product.name.as_str()) && c.combinations.len() == 1,
         "{:?}",
@@ -123,7 +123,7 @@ fn units_of_models() {
     };
     let model = "[states]\nx = { equation = \"-k*x\", unit = \"m/s^2\" }\n[parameters]\nk = { unit = \"1/s\" }\n[outputs]\ny = { expression = \"x\", unit = \"m/s^2\" }\n[simulation]\nvalues = { x = 2, k = 1 }\nnoise = { y = 0.01 }\n";
     let right = calibrated(model, &text("", 1.0, "", 1.0), &options()).expect("calibrated");
-    let k = |c: &SystemCalibration| found(&c.unknowns, "k").estimate.expect("determined");
+    let k = |c: &SystemCalibration| found(&c.quantities, "k").estimate.expect("determined");
     for (unit, by, of, scale) in [
         (" [s]", 1.0, " [m/s^2]", 1.0),
         (" [min]", 1.0 / 60.0, "", 1.0),

@@ -82,7 +82,7 @@ fn errors(bench: &Bench, c: &Calibration) -> Vec<(String, f64)> {
             _ => return None,
         })
     };
-    let known = c.unknowns.iter().filter(|u| u.determined).filter_map(|u| Some((u, of(&u.name)?)));
+    let known = c.quantities.iter().filter(|u| u.determined).filter_map(|u| Some((u, of(&u.name)?)));
     known.map(|(u, t)| (u.name.clone(), (u.estimate.expect("there") - t) / u.sigma.expect("there"))).collect()
 }
 
@@ -227,7 +227,7 @@ fn what_is_not_told_apart_has_no_estimate() {
     let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
     is_right(&c);
     for name in ["psi_y", "D_SZ", "D_IX", "D_OZ"] {
-        let u = c.unknowns.iter().find(|u| u.name == name).expect("an unknown");
+        let u = c.quantities.iter().find(|u| u.name == name).expect("an unknown");
         assert_eq!((u.determined, u.estimate, u.sigma), (false, None, None), "{name}");
         assert!(!c.covariance.names.contains(&u.name));
     }
@@ -246,7 +246,7 @@ fn what_is_not_told_apart_has_no_estimate() {
     let again = calibrate(&scheme(&bench, "F,I,O,S"), &other, vec![record], &Options::default(), &|_| true)
         .expect("calibrated");
     for (a, b) in
-        c.unknowns.iter().chain(&c.combinations).zip(again.unknowns.iter().chain(&again.combinations))
+        c.quantities.iter().chain(&c.combinations).zip(again.quantities.iter().chain(&again.combinations))
     {
         if let (Some(x), Some(y), Some(s)) = (a.estimate, b.estimate, a.sigma) {
             assert!((x - y).abs() < s, "{}: {x} {y} +- {s}", a.name);
@@ -278,7 +278,7 @@ fn faults_are_named() {
         );
     }
     assert!(c.outliers.iter().all(|o| [102, 702].iter().any(|l| (o.lines.0..=o.lines.1).contains(l))));
-    for (a, b) in right.unknowns.iter().zip(&c.unknowns) {
+    for (a, b) in right.quantities.iter().zip(&c.quantities) {
         assert!(
             (a.estimate.expect("there") - b.estimate.expect("there")).abs() < a.sigma.expect("there"),
             "{}",
@@ -320,7 +320,7 @@ fn faults_are_named() {
     let c = c.expect("calibrated");
     let [Finding::Noise { factor, .. }] = c.findings[..] else { panic!("{:?}", c.findings) };
     assert!((factor / 3.0 - 1.0).abs() < 0.1, "{factor}");
-    let u = &c.unknowns[3];
+    let u = &c.quantities[3];
     assert!((u.sigma_rescaled.expect("there") / u.sigma.expect("there") - factor).abs() < 1e-9);
 
     // a position that is missing
@@ -378,7 +378,7 @@ fn positions_are_found() {
         (c.records[0].positions_by, &c.records[0].ignored),
         (PositionsBy::Static, &vec!["note".to_string()])
     );
-    for (a, b) in labelled.unknowns.iter().zip(&c.unknowns) {
+    for (a, b) in labelled.quantities.iter().zip(&c.quantities) {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
         assert!(
             (x - y).abs() < 0.6 * s && (b.sigma.expect("there") / s - 1.0).abs() < 0.1,
@@ -439,7 +439,7 @@ fn columns_of_all_kinds() {
     };
     let c = with_recording(&bench, recording.clone(), text(0.0, 360.5)).expect("calibrated");
     is_right(&c);
-    for (a, b) in right.unknowns.iter().zip(&c.unknowns) {
+    for (a, b) in right.quantities.iter().zip(&c.quantities) {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
         assert!((x - y).abs() < 1e-3 * s, "{}: {x} {y} +- {s}", a.name);
     }
@@ -477,7 +477,7 @@ fn noise_is_estimated() {
         // 1200 samples, two a measurement: a standard deviation is known to 3 %
         assert!((channel.sigma / 3e-5 - 1.0).abs() < 0.12, "{channel:?}");
     }
-    for (a, b) in knows.unknowns.iter().zip(&c.unknowns) {
+    for (a, b) in knows.quantities.iter().zip(&c.quantities) {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
         assert!((x - y).abs() < 0.3 * s && (b.sigma.expect("there") / s - 1.0).abs() < 0.12, "{}", a.name);
     }
@@ -503,7 +503,7 @@ fn what_is_held_bends_little() {
         assert!(errors(&bench, c).iter().all(|(_, e)| e.abs() < 3.5), "{:?}", errors(&bench, c));
     }
     let mut compared = 0;
-    for (u, v) in a.unknowns.iter().chain(&a.combinations).zip(b.unknowns.iter().chain(&b.combinations)) {
+    for (u, v) in a.quantities.iter().chain(&a.combinations).zip(b.quantities.iter().chain(&b.combinations)) {
         assert_eq!((&u.name, u.determined), (&v.name, v.determined));
         if let (Some(x), Some(y), Some(s)) = (u.estimate, v.estimate, u.sigma) {
             assert!((x - y).abs() < 0.25 * s, "{}: {x} {y} +- {s}", u.name);
@@ -564,7 +564,7 @@ fn an_interrupt_leaves_what_there_is() {
     let c = until(2, false).expect("calibrated");
     assert_eq!((c.consistent, c.findings.first()), (false, Some(&Finding::Interrupted)));
     // two linearisations are near
-    for (a, b) in whole.unknowns.iter().zip(&c.unknowns) {
+    for (a, b) in whole.quantities.iter().zip(&c.quantities) {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
         assert!((x - y).abs() < 100.0 * s, "{}: {x} {y} +- {s}", a.name);
     }

@@ -194,7 +194,7 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
         }
     }
     let without = |of: fn(&Estimated) -> bool| -> Vec<&str> {
-        c.unknowns.iter().filter(|u| !u.determined && of(u)).map(|u| u.name.as_str()).collect()
+        c.quantities.iter().filter(|u| !u.determined && of(u)).map(|u| u.name.as_str()).collect()
     };
     let by_scheme = without(|u| u.degree.is_none());
     if !by_scheme.is_empty() {

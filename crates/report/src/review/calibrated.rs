@@ -52,8 +52,8 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
 /// The answers that a review begins with.
 pub(super) fn status(c: &Calibration, title: String) -> Status {
     let row = |what, grade, text| Finding { what, grade, text };
-    let all = c.unknowns.len();
-    let determined = c.unknowns.iter().filter(|u| u.determined).count();
+    let all = c.quantities.len();
+    let determined = c.quantities.iter().filter(|u| u.determined).count();
     let first = c.findings.first().map(|f| finding(f, &c.records));
     let f = &c.fit;
     Status {
