@@ -110,3 +110,106 @@ impl Additive {
         if bound.is_finite() { bound.max(0.0) } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::exact::{Real, Reals, real};
+    use super::super::weights::weigh;
+    use super::*;
+    use crate::design::criterion::{Criterion, Limits};
+    use crate::design::information::Evaluator;
+    use obsdeg_core::model::{Angle, Carry, Euler, Ring, Scheme};
+    use obsdeg_evidence::simulation::Conditions;
+    use obsdeg_exact::SplitMix64;
+
+    /// What is proven by an X in 512 bits, of the information of the candidates as the search has it.
+    fn proven(evaluator: &Evaluator, k: usize, problem: &Additive, dual: &Dual) -> Real {
+        let (n, m) = (evaluator.n, problem.unknowns());
+        let columns: Vec<Vec<Real>> =
+            dual.x.column_iter().map(|c| c.iter().copied().map(real).collect()).collect();
+        let square = real(evaluator.dph).mul(&real(evaluator.dph));
+        let energy = |entry: &dyn Fn(usize, usize) -> f64| {
+            let mut sum = Real::ZERO;
+            for x in &columns {
+                for (i, j) in (0..m).flat_map(|i| (0..m).map(move |j| (i, j))) {
+                    sum = sum.add(&x[i].mul(&x[j]).mul(&real(entry(i, j))));
+                }
+            }
+            sum
+        };
+        let most =
+            evaluator.candidates.iter().map(|c| energy(&|i, j| c.own[(3 + i.max(j)) * n + 3 + i.min(j)]));
+        let most = most.fold(Real::ZERO, |a, b| if b.sub(&a).is_positive() { b } else { a });
+        let known = energy(&|i, j| if i == j { evaluator.prior.coefficients[i] } else { 0.0 });
+        let energy = most.mul(&Real::from_i64(k as i64)).add(&known).mul(&square);
+        let d = problem.counting();
+        let counting = |j: usize| problem.nuisance + j;
+        let over = |x: Real, y: &Real| x.div(y).expect("not zero");
+        let shared = |vectors: &DMatrix<f64>| {
+            let mut sum = Real::ZERO;
+            for (j, x) in columns.iter().enumerate() {
+                let v: Vec<Real> = vectors.column(j).iter().copied().map(real).collect();
+                let root = real(dual.shares[j]).sqrt().unwrap_or(Real::ZERO);
+                sum = sum.add(&root.mul(&Reals.dot(v.iter().zip(x))));
+            }
+            over(sum.mul(&sum), &energy)
+        };
+        let shares = dual.shares.iter().fold(Real::ZERO, |sum, s| sum.add(&real(*s)));
+        match &problem.aim {
+            Aim::Volume => {
+                let logs = (0..d).map(|j| columns[j][counting(j)].abs().ln().expect("positive"));
+                let sum = logs.fold(Real::ZERO, |sum, x| sum.add(&x));
+                let mean = over(sum.shifted(1), &Real::from_i64(d as i64));
+                over(mean.exp().expect("finite").mul(&Real::from_i64(d as i64)), &energy)
+            }
+            Aim::Least => {
+                let squares = columns.iter().flat_map(|x| x[problem.nuisance..].iter().map(|x| x.mul(x)));
+                over(squares.fold(Real::ZERO, |sum, x| sum.add(&x)), &energy)
+            }
+            Aim::Mean(vectors) => over(shared(vectors), &shares),
+            Aim::Largest(vectors, offsets) => {
+                let known = offsets.iter().zip(&dual.shares).map(|(o, s)| real(*o).mul(&real(*s)));
+                over(known.fold(shared(vectors), |sum, x| sum.add(&x)), &shares)
+            }
+        }
+    }
+
+    /// Random tasks of every criterion: the bound in double precision is not above what its X proves in 512 bits, and below by
+    /// less than 1e-7 of it.
+    #[test]
+    fn no_bound_is_above_what_its_matrix_proves() {
+        let mut rng = SplitMix64::new(43);
+        let mut told = 0;
+        for task in 0..60 {
+            let mut below = |n: u64| rng.below(n) as usize;
+            let terms = ["F", "F,I", "F,O,S", "F,K0"][below(4)];
+            let base = Scheme {
+                carry: Carry::Reset,
+                latitude: (5 + below(80)).to_string().parse().ok(),
+                unknowns: terms.parse().expect("terms"),
+                ..Scheme::default()
+            };
+            let candidates: Vec<Euler> = (0..8 + below(8))
+                .map(|_| std::array::from_fn(|_| Angle::from_degrees(45 * below(8) as i32)))
+                .collect();
+            let counting: Vec<usize> = (0..3 * terms.split(',').count() - below(2)).collect();
+            let psi = if task % 2 == 0 { [f64::INFINITY; 3] } else { [0.01; 3] };
+            let limits = Limits { coefficients: vec![0.03; counting.len()], psi };
+            let criteria =
+                [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)];
+            let criterion = &criteria[task % 5];
+            let conditions = Conditions::default();
+            let evaluator = Evaluator::new(&base, &candidates, &counting, &conditions).expect("an evaluator");
+            let k = 3 + below(9);
+            let problem = evaluator.additive(evaluator.aim(criterion), k);
+            let Some(found) = weigh(&problem, &|| true) else { continue };
+            let bound = problem.lower_bound(&found.dual);
+            let truth = proven(&evaluator, k, &problem, &found.dual);
+            assert!(truth.sub(&real(bound)).is_positive(), "task {task} {criterion:?}: {bound:e}");
+            let part = truth.to_f64() / bound - 1.0;
+            assert!(part < 1e-7, "task {task} {criterion:?}: {part:e}");
+            told += 1;
+        }
+        assert!(told > 40, "{told}");
+    }
+}

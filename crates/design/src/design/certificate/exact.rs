@@ -1,6 +1,7 @@
 //! The same in balls of 512 bits, for tests: other arithmetic, by elimination.
 
-use obsdeg_core::model::Ring;
+use nalgebra::DMatrix;
+use obsdeg_core::model::{Angle, Euler, LOCAL, Ring, earth_rate_in, elementary, product};
 use obsdeg_exact::Ball;
 
 use super::super::criterion::Criterion;
@@ -40,6 +41,53 @@ impl Ring for Reals {
 
 pub(super) fn square_root(x: &Real) -> f64 {
     x.sqrt().expect("not negative").to_f64()
+}
+
+/// What coefficients make of drift and accelerometers at the rotation of these angles.
+pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>> {
+    #[derive(Clone, Copy)]
+    struct Scaled(Real);
+    impl std::ops::Mul<f64> for Scaled {
+        type Output = Self;
+        fn mul(self, factor: f64) -> Self {
+            Self(self.0.mul(&real(factor)))
+        }
+    }
+    let half = Real::from_i64(180_000_000_000);
+    let turn = |axis: usize| {
+        let angle: &Angle = &euler[axis];
+        let radians = Real::from_i64(angle.nanodeg()).mul(&Real::pi()).div(&half).expect("not zero");
+        let (sin, cos) = radians.sin_cos().expect("small");
+        elementary(&Reals, axis, &(cos, sin))
+    };
+    let c = product(&Reals, &product(&Reals, &turn(0), &turn(1)), &turn(2));
+    let [w_u, w_n] = [evaluator.w[1][2], -evaluator.w[0][2]].map(real);
+    let errors = evaluator.platform.errors();
+    let mut rows: Vec<Vec<Real>> =
+        errors.drift_rows(&Reals, &c, || earth_rate_in(&Reals, &c, &w_n, &w_u)).into();
+    if evaluator.platform.observed().accelerometers {
+        rows.extend(errors.accelerometer_rows(&Reals, &c));
+    }
+    let ordered = |row: Vec<Real>| {
+        let row: Vec<Scaled> = row.into_iter().map(Scaled).collect();
+        evaluator.in_order(&row).into_iter().map(|x| x.0).collect()
+    };
+    rows.into_iter().map(ordered).collect()
+}
+
+/// `d` there, G being `g`.
+pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x: &DMatrix<f64>) -> Real {
+    let mut sum = Real::ZERO;
+    for column in x.column_iter() {
+        let x: Vec<Real> = column.iter().copied().map(real).collect();
+        let y: Vec<Real> = rows.iter().map(|row| Reals.dot(row.iter().zip(&x))).collect();
+        for (a, row) in y.iter().zip(g) {
+            for (b, g) in y.iter().zip(row) {
+                sum = sum.add(&a.mul(b).mul(&real(*g)));
+            }
+        }
+    }
+    sum
 }
 
 type Matrix = Vec<Vec<Real>>;

@@ -321,6 +321,7 @@ fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler>
 
 #[cfg(test)]
 mod tests {
+    use super::super::exact::{Real, effects_of, energy_of, real};
     use super::*;
     use crate::design::Candidates;
     use obsdeg_core::model::Scheme;
@@ -354,5 +355,66 @@ mod tests {
             assert!(off(n) < 1e-9, "{terms}: {}", off(n));
             assert!(off(n / 2 - 1) > 1e-6, "{terms}");
         }
+    }
+
+    /// What energies, what is interpolated of them, and the information of positions are off by is within what is told, against 512 bits; and
+    /// what is told is not much more than that.
+    #[test]
+    fn rounding_is_within_its_bounds() {
+        let mut rng = SplitMix64::new(5);
+        let mut largest = [0.0f64; 3];
+        for terms in ["F", "F,I,O,S", "F,II,OO", "F,I,GS,GM", "F,K0,K1,K2,M6"] {
+            let base = Scheme {
+                carry: obsdeg_core::model::Carry::Reset,
+                latitude: "28.2".parse().ok(),
+                unknowns: terms.parse().expect("terms"),
+                ..Scheme::default()
+            };
+            let mut below = |n: u64| rng.below(n) as i64;
+            let mut candidates: Vec<Euler> = (0..6)
+                .map(|_| std::array::from_fn(|_| Angle::from_nanodeg(below(FULL) - FULL as i64 / 2)))
+                .collect();
+            candidates.extend(Candidates::cardinals().attitudes.into_iter().take(2));
+            let evaluator =
+                Evaluator::new(&base, &candidates, &[0], &Conditions::default()).expect("an evaluator");
+            let m = evaluator.n - 3;
+            let x = DMatrix::from_fn(m, 3, |_, _| below(1 << 20) as f64 / f64::from(1 << 19) - 1.0);
+            let (n, g) = (evaluator.degree(), evaluator.information_of_effects());
+            let energy = |e: &Euler| evaluator.energy_bounded(e, &g, &x);
+            let mut within = |kind: usize, told: f64, truth: &Real, radius: f64, place: &str| {
+                let off = real(told).sub(truth).to_f64().abs();
+                assert!(off <= radius, "{terms}: {place} {told:e} off by {off:e}, told {radius:e}");
+                largest[kind] = largest[kind].max(if radius > 0.0 { off / radius } else { 0.0 });
+            };
+            let net: Vec<_> = on_net(FINE, n, &|e| energy(e).value).collect();
+            let most = net.iter().map(|(_, d)| *d).fold(0.0, f64::max);
+            let (hidden, moved) = hidden(FINE, n, &energy);
+            assert!(hidden < 1e-8 * most && moved < 1e-8, "{terms}: {hidden:e} {moved:e} {most:e}");
+            for at in net.iter().step_by(99_991) {
+                let there = euler(at.0);
+                within(
+                    0,
+                    at.1,
+                    &energy_of(&effects_of(&evaluator, &there), &g, &x),
+                    hidden + moved * most,
+                    "net",
+                );
+            }
+            for (c, e) in candidates.iter().enumerate() {
+                let rows = effects_of(&evaluator, e);
+                let told = energy(e);
+                within(1, told.value, &energy_of(&rows, &g, &x), told.radius, "energy");
+                let errors = evaluator.errors_of(std::iter::once((c, e)));
+                for (i, j) in (0..m).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                    let unit = |k: usize| DMatrix::from_fn(m, 1, |i, _| f64::from(u8::from(i == k)));
+                    // by polarisation: 4 a_ij = d(e_i + e_j) - d(e_i - e_j)
+                    let of = |x: DMatrix<f64>| energy_of(&rows, &g, &x);
+                    let truth = of(unit(i) + unit(j)).sub(&of(unit(i) - unit(j))).shifted(-2);
+                    let own = evaluator.candidates[c].own[(3 + i) * evaluator.n + 3 + j];
+                    within(2, own, &truth, errors[(i, j)], "information");
+                }
+            }
+        }
+        assert!(largest.iter().all(|part| *part > 1e-5), "{largest:?}");
     }
 }
