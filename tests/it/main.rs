@@ -36,3 +36,6 @@ mod simulation;
 mod solutions;
 mod structure;
 mod whole_platform;
+mod workbench;
+mod workbench_page;
+mod workbench_positions;

@@ -77,6 +77,7 @@ fn crates() -> Imports {
         "commands",
         "python",
         "cli",
+        "web",
     ];
     let imports = |name: &&str| {
         let place = root().join("crates").join(name);

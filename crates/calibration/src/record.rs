@@ -2,11 +2,16 @@
 //!
 //! A header is `name [unit]`; a name without brackets has no unit. Lines that begin with `#` are comments. An empty cell is a value that is not there.
 
+#[cfg(feature = "parquet")]
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek};
+#[cfg(feature = "parquet")]
+use std::io::Seek;
+use std::io::{BufRead, BufReader, Read};
 
 use obsdeg_core::model::Recording;
+#[cfg(feature = "parquet")]
 use parquet::file::reader::{FileReader, SerializedFileReader};
+#[cfg(feature = "parquet")]
 use parquet::record::Field;
 use sha2::{Digest, Sha256};
 
@@ -168,6 +173,7 @@ impl Column {
 /// What rows come from.
 enum Rows {
     Csv(Lines),
+    #[cfg(feature = "parquet")]
     Parquet(Box<dyn FileReader>),
 }
 
@@ -244,10 +250,11 @@ pub struct Row<'a> {
 }
 
 impl Record {
-    /// A record from a file: Parquet if it begins so, else CSV.
+    /// A record from a file, with the feature `parquet`: Parquet if it begins so, else CSV.
     ///
     /// # Errors
     /// [`RecordError`].
+    #[cfg(feature = "parquet")]
     pub fn file(name: &str, mut file: File) -> Result<Self, RecordError> {
         let wrong =
             |e: &dyn std::fmt::Display| RecordError::Read { record: name.into(), reason: e.to_string() };
@@ -263,10 +270,11 @@ impl Record {
         Self::parquet(name, Box::new(SerializedFileReader::new(file).map_err(|e| wrong(&e))?))
     }
 
-    /// A record from a pipe: Parquet, which ends with its header and so is read whole, if it begins so, else CSV.
+    /// A record from a pipe, with the feature `parquet`: Parquet, which ends with its header and so is read whole, if it begins so, else CSV.
     ///
     /// # Errors
     /// [`RecordError`].
+    #[cfg(feature = "parquet")]
     pub fn stream(name: &str, mut from: Box<dyn Read>) -> Result<Self, RecordError> {
         let wrong =
             |e: &dyn std::fmt::Display| RecordError::Read { record: name.into(), reason: e.to_string() };
@@ -280,6 +288,7 @@ impl Record {
         Self::parquet(name, Box::new(reader))
     }
 
+    #[cfg(feature = "parquet")]
     fn parquet(name: &str, reader: Box<dyn FileReader>) -> Result<Self, RecordError> {
         let fields = reader.metadata().file_metadata().schema().get_fields();
         let headers: Vec<String> = fields.iter().map(|f| f.name().to_string()).collect();
@@ -459,6 +468,7 @@ impl Record {
                     row(line, &mut cell, label.map_or("", |i| &cells[i]))?;
                 }
             }
+            #[cfg(feature = "parquet")]
             Rows::Parquet(reader) => {
                 let wrong = |e: parquet::errors::ParquetError| RecordError::Read {
                     record: name.clone(),
@@ -489,6 +499,7 @@ enum Cell {
     Text(String),
 }
 
+#[cfg(feature = "parquet")]
 impl Cell {
     fn of(field: &Field) -> Self {
         match field {
@@ -507,6 +518,7 @@ impl Cell {
 }
 
 /// A label of Parquet.
+#[cfg(feature = "parquet")]
 fn text_of(field: &Field) -> String {
     match field {
         Field::Null => String::new(),

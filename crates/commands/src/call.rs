@@ -124,16 +124,63 @@ fn none<A>(_: &A) -> Result<Vec<File>, Problem> {
     Ok(Vec::new())
 }
 
-fn whole<A: Answer + Send + Sync + 'static>(
-    answer: A,
-    passed: bool,
-    files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
-) -> Result<Answered, Problem> {
-    Ok(Answered { answer: Box::new(Whole { answer, files }), passed })
+/// What becomes of an answer.
+trait Wanted {
+    type Out;
+
+    fn whole<A: Answer + Send + Sync + 'static>(
+        answer: A,
+        passed: bool,
+        files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+    ) -> Result<Self::Out, Problem>;
+
+    fn text(text: String, passed: bool) -> Result<Self::Out, Problem>;
 }
 
-fn text(text: String, passed: bool) -> Result<Answered, Problem> {
-    Ok(Answered { answer: Box::new(Text(text)), passed })
+/// All of it is kept.
+struct All;
+
+impl Wanted for All {
+    type Out = Answered;
+
+    fn whole<A: Answer + Send + Sync + 'static>(
+        answer: A,
+        passed: bool,
+        files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+    ) -> Result<Answered, Problem> {
+        Ok(Answered { answer: Box::new(Whole { answer, files }), passed })
+    }
+
+    fn text(text: String, passed: bool) -> Result<Answered, Problem> {
+        Ok(Answered { answer: Box::new(Text(text)), passed })
+    }
+}
+
+/// Only its text: a program that asks for no more holds no writer of anything else.
+struct JsonOnly;
+
+impl Wanted for JsonOnly {
+    type Out = (String, bool);
+
+    fn whole<A: Answer + Send + Sync + 'static>(
+        answer: A,
+        passed: bool,
+        _: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+    ) -> Result<Self::Out, Problem> {
+        Ok((obsdeg_report::json(&answer)?, passed))
+    }
+
+    fn text(text: String, passed: bool) -> Result<Self::Out, Problem> {
+        Ok((text, passed))
+    }
+}
+
+/// The text of an answer ([`Answered::text`]) alone, and whether the command line would exit with 0.
+///
+/// # Errors
+/// As [`call`].
+pub fn call_json(command: &str, request: &str, host: &mut Host<'_>) -> Result<(String, bool), Problem> {
+    object(request).and_then(|request| answered::<JsonOnly>(command, request, host)).map_err(in_snake_case)
 }
 
 /// Answers a command. `request` is a JSON object with its options, named as on the command line in snake case, and with its files,
@@ -143,24 +190,28 @@ fn text(text: String, passed: bool) -> Result<Answered, Problem> {
 /// # Errors
 /// What is wrong with the request; options are named in snake case.
 pub fn call(command: &str, request: &str, host: &mut Host<'_>) -> Result<Answered, Problem> {
-    object(request).and_then(|request| answered(command, request, host)).map_err(in_snake_case)
+    object(request).and_then(|request| answered::<All>(command, request, host)).map_err(in_snake_case)
 }
 
-fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> Result<Answered, Problem> {
+fn answered<W: Wanted>(
+    command: &str,
+    request: Map<String, Value>,
+    host: &mut Host<'_>,
+) -> Result<W::Out, Problem> {
     match command {
         "analyze" => {
             let mut asked: Request<Analyze, Sources> = Request::read(request)?;
             asked.options.input.given = asked.given;
             let read = asked.options.input.read(asked.files.sources)?;
             let judged = analyze(&asked.options, &read, host)?;
-            whole(judged, true, move |_| Ok(position_figures(&read)))
+            W::whole(judged, true, move |_| Ok(position_figures(&read)))
         }
         "simulate" => {
             let mut asked: Request<Simulate, Sources> = Request::read(request)?;
             asked.options.input.given = asked.given;
             let input = asked.options.input.read_one(asked.files.sources)?;
             let (run, traces) = simulate(&asked.options, &input)?;
-            whole(run, true, move |run| Ok(simulation_files(run, &traces)?))
+            W::whole(run, true, move |run| Ok(simulation_files(run, &traces)?))
         }
         "crosscheck" => {
             let mut asked: Request<Crosscheck, Sources> = Request::read(request)?;
@@ -168,7 +219,7 @@ fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> 
             let input = asked.options.input.read_one(asked.files.sources)?;
             let evidence = crosscheck(&asked.options, &input, host)?;
             let passed = evidence.passed();
-            whole(evidence, passed, |e| Ok(crosscheck_files(e)?))
+            W::whole(evidence, passed, |e| Ok(crosscheck_files(e)?))
         }
         "calibrate" => {
             let mut asked: Request<Calibrate, Records> = Request::read(request)?;
@@ -177,23 +228,23 @@ fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> 
             let source = one(sources)?;
             let record = |r: Source| {
                 let bytes = std::io::Cursor::new(r.text.into_bytes());
-                Record::stream(&r.name, Box::new(bytes)).map_err(|e| Problem::input(e.to_string()))
+                Record::csv(&r.name, Box::new(bytes)).map_err(|e| Problem::input(e.to_string()))
             };
             let records = records.into_iter().map(record).collect::<Result<_, _>>()?;
-            calibrated(&asked.options, source, records, before.as_ref(), host)
+            calibrated::<W>(&asked.options, source, records, before.as_ref(), host)
         }
         "compare" => {
             let asked: Request<Compare, Sources> = Request::read(request)?;
-            whole(compare(&asked.options, read(asked.files.sources)?)?, true, none)
+            W::whole(compare(&asked.options, read(asked.files.sources)?)?, true, none)
         }
         "design" => {
             let asked: Request<Search, SearchFiles> = Request::read(request)?;
             match design(&asked.options, &asked.files, host)? {
-                Designed::Schemes(found) => whole(*found, true, |f| f.files()),
-                Designed::Walks(found) => whole(*found, true, |f| Ok(f.files())),
+                Designed::Schemes(found) => W::whole(*found, true, |f| f.files()),
+                Designed::Walks(found) => W::whole(*found, true, |f| Ok(f.files())),
                 Designed::Part(part) => {
                     let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
-                    text(json + "\n", part.complete)
+                    W::text(json + "\n", part.complete)
                 }
             }
         }
@@ -205,11 +256,11 @@ fn answered(command: &str, request: Map<String, Value>, host: &mut Host<'_>) -> 
             let reviewed = report(&asked.options, read(sources)?, &calibrations, host)?;
             let files = reviewed.files(&origin, ReviewFormat::Html, &picture_folder("review"))?;
             let page = files.into_iter().next().map(|page| page.bytes).unwrap_or_default();
-            text(String::from_utf8(page).map_err(|e| Problem::internal(e.to_string()))?, true)
+            W::text(String::from_utf8(page).map_err(|e| Problem::internal(e.to_string()))?, true)
         }
         "paper" => {
             let asked: Request<Paper, NoFiles> = Request::read(request)?;
-            whole(paper(&asked.options)?, true, none)
+            W::whole(paper(&asked.options)?, true, none)
         }
         _ => {
             Err(Problem::input(format!("`{command}` is no command; expected one of {}", COMMANDS.join(", "))))
@@ -334,21 +385,21 @@ pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) 
         let mut asked: Request<Calibrate, Records> = Request::read(object(request)?)?;
         asked.options.given = asked.given;
         let source = one(asked.files.sources)?;
-        calibrated(&asked.options, source, records, asked.files.before.as_ref(), host)
+        calibrated::<All>(&asked.options, source, records, asked.files.before.as_ref(), host)
     };
     answer().map_err(in_snake_case)
 }
 
-fn calibrated(
+fn calibrated<W: Wanted>(
     options: &Calibrate,
     source: Source,
     records: Vec<Record>,
     before: Option<&Source>,
     host: &Host<'_>,
-) -> Result<Answered, Problem> {
+) -> Result<W::Out, Problem> {
     let found = calibrate(options, source.read()?, records, before, host)?;
     let passed = found.passed();
-    whole(found, passed, |found| Ok(found.files()?))
+    W::whole(found, passed, |found| Ok(found.files()?))
 }
 
 fn one(sources: Vec<Source>) -> Result<Source, Problem> {

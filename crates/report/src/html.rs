@@ -150,11 +150,17 @@ fn picture(p: &Picture) -> Json {
 
 /// MathML; program notation where the LaTeX is none.
 fn formula(f: &Typeset) -> Json {
-    let pieces: Option<Vec<String>> = terms(&f.latex).iter().map(|piece| mathml(piece)).collect();
-    json!({ "text": f.text, "mathml": pieces.map_or(Json::Null, |p| Json::from(p.join(" "))) })
+    json!({ "text": f.text, "mathml": lines(&f.latex) })
 }
 
-fn mathml(latex: &str) -> Option<String> {
+/// LaTeX as MathML that may break before its signs.
+pub(crate) fn lines(latex: &str) -> Option<String> {
+    let pieces: Option<Vec<String>> = terms(latex).iter().map(|piece| mathml(piece)).collect();
+    pieces.map(|p| p.join(" "))
+}
+
+/// LaTeX as MathML.
+pub(crate) fn mathml(latex: &str) -> Option<String> {
     let storage = Storage::new();
     let parser = Parser::new(latex, &storage);
     let mut out = String::new();

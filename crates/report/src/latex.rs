@@ -6,7 +6,7 @@ use crate::document::{Block, Cell, Column, Document};
 use crate::visible;
 #[cfg(feature = "pdf")]
 pub(crate) use math::{FUNCTIONS, GREEK};
-pub(crate) use math::{expression, left, solution, symbol};
+pub(crate) use math::{expression, left, solution, solution_of, symbol};
 
 /// Plain text with LaTeX's special characters escaped.
 pub(crate) fn escape(text: &str) -> String {

@@ -120,6 +120,16 @@ pub struct Layout {
     pub ascii: bool,
 }
 
+/// An expression of an answer, in program notation, as MathML; `None` where it cannot be typeset.
+pub fn mathml(expression: &str) -> Option<String> {
+    html::mathml(&latex::expression(expression))
+}
+
+/// A solution in an answer as MathML: its terms, each a coefficient, an observation and a station; `None` where it cannot be typeset.
+pub fn solution_mathml(terms: &[[&str; 3]]) -> Option<String> {
+    html::lines(&latex::solution_of(terms))
+}
+
 /// Why a result could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
@@ -219,11 +229,19 @@ impl<A: Answer> Answer for Several<A> {
 pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<String, ReportError> {
     Ok(match format {
         Format::Table => table::document(&answer.document(), layout),
-        Format::Json => visible::json(answer)?,
+        Format::Json => json(answer)?,
         Format::Markdown => markdown::document(&answer.document()),
         Format::Csv => csv(answer, None)?,
         Format::Latex => latex::document(&answer.document()),
     })
+}
+
+/// A result as JSON, and nothing else.
+///
+/// # Errors
+/// [`ReportError::Json`].
+pub fn json(answer: &impl Answer) -> Result<String, ReportError> {
+    Ok(visible::json(answer)?)
 }
 
 /// A result as a part of an HTML page, such as a notebook: tables and formulas (MathML) that read without scripts.

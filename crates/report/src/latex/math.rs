@@ -405,9 +405,54 @@ pub(crate) fn solution(s: &Solution, frame: Frame, stations: &[StationLabel]) ->
     }
 }
 
+/// A solution from an answer's terms, each a coefficient in program notation, an observation (`Z3'`) and a station: those of one
+/// coefficient, but for the sign, in a bracket.
+pub(crate) fn solution_of(terms: &[[&str; 3]]) -> String {
+    let mut groups: Vec<(&str, Vec<(bool, String)>)> = Vec::new();
+    for &[coefficient, observation, station] in terms {
+        let (negative, size) =
+            coefficient.strip_prefix('-').map_or((false, coefficient), |size| (true, size));
+        let z = (negative, left(observation, Some(station)));
+        match groups.iter_mut().find(|(c, _)| *c == size) {
+            Some((_, of)) => of.push(z),
+            None => groups.push((size, vec![z])),
+        }
+    }
+    let mut out = String::new();
+    for (size, of) in &groups {
+        // the sign of the first stands before the bracket
+        let first = of[0].0;
+        let mut inner = String::new();
+        for (negative, z) in of {
+            sum(&mut inner, *negative != first, z);
+        }
+        match (*size, of.len()) {
+            ("1", _) => of.iter().for_each(|(negative, z)| sum(&mut out, *negative, z)),
+            (_, 1) => sum(&mut out, first, &format!("{}\\,{inner}", factor(size))),
+            _ => sum(&mut out, first, &format!("{}\\,({inner})", factor(size))),
+        }
+    }
+    if out.is_empty() { "0".into() } else { out }
+}
+
+/// An expression as a factor: a sum in brackets.
+fn factor(text: &str) -> String {
+    let math = expression(text);
+    if [" + ", " - "].iter().any(|sign| text.contains(sign)) { format!("({math})") } else { math }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn terms_of_one_coefficient_share_a_bracket() {
+        let terms = [["-wU/2", "Z1", "p1"], ["wU/2", "Z1", "p2"], ["-1", "Z3''", "p1"], ["1", "Z3'", "p2"]];
+        let math = "-\\frac{\\omega_U}{2}\\,(Z_{1}(\\text{p1}) - Z_{1}(\\text{p2})) - \\ddot{Z}_{3}(\\text{p1}) + \\dot{Z}_{3}(\\text{p2})";
+        assert_eq!(solution_of(&terms), math);
+        assert_eq!(solution_of(&[["a - b", "Z1", "p1"]]), "(a - b)\\,Z_{1}(\\text{p1})");
+        assert_eq!(solution_of(&[]), "0");
+    }
 
     #[test]
     fn names_and_expressions() {

@@ -1,0 +1,166 @@
+// The table of verdicts, what changed in it, links between what cannot be told apart, sigmas against requirements.
+
+const WORDS = { observable: 'observable', inseparable: 'inseparable', not_excited: 'not excited', unobservable: 'not observable', not_seen: 'not seen' };
+// the verdicts of the scheme as it is, those before the last gesture, its sigmas by name
+const verdicts = { now: null, before: null, sigmas: null, sigmasOf: null, solutions: null, solutionsOf: null };
+
+/** What is on the table is what changes are told against, from here on. */
+function emphasise() { verdicts.before = verdicts.now ?? verdicts.before; }
+
+const verdictOf = (q) => (q.degree === null || q.degree === undefined ? WORDS[q.status] ?? q.status : String(q.degree));
+const byName = (answer) => new Map((answer?.quantities ?? []).map((q) => [q.name, q]));
+
+function cell(row, index, className) {
+  while (row.children.length <= index) row.append(document.createElement(row.children.length === 1 ? 'th' : 'td'));
+  const e = row.children[index];
+  if (className && e.className !== className) e.className = className;
+  if (e.tagName === 'TH') e.scope = 'row';
+  return e;
+}
+
+const put = (e, text) => { if (e.textContent !== text) e.textContent = text; };
+function putMath(e, math, text) {
+  const key = math || text;
+  if (e.dataset.of === key) return;
+  e.dataset.of = key;
+  if (math) e.innerHTML = math; else e.replaceChildren(text.length > 60 ? element('code', { textContent: text }) : text);
+}
+
+/** A name as a formula, and as a text for those who hear it. */
+function putName(e, math, name) {
+  if (e.dataset.of === (math || name)) return;
+  putMath(e, math, name);
+  if (!math) return;
+  e.firstElementChild.setAttribute('aria-hidden', 'true');
+  e.append(element('span', { className: 'unseen', textContent: name }));
+}
+
+/** Draws the answer about the scheme. */
+function drawVerdicts() {
+  const box = $('verdicts'), answer = verdicts.now?.answer;
+  if (!answer) return;
+  let table = box.querySelector('table');
+  if (!table) {
+    table = element('table', {}, element('thead'), element('tbody'));
+    table.tHead.innerHTML = '<tr><td class="links"></td><th scope="col">unknown</th><th scope="col">degree</th><th scope="col">status</th><th scope="col">sigma against requirement</th><th scope="col">solution, or why there is none</th></tr>';
+    const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+    svg.id = 'links';
+    svg.setAttribute('aria-hidden', 'true');
+    box.append(table, svg);
+  }
+  const order = new Map(answer.unknowns.map((n, i) => [n, i]));
+  const rows = [...answer.quantities].sort((a, b) => order.get(a.name) - order.get(b.name));
+  const combinations = answer.combinations ?? [];
+  const all = [...rows, ...combinations.map((q) => ({ ...q, combined: true }))];
+  const body = table.tBodies[0], old = byName(verdicts.before?.answer);
+  while (body.rows.length > all.length) body.lastChild.remove();
+  while (body.rows.length < all.length) body.append(document.createElement('tr'));
+  let changes = 0;
+  all.forEach((q, i) => {
+    const tr = body.rows[i], name = q.name ?? q.expression, before = old.get(name);
+    const differs = !!before && verdictOf(before) !== verdictOf(q);
+    changes += differs;
+    const kind = `${q.status ?? 'observable'}${differs ? ' changed' : ''}`;
+    if (tr.className !== kind) tr.className = kind;
+    if (tr.dataset.name !== name) tr.dataset.name = name;
+    cell(tr, 0, 'links');
+    putName(cell(tr, 1), verdicts.now.math[name], name);
+    const degree = cell(tr, 2, 'degree');
+    const text = q.degree ?? '\u2013', was = differs ? ` was ${before.degree ?? 'none'}` : '';
+    if (degree.textContent !== text + was) degree.replaceChildren(String(text), ...(was ? [element('small', { textContent: was })] : []));
+    put(cell(tr, 3, 'status'), q.combined ? 'combination' : WORDS[q.status] ?? q.status);
+    drawSigma(cell(tr, 4, 'sigma'), q.combined ? null : name);
+    drawSolution(cell(tr, 5, 'solution'), q, name);
+  });
+  drawLinks(rows);
+  // of another scheme they are faint until those of this one are there
+  const asked = JSON.stringify(state.scheme);
+  table.classList.toggle('old-sigmas', verdicts.sigmasOf !== asked);
+  table.classList.toggle('old-solutions', verdicts.solutionsOf !== asked);
+  const open = rows.filter((q) => q.degree === null).map((q) => q.name);
+  const worst = Math.max(0, ...rows.map((q) => q.degree ?? 0));
+  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${open.length} not observable by themselves` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}`);
+  offerStrip(rows);
+}
+
+// a solution of more terms is folded
+const SHORT = 8;
+
+function drawSolution(td, q, name) {
+  const solved = verdicts.solutions?.find(name);
+  if (q.degree !== null && q.degree !== undefined) {
+    const text = solved?.solution?.text ?? '', math = verdicts.solutions?.math[text], terms = solved?.solution?.terms.length ?? 0;
+    if (solved && !solved.solution) return putMath(td, '', 'not written out');
+    if (terms <= SHORT) return putMath(td, math, text);
+    if (td.dataset.of === text) return;
+    td.dataset.of = text;
+    const inner = element('div'), fold = element('details', {}, element('summary', { textContent: `${terms} terms` }), inner);
+    fold.addEventListener('toggle', () => putMath(inner, math, text), { once: true });
+    return td.replaceChildren(fold);
+  }
+  const why = q.partners?.length ? `not told from ${q.partners.join(', ')}` : 'never moves Z';
+  const other = (solved ?? q).elsewhere;
+  const where = other && [[other.other_latitudes, 'latitudes'], [other.other_angles, 'angles']].filter(([d]) => d !== null && d !== undefined)
+    .map(([d, what]) => `degree ${d} at other ${what}`).join('; ');
+  putMath(td, '', where ? `${why}; ${where}` : why);
+}
+
+function drawSigma(td, name) {
+  const s = name && verdicts.sigmas?.get(name);
+  const key = s ? `${s.sigma} ${s.required_sigma} ${s.missed}` : '';
+  if (td.dataset.of === key) return;
+  td.dataset.of = key;
+  if (!s) return td.replaceChildren();
+  const ratio = s.sigma / s.required_sigma;
+  // three decades, two of them below the requirement
+  const part = Math.max(0.01, Math.min(1, (Math.log10(ratio) + 2) / 3));
+  // what samples do not determine misses its requirement, whatever a prior makes of sigma
+  const over = s.missed !== undefined, prior = s.missed && s.missed !== 'too_large' ? ', from the prior only' : '';
+  const bar = element('i'), box = element('span', { className: `against${over ? ' over' : ''}` }, bar, element('b'));
+  bar.style.width = `${part * 100}%`;
+  box.setAttribute('role', 'img');
+  box.setAttribute('aria-label', `${over ? 'misses' : 'meets'} its requirement: ${ratio.toPrecision(2)} times${prior}`);
+  box.title = `required ${s.required_sigma} ${s.unit}${prior}`;
+  td.replaceChildren(box, `${s.sigma.toPrecision(2)} ${s.unit}`);
+}
+
+/** Arcs beside the table between unknowns that cannot be told apart. */
+function drawLinks(rows) {
+  const svg = $('links'), body = $('verdicts').querySelector('tbody');
+  const places = rows.map((_, i) => body.rows[i].offsetTop + body.rows[i].offsetHeight / 2);
+  const index = new Map(rows.map((q, i) => [q.name, i])), groups = new Map();
+  for (const q of rows) {
+    if (q.status === 'inseparable' && q.partners.length) groups.set([q.name, ...q.partners].sort().join(' '), [q.name, ...q.partners]);
+  }
+  const key = JSON.stringify([[...groups.keys()], places]);
+  if (svg.dataset.of === key) return;
+  svg.dataset.of = key;
+  const height = body.offsetTop + body.offsetHeight;
+  svg.setAttribute('height', height);
+  svg.setAttribute('width', 34);
+  const make = (tag, attributes) => {
+    const e = document.createElementNS('http://www.w3.org/2000/svg', tag);
+    for (const [k, v] of Object.entries(attributes)) e.setAttribute(k, v);
+    return e;
+  };
+  const parts = [];
+  [...groups.values()].forEach((names, g) => {
+    const ys = names.filter((n) => index.has(n)).map((n) => places[index.get(n)]).sort((a, b) => a - b);
+    ys.forEach((y) => parts.push(make('circle', { cx: 29, cy: y, r: 2.6 })));
+    for (let i = 1; i < ys.length; i++) {
+      const bend = 29 - Math.min(25, 9 + (ys[i] - ys[i - 1]) / 8 + g * 3);
+      parts.push(make('path', { d: `M29 ${ys[i - 1]} C${bend} ${ys[i - 1]} ${bend} ${ys[i]} 29 ${ys[i]}` }));
+    }
+  });
+  svg.replaceChildren(...parts);
+}
+
+function tableOf(heads, rows, caption = '') {
+  const table = element('table', {}, ...(caption ? [element('caption', { textContent: caption })] : []), element('thead'), element('tbody'));
+  table.tHead.append(element('tr', {}, ...heads.map((h) => element('th', { scope: 'col', textContent: h }))));
+  for (const row of rows) {
+    const cells = row.map((x) => (x instanceof Node ? element('td', {}, x) : element('td', { textContent: x ?? '' })));
+    table.tBodies[0].append(element('tr', {}, ...cells));
+  }
+  return table;
+}

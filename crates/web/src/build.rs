@@ -1,0 +1,180 @@
+//! The engine compiled and packed, and the page around it.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use lzma_rust2::{LzmaOptions, LzmaWriter};
+use minijinja::{Environment, context};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use wasm_bindgen_cli_support::Bindgen;
+
+const TEMPLATE: &str = include_str!("../page/page.html");
+const STYLE: &str = include_str!("../page/page.css");
+const WORKER: &str = include_str!("../page/worker.js");
+/// The scripts of the page, one after the other.
+const SCRIPTS: [&str; 10] = [
+    include_str!("../page/engine.js"),
+    include_str!("../page/geometry.js"),
+    include_str!("../page/scheme.js"),
+    include_str!("../page/positions.js"),
+    include_str!("../page/view.js"),
+    include_str!("../page/table.js"),
+    include_str!("../page/ask.js"),
+    include_str!("../page/design.js"),
+    include_str!("../page/tour.js"),
+    include_str!("../page/main.js"),
+];
+
+/// Why there is no page.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BuildError {
+    /// A file.
+    #[error("{path}: {reason}")]
+    File { path: String, reason: std::io::Error },
+    /// The compiler, which has said more.
+    #[error(
+        "the engine was not compiled; expected the target wasm32-unknown-unknown (rustup target add wasm32-unknown-unknown)"
+    )]
+    Compiler,
+    /// The glue between script and engine.
+    #[error("no glue: {0}")]
+    Glue(String),
+    /// The page.
+    #[error("no page: {0}")]
+    Page(#[from] minijinja::Error),
+}
+
+/// WebAssembly and the script that calls it.
+struct Module {
+    wasm: Vec<u8>,
+    script: String,
+}
+
+/// Writes the page, and says what it wrote.
+pub(crate) fn page(asked: Option<PathBuf>) -> Result<String, BuildError> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let compiled = compile(&root)?;
+    let engine = glued(&compiled, "obsdeg_web")?;
+    let unpack = glued(&compiled, "obsdeg_unpack")?;
+    let packed = packed(&engine.wasm)?;
+    let script = format!("'use strict';(() => {{\n{}\n}})();", SCRIPTS.join("\n"));
+    let data = json!({
+        "worker": format!("{}\n{}\n{WORKER}", unpack.script, engine.script),
+        "unpack": as_text(&unpack.wasm),
+        "engine": as_text(&packed),
+        "version": env!("CARGO_PKG_VERSION"),
+        "examples": examples(&root)?,
+    });
+    let mut environment = Environment::new();
+    environment.add_template("page", TEMPLATE)?;
+    let text = environment.get_template("page")?.render(context! {
+        style => STYLE,
+        style_digest => digest(STYLE),
+        script => &script,
+        script_digest => digest(&script),
+        version => env!("CARGO_PKG_VERSION"),
+        // nothing in it ends the element that holds it
+        data => data.to_string().replace('<', "\\u003c"),
+    })?;
+    let path = asked.unwrap_or_else(|| root.join("target/workbench.html"));
+    fs::write(&path, &text)
+        .map_err(|reason| BuildError::File { path: path.display().to_string(), reason })?;
+    let [all, whole, small] = [text.len(), engine.wasm.len(), packed.len()].map(|n| n as f64 / 1e6);
+    Ok(format!("{}: {all:.2} MB; the engine {whole:.2} MB, packed {small:.2} MB", path.display()))
+}
+
+/// Compiles the engine and what unpacks it; the files that came of it.
+fn compile(root: &Path) -> Result<Vec<PathBuf>, BuildError> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let done = Command::new(cargo)
+        .args(["build", "--lib", "-p", "obsdeg-web", "-p", "obsdeg-unpack", "--profile", "web"])
+        .args(["--target", "wasm32-unknown-unknown", "--message-format", "json-render-diagnostics"])
+        .current_dir(root)
+        .stderr(Stdio::inherit())
+        .output();
+    let done = done.ok().filter(|d| d.status.success()).ok_or(BuildError::Compiler)?;
+    let messages = String::from_utf8_lossy(&done.stdout);
+    let artifacts = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let files = artifacts.filter_map(|m| m["filenames"].as_array().cloned()).flatten();
+    let paths = files.filter_map(|f| f.as_str().map(PathBuf::from));
+    Ok(paths.filter(|p| p.extension().is_some_and(|e| e == "wasm")).collect())
+}
+
+/// The one of these files with that name, and the script that calls it.
+fn glued(compiled: &[PathBuf], name: &str) -> Result<Module, BuildError> {
+    let file =
+        compiled.iter().find(|p| p.file_stem().is_some_and(|s| s == name)).ok_or(BuildError::Compiler)?;
+    let glue = || {
+        let mut bindgen = Bindgen::new();
+        bindgen.input_path(file).no_modules(true)?.no_modules_global(name)?;
+        bindgen.typescript(false).remove_name_section(true).remove_producers_section(true).generate_output()
+    };
+    let mut output = glue().map_err(|e| BuildError::Glue(format!("{e:#}")))?;
+    Ok(Module { wasm: output.wasm_mut().emit_wasm(), script: output.js().into() })
+}
+
+/// Packed as LZMA.
+fn packed(bytes: &[u8]) -> Result<Vec<u8>, BuildError> {
+    let options =
+        LzmaOptions { nice_len: 273, dict_size: 1 << 24, lc: 4, pb: 0, ..LzmaOptions::with_preset(9) };
+    let write = || {
+        let mut writer = LzmaWriter::new_use_header(Vec::new(), &options, Some(bytes.len() as u64))?;
+        writer.write_all(bytes)?;
+        writer.finish()
+    };
+    write().map_err(|reason| BuildError::File { path: "packing".into(), reason })
+}
+
+/// Bytes as characters, five for four (base64 takes five and a third): four bytes are a number, least significant first, its digits to the base 85
+/// likewise, from `(` on without the backslash. The length stands before them.
+fn as_text(bytes: &[u8]) -> String {
+    let mut out = format!("{} ", bytes.len());
+    for chunk in bytes.chunks(4) {
+        let mut number = chunk.iter().rev().fold(0u64, |n, b| n << 8 | u64::from(*b));
+        for _ in 0..5 {
+            let digit = (number % 85) as u8 + b'(';
+            out.push(char::from(if digit == b'\\' {
+                b'}'
+            } else if digit == b'<' {
+                b'~'
+            } else {
+                digit
+            }));
+            number /= 85;
+        }
+    }
+    out
+}
+
+/// Schemes and models of the repository's examples, with what its list says of each.
+fn examples(root: &Path) -> Result<Vec<Value>, BuildError> {
+    let read = |path: &Path| {
+        fs::read_to_string(path)
+            .map_err(|reason| BuildError::File { path: path.display().to_string(), reason })
+    };
+    let folder = root.join("examples");
+    let list = read(&folder.join("README.md"))?;
+    let mut out = Vec::new();
+    for row in list.lines().filter_map(|l| l.strip_prefix("| [")) {
+        let Some((names, about)) = row.trim_end_matches(" |").split_once(" | ") else { continue };
+        for name in names.split('(').skip(1).filter_map(|n| n.split(')').next()) {
+            for kind in ["scheme", "model"] {
+                let file = folder.join(name).join(format!("{kind}.toml"));
+                if file.is_file() {
+                    out.push(json!({ "name": name, "kind": kind, "about": about, "text": read(&file)? }));
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// What a content security policy calls a text by.
+fn digest(text: &str) -> String {
+    STANDARD.encode(Sha256::digest(text))
+}

@@ -1,0 +1,277 @@
+//! The page of `crates/web` in a real browser, from disk: what it says, opens, saves, searches and shows, against the command line.
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::browser::Browser;
+use crate::program::run;
+use crate::workbench_page::{choose, click, key, opened, quiet, root, says, scheme, wait, write};
+
+#[test]
+fn the_page_is_small_and_asks_for_nothing() {
+    let Some((mut browser, page)) = opened(1400) else { return };
+    let text = fs::read_to_string(page).expect("the page");
+    assert!(text.len() < 2_500_000, "{} bytes", text.len());
+    // what would be forbidden is refused: the policy is not void
+    let refused = browser.value("fetch('https://example.com').then(() => 'sent', () => 'refused')");
+    assert_eq!(refused, json!("refused"));
+    assert!(browser.events.iter().any(|e| e.to_string().contains("Content Security Policy")));
+    assert!(text.contains("default-src 'none'") && !text.contains("'unsafe-inline'"));
+    let private = browser.value("document.getElementById('private').checkVisibility()");
+    assert_eq!(private, json!(true));
+}
+
+#[test]
+fn its_json_is_that_of_the_command_line() {
+    let Some((mut browser, _)) = opened(1400) else { return };
+    let examples = browser.value("JSON.parse(document.getElementById('data').textContent).examples");
+    let examples = examples.as_array().expect("a list");
+    assert!(examples.len() > 25, "{}", examples.len());
+    for example in examples {
+        let (name, kind) =
+            (example["name"].as_str().expect("a name"), example["kind"].as_str().expect("a kind"));
+        let file = format!("examples/{name}/{kind}.toml");
+        assert_eq!(example["text"], json!(fs::read_to_string(root().join(&file)).expect("readable")));
+        // the page holds no symbolic engine: with one, solutions are left out of both
+        let mut request = json!({ "sources": [{ "name": file, "text": example["text"] }] });
+        let mut command = vec!["analyze", &file, "--format", "json"];
+        if cfg!(feature = "symbolica") {
+            request["solutions"] = json!(false);
+            command.extend(["--solutions", "off"]);
+        }
+        let said = browser.value(&format!("obsdeg.call('analyze', {request})"));
+        let printed = run(&command);
+        let printed = String::from_utf8(printed.stdout).expect("text");
+        assert!(printed.len() > 500 || said["problem"].is_object(), "{file}: {said}");
+        assert!(said["text"].as_str().unwrap_or_default() == printed, "{file}: other bytes");
+    }
+    // another command, with random numbers in it
+    let file = "examples/six-positions/scheme.toml";
+    let text = fs::read_to_string(root().join(file)).expect("readable");
+    let request = json!({ "sources": [{ "name": file, "text": text }], "seed": 5 });
+    let said = browser.value(&format!("obsdeg.call('simulate', {request})"));
+    let printed = run(&["simulate", file, "--seed", "5", "--format", "json"]);
+    assert!(said["text"].as_str().unwrap_or_default().as_bytes() == printed.stdout, "{said}");
+    quiet(&browser);
+}
+
+#[test]
+fn schemes_come_and_go() {
+    let Some((mut browser, page)) = opened(1400) else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let saved = folder.path().display().to_string();
+    browser.call("Browser.setDownloadBehavior", json!({ "behavior": "allow", "downloadPath": saved }));
+    let b = &mut browser;
+    let whole = |name: &str| {
+        let patience = Instant::now() + Duration::from_secs(60);
+        loop {
+            if let Ok(text) = fs::read_to_string(folder.path().join(name))
+                && !text.is_empty()
+            {
+                return text;
+            }
+            assert!(Instant::now() < patience, "{name} is not saved");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    let drop_file = |b: &mut Browser, file: &Path| {
+        for kind in ["dragEnter", "dragOver", "drop"] {
+            let data = json!({ "items": [], "files": [file], "dragOperationsMask": 1 });
+            b.call("Input.dispatchDragEvent", json!({ "type": kind, "x": 300, "y": 300, "data": data }));
+        }
+    };
+    // dropped, saved, and the same
+    drop_file(b, &root().join("examples/twelve-positions/scheme.toml"));
+    wait(b, "twelve", "document.querySelectorAll('#positions li').length == 12");
+    click(b, "#save");
+    let text = whole("scheme.toml");
+    let file = folder.path().join("scheme.toml").display().to_string();
+    let own =
+        run(&["analyze", "examples/twelve-positions/scheme.toml", "--solutions", "off", "--format", "json"]);
+    assert_eq!(
+        run(&["analyze", &file, "--solutions", "off", "--format", "json"]).stdout,
+        own.stdout,
+        "{text}"
+    );
+    click(b, "#json");
+    let answer: Value = serde_json::from_str(&whole("scheme.json")).expect("JSON");
+    assert_eq!(answer["schema"], json!("obsdeg.analysis/1"));
+    click(b, "#report");
+    assert!(whole("scheme.html").contains("<math"));
+    // a link holds it
+    click(b, "#link");
+    wait(b, "link", "location.hash.length > 100");
+    let link = b.value("location.href").as_str().expect("an address").to_string();
+    let before = scheme(b);
+    b.call("Page.navigate", json!({ "url": "about:blank" }));
+    b.call("Page.navigate", json!({ "url": link }));
+    wait(b, "the link is open", "window.obsdeg && document.querySelectorAll('#positions li').length == 12");
+    assert_eq!(scheme(b), before);
+    b.value("location.hash = 'scheme=%%%', 1");
+    wait(b, "a damaged link", "document.getElementById('notice').textContent.includes('damaged')");
+    assert_eq!(scheme(b), before);
+    // wrong TOML: its place, and nothing is lost
+    let wrong = folder.path().join("wrong.toml");
+    fs::write(&wrong, "carry = \"platform\"\n[[position]]\nangles_deg = [0, 0, \"NUE\n").expect("written");
+    drop_file(b, &wrong);
+    wait(b, "wrong TOML", "document.getElementById('text-problem').textContent.startsWith('Line 3, column')");
+    let marked = b.value("document.querySelector('#text-problem pre').textContent");
+    assert!(marked.as_str().is_some_and(|m| m.starts_with("3 | angles_deg") && m.contains('^')), "{marked}");
+    click(b, "#text-problem button");
+    let place = b.value("document.getElementById('text').selectionStart").as_u64().expect("a place");
+    assert!((36..=62).contains(&place), "{place}");
+    assert_eq!(scheme(b), before);
+    // a model and the gallery
+    let models = b.value("[...document.querySelectorAll('#gallery option')].map(o => o.textContent)");
+    let lotka = models
+        .as_array()
+        .expect("a list")
+        .iter()
+        .position(|m| m == "lotka-volterra (model)")
+        .expect("a model");
+    choose(b, "#gallery", &(lotka - 1).to_string());
+    wait(
+        b,
+        "symmetries",
+        "document.getElementById('text-verdicts').textContent.includes('multiply x2 by s; divide b by s')",
+    );
+    // a link holds a model too
+    let model = b.value("document.getElementById('text').value");
+    click(b, "#link");
+    wait(b, "link of a text", "location.hash.startsWith('#text=')");
+    let link = b.value("location.href").as_str().expect("an address").to_string();
+    b.call("Page.navigate", json!({ "url": "about:blank" }));
+    b.call("Page.navigate", json!({ "url": link }));
+    wait(b, "the text is there", "window.obsdeg && document.getElementById('text').value.length > 100");
+    assert_eq!(b.value("document.getElementById('text').value"), model);
+    wait(b, "and judged", "document.getElementById('text-verdicts').textContent.includes('rank 5 of 6')");
+    choose(b, "#gallery", "0");
+    wait(b, "a scheme", "document.getElementById('text-verdicts').textContent.includes('rank 8 of 15')");
+    click(b, "#take");
+    wait(
+        b,
+        "taken",
+        "document.querySelectorAll('#positions li').length == 2 && !document.getElementById('panel-scheme').hidden",
+    );
+    quiet(b);
+    assert!(page.is_file());
+}
+
+#[test]
+fn the_best_positions_are_found() {
+    let Some((mut browser, _)) = opened(1400) else { return };
+    let b = &mut browser;
+    choose(b, "#carry", "inertial");
+    click(b, "#tab-design");
+    click(b, "#design-go");
+    wait(
+        b,
+        "progress",
+        "/\\d of \\d/.test(document.getElementById('design-said').textContent) || document.querySelector('#found td')",
+    );
+    wait(b, "found", "document.querySelectorAll('#found tbody tr').length > 0");
+    let value = b.value("document.querySelector('#found tbody tr').children[2].textContent");
+    let answer = run(&["design", "--positions", "5", "--carry", "inertial", "--format", "json"]);
+    let answer: Value = serde_json::from_slice(&answer.stdout).expect("JSON");
+    let best = answer["found"][0]["value"].as_f64().expect("a number");
+    assert!(value.as_str().is_some_and(|v| v.starts_with(&format!("{best:.5}")[..6])), "{value} {best}");
+    click(b, "#found tbody tr:first-child button");
+    wait(b, "five", "document.querySelectorAll('#positions li').length == 5");
+    wait(b, "all", "document.getElementById('summary').textContent.startsWith('rank 15 of 15')");
+    // a longer search is ended, and the next one begins
+    click(b, "#tab-design");
+    write(b, "#design-k", "9");
+    click(b, "#design-go");
+    wait(b, "under way", "!document.getElementById('design-stop').disabled");
+    click(b, "#design-stop");
+    wait(b, "ended", "document.getElementById('design-said').textContent == 'Stopped.'");
+    write(b, "#design-k", "5");
+    click(b, "#design-go");
+    wait(b, "again", "document.querySelectorAll('#found tbody tr').length > 0");
+    quiet(b);
+}
+
+/// The tour says what the table beside it shows.
+#[test]
+fn the_tour_shows_what_it_says() {
+    let Some((mut browser, _)) = opened(1400) else { return };
+    let b = &mut browser;
+    click(b, "#start-tour");
+    says(b, "psi_y", 3, "inseparable");
+    says(b, "psi_y", 5, "not told from D_FZ");
+    click(b, "#tour-next");
+    says(b, "psi_y", 2, "0");
+    // every multiple of 5 degrees but 0 and 180 gives degree 0, as is said
+    wait(b, "marks", "document.getElementById('alpha').title == 'Other verdicts at -180, 0, 180 deg'");
+    click(b, "#tour-next");
+    says(b, "psi_y", 3, "not excited");
+    // the poles are the latitudes that are marked
+    wait(b, "latitudes", "document.getElementById('latitude').title == 'Other verdicts at -90, 90 deg'");
+    for name in ["D_FY", "D_IY"] {
+        says(b, name, 3, "not excited");
+    }
+    b.value("document.getElementById('latitude').focus(), 1");
+    key(b, "ArrowLeft", 37, 0);
+    for name in ["D_FY", "D_IY"] {
+        says(b, name, 2, "2");
+    }
+    click(b, "#tour-next");
+    wait(b, "all", "document.getElementById('summary').textContent.startsWith('rank 15 of 15')");
+    for name in ["D_IX", "D_IY", "D_IZ"] {
+        says(b, name, 2, "2");
+    }
+    click(b, "#tour-next");
+    says(b, "D_IX - D_IY", 2, "1");
+    says(b, "D_IX + D_IY + D_IZ", 2, "2");
+    assert_eq!(b.value("document.getElementById('tour-next').disabled"), json!(true));
+    click(b, "#tour-end");
+    assert_eq!(b.value("document.getElementById('tour').hidden"), json!(true));
+    quiet(b);
+}
+
+#[test]
+fn it_is_for_everyone() {
+    let Some((mut browser, _)) = opened(1400) else { return };
+    let b = &mut browser;
+    let axe =
+        fs::read_to_string(root().join("tests/data/axe/axe.min.js")).expect("tests/data/axe/axe.min.js");
+    wait(
+        b,
+        "sigmas",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts .against').length == 15",
+    );
+    b.value(&format!("{axe};1"));
+    click(b, "#start-tour");
+    for scheme in ["light", "dark"] {
+        let wanted = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
+        b.call("Emulation.setEmulatedMedia", wanted);
+        for tab in ["text", "design", "scheme"] {
+            b.value(&format!("document.getElementById('tab-{tab}').click(), 1"));
+            for width in [400, 800, 1280, 1920, 2560] {
+                b.size(width, 1000);
+                b.settle();
+                let beyond = b.value(
+                    "(() => { const w = document.documentElement.clientWidth; \
+                     const out = [...document.body.querySelectorAll('*')].filter(e => e.checkVisibility() && (!e.closest('.wide') || e.classList.contains('wide'))) \
+                     .filter(e => e.getBoundingClientRect().right > w + 1).map(e => e.tagName + '#' + e.id); \
+                     return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
+                );
+                assert_eq!(beyond, json!([]), "{tab} at {width} px");
+                let found = b.value(
+                    "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + v.nodes[0].html.slice(0, 200))])",
+                );
+                assert!(
+                    found[0].as_u64() > Some(10) && found[1] == json!([]),
+                    "{tab} {scheme} {width}: {found}"
+                );
+            }
+        }
+    }
+    // by keys alone: tabs have arrows, everything that works has a name
+    b.value("document.getElementById('tab-scheme').focus(), 1");
+    key(b, "ArrowRight", 39, 0);
+    assert_eq!(b.value("document.activeElement.id"), json!("tab-design"));
+}

@@ -1,0 +1,176 @@
+//! The page of `crates/web` in a real browser, from disk: what its tests do there.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::browser::Browser;
+
+pub(crate) fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The page, built from what is there now; none where there is no target or no browser.
+#[expect(clippy::print_stderr, reason = "a skipped test says why")]
+pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
+    static PAGE: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let built = PAGE.get_or_init(|| {
+        let libraries = Command::new("rustc")
+            .args(["--print", "target-libdir", "--target", "wasm32-unknown-unknown"])
+            .output()
+            .ok()?;
+        if !Path::new(String::from_utf8_lossy(&libraries.stdout).trim()).is_dir() {
+            return None;
+        }
+        let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("workbench.html");
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let built = Command::new(cargo)
+            .args(["run", "-q", "-p", "obsdeg-web", "--bin", "workbench", "--"])
+            .arg(&page)
+            .current_dir(root())
+            .status();
+        assert!(built.expect("cargo runs").success(), "the page is built");
+        Some(page)
+    });
+    let Some(page) = built.as_deref() else {
+        eprintln!(
+            "skipped: the target wasm32-unknown-unknown is not installed (rustup target add wasm32-unknown-unknown)"
+        );
+        return None;
+    };
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("skipped: no Chromium on this machine");
+        return None;
+    };
+    browser.open(page, width, 1000);
+    ready(&mut browser);
+    Some((browser, page))
+}
+
+pub(crate) fn wait(browser: &mut Browser, what: &str, condition: &str) {
+    let patience = Instant::now() + Duration::from_secs(120);
+    while browser.value(&format!("!!({condition})")) != json!(true) {
+        if Instant::now() > patience {
+            let page = browser.value("document.body.innerText.slice(0, 3000)");
+            panic!("{what}: {condition} does not come true\n{}", page.as_str().unwrap_or_default());
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+pub(crate) fn ready(browser: &mut Browser) {
+    wait(browser, "start", "document.querySelector('#verdicts tbody tr')");
+}
+
+const CELL: &str = "(name, column) => document.querySelector(`#verdicts tr[data-name=\"${name}\"]`)?.children[column]?.textContent";
+
+/// Waits until a cell of the table of verdicts says so.
+pub(crate) fn says(browser: &mut Browser, name: &str, column: usize, text: &str) {
+    let condition = format!("({CELL})({name:?}, {column})?.startsWith({text:?})");
+    wait(browser, name, &condition);
+}
+
+pub(crate) fn click(browser: &mut Browser, selector: &str) {
+    browser.mouse(selector, true);
+}
+
+/// Writes into a field as a person would, and leaves it.
+pub(crate) fn write(browser: &mut Browser, selector: &str, text: &str) {
+    browser.value(&format!(
+        "document.querySelector({selector:?}).focus(), document.querySelector({selector:?}).select?.(), 1"
+    ));
+    browser.call("Input.insertText", json!({ "text": text }));
+    browser.value(&format!("document.querySelector({selector:?}).blur(), 1"));
+    browser.settle();
+}
+
+pub(crate) fn choose(browser: &mut Browser, selector: &str, value: &str) {
+    browser.value(&format!(
+        "(() => {{ const e = document.querySelector({selector:?}); e.value = {value:?}; e.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
+    ));
+}
+
+pub(crate) fn key(browser: &mut Browser, key: &str, code: u32, modifiers: u32) {
+    for kind in ["rawKeyDown", "keyUp"] {
+        let event = json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": modifiers });
+        browser.call("Input.dispatchKeyEvent", event);
+    }
+    browser.settle();
+}
+
+/// Drags from one point to another in so many steps.
+pub(crate) fn drag(browser: &mut Browser, from: [f64; 2], to: [f64; 2], steps: usize, pause: Duration) {
+    let mut event = |kind: &str, [x, y]: [f64; 2], buttons: u32| {
+        let button = if buttons == 0 && kind == "mouseMoved" { "none" } else { "left" };
+        let at =
+            json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1 });
+        browser.call("Input.dispatchMouseEvent", at);
+    };
+    event("mouseMoved", from, 0);
+    event("mousePressed", from, 1);
+    for i in 1..=steps {
+        let part = i as f64 / steps as f64;
+        event("mouseMoved", [0, 1].map(|k| from[k] + part * (to[k] - from[k])), 1);
+        std::thread::sleep(pause);
+    }
+    event("mouseReleased", to, 0);
+    browser.settle();
+}
+
+/// Moves a finger from one point to another.
+pub(crate) fn swipe(browser: &mut Browser, from: [f64; 2], to: [f64; 2]) {
+    let mut event = |kind: &str, points: Value| {
+        browser.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
+    };
+    let at = |part: f64| {
+        let [x, y] = [0, 1].map(|k| from[k] + part * (to[k] - from[k]));
+        json!([{ "x": x, "y": y }])
+    };
+    event("touchStart", at(0.0));
+    for i in 1..=10 {
+        event("touchMove", at(f64::from(i) / 10.0));
+    }
+    event("touchEnd", json!([]));
+    browser.settle();
+}
+
+/// Left, top, width and height of an element that is scrolled to.
+pub(crate) fn place(browser: &mut Browser, selector: &str) -> [f64; 4] {
+    let place = browser.value(&format!(
+        "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{ block: 'center' }}); \
+         const r = e.getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; }})()"
+    ));
+    [0, 1, 2, 3].map(|k| place[k].as_f64().expect("a number"))
+}
+
+/// The point of a slider's thumb at a value from -180 to 180.
+pub(crate) fn thumb(browser: &mut Browser, axis: &str, value: f64) -> [f64; 2] {
+    let [x, y, w, h] = place(browser, &format!("#{axis}"));
+    [x + 8.0 + (w - 16.0) * (value + 180.0) / 360.0, y + h / 2.0]
+}
+
+pub(crate) fn scheme(browser: &mut Browser) -> String {
+    browser.value("obsdeg.scheme()").as_str().expect("TOML").into()
+}
+
+pub(crate) fn names(browser: &mut Browser) -> Value {
+    browser.value("[...document.querySelectorAll('#positions .name')].map(b => b.textContent)")
+}
+
+/// Nothing was said to the console, nothing was asked of a network.
+pub(crate) fn quiet(browser: &Browser) {
+    for event in &browser.events {
+        let (method, of) = (event["method"].as_str().unwrap_or_default(), &event["params"]);
+        for bad in ["Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled"] {
+            assert_ne!(method, bad, "{of}");
+        }
+        if method == "Network.requestWillBeSent" {
+            let url = of["request"]["url"].as_str().unwrap_or_default();
+            let own = url.starts_with("data:") || url.starts_with("blob:") || url.contains("workbench.html");
+            assert!(own, "{url}");
+        }
+    }
+}
