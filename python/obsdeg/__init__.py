@@ -14,15 +14,20 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _obsdeg
-from ._files import Judged, Model, Scheme, source
+from . import options as options
+from . import shapes as shapes
+from ._files import Judged, Model, Scheme, Text, Texted, source
 from ._obsdeg import ProblemError, __version__
 from ._progress import heard
+from ._records import Record
 from ._results import (
+    KINDS,
     Analysis,
     Answer,
     Audit,
@@ -30,14 +35,27 @@ from ._results import (
     Comparison,
     CrossCheck,
     Design,
+    Judgement,
+    Judgements,
     Part,
     Progress,
-    Record,
     Report,
     Simulation,
     SystemAnalysis,
+    SystemCalibration,
+    SystemEvidence,
+    SystemRun,
+    Walks,
 )
-from ._texts import Attitude, Number, assignments, attitude, decimal
+from ._texts import assignments, attitude, decimal
+
+if TYPE_CHECKING:
+    import pandas
+    from typing_extensions import Unpack
+
+    class _Calibrate(options.Calibrate, total=False):
+        prior: Calibration | SystemCalibration | str | os.PathLike[str]
+        progress: Progress | bool
 
 __all__ = [
     "Analysis",
@@ -47,6 +65,8 @@ __all__ = [
     "Comparison",
     "CrossCheck",
     "Design",
+    "Judgement",
+    "Judgements",
     "Model",
     "Part",
     "ProblemError",
@@ -55,6 +75,11 @@ __all__ = [
     "Scheme",
     "Simulation",
     "SystemAnalysis",
+    "SystemCalibration",
+    "SystemEvidence",
+    "SystemRun",
+    "Text",
+    "Walks",
     "__version__",
     "analyze",
     "calibrate",
@@ -62,8 +87,10 @@ __all__ = [
     "crosscheck",
     "design",
     "load",
+    "options",
     "paper",
     "report",
+    "shapes",
     "simulate",
 ]
 
@@ -100,18 +127,63 @@ def _request(options: Mapping[str, Any], **files: Any) -> str:
     return json.dumps({name: value for name, value in asked.items() if value is not None})
 
 
-def _ask(kind: type[Any], command: str, request: str, progress: Progress | bool | None = None) -> Any:
+def _ask(kinds: tuple[type[Answer], ...], command: str, request: str, progress: Progress | bool | None = None) -> Any:
+    """What a command answers; where that may be of several kinds it says which."""
+    asked = (command, request, None)
+    if progress is None:
+        return _as(kinds, _obsdeg.answer(command, request), asked)
     show, bar = heard(progress)
     try:
-        return kind(_obsdeg.answer(command, request, show), (command, request, None))
+        return _as(kinds, _obsdeg.answer(command, request, show), asked)
     finally:
         if bar is not None:
             bar.close()
 
 
+def _as(kinds: tuple[type[Answer], ...], rust: _obsdeg.Answer, asked: Any) -> Any:
+    if len(kinds) == 1:
+        return kinds[0](rust, asked)
+    answer = Answer(rust, asked)
+    schema = re.match(r'\s*\{\s*"schema":\s*"([^"]*)"', answer.json())
+    answer.__class__ = KINDS[schema[1]] if schema else Judgements
+    return answer
+
+
+def _kinds(what: tuple[Judged, ...], of_scheme: type[Answer], of_model: type[Answer]) -> tuple[type[Answer], ...]:
+    """Whether it is a scheme or a model is known of all but files."""
+    if not what or len(what) == 1 and isinstance(what[0], Scheme):
+        return (of_scheme,)
+    if len(what) == 1 and isinstance(what[0], Model):
+        return (of_model,)
+    return (of_scheme, of_model)
+
+
 def _several(what: Iterable[Judged]) -> list[dict[str, str]]:
     return [source(w) for w in what]
 
+
+@overload
+def analyze(*, progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]) -> Analysis: ...
+
+
+@overload
+def analyze(what: Scheme, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]) -> Analysis: ...
+
+
+@overload
+def analyze(what: Model, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]) -> SystemAnalysis: ...
+
+
+@overload
+def analyze(
+    what: str | os.PathLike[str] | Texted, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]
+) -> Analysis | SystemAnalysis: ...
+
+
+@overload
+def analyze(
+    what: Judged, other: Judged, /, *more: Judged, progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]
+) -> Judgements: ...
 
 
 def analyze(*what: Judged, progress: Progress | bool | None = None, **options: Any) -> Any:
@@ -119,55 +191,135 @@ def analyze(*what: Judged, progress: Progress | bool | None = None, **options: A
 
     Args:
         what: schemes, models, or files with them; none where ``angles`` are given.
+        progress: hears how far it is; ``True`` for a bar of tqdm.
         options: ``angles``, ``carry``, ``latitude`` [deg], ``terms``, ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``,
             ``count_limit``, ``solutions``, ``frame``, ``formulas``, ``seed``: those of ``obsdeg analyze``.
 
     Returns:
-        An :class:`Analysis`, of a model a :class:`SystemAnalysis`; of several files an :class:`Answer` with a list.
+        An :class:`Analysis`, of a model a :class:`SystemAnalysis`; of several :class:`Judgements`.
 
     Raises:
         ProblemError: what is wrong, with its place.
     """
-    sources = _several(what)
-    kind: type[Answer] = Analysis if len(sources) < 2 else Answer
-    if len(sources) == 1 and (isinstance(what[0], Model) or _says_model(sources[0])):
-        kind = SystemAnalysis
-    return _ask(kind, "analyze", _request(options, sources=sources), progress)
+    kinds = (Judgements,) if len(what) > 1 else _kinds(what, Analysis, SystemAnalysis)
+    return _ask(kinds, "analyze", _request(options, sources=_several(what)), progress)
 
 
-def _says_model(one: Mapping[str, str]) -> bool:
-    text = one["text"]
-    return text.lstrip().startswith("{") or "[outputs]" in text
+@overload
+def simulate(**options: Unpack[options.Simulate]) -> Simulation: ...
 
 
-def simulate(*what: Judged, **options: Any) -> Simulation:
-    """One run of the filter against a simulated truth; options are those of ``obsdeg simulate`` (noise in g, dwell and step in s).
+@overload
+def simulate(what: Scheme, /, **options: Unpack[options.Simulate]) -> Simulation: ...
+
+
+@overload
+def simulate(what: Model, /, **options: Unpack[options.Simulate]) -> SystemRun: ...
+
+
+@overload
+def simulate(what: str | os.PathLike[str] | Texted, /, **options: Unpack[options.Simulate]) -> Simulation | SystemRun: ...
+
+
+def simulate(*what: Judged, **options: Any) -> Any:
+    """One run of the filter against a simulated truth.
+
+    Args:
+        what: a scheme or model with numbers, or a file with one; none where ``angles`` are given.
+        options: those of ``obsdeg simulate``: ``dwell`` and ``step`` [s], ``noise`` [g], ``requirement``, ``truth``, ``filter``, ...
+
+    Returns:
+        A :class:`Simulation`, of a model a :class:`SystemRun`.
 
     Raises:
         ProblemError: what is wrong, with its place.
     """
-    answer: Simulation = _ask(Simulation, "simulate", _request(options, sources=_several(what)))
-    return answer
+    return _ask(_kinds(what, Simulation, SystemRun), "simulate", _request(options, sources=_several(what)))
 
 
-def crosscheck(*what: Judged, progress: Progress | bool | None = None, **options: Any) -> CrossCheck:
+@overload
+def crosscheck(*, progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]) -> CrossCheck: ...
+
+
+@overload
+def crosscheck(what: Scheme, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]) -> CrossCheck: ...
+
+
+@overload
+def crosscheck(what: Model, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]) -> SystemEvidence: ...
+
+
+@overload
+def crosscheck(
+    what: str | os.PathLike[str] | Texted, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]
+) -> CrossCheck | SystemEvidence: ...
+
+
+def crosscheck(*what: Judged, progress: Progress | bool | None = None, **options: Any) -> Any:
     """The exact verdicts against a filter; ``passed`` is False where something disagrees.
 
-    Raises:
-        ProblemError: what is wrong, with its place.
-    """
-    answer: CrossCheck = _ask(CrossCheck, "crosscheck", _request(options, sources=_several(what)), progress)
-    return answer
+    Args:
+        what: a scheme or model with numbers, or a file with one; none where ``angles`` are given.
+        progress: hears how far it is, and ends it where it returns False; ``True`` for a bar of tqdm.
+        options: those of ``obsdeg crosscheck``: of :func:`simulate`, and ``runs``, ``filter_carry``, ``filter_latitude`` [deg], ``filter_drop``.
 
-
-def compare(*what: Judged, **options: Any) -> Comparison:
-    """Schemes side by side; options are those of ``obsdeg compare``.
+    Returns:
+        A :class:`CrossCheck`, of a model a :class:`SystemEvidence`.
 
     Raises:
         ProblemError: what is wrong, with its place.
     """
-    answer: Comparison = _ask(Comparison, "compare", _request(options, sources=_several(what)))
+    return _ask(_kinds(what, CrossCheck, SystemEvidence), "crosscheck", _request(options, sources=_several(what)), progress)
+
+
+def compare(*what: Judged, **options: Unpack[options.Compare]) -> Comparison:
+    """Schemes side by side: degrees, and sigmas of the coefficients at the end of each.
+
+    Args:
+        what: schemes, or files with them.
+        options: those of ``obsdeg compare``: ``dwell`` and ``step`` [s], ``noise`` [g], ``requirement``, ...
+
+    Raises:
+        ProblemError: what is wrong, with its place.
+    """
+    answer: Comparison = _ask((Comparison,), "compare", _request(options, sources=_several(what)))
     return answer
+
+
+@overload
+def design(
+    positions: int | None = None,
+    *,
+    part: tuple[int, int],
+    candidates: Literal["cardinal", "free"] | str | Scheme | os.PathLike[str] | None = ...,
+    resume: Part | str | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Design],
+) -> Part: ...
+
+
+@overload
+def design(
+    positions: int,
+    *,
+    candidates: Literal["cardinal", "free"] | str | Scheme | os.PathLike[str] | None = ...,
+    part: None = ...,
+    merge: Iterable[Part | str] | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Design],
+) -> Design: ...
+
+
+@overload
+def design(
+    positions: int | None = None,
+    *,
+    candidates: Literal["cardinal", "free"] | str | Scheme | os.PathLike[str] | None = ...,
+    part: None = ...,
+    merge: Iterable[Part | str] | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Design],
+) -> Design | Walks: ...
 
 
 def design(
@@ -192,6 +344,9 @@ def design(
             with the best so far.
         options: the others of ``obsdeg design``.
 
+    Returns:
+        A :class:`Design`; a :class:`Part` of one with ``part``; :class:`Walks` with ``minimum=True`` where torquer errors are among the ``terms``.
+
     Raises:
         ProblemError: what is wrong; nothing was found.
     """
@@ -208,39 +363,53 @@ def design(
         options["part"] = list(part)
     if positions is not None:
         options["positions"] = positions
-    return _ask(Part if part is not None else Design, "design", _request(options, **files), progress)
+    kinds = (Part,) if part is not None else (Design, Walks) if positions is None else (Design,)
+    return _ask(kinds, "design", _request(options, **files), progress)
 
 
 def _part(part: Part | str, name: str) -> dict[str, str]:
     return {"name": name, "text": part if isinstance(part, str) else part.json()}
 
 
+@overload
+def calibrate(what: Scheme, *records: str | os.PathLike[str] | pandas.DataFrame, **options: Unpack[_Calibrate]) -> Calibration: ...
+
+
+@overload
+def calibrate(what: Model, *records: str | os.PathLike[str] | pandas.DataFrame, **options: Unpack[_Calibrate]) -> SystemCalibration: ...
+
+
+@overload
 def calibrate(
-    what: Judged,
-    *records: Any,
-    prior: Calibration | str | os.PathLike[str] | None = None,
-    progress: Progress | bool | None = None,
-    **options: Any,
-) -> Calibration:
-    """What a scheme or model determines, estimated from the records of its runs.
+    what: str | os.PathLike[str] | Texted, *records: str | os.PathLike[str] | pandas.DataFrame, **options: Unpack[_Calibrate]
+) -> Calibration | SystemCalibration: ...
+
+
+def calibrate(what: Judged, *records: Any, prior: Any = None, progress: Progress | bool | None = None, **options: Any) -> Any:
+    """What a scheme or model determines, estimated from the records of its runs; ``passed`` is False where the model does not explain them.
 
     Args:
-        what: the scheme or model.
+        what: the scheme or model, or a file with one.
         records: files (CSV, Parquet), or pandas DataFrames whose columns are named as in files (``t [s]``, ``fx [g]``).
-        prior: a calibration before.
+        prior: a calibration before, or the file that ``obsdeg calibrate -o`` wrote of it.
+        progress: hears how far it is, and ends it where it returns False; ``True`` for a bar of tqdm.
+        options: those of ``obsdeg calibrate``: ``noise`` [g], ``step`` [s], ``gravity`` [m/s^2], ``gate``, ``starts``, ``profile``, ...
+
+    Returns:
+        A :class:`Calibration`, of a model a :class:`SystemCalibration`.
 
     Raises:
         ProblemError: what is wrong with a record, with its line.
     """
     files: dict[str, Any] = {"sources": [source(what)]}
     if prior is not None:
-        text = prior.json() if isinstance(prior, Calibration) else Path(prior).read_text(encoding="utf-8")
+        text = prior.json() if isinstance(prior, Answer) else Path(prior).read_text(encoding="utf-8")
         files["before"] = {"name": "prior", "text": text}
     request = _request(options, **files)
     given = [_record(r, i) for i, r in enumerate(records)]
     show, bar = heard(progress)
     try:
-        return Calibration(_obsdeg.calibrate(request, given, show), ("calibrate", request, given))
+        return _as(_kinds((what,), Calibration, SystemCalibration), _obsdeg.calibrate(request, given, show), ("calibrate", request, given))
     finally:
         if bar is not None:
             bar.close()
@@ -254,24 +423,34 @@ def _record(record: Any, i: int) -> tuple[str, bytes | None]:
 
 def report(
     *what: Judged,
-    calibrations: Mapping[str, Calibration] | None = None,
+    calibrations: Mapping[str, Calibration | SystemCalibration] | None = None,
     progress: Progress | bool | None = None,
-    **options: Any,
+    **options: Unpack[options.Report],
 ) -> Report:
     """The design review of schemes and models, as a page.
+
+    Args:
+        what: schemes and models, or files with them.
+        calibrations: what was estimated from records, by the names that the page calls them.
+        progress: hears how far it is; ``True`` for a bar of tqdm.
+        options: those of ``obsdeg report``: of :func:`simulate`, and ``runs``.
 
     Raises:
         ProblemError: what is wrong, with its place.
     """
     given = [{"name": name, "source": {"name": name, "text": c.json()}} for name, c in (calibrations or {}).items()]
     request = _request(options, sources=_several(what), calibrations=given, command="obsdeg.report(...) in Python")
-    answer: Report = _ask(Report, "report", request, progress)
+    answer: Report = _ask((Report,), "report", request, progress)
     return answer
 
 
 def paper(*, seed: int = 1) -> Audit:
-    """The equations and claims of the paper against the algebra."""
-    answer: Audit = _ask(Audit, "paper", _request({"seed": seed}))
+    """The equations and claims of the paper against the algebra.
+
+    Args:
+        seed: seed of all random choices.
+    """
+    answer: Audit = _ask((Audit,), "paper", _request({"seed": seed}))
     return answer
 
 

@@ -5,16 +5,24 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Protocol, Union
 
 from ._texts import Attitude, Number, attitude, decimal, toml
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 #: A file, or what is in one.
 Path_ = Union[str, "os.PathLike[str]"]
 
 
-class _Text:
-    """A text with a name."""
+class Text:
+    """A text with a name: what :class:`Scheme` and :class:`Model` are.
+
+    Attributes:
+        text: what a file holds.
+        name: what errors and reports call it.
+    """
 
     kind = "any"
     __slots__ = ("name", "text")
@@ -24,9 +32,10 @@ class _Text:
         self.name = name or f"{self.kind}.toml"
 
     @classmethod
-    def read(cls, path: Path_) -> Any:
+    def read(cls, path: Path_) -> Self:
         """From a file (TOML; a model may be JSON)."""
-        return cls._of(Path(path).read_text(encoding="utf-8"), os.fspath(path))
+        made: Self = cls._of(Path(path).read_text(encoding="utf-8"), os.fspath(path))
+        return made
 
     @classmethod
     def _of(cls, text: str, name: str) -> Any:
@@ -45,7 +54,7 @@ class _Text:
         return f"{type(self).__name__}({self.name!r}, {len(self.text.splitlines())} lines)"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Text) and (self.kind, self.text) == (other.kind, other.text)
+        return isinstance(other, Text) and (self.kind, self.text) == (other.kind, other.text)
 
     def __hash__(self) -> int:
         return hash((self.kind, self.text))
@@ -54,7 +63,7 @@ class _Text:
         return (type(self)._of, (self.text, self.name))
 
 
-class Scheme(_Text):
+class Scheme(Text):
     """A torquing scheme: positions, and how the platform gets from one to the next.
 
     Args:
@@ -109,7 +118,7 @@ def _is_number(text: str) -> bool:
     return text.strip().lstrip("+-")[:1].isdigit()
 
 
-class Model(_Text):
+class Model(Text):
     """Any system x' = f(x, u, p, t), z = h, as the text of a model file (TOML or JSON)."""
 
     kind = "model"
@@ -122,13 +131,25 @@ class Model(_Text):
         return made
 
 
+class Texted(Protocol):
+    """What an importer gives: a model's text, and what it is called."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    @property
+    def text(self) -> str:
+        """A scheme or model."""
+
+
 #: What is judged: a scheme, a model, or a file with one.
-Judged = Union[Scheme, Model, Path_]
+Judged = Union[Scheme, Model, Path_, Texted]
 
 
 def source(what: Judged) -> dict[str, str]:
     """What a request has of a scheme, a model or a file."""
-    if isinstance(what, _Text):
+    if isinstance(what, Text):
         return what._source()
     if hasattr(what, "text") and hasattr(what, "name"):
         return {"name": str(what.name), "text": str(what.text)}

@@ -4,64 +4,19 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from . import _obsdeg
+from . import _obsdeg, shapes
+from ._records import fields, found
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ._files import Scheme
 
 #: Asks again for an answer whose Rust side is gone, after pickle: (command, request, records).
 _Asked = tuple[str, str, list[tuple[str, bytes | None]] | None]
-
-
-class Record(Mapping[str, Any]):
-    """An object of the JSON: its keys are attributes."""
-
-    __slots__ = ("_of",)
-
-    def __init__(self, of: dict[str, Any]) -> None:
-        self._of = of
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name == "_of":
-            raise AttributeError(name)
-        try:
-            return wrapped(self._of[name])
-        except KeyError:
-            raise AttributeError(f"there is no `{name}` here; there are {', '.join(self._of)}") from None
-
-    def __getitem__(self, name: str) -> Any:
-        return wrapped(self._of[name])
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._of)
-
-    def __len__(self) -> int:
-        return len(self._of)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._of]
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self._of.items())})"
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain dicts and lists."""
-        return self._of
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self._of
-
-    def __setstate__(self, of: dict[str, Any]) -> None:
-        self._of = of
-
-
-def wrapped(value: Any) -> Any:
-    """A value of the JSON, with its keys as attributes."""
-    if isinstance(value, dict):
-        return Record(value)
-    if isinstance(value, list):
-        return [wrapped(v) for v in value]
-    return value
 
 
 class Answer:
@@ -103,7 +58,7 @@ class Answer:
         """A list of the JSON as CSV, the main one where none is named."""
         return self._answer().table(table)
 
-    def to_frame(self, table: str | None = None) -> Any:
+    def to_frame(self, table: str | None = None) -> pandas.DataFrame:
         """A list of the JSON as a pandas DataFrame (which has the dataframe interchange protocol, for polars and others).
 
         Raises:
@@ -118,18 +73,15 @@ class Answer:
         """What ``-o`` writes into a folder beside the JSON: figures (SVG, PNG), series, schemes that were found."""
         return self._answer().files()
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        data = self.to_dict()
-        if not isinstance(data, dict) or name not in data:
-            known = ", ".join(data) if isinstance(data, dict) else "none"
-            raise AttributeError(f"there is no `{name}` in this answer; there are {known}")
-        return wrapped(data[name])
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_"):
+                raise AttributeError(name)
+            return found(type(self), self.to_dict(), name, "in this answer")
 
     def __dir__(self) -> list[str]:
-        data = self.to_dict()
-        return [*super().__dir__(), *(data if isinstance(data, dict) else [])]
+        return [*super().__dir__(), *fields(type(self))]
 
     def __str__(self) -> str:
         return self.text("table")
@@ -138,7 +90,7 @@ class Answer:
         return f"<{type(self).__name__}: {self._summary()}>"
 
     def _summary(self) -> str:
-        return str(self.to_dict().get("schema", self._asked[0])) if isinstance(self.to_dict(), dict) else self._asked[0]
+        return str(self.to_dict()["schema"])
 
     def _repr_html_(self) -> str:
         return self._answer().fragment()
@@ -176,52 +128,104 @@ def _drawn(of: Answer, *names: str) -> str | None:
     return None
 
 
-class Analysis(Answer):
-    """The observable degree of every unknown of a scheme."""
+class Judgement(Answer):
+    """The observable degree of every unknown, of a scheme (:class:`Analysis`) or any system (:class:`SystemAnalysis`)."""
 
-    def _summary(self) -> str:
-        return f"{len(self.quantities)} unknowns, rank {self.to_dict()['rank']}"
+    if TYPE_CHECKING:
+        rank: int
 
     @property
     def degrees(self) -> dict[str, int | None]:
         """The observable degree by unknown; None where it is not determined."""
-        return {q["name"]: q.get("degree") for q in self.to_dict()["quantities"]}
+        return {q["name"]: q["degree"] for q in self.to_dict()["quantities"]}
 
     @property
-    def statuses(self) -> dict[str, str]:
+    def statuses(self) -> dict[str, shapes.Status]:
         """The status by unknown."""
         return {q["name"]: q["status"] for q in self.to_dict()["quantities"]}
 
+    def _summary(self) -> str:
+        of = self.to_dict()
+        return f"{len(of['quantities'])} unknowns, rank {of['rank']}"
 
-class SystemAnalysis(Analysis):
-    """The same of any system."""
+
+class Analysis(Judgement, shapes.Analysis):
+    """The observable degree of every unknown of a scheme."""
 
 
-class Comparison(Answer):
+class SystemAnalysis(Judgement, shapes.SystemAnalysis):
+    """The observable degree of every unknown of a model."""
+
+
+class Judgements(Answer):
+    """The answers on several schemes and models, in their order: a sequence of :class:`Judgement`."""
+
+    def __len__(self) -> int:
+        return len(self.to_dict())
+
+    def __getitem__(self, i: int) -> Judgement:
+        one = self.to_dict()[i]
+        command, request, _ = self._asked
+        asked = json.loads(request)
+        # asked again only for what the JSON of all does not hold
+        part = json.dumps({**asked, "sources": [asked["sources"][i]]})
+        judgement = KINDS[one["answer"]["schema"]](None, (command, part, None))
+        judgement._data = one["answer"]
+        return judgement  # type: ignore[return-value]
+
+    def __iter__(self) -> Iterator[Judgement]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def names(self) -> list[str]:
+        """The names of what was judged."""
+        return [one["name"] for one in self.to_dict()]
+
+    def _summary(self) -> str:
+        return f"{len(self)} judged"
+
+
+class Comparison(Answer, shapes.Comparison):
     """Schemes side by side."""
 
 
-class Design(Answer):
+class Design(Answer, shapes.Design):
     """Schemes that were found."""
 
-    def winner(self) -> Any:
+    def winner(self) -> Scheme:
         """The best scheme that was found.
 
         Raises:
             LookupError: there is none.
         """
-        from ._files import Scheme
-
-        files = self.files()
-        if "winner.toml" not in files:
-            raise LookupError("no scheme was found")
-        return Scheme.from_text(files["winner.toml"].decode("utf-8"), name="winner.toml")
+        return _winner(self)
 
     def _figure(self) -> str | None:
         return _drawn(self, "front.svg", "positions.svg")
 
 
-class Part(Answer):
+class Walks(Answer, shapes.Walks):
+    """The fewest positions where torquer errors make schemes walks (``design(minimum=True)`` with their terms)."""
+
+    def winner(self) -> Scheme:
+        """The scheme that was found.
+
+        Raises:
+            LookupError: there is none.
+        """
+        return _winner(self)
+
+
+def _winner(of: Answer) -> Scheme:
+    from ._files import Scheme
+
+    files = of.files()
+    if "winner.toml" not in files:
+        raise LookupError("no scheme was found")
+    return Scheme.from_text(files["winner.toml"].decode("utf-8"), name="winner.toml")
+
+
+class Part(Answer, shapes.Part):
     """A part of a search, to be put together with the others by ``design(merge=...)``."""
 
     def _repr_html_(self) -> str:
@@ -229,30 +233,79 @@ class Part(Answer):
         return f"<p>part {part['part'][0]} of {part['part'][1]}, {'complete' if part['complete'] else 'interrupted'}</p>"
 
 
-class Simulation(Answer):
-    """A run of the filter against a simulated truth."""
+class Simulation(Answer, shapes.Simulation):
+    """A run of the filter on a scheme against a simulated truth."""
 
-    def series(self) -> Any:
-        """Truth, estimate and sigma over time as a pandas DataFrame."""
-        import pandas
-
-        return pandas.read_csv(io.BytesIO(self.files()["series.csv"]))
+    def series(self) -> pandas.DataFrame:
+        """Truth, estimate and sigma over time."""
+        return _series(self)
 
 
-class CrossCheck(Answer):
-    """The exact verdicts against a filter."""
+class SystemRun(Answer, shapes.SystemRun):
+    """A run of the filter on a model against a simulated truth."""
+
+    def series(self) -> pandas.DataFrame:
+        """Truth, estimate and sigma over time."""
+        return _series(self)
 
 
-class Calibration(Answer):
-    """What a scheme or model determines, estimated from records."""
+def _series(of: Answer) -> pandas.DataFrame:
+    import pandas
 
-    def covariance(self) -> Any:
-        """The covariance matrix of the estimates as a pandas DataFrame."""
+    return pandas.read_csv(io.BytesIO(of.files()["series.csv"]))
+
+
+class CrossCheck(Answer, shapes.CrossCheck):
+    """The exact verdicts on a scheme against a filter."""
+
+    if TYPE_CHECKING:
+        # of the answer and of its JSON, which are the same
+        passed: bool
+
+
+class SystemEvidence(Answer, shapes.SystemEvidence):
+    """The exact verdicts on a model against a filter and integrators."""
+
+    if TYPE_CHECKING:
+        passed: bool
+
+
+class Calibration(Answer, shapes.Calibration):
+    """What a scheme determines, estimated from records."""
+
+    def covariance_frame(self) -> pandas.DataFrame:
+        """The covariance matrix of the estimates."""
         return self.to_frame("covariance")
 
 
-class Audit(Answer):
+class SystemCalibration(Answer, shapes.SystemCalibration):
+    """What a model determines, estimated from records."""
+
+    def covariance_frame(self) -> pandas.DataFrame:
+        """The covariance matrix of the estimates."""
+        return self.to_frame("covariance")
+
+
+class Audit(Answer, shapes.Audit):
     """The paper against the algebra."""
+
+
+#: The answers by the schemas that they name.
+KINDS: dict[str, type[Answer]] = {
+    "obsdeg.analysis/1": Analysis,
+    "obsdeg.system/1": SystemAnalysis,
+    "obsdeg.comparison/1": Comparison,
+    "obsdeg.design/1": Design,
+    "obsdeg.walks/1": Walks,
+    "obsdeg.part/1": Part,
+    "obsdeg.simulation/1": Simulation,
+    "obsdeg.system-run/1": SystemRun,
+    "obsdeg.crosscheck/1": CrossCheck,
+    "obsdeg.system-evidence/1": SystemEvidence,
+    "obsdeg.calibration/1": Calibration,
+    "obsdeg.system-calibration/1": SystemCalibration,
+    "obsdeg.audit/1": Audit,
+}
 
 
 class Report(Answer):
@@ -262,6 +315,10 @@ class Report(Answer):
     def html(self) -> str:
         """The page."""
         return self.json()
+
+    def to_dict(self) -> dict[str, str]:
+        """The page alone: a report has no JSON."""
+        return {"html": self.html}
 
     def write(self, path: Any) -> None:
         """To a file."""

@@ -8,13 +8,15 @@ With Dask Distributed::
     with distributed.Client("scheduler:8786") as client:
         found = campaign.design("search", 40, executor=client.get_executor, positions=7, carry="inertial")
 
-With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: a pool of processes.
+With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: :func:`processes`. A script that starts processes has its work below
+``if __name__ == "__main__":``, as everywhere in Python.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import multiprocessing
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -29,6 +31,15 @@ import obsdeg
 Executors = Callable[[], Executor]
 
 
+def processes(workers: int | None = None) -> ProcessPoolExecutor:
+    """A pool of processes on this machine, as many as cores where nothing else is said.
+
+    They do not begin as copies of this process (``fork``): the threads of the engine, which are no part of a copy, would be waited for without end.
+    """
+    start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context(start))
+
+
 class CampaignError(RuntimeError):
     """A task failed as often as it may: `task` says which."""
 
@@ -41,7 +52,7 @@ def run(
     function: Callable[[Any], Any],
     tasks: Iterable[Any],
     *,
-    executor: Executors = ProcessPoolExecutor,
+    executor: Executors = processes,
     retries: int = 2,
     ahead: int = 64,
 ) -> Iterator[tuple[Any, Any]]:
@@ -148,7 +159,7 @@ def design(
     folder: str | os.PathLike[str],
     parts: int,
     *,
-    executor: Executors = ProcessPoolExecutor,
+    executor: Executors = processes,
     retries: int = 2,
     heard: Callable[[int, int], None] | None = None,
     **options: Any,
@@ -208,7 +219,7 @@ def sweep(
     tasks: Iterable[Mapping[str, Any]],
     *,
     chunk: int = 500,
-    executor: Executors = ProcessPoolExecutor,
+    executor: Executors = processes,
     retries: int = 2,
     heard: Callable[[int], None] | None = None,
 ) -> Path:
@@ -244,18 +255,27 @@ def sweep(
     return folder
 
 
+def _call(fn: Callable[..., Any], args: Any, kwargs: Any) -> Any:
+    # what Ray takes must be a function; a partial one is none
+    return fn(*args, **kwargs)
+
+
 class RayExecutor(Executor):
-    """Ray as an executor."""
+    """Ray as an executor.
+
+    Args:
+        options: those of ``ray.init``, where Ray does not run yet; it then runs until the process ends.
+    """
 
     def __init__(self, **options: Any) -> None:
         import ray
 
-        self._ray = ray
         if not ray.is_initialized():
             ray.init(**options)
+        # what a lost worker had in hand is tried again by the campaign, not there
+        self._remote = ray.remote(max_retries=0)(_call)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Hands a call to Ray."""
-        # what a lost worker had in hand is tried again here, not there
-        future: Future[Any] = self._ray.remote(max_retries=0)(fn).remote(*args, **kwargs).future()
+        future: Future[Any] = self._remote.remote(fn, args, kwargs).future()
         return future

@@ -1,11 +1,12 @@
 //! The extension module of the Python package `obsdeg`: commands by name, options as JSON. Everything else is Python.
 
 use std::fs::File;
+use std::hint::black_box;
 use std::io::Cursor;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use obsdeg_calibration::record::Record;
 use obsdeg_commands::{Answered, Host, Kind, Now, Problem, call, call_calibrate};
@@ -91,6 +92,24 @@ fn calibrate(
         let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
         call_calibrate(request, records, host)
     })
+}
+
+/// Seconds that a command takes when it is asked so many times from Rust, its JSON written or not: what the package adds to that is measured against it
+/// (`python/benches/overhead.py`).
+#[pyfunction]
+fn seconds(py: Python<'_>, command: &str, request: &str, times: u32, written: bool) -> PyResult<f64> {
+    py.detach(|| {
+        let start = Instant::now();
+        for _ in 0..times {
+            let answered = call(command, request, &mut Host::silent())?;
+            if written {
+                black_box(answered.text()?);
+            }
+            black_box(answered.passed);
+        }
+        Ok(start.elapsed().as_secs_f64())
+    })
+    .map_err(raised)
 }
 
 /// Between two times that Python hears of progress, or is asked whether a key was pressed.
@@ -201,5 +220,6 @@ fn _obsdeg(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("COMMANDS", obsdeg_commands::COMMANDS.to_vec())?;
     m.add_class::<Answer>()?;
     m.add_function(wrap_pyfunction!(answer, m)?)?;
-    m.add_function(wrap_pyfunction!(calibrate, m)?)
+    m.add_function(wrap_pyfunction!(calibrate, m)?)?;
+    m.add_function(wrap_pyfunction!(seconds, m)?)
 }

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 from .problem import ImportProblem
 
 if TYPE_CHECKING:
-    from .system import System, to_toml
+    from .system import System as System
+    from .system import to_toml as to_toml
 
-__all__ = ["ImportProblem", "Imported", "System", "load", "to_toml"]
+__all__ = ["ImportProblem", "Imported", "load"]
 
 
 @dataclass(frozen=True)

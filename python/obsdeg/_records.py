@@ -1,0 +1,155 @@
+"""Objects of the JSON as objects of their types."""
+
+from __future__ import annotations
+
+import json
+import keyword
+import types
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+Read = Callable[[Any], Any]
+
+
+class Record:
+    """An object of the JSON: its keys are attributes (with ``_`` behind those that are words of Python: ``pass_``) and items.
+
+    What the JSON leaves out is None, or an empty list.
+    """
+
+    __slots__ = ("_of",)
+
+    def __init__(self, of: dict[str, Any]) -> None:
+        self._of = of
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("__") or name == "_of":
+                raise AttributeError(name)
+            return found(type(self), self._of, name, "here")
+
+    def __getitem__(self, name: str) -> Any:
+        return fields(type(self)).get(name, untyped)(self._of[name])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._of
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._of)
+
+    def __len__(self) -> int:
+        return len(self._of)
+
+    def keys(self) -> Any:
+        """The names of what it holds; ``dict(record)`` has all."""
+        return self._of.keys()
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *fields(type(self)), *self._of]
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self._of.items())})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Record) and self._of == other._of
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self._of, sort_keys=True))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain dicts and lists."""
+        return self._of
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self._of
+
+    def __setstate__(self, of: dict[str, Any]) -> None:
+        self._of = of
+
+
+class Shape:
+    """What the JSON of an answer holds, as types of attributes."""
+
+
+def found(kind: type, of: Any, name: str, where: str) -> Any:
+    """An attribute.
+
+    Raises:
+        AttributeError: there is none; the error names those that there are.
+    """
+    known = fields(kind)
+    key = _key(name)
+    if isinstance(of, dict) and key in of:
+        return known.get(key, untyped)(of[key])
+    if key in known:
+        return known[key](None)
+    names = [*of, *(k for k in known if k not in of)] if isinstance(of, dict) else []
+    raise AttributeError(f"there is no `{name}` {where}; there are {', '.join(names) or 'none'}")
+
+
+def _key(name: str) -> str:
+    return name[:-1] if name.endswith("_") and keyword.iskeyword(name[:-1]) else name
+
+
+def untyped(value: Any) -> Any:
+    """A value of no known type."""
+    if isinstance(value, dict):
+        return Record(value)
+    return [untyped(v) for v in value] if isinstance(value, list) else value
+
+
+_FIELDS: dict[type, dict[str, Read]] = {}
+
+
+def fields(kind: type) -> dict[str, Read]:
+    """How each attribute of a class is read; what is missing is read from None."""
+    if kind not in _FIELDS:
+        hints = {_key(name): hint for name, hint in get_type_hints(kind).items() if not name.startswith("_")}
+        _FIELDS[kind] = {name: _reader(hint) for name, hint in hints.items()}
+    return _FIELDS[kind]
+
+
+def _plain(value: Any) -> Any:
+    return value
+
+
+def _reader(hint: Any) -> Read:
+    origin, inside = get_origin(hint), get_args(hint)
+    if isinstance(hint, type) and issubclass(hint, Record):
+        return hint
+    if origin in (Union, types.UnionType):
+        kinds = [k for k in inside if k is not type(None)]
+        records = [k for k in kinds if isinstance(k, type) and issubclass(k, Record)]
+        others = [r for r in (_reader(k) for k in kinds if k not in records) if r is not _plain]
+        return _chosen(records, others[0] if others else _plain) if records or others else _plain
+    if origin is list:
+        one = _reader(inside[0])
+        return (lambda value: list(value or ())) if one is _plain else (lambda value: [one(v) for v in value or ()])
+    if origin is tuple:
+        each = [_reader(k) for k in inside]
+        return lambda value: tuple(read(v) for read, v in zip(each, value, strict=True))
+    if origin is dict:
+        one = _reader(inside[1])
+        return lambda value: {k: one(v) for k, v in value.items()}
+    return _plain
+
+
+def _chosen(records: list[type[Record]], other: Read) -> Read:
+    """That of several types which a value is of: its constants are those, and it has all keys."""
+
+    def read(value: Any) -> Any:
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            return other(value)
+        if len(records) == 1:
+            return records[0](value)
+        for kind in records:
+            hints = get_type_hints(kind)
+            constants = {k: get_args(h) for k, h in hints.items() if get_origin(h) is Literal and len(get_args(h)) == 1}
+            if value.keys() <= fields(kind).keys() and all(value.get(k) in c for k, c in constants.items()):
+                return kind(value)
+        return Record(value)
+
+    return read

@@ -1,0 +1,223 @@
+"""The options of the commands: those of the command line in snake case, as types."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
+from typing import Literal, TypedDict, Union
+
+from ._texts import Attitude, Number
+
+#: A number that need not be exact.
+Real = Union[int, float, Decimal]
+
+Carry = Literal["platform", "inertial", "reset"]
+#: One number, or one each for X, Y and Z.
+PerAxis = Union[Real, tuple[Real, Real, Real]]
+#: Numbers by the names of unknowns or families: ``{"D_FX": 11, "D_I": 5}``.
+ByName = Union[Mapping[str, Real], Sequence[str]]
+Names = Union[str, Sequence[str]]
+
+
+class Seeded(TypedDict, total=False):
+    """What is drawn at random."""
+
+    seed: int
+    """Seed of all random choices [default: 1]."""
+
+
+class Assumed(TypedDict, total=False):
+    """What holds of schemes, whatever their files say."""
+
+    carry: Carry | None
+    """What is carried between positions: psi in platform axes, as in the paper, in geographic axes (real torqued slews), or a psi of its own each."""
+    latitude: Number | None
+    """Latitude in degrees, exact; left out: generic, or 28.2 where numbers need one."""
+
+
+class Terms(TypedDict, total=False):
+    """What is unknown."""
+
+    terms: Names
+    """Unknown terms: F, I, O, S, II, OO, SS, IO, IS, OS (drifts of gyros), GS, GM, GM3 (torquers), K0, K1, M6, M3, K2, K3, Kx (accelerometers), or
+    the families gyros, accelerometers, all; or drift for eps^n of one position."""
+    axes: Literal["accelerometers", "gyros", "body"]
+    """What defines the platform axes, and so which misalignments the families have."""
+
+
+class Positions(Assumed, Terms, total=False):
+    """Positions, and what is assumed of them."""
+
+    angles: Iterable[Attitude]
+    """A position each: Euler angles alpha, beta, gamma in degrees (C_c^n = Mx My Mz), names for any angle, or direction letters (``"NUE"``);
+    ``"0,0,0@X_p:360"`` turns from there."""
+    combination: Names
+    """Linear combinations of unknowns to be judged too, such as ``"D_IX - D_IY"``."""
+    path: Literal["one-axis", "gimbals"]
+    """How the platform is turned from one position to the next: the shortest way, or alpha, beta, gamma one after another."""
+    measured_azimuth: bool
+    """The azimuth psi_y^n is measured too."""
+
+
+class GyroNoise(TypedDict, total=False):
+    """The noise of the gyros."""
+
+    angle_random_walk: PerAxis
+    """Angle random walk in deg/sqrt(h)."""
+    rate_random_walk: PerAxis
+    """Rate random walk in deg/h/sqrt(h)."""
+    bias_instability: PerAxis
+    """Bias instability in deg/h: B of IEEE Std 952."""
+    correlation_time: Real
+    """Its correlation time in s [default: 3600]."""
+
+
+class Measured(TypedDict, total=False):
+    """How long and how well is measured."""
+
+    dwell: Real
+    """Dwell of positions that do not say theirs, in s [default: 1000]."""
+    step: Real
+    """Largest sampling step in s [default: 10]."""
+    noise: Real
+    """White noise of Z per sample and axis in g [default: 1e-5]."""
+    accelerometer_instability: Real
+    """Bias instability of the accelerometers in ug."""
+    accelerometer_correlation_time: Real
+    """Its correlation time in s [default: 3600]."""
+    azimuth_noise: Real
+    """Noise of a measured azimuth per sample in deg [default: 0.001]."""
+    requirement: ByName
+    """Largest standard deviation allowed, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: psi 0.01, D 0.1]."""
+
+
+class Filtered(Measured, GyroNoise, total=False):
+    """What is simulated, and the filter."""
+
+    truth: Literal["linear", "exact"]
+    """What the simulated truth is: the model itself, or direction cosines."""
+    filter: Literal["linear", "extended", "iterated"]
+    """The filter [default: linear where its model holds, else iterated]."""
+    slew_rate: Real
+    """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
+    drift_noise: str
+    """Random drift with its unit: ``"0.01 deg/h"`` is a bias held for one step, ``"0.001 deg/sqrt(h)"`` a random walk."""
+    propagation: Literal["exponential", "rk4"]
+    """Transition matrix of the filter: the matrix exponential, or Runge-Kutta of fourth order."""
+    value: ByName
+    """True values in deg, deg/h, deg/h/g, ppm, arcsec, ug."""
+    prior: ByName
+    """Initial standard deviations, likewise."""
+    estimate: ByName
+    """Initial estimates, likewise."""
+    drift_scale: Real
+    """Factor on the true drifts and their priors [default: 1]."""
+
+
+class Analyze(Seeded, Positions, total=False):
+    """The options of :func:`obsdeg.analyze`."""
+
+    order: int
+    """The highest order of derivatives to look at in a model that has no proven end."""
+    count_limit: int
+    """Limit of the work of counting the solutions of a model: millions of products at each of two points."""
+    solutions: bool
+    """Solving expressions and numbers of solutions [default: True]."""
+    frame: Literal["n", "platform"]
+    """Axes of Z in solutions [default: n]."""
+    formulas: bool
+    """Z and its derivatives, and psi and eps at each position, as formulas."""
+
+
+class Simulate(Seeded, Positions, Filtered, total=False):
+    """The options of :func:`obsdeg.simulate`."""
+
+
+class Crosscheck(Seeded, Positions, Filtered, total=False):
+    """The options of :func:`obsdeg.crosscheck`."""
+
+    runs: int
+    """Monte Carlo runs [default: 200]."""
+    filter_carry: Carry
+    """Makes the filter wrong: another carry."""
+    filter_latitude: Number
+    """Makes the filter wrong: another latitude in degrees."""
+    filter_drop: str
+    """Makes the filter wrong: it does not know of this position."""
+
+
+class Compare(Seeded, Assumed, Measured, GyroNoise, total=False):
+    """The options of :func:`obsdeg.compare`."""
+
+
+class Calibrate(Seeded, Assumed, GyroNoise, total=False):
+    """The options of :func:`obsdeg.calibrate`."""
+
+    starts: int
+    """Starts of the iteration for a model [default: 16]."""
+    profile: Names
+    """Unknowns whose profiles are drawn, what the data say of each when all others follow."""
+    noise: Real
+    """White noise of Z per sample and axis in g [default: that of the scheme]."""
+    azimuth_noise: Real
+    """Noise of a measured azimuth per sample in deg [default: that of the scheme]."""
+    estimate_noise: bool
+    """Estimate the noise of every component of Z from what the estimate leaves of it."""
+    step: Real
+    """Samples within so many s are taken together as one measurement."""
+    slew_rate: Real
+    """Rate of the turns between positions in deg/s."""
+    drift_noise: str
+    """Random drift with its unit, as of a simulation."""
+    gravity: Real
+    """What one g is, in m/s^2 [default: 9.80665]."""
+    gate: Real
+    """Probability that no measurement of a right record is left out as an outlier [default: 0.999]."""
+
+
+class Design(Seeded, Assumed, Terms, Measured, total=False):
+    """The options of :func:`obsdeg.design` beside those that it names itself."""
+
+    minimum: bool
+    """Only find the fewest positions that make every required coefficient observable, with the proof."""
+    round: Number
+    """With ``candidates="free"``: angles are rounded to multiples of so many degrees [default: 5]."""
+    max_turn: Real
+    """With ``minimum`` and torquer errors: the largest turn from one position to the next, in degrees [default: 90]."""
+    keep: int
+    """How many schemes are listed [default: 10]."""
+    restarts: int
+    """Restarts of the exchange [default: 200]."""
+    within: Real
+    """Under reset carry: a scheme is enough when it is within so many percent of what is possible at all [default: 0.01]."""
+    refine: bool
+    """Move the angles of the best scheme continuously, to hundredths of a degree."""
+    divide: bool
+    """Divide the total time among the positions of the best scheme."""
+    front: Sequence[int]
+    """Other numbers of positions for the front of total time against the criterion."""
+    observable: Names
+    """Coefficients or families that must be observable and that the criterion is about [default: all]."""
+    max_degree: int | ByName
+    """Largest degree, of all required coefficients or by name: ``1``, ``{"D_F": 1}``."""
+    criterion: Literal["worst", "a", "d", "e", "margin"]
+    """What makes one scheme better: the largest sigma, trace, determinant, largest eigenvalue, or the largest sigma over its requirement."""
+    meet: bool
+    """Only schemes that meet every requirement."""
+    max_time: Real
+    """Largest total time with slews in s."""
+    max_slew: Real
+    """Longest slew between successive positions in s."""
+    slew_rate: Real
+    """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
+    gimbal: Names
+    """How far gimbals turn in degrees: ``["alpha=-180:180", "beta=-80:80"]``."""
+    prior: ByName
+    """Initial standard deviations in deg, deg/h, deg/h/g, ppm, arcsec, ug."""
+
+
+class Report(Seeded, Assumed, Filtered, total=False):
+    """The options of :func:`obsdeg.report`."""
+
+    runs: int
+    """Monte Carlo runs of the evidence [default: 100]."""
