@@ -38,6 +38,13 @@ def test_a_killed_worker_costs_what_it_had_in_hand(tmp_path: Path) -> None:
     assert done == {i: i * i for i in range(20)}
 
 
+def test_the_threads_of_the_engine_are_not_waited_for(tmp_path: Path) -> None:
+    # a search in this process first: its threads would be no part of a copy of it
+    whole = obsdeg.design(**SEARCH)
+    assert campaign.design(tmp_path, 2, **SEARCH).json() == whole.json()
+    assert campaign.processes(1).submit(os.getppid).result() != os.getpid()
+
+
 def test_what_fails_too_often_is_named() -> None:
     with pytest.raises(campaign.CampaignError, match="7 failed 3 times, last with OSError"):
         list(campaign.run(_always_wrong, [7], executor=lambda: ThreadPoolExecutor(1)))
@@ -122,5 +129,51 @@ def test_dask_with_a_worker_killed(tmp_path: Path) -> None:
         os.kill(victim, signal.SIGKILL)
         done.update(results)
         assert done == {i: i + 1 for i in range(60)}
-        found = campaign.design(tmp_path, 3, executor=executor, **SEARCH)
-        assert found.json() == obsdeg.design(**SEARCH).json()
+        search_with_a_worker_killed(tmp_path, executor, next(iter(client.run(os.getpid).values())))
+
+
+def search_with_a_worker_killed(folder: Path, executor: Any, victim: int) -> None:
+    """Parts are the whole, a worker killed by its process id when the first part is there."""
+    killed: list[int] = []
+
+    def heard(done: int, of: int) -> None:
+        if not killed:
+            assert done < of
+            os.kill(victim, signal.SIGKILL)
+            killed.append(victim)
+
+    search: dict[str, Any] = {"positions": 4, "carry": "inertial", "observable": ["D_F"]}
+    found = campaign.design(folder, 8, executor=executor, heard=heard, **search)
+    assert killed and found.json() == obsdeg.design(**search).json()
+
+
+def test_ray_with_a_worker_killed(tmp_path: Path) -> None:
+    ray = pytest.importorskip("ray", reason="Ray is not installed: that its executor works is not tested")
+    try:
+
+        def executor() -> Executor:
+            # the functions of this file are found there too
+            path = os.pathsep.join([str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+            where = {"env_vars": {"PYTHONPATH": path}}
+            return campaign.RayExecutor(num_cpus=2, include_dashboard=False, log_to_driver=False, runtime_env=where)
+
+        marks = tmp_path / "marks"
+        marks.mkdir()
+        # killed by itself, with what it has in hand
+        assert dict(campaign.run(partial(_once_killed, marks), range(20), executor=executor)) == {i: i * i for i in range(20)}
+        assert (marks / "killed").exists()
+        search_with_a_worker_killed(tmp_path / "search", executor, executor().submit(os.getpid).result())
+    finally:
+        ray.shutdown()
+
+
+def test_the_example_in_parts_is_the_whole(tmp_path: Path) -> None:
+    script = Path(__file__).resolve().parents[2] / "examples" / "nine-of-24" / "search.py"
+    command = [sys.executable, str(script)]
+    done = subprocess.run([*command, str(tmp_path), "--positions", "5"], capture_output=True, text=True, check=True)
+    lines, table = done.stdout.split("24 of 24 parts\n")
+    assert lines.startswith("1 of 24 parts\n") and len(list(tmp_path.glob("*-of-24.json"))) == 24
+    whole = obsdeg.design(5, carry="inertial")
+    assert table.strip() == str(whole).strip() and "proven" in table
+    measured = subprocess.run([*command, "--measure", "--positions", "5"], capture_output=True, text=True, check=True)
+    assert "all 24 parts: 3.32e+05 sequences" in measured.stdout
