@@ -1,4 +1,4 @@
-"""Published verdicts: of systems in STRIKE-GOLDD's syntax, and what a simulator says of unknowns of PEtab problems that are not observable."""
+"""What a simulator says of unknowns of PEtab problems that are not observable."""
 
 from __future__ import annotations
 
@@ -7,79 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-import scripts
-from conftest import references, shared, statuses
+from conftest import shared
 from petab_oracle import Model, Tables, observed, prepared
-
-from obsdeg.importers import strike_goldd, to_toml
-
-C2M = """
-syms x1 x2 k1e k12 k21 b v
-x = [x1; x2]; h = x1;
-{inputs}
-f = [-(k1e + k12)*x1 + k21*x2 + b*v;  % the measured one
-     k12*x1 - k21*x2];
-p = [{unknown}].';
-save('C2M','x','p','h','f','u','w');
-"""
-VAJDA = """
-% S. Vajda et al., Math. Biosciences 93 (1989) 217: two states, one input
-syms x1 x2 t1 t2 t3 t4 w
-x = [x1 x2].'; p = [t1;t2;t3;t4]; u = []; h = x1;
-f = [t1*x1^2 + t2*x1*x2 + w;
-     t3*x1^2 + t4*x1*x2];
-save('Vajda','x','p','w','u','h','f');
-"""
-BIG = """
-% beta cells, insulin, glucose: B. Topp et al., J. Theor. Biol. 206 (2000) 605; O. Karin et al., Mol. Syst. Biol. 12 (2016) 886
-syms G B I
-x = [G, B, I];
-syms v u0 secrete si gamma c alpha
-p = [secrete si gamma c alpha]; u = v;
-up = 0.021/(24*60); down = 0.025/(24*60);   % per minute
-grow = up/(1 + (8.4/G)^1.7);
-die  = down/(1 + (G/4.8)^8.5);
-h = G;
-f = [u0 + v - (c + si*I)*G; B*(grow - die); secrete*B*G^2/(alpha^2 + G^2) - gamma*I];
-save('BIG','x','p','h','u','f');
-"""
-MANUAL = "STRIKE-GOLDD manual 4.3"
-REPAIR = "G. Massonis, J. R. Banga, A. F. Villaverde, AutoRepar: supplementary information"
-
-
-def c2m(unknown: str, known: bool) -> str:
-    inputs = "u = [v]; w = [];" if known else "w = v; u = [];"
-    return C2M.format(unknown=unknown, inputs=inputs)
-
-
-#: Texts, options, what is not observable, and where that is published.
-PUBLISHED: dict[str, tuple[str, dict[str, Any], set[str], str]] = {
-    "two compartments, any input": (c2m("k1e k12 k21 b", True), {}, set(), MANUAL),
-    "two compartments, constant input": (c2m("k1e k12 k21 b", True), {"known_inputs": 0}, {"x2", "k1e", "k12", "k21", "b"}, MANUAL),
-    "two compartments, a ramp": (c2m("k1e k12 k21 b", True), {"known_inputs": 1}, set(), MANUAL),
-    "two compartments, unknown input": (c2m("k1e, k12, k21", False), {"unknown_inputs": 0}, {"x2", "v", "k1e", "k12", "k21"}, MANUAL),
-    "two compartments, unknown ramp": (c2m("k1e, k12, k21", False), {"unknown_inputs": 1}, {"x2", "v", "v'", "k1e", "k12", "k21"}, MANUAL),
-    "two compartments, elimination known": (c2m("k12 k21", False), {"unknown_inputs": 0}, set(), MANUAL),
-    "two compartments, elimination known, ramp": (c2m("k12 k21", False), {"unknown_inputs": 1}, set(), MANUAL),
-    "Vajda": (VAJDA, {"unknown_inputs": 1}, {"t2", "t3", "x2"}, REPAIR),
-    "glucose alone": (BIG, {}, {"secrete", "si", "B", "I"}, REPAIR),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_verdicts_are_those_that_are_published(name: str) -> None:
-    text, options, lost, _ = PUBLISHED[name]
-    found = statuses(to_toml(strike_goldd.read(text, **options)))
-    assert {n for n, s in found.items() if s != "observable"} == lost
-
-
-def test_pharmacokinetics_with_an_unknown_input() -> None:
-    """B. Merkt et al., Phys. Rev. E 92 (2015) 012920; verdict in the same supplement."""
-    model = scripts.renamed(references()["pk_merkt_known_input"])
-    system = strike_goldd.read(scripts.matlab({**model, "known_inputs": [], "unknown_inputs": model["known_inputs"]}), unknown_inputs=1)
-    lost = {n for n, s in statuses(to_toml(system)).items() if s != "observable"}
-    signal = model["known_inputs"][0]
-    assert lost == {"k1", "k2", "k3", "k7", "s2", "s3", "x1", "x2", "x3", "x4", signal, f"{signal}'"}
 
 
 def scaled(*factors: tuple[int, str]) -> Callable[[dict[str, float], float], dict[str, float]]:
