@@ -3,7 +3,7 @@
 //! A block of `console` shows commands (`$ ...`) and what they print on stdout, a line `...` stands for any lines; a block of `sh` is a
 //! script that must succeed. Before a block `<!-- file NAME -->` makes it a file of that name, `<!-- exit code N -->` says that its commands
 //! end so, and their errors are shown behind what they print. Commands run one after the other, in a folder of their own with the examples in
-//! it. `UPDATE_BOOK=1` writes into the texts what is printed: between two `...` the lines that are most like those that are there.
+//! it; blocks of `pycon` are run by `python/tests/test_readme.py`. `UPDATE_BOOK=1` writes into the texts what is printed: between two `...` the lines that are most like those that are there.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -210,7 +210,7 @@ fn held(name: &str, text: &str) -> (Vec<String>, String) {
                 }
             }
             other => {
-                let known = ["toml", "text", "math"].contains(&other);
+                let known = ["toml", "text", "math", "pycon"].contains(&other);
                 let hidden = block.lines.iter().any(|l| l.trim_start().starts_with("obsdeg "));
                 assert!(known && !hidden, "{}: a block of {other:?} is not run", place(0));
             }
