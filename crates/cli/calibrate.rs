@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     scheme: Option<PathBuf>,
 
     /// The model file of any other system; FILE is the record then, with columns `t`, outputs, known inputs, `sigma_NAME` of either,
-    /// `experiment`
+    /// `experiment`, `segment`
     #[arg(long, value_name = "FILE", conflicts_with = "scheme")]
     model: Option<PathBuf>,
 

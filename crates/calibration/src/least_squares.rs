@@ -178,9 +178,9 @@ impl Information {
 pub struct Solution {
     /// The unknowns (shape n).
     pub x: DVector<f64>,
-    /// The inverse root of the information (n x n): the covariance is this times its transpose.
+    /// The inverse root of the information (n x any): the covariance is this times its transpose.
     pub inverse_root: DMatrix<f64>,
-    /// The root itself.
+    /// The root itself, by the directions in which the unknowns are free.
     pub root: DMatrix<f64>,
     /// The sum of squares that the rows leave.
     pub left: f64,

@@ -202,7 +202,7 @@ pub enum SystemCalibrationError {
     /// The record.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Constraints or segments.
+    /// What records of some kinds cannot have.
     #[error("a model with {what} cannot be calibrated yet; expected one without")]
     NotYet {
         /// What it has.
@@ -254,6 +254,32 @@ pub enum SystemCalibrationError {
     Prior {
         /// What it has.
         found: String,
+    },
+    /// A calibration of a system with constraints, for one without.
+    #[error(
+        "the prior calibration knows {found} as constraints make them, which the model has not; expected the same `constraints`"
+    )]
+    PriorHeld {
+        /// What it has of the unknowns of the model.
+        found: String,
+    },
+    /// Constraints that cannot be met.
+    #[error(
+        "the constraint {constraint} does not hold anywhere near one of {starts} starts; expected constraints that hold at once, and values under [simulation.values] near the solution"
+    )]
+    Unheld {
+        /// How many were tried.
+        starts: usize,
+        /// The first that does not.
+        constraint: String,
+    },
+    /// A constraint that says nothing where it holds.
+    #[error(
+        "the constraint {constraint} has no slope at the solution, as a square has none where it is zero; expected one that changes with the unknowns in it"
+    )]
+    Flat {
+        /// The constraint.
+        constraint: String,
     },
     /// Nothing to learn from intervals at rest.
     #[error(

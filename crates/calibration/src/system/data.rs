@@ -21,6 +21,8 @@ pub(super) struct Data {
     pub(super) experiment: usize,
     /// Rows of another run begin at the start anew.
     pub(super) run: usize,
+    /// Of the timeline: a segment begins with its first row.
+    pub(super) segment: usize,
     pub(super) t: f64,
     /// Values of inputs, and their standard deviations.
     pub(super) inputs: Vec<(f64, f64)>,
@@ -61,6 +63,8 @@ struct Columns {
     /// Outputs: a column and that of its standard deviation, or what it is known to be.
     outputs: Vec<Result<(usize, Option<usize>), f64>>,
     label: Option<usize>,
+    /// The wanted number of the segment.
+    segment: Option<usize>,
     ignored: Vec<String>,
 }
 
@@ -119,13 +123,25 @@ impl Columns {
             let what = "intervals at rest that are sought and a column `experiment`";
             return Err(SystemCalibrationError::NotYet { what });
         }
+        let named = record.find("segment").filter(|column| wanted.iter().all(|w| w.column != *column));
+        if model.segments.len() > 1 {
+            if named.is_none() {
+                return Err(record.missing("`segment` (1, 2, ...: it begins with its first row)").into());
+            }
+            if model.recording.still.is_some() {
+                let what = "intervals at rest that are sought in several segments";
+                return Err(SystemCalibrationError::NotYet { what });
+            }
+        }
+        wanted.extend(named.map(|column| Wanted { column, scale: 1.0 }));
+        let segment = named.map(|_| wanted.len() - 1);
         let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
         let columns = record.columns().iter().enumerate();
         let ignored = columns.filter(|(i, _)| !used(*i)).map(|(_, c)| c.text.clone()).collect();
         if wanted.len() > MOST {
             return Err(SystemCalibrationError::TooMany { found: wanted.len() });
         }
-        Ok(Self { wanted, inputs, outputs, label, ignored })
+        Ok(Self { wanted, inputs, outputs, label, segment, ignored })
     }
 }
 
@@ -140,6 +156,9 @@ pub(super) fn read(
     let (name, experiments) = (record.name().to_string(), model.experiments.max(1));
     let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
     let mut rows: Vec<Data> = Vec::new();
+    let segments = model.segments.len().max(1);
+    // the segment and the time of the last row of every experiment
+    let mut reached = vec![(0, f64::NEG_INFINITY); experiments];
     let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
         let samples = rows.len() + 1;
         if samples.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples }) {
@@ -161,6 +180,26 @@ pub(super) fn read(
             }
         };
         let t = row.numbers[0].unwrap_or(f64::NAN);
+        // an experiment may go on behind rows of another
+        let (last, time) = reached[experiment];
+        let mut segment = last;
+        if let Some(i) = columns.segment {
+            let most = (last + 2).min(segments);
+            let found = row.numbers[i].filter(|n| (last + 1..=most).any(|k| *n == k as f64));
+            let expected = match most == last + 1 {
+                true => format!("{most}: the model has no more segments"),
+                false => {
+                    format!("{} or {most} (segments follow each other, each with a row at least)", last + 1)
+                }
+            };
+            let text = row.numbers[i].map_or_else(|| "nothing".into(), |n| n.to_string());
+            segment = found.ok_or_else(|| refuse("segment", text, &expected))? as usize - 1;
+        }
+        if t <= time {
+            let expected = format!("a time after {time}, which experiment {} has reached", experiment + 1);
+            return Err(refuse(&texts[0], t.to_string(), &expected));
+        }
+        reached[experiment] = (segment, t);
         if t < 0.0 && still.is_none() {
             return Err(refuse(&texts[0], t.to_string(), "a time from 0, the start of the model, on"));
         }
@@ -190,6 +229,7 @@ pub(super) fn read(
             line: row.line,
             experiment,
             run: experiment,
+            segment,
             t,
             inputs: of_inputs,
             outputs,
@@ -262,6 +302,7 @@ fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data 
         line: first.line,
         experiment: 0,
         run: 0,
+        segment: 0,
         t: (first.t + last.t) / 2.0,
         inputs: inputs.iter().enumerate().map(input).collect(),
         outputs: outputs.iter().map(|o| o.map(|(mean, _)| mean)).collect(),

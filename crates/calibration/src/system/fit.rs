@@ -1,6 +1,7 @@
 //! Least squares of a model on the rows of its data: Levenberg and Marquardt with the Jacobians of its graph.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
+use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Measurement};
 use obsdeg_evidence::system::Numeric;
@@ -45,6 +46,8 @@ pub(super) struct At {
     pub(super) keys: Vec<(usize, usize)>,
     /// The same of what was known before, with unit errors.
     pub(super) known: (DMatrix<f64>, DVector<f64>),
+    /// Where unknowns may go ([`Problem::ways`]).
+    pub(super) ways: DMatrix<f64>,
 }
 
 impl At {
@@ -99,16 +102,20 @@ impl Problem<'_> {
             sigmas: Vec::new(),
             keys: Vec::new(),
             known: (self.known.0.clone(), &self.known.1 - &self.known.0 * x),
+            ways: self.ways(base, x, None)?,
         };
         let (mut rows, mut left): (Vec<RowDVector<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
         let data = self.data;
         let ones = vec![1.0; self.noise.len()];
         let mut now = (usize::MAX, 0.0, start.clone(), to_start.clone());
+        let mut segment = 0;
         for (k, row) in data.rows.iter().enumerate() {
             if now.0 != row.run {
-                now = (row.run, 0.0, start.clone(), to_start.clone());
+                let (x, by) = self.numeric.carry(row.experiment * segments, 0.0, &start);
+                now = (row.run, 0.0, x, by * &to_start);
+                segment = 0;
             }
-            let part = row.experiment * segments;
+            let part = row.experiment * segments + segment;
             // what was held until here, then what is held from here on
             if row.t > now.1 {
                 let process = self.numeric.process(part);
@@ -116,6 +123,13 @@ impl Problem<'_> {
                 let next = runge_kutta(&process, now.1, &now.2, row.t - now.1, steps)?;
                 now = (row.run, row.t, next.x, next.phi * now.3);
             }
+            // a segment begins with its first row
+            while segment < row.segment {
+                segment += 1;
+                let (x, by) = self.numeric.carry(row.experiment * segments + segment, row.t, &now.2);
+                now = (now.0, now.1, x, by * now.3);
+            }
+            let part = row.experiment * segments + segment;
             for (&input, (value, _)) in data.inputs.iter().zip(&row.inputs) {
                 self.numeric.hold(input, *value);
             }
@@ -168,17 +182,35 @@ pub(super) fn size(x: f64) -> f64 {
     x.abs().max(1e-3)
 }
 
-/// The step from `at`, pulled by `pull` per size of an unknown.
+/// The step from `at`, pulled by `pull` per size of an unknown, as far as constraints leave a way: the root of the solution is by these ways.
 pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, EkfError> {
-    let n = x.len();
+    let mut ways = at.ways.clone();
+    ways.row_iter_mut().zip(x.iter()).for_each(|(mut row, x)| row.scale_mut(size(*x)));
+    let n = ways.ncols();
     let mut rows = Rows::new(n);
-    let weights = DVector::from_iterator(at.sigmas.len(), at.sigmas.iter().map(|s| 1.0 / s));
-    let whitened = DMatrix::from_fn(at.rows.nrows(), n, |i, j| at.rows[(i, j)] * weights[i]);
-    rows.add(&whitened, &at.left.component_mul(&weights));
-    rows.add(&at.known.0, &at.known.1);
-    let pulls = DVector::from_iterator(n, x.iter().map(|v| pull / size(*v)));
-    rows.add(&DMatrix::from_diagonal(&pulls), &DVector::zeros(n));
-    rows.solve()
+    let mut whitened = &at.rows * &ways;
+    whitened.row_iter_mut().zip(&at.sigmas).for_each(|(mut row, s)| row.scale_mut(1.0 / s));
+    let left = at.left.zip_map(&DVector::from_column_slice(&at.sigmas), |e, s| e / s);
+    rows.add(&whitened, &left);
+    rows.add(&(&at.known.0 * &ways), &at.known.1);
+    rows.add(&(DMatrix::identity(n, n) * pull), &DVector::zeros(n));
+    let found = rows.solve()?;
+    Ok(Solution { x: &ways * found.x, inverse_root: &ways * found.inverse_root, ..found })
+}
+
+/// Why there is no end of an iteration.
+#[derive(Debug, Clone)]
+pub(super) enum Stuck {
+    /// The model gives no numbers.
+    Numbers(EkfError),
+    /// The constraint of this number does not hold.
+    Held(usize),
+}
+
+impl From<EkfError> for Stuck {
+    fn from(e: EkfError) -> Self {
+        Self::Numbers(e)
+    }
 }
 
 /// Where an iteration ended.
@@ -196,15 +228,18 @@ pub(super) fn settle(
     mut x: DVector<f64>,
     finer: usize,
     fixed: Option<usize>,
-) -> Result<Settled, EkfError> {
-    let freeze = |at: &mut At| {
+) -> Result<Settled, Stuck> {
+    let there = |problem: &mut Problem<'_>, x: &DVector<f64>| -> Result<At, EkfError> {
+        let mut at = problem.at(base, x, finer)?;
         if let Some(j) = fixed {
             at.rows.column_mut(j).fill(0.0);
             at.known.0.column_mut(j).fill(0.0);
+            at.ways = problem.ways(base, x, fixed)?;
         }
+        Ok(at)
     };
-    let mut at = problem.at(base, &x, finer)?;
-    freeze(&mut at);
+    x = problem.held(base, x, fixed).map_err(Stuck::Held)?;
+    let mut at = there(problem, &x)?;
     let mut cost = at.cost();
     // a pull as strong as the data say little at first
     let mut pull = 1e-2 * (cost.max(1.0)).sqrt();
@@ -214,9 +249,9 @@ pub(super) fn settle(
             break;
         }
         let solution = step(&at, &x, pull)?;
-        let moved = &x + &solution.x;
-        let next = problem.at(base, &moved, finer).ok();
-        let next = next.filter(|n| n.cost_by(&at.sigmas) <= cost * (1.0 + 1e-12));
+        let moved = problem.held(base, &x + &solution.x, fixed).ok();
+        let next = moved.and_then(|moved| Some((there(problem, &moved).ok()?, moved)));
+        let next = next.filter(|(n, _)| n.cost_by(&at.sigmas) <= cost * (1.0 + 1e-12));
         let scale = (cost / at.sigmas.len() as f64).max(1.0).sqrt();
         // how far it would go without the pull
         let weak = step(&at, &x, 1.0 / WEAK)?;
@@ -226,8 +261,7 @@ pub(super) fn settle(
             break;
         }
         match next {
-            Some(mut n) => {
-                freeze(&mut n);
+            Some((n, moved)) => {
                 (x, cost, at) = (moved, n.cost(), n);
                 pull = (pull / 5.0).max(1.0 / WEAK);
             }
@@ -256,9 +290,8 @@ pub(super) fn leverage(at: &At, solution: &Solution, i: usize) -> f64 {
 }
 
 /// The number of combinations that the data determine: a pull is all there is of the others.
-pub(super) fn rank(solution: &Solution, x: &DVector<f64>) -> usize {
-    // of unknowns in units of their size the root has singular values of the pull, or far larger ones
-    let scaled = DMatrix::from_fn(x.len(), x.len(), |i, j| solution.root[(i, j)] * size(x[j]));
-    let values = obsdeg_ekf::decomposition::singular_values(&scaled).map(|(v, _)| v).unwrap_or_default();
+pub(super) fn rank(solution: &Solution) -> usize {
+    // of unknowns in parts of their size the root has singular values of the pull, or far larger ones
+    let values = singular_values(&solution.root).map(|(v, _)| v).unwrap_or_default();
     values.iter().filter(|v| **v > 10.0 / WEAK).count()
 }

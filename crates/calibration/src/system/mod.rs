@@ -1,6 +1,8 @@
 //! Any system calibrated from data: Gauss and Newton with the Jacobians of the model's own graph, from several starts.
 
 mod answer;
+mod before;
+mod constraints;
 mod data;
 mod fit;
 mod outliers;
@@ -26,8 +28,9 @@ use crate::answer::{Before, CovarianceTable};
 use crate::least_squares::Solution;
 use crate::record::Record;
 use crate::setup::Basis;
+use before::said_before;
 use data::{Read, read};
-use fit::{At, Problem, Settled, WEAK, leverage, rank, settle, size, step};
+use fit::{At, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size, step};
 
 /// Name and version of the JSON layout.
 const SCHEMA: &str = "obsdeg.system-calibration/1";
@@ -62,12 +65,6 @@ pub fn calibrate_system(
     options: &SystemOptions,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
-    if !model.constraints.is_empty() {
-        return Err(SystemCalibrationError::NotYet { what: "constraints" });
-    }
-    if model.segments.len() > 1 {
-        return Err(SystemCalibrationError::NotYet { what: "several segments" });
-    }
     let compiled = model.compile()?;
     let data = read(record, model, going)?;
     let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
@@ -84,31 +81,6 @@ pub fn calibrate_system(
 /// The digest of a model: of what its verdicts depend on.
 fn digest(model: &SystemModel) -> String {
     format!("{:016x}", model.random(0, "calibration").next_u64())
-}
-
-/// Rows and values of what a calibration before says of the unknowns `names`, with unit errors.
-fn said_before(
-    table: &CovarianceTable,
-    names: &[&str],
-) -> Result<(DMatrix<f64>, DVector<f64>), SystemCalibrationError> {
-    let nothing = || SystemCalibrationError::Prior { found: table.names.join(", ") };
-    let n = table.names.len();
-    let shapes = table.estimates.len() == n && table.covariance.len() == n;
-    if !shapes || table.covariance.iter().any(|row| row.len() != n) {
-        return Err(nothing());
-    }
-    let place = |k: usize| names.iter().position(|name| *name == table.names[k]).map(|j| (k, j));
-    let found: Vec<(usize, usize)> = (0..n).filter_map(place).collect();
-    if found.is_empty() {
-        return Err(nothing());
-    }
-    let m = found.len();
-    let p = DMatrix::from_fn(m, m, |i, j| table.covariance[found[i].0][found[j].0]);
-    let root = nalgebra::Cholesky::new(p).ok_or_else(nothing)?.l();
-    let rows = DMatrix::from_fn(m, names.len(), |i, j| f64::from(u8::from(found[i].1 == j)));
-    let values = DMatrix::from_fn(m, 1, |i, _| table.estimates[found[i].0]);
-    let solve = |b: DMatrix<f64>| root.solve_lower_triangular(&b).ok_or_else(nothing);
-    Ok((solve(rows)?, solve(values)?.column(0).into_owned()))
 }
 
 /// A combination: its text, its degree, its value, and its derivatives by unknowns.
@@ -174,13 +146,13 @@ impl<'a> Calibrating<'a> {
         }
         let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
         let longest = nominal.step.unwrap_or(f64::INFINITY).min(if last > 0.0 { last / 50.0 } else { 1.0 });
-        let names: Vec<&str> = free.iter().map(|&i| numeric.names[i].as_str()).collect();
-        let known = match &options.prior {
-            Some(before) => said_before(&before.estimates, &names)?,
-            None => (DMatrix::zeros(0, free.len()), DVector::zeros(0)),
-        };
-        let problem =
+        let known = (DMatrix::zeros(0, free.len()), DVector::zeros(0));
+        let mut problem =
             Problem { numeric, data, free, noise, longest, known, going, passes: 0, stopped: false };
+        if let Some(before) = &options.prior {
+            let names: Vec<&str> = problem.free.iter().map(|&i| problem.numeric.names[i].as_str()).collect();
+            problem.known = said_before(&before.estimates, &names, &problem, &base)?;
+        }
         Ok(Self { model, compiled, data, options, problem, base, estimated })
     }
 
@@ -196,11 +168,19 @@ impl<'a> Calibrating<'a> {
         let verdicts: Vec<_> = (0..names.len()).map(verdict).collect();
         let observable = |j: usize| verdicts[j].is_some_and(|v| v.status == Status::Observable);
         let (ends, tried, first_error) = self.search(&starts, &observable);
+        let model = self.model;
+        let constraint = |i: usize| model.constraints[i % model.constraints.len()].text.clone();
+        let stuck = |e| match e {
+            Stuck::Numbers(reason) => SystemCalibrationError::Nowhere { starts: tried, reason },
+            Stuck::Held(i) => SystemCalibrationError::Unheld { starts: tried, constraint: constraint(i) },
+        };
         let Some(best) = ends.first().cloned() else {
-            let reason = first_error.unwrap_or(EkfError::Singular { column: 0 });
-            return Err(SystemCalibrationError::Nowhere { starts: tried, reason });
+            return Err(stuck(first_error.unwrap_or(Stuck::Numbers(EkfError::Singular { column: 0 }))));
         };
         let nowhere = |reason| SystemCalibrationError::Nowhere { starts: tried, reason };
+        if let Some(i) = self.problem.flat(&self.base, &best.x) {
+            return Err(SystemCalibrationError::Flat { constraint: constraint(i) });
+        }
         // steps of integration until finer ones change nothing that shows
         let mut finer = 1;
         let mut best = best;
@@ -221,7 +201,7 @@ impl<'a> Calibrating<'a> {
                 break;
             }
             finer *= 2;
-            best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(nowhere)?;
+            best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(stuck)?;
         }
         // noise that nobody gave
         for _ in 0..ROUNDS {
@@ -231,7 +211,7 @@ impl<'a> Calibrating<'a> {
                 break;
             }
             self.problem.noise.iter_mut().zip(&factors).for_each(|(s, f)| *s *= f);
-            best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(nowhere)?;
+            best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(stuck)?;
         }
         let at = self.problem.at(&self.base, &best.x, finer).map_err(nowhere)?;
         let solution = step(&at, &best.x, 1.0 / WEAK).map_err(nowhere)?;
@@ -239,15 +219,15 @@ impl<'a> Calibrating<'a> {
         let determined: Vec<bool> = (0..names.len())
             .map(|j| observable(j) && weaker.sigma(&[(j, 1.0)]) <= DETERMINED * solution.sigma(&[(j, 1.0)]))
             .collect();
-        let rank = rank(&solution, &best.x);
-        let measured = measured + self.problem.known.1.len();
+        let rank = rank(&solution);
+        let measured = measured + at.known.1.len();
         if measured <= rank {
             return Err(SystemCalibrationError::TooFew { found: measured, unknowns: rank });
         }
         let degrees_of_freedom = measured - rank;
         let mean = at.cost() / degrees_of_freedom as f64;
         let rescale = mean.sqrt().max(1.0);
-        let known = &self.problem.known.0;
+        let known = &at.known.0;
         let between = |a: &[(usize, f64)], b: &[(usize, f64)]| solution.covariance_with(a, b, rescale, known);
         let estimate =
             |name: &str, unit: &str, status, degree, determined: bool, value: f64, terms: &[(usize, f64)]| {
@@ -451,7 +431,9 @@ impl<'a> Calibrating<'a> {
                 }
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let flat = points.iter().all(|p| p.1.abs() < 0.01);
+            // what constraints alone make it has no other values
+            points.dedup_by(|a, b| a.0 == b.0);
+            let flat = points.len() > 1 && points.iter().all(|p| p.1.abs() < 0.01);
             out.push(Profile { name: name.clone(), points, flat });
         }
         Ok(out)

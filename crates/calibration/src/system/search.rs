@@ -1,12 +1,11 @@
 //! Where iterations start, when there have been enough of them, and where they end.
 
 use nalgebra::DVector;
-use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::Noise;
 
 use super::Calibrating;
 use super::answer::OtherSolution;
-use super::fit::{Settled, settle, size};
+use super::fit::{Settled, Stuck, settle, size};
 use crate::least_squares::Solution;
 
 /// Two solutions are one when all that is determined differs by less, in sigma.
@@ -43,18 +42,22 @@ fn enough(found: usize, starts: usize) -> bool {
 }
 
 impl Calibrating<'_> {
-    /// The starts: that of the file, then others about it.
+    /// The starts: that of the file, then others about it, where constraints bind an unknown of either sign.
     pub(super) fn starts(&self) -> Vec<DVector<f64>> {
         let mut noise = Noise::new(self.options.seed, 18);
         let first: Vec<f64> = self.problem.free.iter().map(|&i| self.base[i]).collect();
+        let bounds = self.problem.bounds(&self.base, &DVector::from_column_slice(&first));
         (0..self.options.starts.max(1))
             .map(|k| {
-                let of = |x: &f64| match (k, *x == 0.0) {
+                let of = |(j, x): (usize, &f64)| match (k, *x == 0.0) {
                     (0, _) => *x,
                     (_, true) => noise.normal(),
-                    (_, false) => x * (SPREAD * noise.normal()).exp(),
+                    (_, false) => {
+                        let size = x * (SPREAD * noise.normal()).exp();
+                        if bounds.column(j).amax() > 0.0 { size.copysign(noise.normal()) } else { size }
+                    }
                 };
-                DVector::from_vec(first.iter().map(of).collect())
+                DVector::from_vec(first.iter().enumerate().map(of).collect())
             })
             .collect()
     }
@@ -65,8 +68,8 @@ impl Calibrating<'_> {
         &mut self,
         starts: &[DVector<f64>],
         counts: &dyn Fn(usize) -> bool,
-    ) -> (Vec<Settled>, usize, Option<EkfError>) {
-        let (mut ends, mut tried, mut first_error): (Vec<Settled>, usize, Option<EkfError>) =
+    ) -> (Vec<Settled>, usize, Option<Stuck>) {
+        let (mut ends, mut tried, mut first_error): (Vec<Settled>, usize, Option<Stuck>) =
             (Vec::new(), 0, None);
         for x in starts {
             // what there is so far is the answer

@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod constraints;
 mod faults;
 mod handheld;
 mod models;

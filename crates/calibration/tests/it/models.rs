@@ -9,11 +9,11 @@ use obsdeg_calibration::{
 use obsdeg_core::system::model_file;
 use obsdeg_exact::SplitMix64;
 
-fn options() -> SystemOptions {
+pub(crate) fn options() -> SystemOptions {
     SystemOptions { starts: 16, profiles: vec![], prior: None, seed: 1 }
 }
 
-fn calibrated(
+pub(crate) fn calibrated(
     model: &str,
     text: &str,
     options: &SystemOptions,
@@ -24,13 +24,13 @@ fn calibrated(
 }
 
 /// Unit normals (Box and Muller).
-fn normals(seed: u64) -> impl FnMut() -> f64 {
+pub(crate) fn normals(seed: u64) -> impl FnMut() -> f64 {
     let mut random = SplitMix64::new(seed);
     let mut uniform = move || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
     move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
 }
 
-fn found<'a>(list: &'a [SystemEstimated], name: &str) -> &'a SystemEstimated {
+pub(crate) fn found<'a>(list: &'a [SystemEstimated], name: &str) -> &'a SystemEstimated {
     list.iter().find(|u| u.name == name).unwrap_or_else(|| panic!("{name}: {list:?}"))
 }
 
@@ -150,4 +150,111 @@ fn units_of_models() {
     // of another model it is said, and counts
     let other = model.replace("-k*x", "-k*x*1");
     assert!(calibrated(&other, &text("", 1.0, "", 1.0), &options).expect("calibrated").shared);
+}
+
+const DOSES: &str = "[constants]\nD = { value = 100 }\n[states]\nA = \"-k*A\"\n[parameters]\nk = {}\nV = {}\n[outputs]\ny = \"A/V\"\n[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\ncarry = { A = \"A + D/2\" }\n[simulation]\nvalues = { A = 50, k = 0.2, V = 8 }\nnoise = { y = 0.05 }\n";
+
+/// Doses at times that the record says: what is left of the first is unknown, the volume follows from the jumps of the next, whose sizes are known.
+#[test]
+fn segments_begin_with_their_first_rows() {
+    let (start, k, v, jumps) = (70.0, 0.13, 12.0, [(6.0, 100.0), (11.5, 50.0)]);
+    let mut normal = normals(8);
+    let mut text = "t,segment,y\n".to_string();
+    let mut times: Vec<f64> = (0..60).map(|i| 0.3 * f64::from(i)).collect();
+    // a row of nothing but the time of a jump
+    times.push(11.5);
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    for t in times {
+        let after = |(at, dose): &(f64, f64)| if t >= *at { dose * (-k * (t - at)).exp() } else { 0.0 };
+        let amount = start * (-k * t).exp() + jumps.iter().map(after).sum::<f64>();
+        let segment = 1 + jumps.iter().filter(|(at, _)| t >= *at).count();
+        let y = if t == 11.5 { String::new() } else { (amount / v + 0.05 * normal()).to_string() };
+        text += &format!("{t},{segment},{y}\n");
+    }
+    let c = calibrated(DOSES, &text, &options()).expect("calibrated");
+    assert_eq!(c.consistent, Some(true), "{:?}", c.findings);
+    for (name, truth) in [("A", start), ("k", k), ("V", v)] {
+        let u = found(&c.quantities, name);
+        let (x, s) = (u.estimate.expect(name), u.sigma.expect(name));
+        assert!((x - truth).abs() < 3.5 * s && s < 0.05 * truth, "{name}: {x} +- {s}");
+    }
+    // without the jumps only amount over volume is told, whatever segments there could be
+    let early: String =
+        text.lines().filter(|l| !l.contains(",2,") && !l.contains(",3,")).map(|l| format!("{l}\n")).collect();
+    let c = calibrated(DOSES, &early, &options()).expect("calibrated");
+    assert!(found(&c.quantities, "k").determined && !found(&c.quantities, "V").determined);
+    let once = DOSES.replace(
+        "[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\ncarry = { A = \"A + D/2\" }\n",
+        "",
+    );
+    let same = calibrated(&once, &early, &options()).expect("calibrated");
+    assert!(same.ignored.is_empty() && found(&same.quantities, "V").estimate.is_none());
+    assert!((same.chi_square / c.chi_square - 1.0).abs() < 1e-6, "{} {}", same.chi_square, c.chi_square);
+    let e = calibrated(&once, &text, &options()).expect_err("segments").to_string();
+    assert!(e.contains("column `segment`: found 2, expected 1: the model has no more segments"), "{e}");
+    for (from, to, message) in [
+        (
+            "t,segment,y",
+            "t,part,y",
+            "data.csv: no column `segment` (1, 2, ...: it begins with its first row)",
+        ),
+        (
+            "\n0.6,1,",
+            "\n0.6,3,",
+            "line 4, column `segment`: found 3, expected 1 or 2 (segments follow each other, each with a row at least)",
+        ),
+        ("\n0.6,1,", "\n0.6,1.5,", "column `segment`: found 1.5, expected 1 or 2"),
+        ("\n6.6,2,", "\n6.6,1,", "column `segment`: found 1, expected 2 or 3"),
+        ("\n6.6,2,", "\n6.6,,", "column `segment`: found nothing, expected 2 or 3"),
+        ("\n13.5,3,", "\n13.5,4,", "column `segment`: found 4, expected 3: the model has no more segments"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let e = calibrated(DOSES, &text.replacen(from, to, 1), &options()).expect_err(to).to_string();
+        assert!(e.contains(message), "{message}: {e}");
+    }
+}
+
+/// Two patients with doses of their own times and amounts at first, and one volume: rows of one among those of the other, or behind them.
+#[test]
+fn experiments_have_segments_of_their_own() {
+    let (k, v) = (0.13, 12.0);
+    let mut normal = normals(21);
+    let mut lines = Vec::new();
+    for i in 0..40 {
+        for (experiment, start, at) in [(1, 70.0, 6.0), (2, 20.0, 3.1)] {
+            let t = 0.3 * f64::from(i);
+            let jump = if t >= at { 100.0 * (-k * (t - at)).exp() } else { 0.0 };
+            let y = (start * (-k * t).exp() + jump) / v + 0.05 * normal();
+            // the dose is at the first row behind it
+            let segment = if t >= at { 2 } else { 1 };
+            lines.push((experiment, format!("{t},{experiment},{segment},{y}\n")));
+            if t < at && t + 0.3 > at && (at / 0.3).fract() > 1e-9 {
+                lines.push((experiment, format!("{at},{experiment},2,\n")));
+            }
+        }
+    }
+    let text = |lines: &[(i32, String)]| -> String {
+        std::iter::once("t,experiment,segment,y\n").chain(lines.iter().map(|l| l.1.as_str())).collect()
+    };
+    let model =
+        format!("experiments = 2\n{}", DOSES.replace("[[segment]]\ncarry = { A = \"A + D/2\" }\n", ""));
+    let c = calibrated(&model, &text(&lines), &options()).expect("calibrated");
+    assert_eq!(c.consistent, Some(true), "{:?}", c.findings);
+    for (name, truth) in [("A@1", 70.0), ("A@2", 20.0), ("k", k), ("V", v)] {
+        let u = found(&c.quantities, name);
+        let (x, s) = (u.estimate.expect(name), u.sigma.expect(name));
+        assert!((x - truth).abs() < 3.5 * s && s < 0.05 * truth, "{name}: {x} +- {s}");
+    }
+    let mut sorted = lines.clone();
+    sorted.sort_by_key(|l| l.0);
+    let other = calibrated(&model, &text(&sorted), &options()).expect("calibrated");
+    assert_eq!(c.quantities, other.quantities);
+    // an experiment goes on behind another's rows, not back
+    sorted.push((1, "5,1,2,3\n".into()));
+    let e = calibrated(&model, &text(&sorted), &options()).expect_err("back").to_string();
+    assert!(
+        e.contains("column `t`: found 5, expected a time after 11.7, which experiment 1 has reached"),
+        "{e}"
+    );
 }

@@ -252,7 +252,7 @@ impl<'a> Numeric<'a> {
 
     /// The values of the constraints at the start of every experiment, which should be zero, and their derivatives by the states of the
     /// filter, a row each.
-    pub(crate) fn constraints(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
+    pub fn constraints(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
         let nodes = &self.compiled.constraints;
         let n = self.states.len();
         let (mut found, mut rows) = (Vec::new(), DMatrix::zeros(nodes.len() * self.experiments(), n));
