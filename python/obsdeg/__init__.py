@@ -12,10 +12,9 @@ a ``str``, a ``Decimal``, or a ``float`` by its shortest text. What is wrong wit
 
 from __future__ import annotations
 
-import json
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -47,7 +46,7 @@ from ._results import (
     SystemRun,
     Walks,
 )
-from ._texts import assignments, attitude, decimal
+from ._texts import as_json, assignments, attitude, decimal
 
 if TYPE_CHECKING:
     import pandas
@@ -94,37 +93,54 @@ __all__ = [
     "simulate",
 ]
 
-#: Options that are lists of `NAME=X`.
-_ASSIGNED = {"requirement", "value", "prior", "estimate", "max_degree"}
-#: Options that are exact decimals.
-_EXACT = {"latitude", "filter_latitude", "round"}
+
+def _texts(value: Any) -> list[str]:
+    return [value] if isinstance(value, str) else list(value)
 
 
-def _option(name: str, value: Any) -> Any:
-    if value is None:
-        return None
-    if name == "angles":
-        return [attitude(a) for a in value]
-    if name in _EXACT:
-        return decimal(value)
-    if name in _ASSIGNED and not isinstance(value, (int, float)):
-        return assignments(value)
-    if name == "max_degree":
-        return [str(value)]
-    if name in ("terms", "combination", "gimbal", "observable", "profile"):
-        texts = [value] if isinstance(value, str) else list(value)
-        return ",".join(texts) if name == "terms" else texts
-    if isinstance(value, (list, tuple)):
-        return ",".join(map(decimal, value)) if name in ("angle_random_walk", "rate_random_walk", "bias_instability") else list(value)
+def _plain(value: Any) -> Any:
     if isinstance(value, (bool, str, int)):
         return value
-    return float(decimal(value))
+    return list(value) if isinstance(value, (list, tuple)) else float(decimal(value))
+
+
+def _per_axis(value: Any) -> Any:
+    return ",".join(map(decimal, value)) if isinstance(value, (list, tuple)) else _plain(value)
+
+
+def _max_degree(value: Any) -> list[str]:
+    return [str(value)] if isinstance(value, int) else assignments(value)
+
+
+#: How options are read that are not as JSON has them.
+_READ: dict[str, Callable[[Any], Any]] = {
+    "angles": lambda value: [attitude(a) for a in value],
+    "latitude": decimal,
+    "filter_latitude": decimal,
+    "round": decimal,
+    "requirement": assignments,
+    "value": assignments,
+    "prior": assignments,
+    "estimate": assignments,
+    "max_degree": _max_degree,
+    "terms": lambda value: ",".join(_texts(value)),
+    "combination": _texts,
+    "gimbal": _texts,
+    "observable": _texts,
+    "profile": _texts,
+    "angle_random_walk": _per_axis,
+    "rate_random_walk": _per_axis,
+    "bias_instability": _per_axis,
+}
 
 
 def _request(options: Mapping[str, Any], **files: Any) -> str:
-    asked = {name: _option(name, value) for name, value in options.items()}
-    asked.update({name: value for name, value in files.items() if value})
-    return json.dumps({name: value for name, value in asked.items() if value is not None})
+    read = _READ.get
+    asked = {name: read(name, _plain)(value) for name, value in options.items() if value is not None}
+    for name, value in files.items():
+        if value:
+            asked[name] = value
+    return as_json(asked)
 
 
 def _ask(kinds: tuple[type[Answer], ...], command: str, request: str, progress: Progress | bool | None = None) -> Any:

@@ -99,6 +99,13 @@ def test_decimals_are_exact(latitude: Any) -> None:
     )
 
 
+def test_requests_are_json() -> None:
+    from obsdeg._texts import as_json
+
+    for value in [{"a": [1, True, "\u00e9\n\"\\\U0001f600", {}, [], 1.5, None]}, "\x00", -7, {"b": {"c": False}}]:
+        assert json.loads(as_json(value)) == json.loads(json.dumps(value)) == value
+
+
 def test_numpy_numbers() -> None:
     numpy = pytest.importorskip("numpy")
     ours = obsdeg.analyze(angles=numpy.array([[0, 0, 0], [180, 0, 0]]), solutions=False)
