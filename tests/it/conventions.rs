@@ -204,6 +204,15 @@ fn wrong_inputs_are_told_with_a_hint() {
     for command in [&["man", "-o"][..], &[&["analyze", scheme, "--figures"][..]].concat()] {
         refused(&[command, &[&at("file.txt")]].concat(), &["file.txt is a file; expected a folder"]);
     }
+    // a name that nothing declares, and one that is cut short
+    let undeclared = at("undeclared.toml");
+    std::fs::write(&undeclared, "[states]\nx='-k*x'\n[outputs]\ny='x'\n").expect("written");
+    let said =
+        ["`k` is not known here; expected one of t, x; new names are declared as parameters, constants"];
+    refused(&["analyze", &undeclared], &said);
+    let short = at("short.toml");
+    std::fs::write(&short, "latitud = 48\n[[position]]\nangles_deg=[0,0,0]\n").expect("written");
+    refused(&["analyze", &short], &["unknown key `latitud`; did you mean `latitude_deg`?"]);
     // what another command wrote
     let part = ["design", "--positions", "5", "--merge", scheme];
     refused(&part, &["scheme.toml: it is no part", "expected the file that `obsdeg design --part` wrote"]);

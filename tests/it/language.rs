@@ -527,8 +527,8 @@ fn experiments_that_are_wrong_are_named() {
         ("[[experiment]]\nconstants={d='e'}", "the constant d of experiment 1: `e` is not known here"),
         ("[[experiment]]\nconstants={d=[1, 2]}", "found a vector of 2; expected a scalar"),
         (
-            "[[experiment]]\nknown_inputs={v='generic'}",
-            "`v` is no known input; expected one of [known_inputs]; did you mean `u`?",
+            "[[experiment]]\nknown_inputs={uu='generic'}",
+            "`uu` is no known input; expected one of [known_inputs]; did you mean `u`?",
         ),
         ("[[experiment]]\nknown_inputs={u='wild'}", "the known input u: expected \"generic\", \"constant\""),
         ("[[experiment]]\nknown_inputs={u={function='sin(x)'}}", "`x` is not known here"),

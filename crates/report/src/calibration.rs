@@ -235,8 +235,8 @@ fn records(c: &Calibration) -> Vec<String> {
             "{}: {} samples from {} to {} s, taken together in {} bins; positions by {}",
             r.name,
             r.samples,
-            r.span_s.0,
-            r.span_s.1,
+            tenths(r.span_s.0),
+            tenths(r.span_s.1),
             r.bins,
             match r.positions_by {
                 PositionsBy::Labels => {
@@ -343,8 +343,8 @@ fn is_whole(x: f64) -> bool {
     (x - x.round()).abs() < 0.05
 }
 
-/// Degrees of freedom: parts where there are some.
-fn degrees(x: f64) -> String {
+/// With a tenth where there is one.
+fn tenths(x: f64) -> String {
     if is_whole(x) { format!("{x:.0}") } else { format!("{x:.1}") }
 }
 
@@ -355,7 +355,7 @@ fn fit(c: &Calibration) -> Vec<String> {
         format!(
             "chi-square {} on {} degrees of freedom{}: {} each (band of 99.9 % {:.4} to {:.4}); rescaled sigmas are times {:.3}{}",
             number(f.chi_square),
-            degrees(f.degrees_of_freedom),
+            tenths(f.degrees_of_freedom),
             if is_whole(f.degrees_of_freedom) {
                 ""
             } else {

@@ -391,12 +391,15 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
         }
         row[b.len()]
     };
+    // one letter for another is no slip
+    let length = name.chars().count();
+    let limit = (length * 2 / 5).max(1).min(length.saturating_sub(1));
     known
         .iter()
-        .map(|k| (distance(name, k), k))
+        .map(|k| (distance(name, k).min(distance(name, k.split_once('_').map_or(k, |(stem, _)| stem))), k))
         .map(|(d, k)| (d > 0 && !goes_on(name, k), d, k))
         .min()
-        .filter(|(far, d, _)| !far || *d <= 1.max(name.chars().count() * 2 / 5))
+        .filter(|(far, d, _)| !far || *d <= limit)
         .map(|(_, _, k)| k.clone())
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
-use crate::model::expression::{Expression, Function, nearest};
+use crate::model::expression::{Expression, Function, among, nearest};
 use crate::model::recording::Recording;
 
 /// Where something is written.
@@ -466,8 +466,13 @@ impl SystemModel {
                         Some(": an output, to which nothing can refer".into())
                     }
                     DagError::UnknownName(name) => {
-                        let known: Vec<String> = names.keys().cloned().collect();
-                        nearest(name, &known).map(|h| format!("; did you mean `{h}`?"))
+                        let mut known: Vec<String> = names.keys().cloned().collect();
+                        known.sort();
+                        let declared = match nearest(name, &known) {
+                            Some(_) => "",
+                            None => "; new names are declared as parameters, constants or known_inputs",
+                        };
+                        Some(format!("; {}{declared}", among(name, &known)))
                     }
                     _ => None,
                 };

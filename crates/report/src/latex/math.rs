@@ -270,6 +270,7 @@ impl Reader<'_> {
             self.rest = rest;
             name.push_str(&self.word(|c| c == '\''));
         }
+        let primes = self.word(|c| c == '\'').len();
         // an entry of a vector
         let index = |c: char| c.is_ascii_digit() || c == ',';
         if let Some((inside, rest)) = self.rest.strip_prefix('[').and_then(|r| r.split_once(']'))
@@ -282,14 +283,19 @@ impl Reader<'_> {
             self.rest = rest;
             name.push_str(&self.station()?);
         }
+        let math = dotted(&symbol(&name), primes);
         if !self.rest.starts_with('(') {
-            return Some((Factor::of(symbol(&name)), None));
+            return Some((Factor::of(math), None));
         }
         let argument = self.bracket()?;
         if name == "sqrt" {
             return Some((Factor::of(format!("\\sqrt{{{argument}}}")), None));
         }
-        let command = FUNCTIONS.iter().find(|(known, _)| *known == name)?.1;
+        let Some((_, command)) = FUNCTIONS.iter().find(|(known, _)| *known == name) else {
+            // the value at a time, such as that at the start
+            let time = argument.chars().all(|c| c.is_ascii_digit());
+            return time.then(|| (Factor::of(format!("{math}({argument})")), None));
+        };
         Some((Factor::of(format!("\\{command}({argument})")), Some((command, argument))))
     }
 
@@ -315,6 +321,20 @@ impl Reader<'_> {
         let sum = if inside { self.sum() } else { None }?;
         self.depth -= 1;
         self.take(')').then_some(sum)
+    }
+}
+
+/// A derivative by time: dots above the letter, as far as there are two, then the order in brackets.
+fn dotted(math: &str, order: usize) -> String {
+    let end = math.find(['_', '^']).filter(|_| !math.starts_with("\\mathit")).unwrap_or(math.len());
+    let (letter, index) = math.split_at(end);
+    match order {
+        0 => math.into(),
+        1 => format!("\\dot{{{letter}}}{index}"),
+        2 => format!("\\ddot{{{letter}}}{index}"),
+        // what has an exponent has no second one
+        _ if index.contains('^') => format!("{{{math}}}^{{({order})}}"),
+        _ => format!("{math}^{{({order})}}"),
     }
 }
 
@@ -474,6 +494,11 @@ mod tests {
             ("psi_x^n^2 + (a/b)^2", "(\\psi_{x}^{n})^{2} + (\\frac{a}{b})^{2}"),
             ("sqrt(a)^3*sin(a)^-1", "(\\sqrt{a})^{3}\\,(\\sin(a))^{-1}"),
             ("exp(-k*t)*x^n", "\\exp(-k\\,t)\\,x^{n}"),
+            // derivatives of outputs, and values at the start
+            ("-(y^2*y'*y'''-2*y''^2)", "-(y^{2}\\,\\dot{y}\\,y^{(3)} - 2\\,\\ddot{y}^{2})"),
+            ("z1'''^2/in_bed'", "\\frac{(z_{\\mathit{1}}^{(3)})^{2}}{\\dot{\\mathit{in\\_bed}}}"),
+            ("y2'*gut(0)", "\\dot{y}_{\\mathit{2}}\\,\\mathit{gut}(0)"),
+            ("f(x)", "\\text{f(x)}"),
             ("a combination of D_FX, D_FY", "\\text{a combination of D\\_FX, D\\_FY}"),
             ("?", "\\text{?}"),
             ("1/2*w@p1^2", "\\frac{(\\omega(\\text{p1}))^{2}}{2}"),
