@@ -470,7 +470,7 @@ def paper(*, seed: int = 1) -> Audit:
     return answer
 
 
-def load(path: str | os.PathLike[str], **options: Any) -> Any:
+def load(path: str | os.PathLike[str], **options: Any) -> Scheme | Model:
     """A scheme or a model from a file, of this program or of others: TOML, JSON, SBML, PEtab, ``@ODEmodel``, STRIKE-GOLDD.
 
     Raises:
@@ -479,5 +479,5 @@ def load(path: str | os.PathLike[str], **options: Any) -> Any:
     from .importers import load as imported
 
     found = imported(Path(path), **options)
-    kind = Scheme if getattr(found, "kind", "model") == "scheme" else Model
+    kind = Scheme if found.kind == "scheme" else Model
     return kind.from_text(found.text, name=os.fspath(path))
