@@ -52,6 +52,20 @@ fn positions_are_edited() {
     let at = [x + 52.0 + (w - 56.0) * 0.75, y + 20.0];
     drag(b, at, at, 1, Duration::from_millis(5));
     wait(b, "strip sets the angle", "Math.abs(Number(document.getElementById('alpha').value) - 90) <= 5");
+    choose(b, "#strip-of", "D_FX");
+    wait(
+        b,
+        "another sigma",
+        "document.getElementById('strip-caption').textContent.includes('sigma of D_FX')",
+    );
+    b.value("document.getElementById('strip').focus(), 1");
+    let before = b.value("Number(document.getElementById('alpha').value)").as_f64().expect("a number");
+    key(b, "ArrowRight", 39, 0);
+    wait(b, "a step along the strip", &format!("document.getElementById('alpha').value == {}", before + 5.0));
+    key(b, "z", 90, 2);
+    wait(b, "and back", &format!("document.getElementById('alpha').value == {before}"));
+    key(b, "y", 89, 2);
+    wait(b, "and forth", &format!("document.getElementById('alpha').value == {}", before + 5.0));
     wait(b, "drop one", "document.getElementById('drop-one').textContent.includes('Without p2: psi_y')");
     wait(
         b,
@@ -80,12 +94,22 @@ fn positions_are_edited() {
         "name and dwell",
         "obsdeg.scheme().includes('name = \"second\"') && obsdeg.scheme().includes('dwell_s = 300')",
     );
+    // what the engine refuses is told, and the table is not taken for its verdict
+    write(b, "#name", "<b>");
+    wait(b, "refused", "document.getElementById('notice').textContent.includes('position name')");
+    wait(b, "stale", "document.getElementById('summary').textContent.startsWith('not judged')");
+    write(b, "#name", "second");
+    wait(b, "judged again", "document.getElementById('summary').textContent.startsWith('rank')");
     // the list: add, duplicate, delete, order by hand and by keys
     click(b, "#add");
     click(b, "#duplicate");
     wait(b, "four", "document.querySelectorAll('#positions li').length == 4");
     click(b, "#delete");
     wait(b, "three", "document.querySelectorAll('#positions li').length == 3");
+    click(b, "#duplicate");
+    b.value("document.querySelector('#positions li.chosen .name').focus(), 1");
+    key(b, "Delete", 46, 0);
+    wait(b, "three again", "document.querySelectorAll('#positions li').length == 3");
     let [x, y, w, h] = place(b, "#positions li:nth-child(2) .grip");
     let [_, last, _, height] = place(b, "#positions li:nth-child(3)");
     drag(b, [x + w / 2.0, y + h / 2.0], [x + w / 2.0, last + height - 4.0], 8, Duration::from_millis(5));
@@ -145,7 +169,8 @@ fn positions_are_edited() {
     );
     click(b, "#generic");
     wait(b, "generic", "!obsdeg.scheme().includes('latitude')");
-    b.value("document.getElementById('latitude').focus(), 1");
+    click(b, "#latitude");
+    wait(b, "the equator", "obsdeg.scheme().includes('latitude_deg = 0\\n')");
     key(b, "End", 35, 0);
     wait(b, "the pole", "obsdeg.scheme().includes('latitude_deg = 90')");
     quiet(b);

@@ -150,12 +150,12 @@ fn picture(p: &Picture) -> Json {
 
 /// MathML; program notation where the LaTeX is none.
 fn formula(f: &Typeset) -> Json {
-    json!({ "text": f.text, "mathml": lines(&f.latex) })
+    json!({ "text": f.text, "mathml": lines(&f.latex, LONG) })
 }
 
-/// LaTeX as MathML that may break before its signs.
-pub(crate) fn lines(latex: &str) -> Option<String> {
-    let pieces: Option<Vec<String>> = terms(latex).iter().map(|piece| mathml(piece)).collect();
+/// LaTeX as MathML that may break before its signs, where it is longer than so many bytes.
+pub(crate) fn lines(latex: &str, long: usize) -> Option<String> {
+    let pieces: Option<Vec<String>> = terms(latex, long).iter().map(|piece| mathml(piece)).collect();
     pieces.map(|p| p.join(" "))
 }
 
@@ -169,9 +169,11 @@ pub(crate) fn mathml(latex: &str) -> Option<String> {
     (!failed).then_some(out)
 }
 
-/// A long formula before each of its plus and minus signs: browsers break lines between formulas, not in them.
-fn terms(latex: &str) -> Vec<String> {
-    const LONG: usize = 120;
+/// From here on a formula of a report may break.
+const LONG: usize = 120;
+
+/// A formula longer than that before each of its plus and minus signs: browsers break lines between formulas, not in them.
+fn terms(latex: &str, long: usize) -> Vec<String> {
     let mut out = vec![String::new()];
     let (mut depth, mut escaped) = (0usize, false);
     for (i, c) in latex.char_indices() {
@@ -183,7 +185,7 @@ fn terms(latex: &str) -> Vec<String> {
         }
         escaped = c == '\\' && !escaped;
         let sign = latex[i..].starts_with(" + ") || latex[i..].starts_with(" - ");
-        if latex.len() > LONG && depth == 0 && sign {
+        if latex.len() > long && depth == 0 && sign {
             // an empty operand before the sign keeps it binary
             out.push("{}".into());
         }
@@ -277,7 +279,7 @@ mod tests {
 
     #[test]
     fn long_formulas_break_before_their_signs() {
-        assert_eq!(terms("D = a + b"), ["D = a + b"]);
+        assert_eq!(terms("D = a + b", LONG), ["D = a + b"]);
         let long = "x".repeat(120);
         let text = format!("D = \\frac{{a + b}}{{c}} (\\text{{p 1 - 2 \\}} + }} - {long}) + \\{{ + e");
         let expected = [
@@ -286,6 +288,6 @@ mod tests {
             "{} + \\{".into(),
             "{} + e".into(),
         ];
-        assert_eq!(terms(&text), expected);
+        assert_eq!(terms(&text, LONG), expected);
     }
 }

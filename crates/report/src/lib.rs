@@ -127,7 +127,7 @@ pub fn mathml(expression: &str) -> Option<String> {
 
 /// A solution in an answer as MathML: its terms, each a coefficient, an observation and a station; `None` where it cannot be typeset.
 pub fn solution_mathml(terms: &[[&str; 3]]) -> Option<String> {
-    html::lines(&latex::solution_of(terms))
+    html::lines(&latex::solution_of(terms), 0)
 }
 
 /// Why a result could not be written.

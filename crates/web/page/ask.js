@@ -8,6 +8,7 @@ function say(text, kind = '') {
 
 const source = (scheme, name = state.name) => ({ name, text: toToml(scheme) });
 let resting = null, answered = null;
+const isStale = () => $('verdicts').classList.contains('stale');
 
 function askVerdicts() { answered = verdictsNow(); }
 
@@ -26,7 +27,11 @@ async function verdictsNow() {
   const request = { sources: [source(scheme)], solutions: false };
   const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(failed);
   if (!found) return;
-  if (found.problem) return wrong(found.problem);
+  $('verdicts').classList.toggle('stale', !!found.problem);
+  if (found.problem) {
+    put($('summary'), 'not judged: what is below is of the scheme before');
+    return wrong(found.problem);
+  }
   if ($('notice').dataset.problem) { say(''); delete $('notice').dataset.problem; }
   verdicts.now = found;
   drawVerdicts();
@@ -47,13 +52,15 @@ function failed(problem) {
 /** Solutions and sigmas, once nothing changes for a moment. */
 function askRest() {
   clearTimeout(resting);
+  // what was under way behind leaves the machine to the verdicts
+  round++;
   resting = setTimeout(async () => {
     if (!state.scheme.position?.length) return;
     const asked = JSON.stringify(state.scheme), named = [source(state.scheme)];
     const still = () => asked === JSON.stringify(state.scheme);
     // what follows is told against the verdicts
     await answered;
-    if (!still()) return;
+    if (!still() || isStale()) return;
     const run = await behind.ask('call', ['simulate', { sources: named }], { lane: 'sigmas' }).catch(failed);
     if (run && still()) {
       verdicts.sigmasOf = asked;
@@ -119,7 +126,7 @@ const needed = { of: null, by: [] };
 function drawNeeds(needs) {
   [...$('positions').children].forEach((li, i) => {
     const n = needs?.[i];
-    put(li.querySelector('.need'), !n ? '' : n.lost.length ? `needed for ${n.lost.length}` : n.later.length ? `lowers ${n.later.length}` : 'not needed');
+    put(li.querySelector('.need'), !n ? '' : n.lost.length ? `needed for ${n.lost.length}` : n.later.length ? `lowers ${n.later.length} degree${n.later.length > 1 ? 's' : ''}` : 'not needed');
   });
 }
 
@@ -141,7 +148,7 @@ function sweepKey(axis) {
 
 const degreesOf = (said) => Object.fromEntries(JSON.parse(said.text).quantities.map((q) => [q.name, q.degree]));
 
-async function sweep(axis) {
+async function sweep(axis, mine) {
   const key = sweepKey(axis);
   if (!key || state.scheme.position.length > MANY) return;
   if (!sweeps.has(key)) {
@@ -155,7 +162,7 @@ async function sweep(axis) {
     s.position[at].angles_deg = angles.map((x, k) => (k === axis ? angle : x));
     return source(s);
   });
-  const fresh = () => sweepKey(axis) === key;
+  const fresh = () => mine === round && sweepKey(axis) === key;
   for (let i = 0; i < GRID.length; i++) {
     if (found.degrees[i]) continue;
     const said = await behind.ask('call', ['analyze', { sources: [texts[i]], solutions: false }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
@@ -188,9 +195,9 @@ async function askBehind() {
   await dropOne();
   for (const axis of [strip.axis, ...[0, 1, 2].filter((k) => k !== strip.axis)]) {
     if (mine !== round) return;
-    await sweep(axis);
+    await sweep(axis, mine);
   }
-  if (mine === round) await sweepLatitudes();
+  if (mine === round) await sweepLatitudes(mine);
 }
 
 function drawSweep(axis) {
@@ -228,7 +235,7 @@ function mark(slider, grid, degrees) {
 const LATITUDES = GRID.filter((angle) => Math.abs(angle) <= 90);
 
 /** The latitudes at which the verdict is another. */
-async function sweepLatitudes() {
+async function sweepLatitudes(mine) {
   if (state.scheme.position.length > MANY) return;
   const keyNow = () => JSON.stringify({ ...state.scheme, latitude_deg: null }), key = keyNow();
   if (!sweeps.has(key)) sweeps.set(key, Array(LATITUDES.length).fill(null));
@@ -237,7 +244,7 @@ async function sweepLatitudes() {
     if (degrees[i]) continue;
     const at = source({ ...rest, latitude_deg: angle });
     const said = await behind.ask('call', ['analyze', { sources: [at], solutions: false }], { lane: `sweep latitude ${i}` }).catch(() => null);
-    if (key !== keyNow() || !said?.text) return;
+    if (mine !== round || key !== keyNow() || !said?.text) return;
     degrees[i] = degreesOf(said);
   }
   mark('latitude', LATITUDES, degrees);
@@ -289,12 +296,12 @@ function drawStrip() {
     values.forEach((v, i) => { if (v > 0) c.lineTo(x(i) + step / 2, h - foot - 6 - ((Math.log10(v) - min) / span) * (low - 14)); });
     c.stroke();
     c.fillStyle = color('soft');
-    c.fillText((10 ** max).toPrecision(2), 0, h - foot - low + 9);
-    c.fillText((10 ** min).toPrecision(2), 0, h - foot - 6);
+    c.fillText(two(10 ** max), 0, h - foot - low + 9);
+    c.fillText(two(10 ** min), 0, h - foot - 6);
   }
   const angles = anglesOfPosition(p), here = x((angles[strip.axis] + 180) / 5) + step / 2;
   c.strokeStyle = color('text'); c.lineWidth = 1.5; c.strokeRect(here - step / 2 - 0.5, 1, step + 1, h - foot - 2);
-  const range = known.length ? ` Below, sigma of ${strip.of}: ${(10 ** Math.min(...known)).toPrecision(2)} to ${(10 ** Math.max(...known)).toPrecision(2)} ${verdicts.sigmas?.get(strip.of)?.unit ?? ''}.` : '';
+  const range = known.length ? ` Below, sigma of ${strip.of}: ${two(10 ** Math.min(...known))} to ${two(10 ** Math.max(...known))} ${verdicts.sigmas?.get(strip.of)?.unit ?? ''}.` : '';
   const highest = Math.max(0, ...found.degrees.flatMap((d) => (d ? Object.values(d) : [])).map((d) => d ?? 0));
   const kinds = [...[0, 1, 2, 3].slice(0, highest + 1).map((d) => [`d${d}`, d === 3 ? 'more' : String(d)]), ['', 'none']];
   const text = `Degree along ${AXES[strip.axis]}:${kinds.map(([, word]) => word).join('')}.${range}`;

@@ -20,7 +20,8 @@ async function search() {
   const began = performance.now();
   let ended = 0;
   const going = (now) => {
-    if (now.total) $('design-progress').value = now.done / now.total;
+    // a stage that is done is followed by another
+    if (now.total && now.done < now.total) $('design-progress').value = now.done / now.total; else $('design-progress').removeAttribute('value');
     put($('design-said'), `${now.what}: ${now.done}${now.total ? ` of ${now.total}` : ''}${now.best ? `, best so far ${now.best.toPrecision(4)}` : ''}`);
   };
   try {

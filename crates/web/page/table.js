@@ -38,7 +38,7 @@ function putName(e, math, name) {
 /** Draws the answer about the scheme. */
 function drawVerdicts() {
   const box = $('verdicts'), answer = verdicts.now?.answer;
-  if (!answer) return;
+  if (!answer || isStale()) return;
   let table = box.querySelector('table');
   if (!table) {
     table = element('table', {}, element('thead'), element('tbody'));
@@ -83,6 +83,7 @@ function drawVerdicts() {
   offerStrip(rows);
 }
 
+const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together with others', not_seen: 'not seen up to the last derivative' };
 // a solution of more terms is folded
 const SHORT = 8;
 
@@ -98,12 +99,15 @@ function drawSolution(td, q, name) {
     fold.addEventListener('toggle', () => putMath(inner, math, text), { once: true });
     return td.replaceChildren(fold);
   }
-  const why = q.partners?.length ? `not told from ${q.partners.join(', ')}` : 'never moves Z';
+  const why = q.partners?.length ? `not told from ${q.partners.join(', ')}` : WHY[q.status] ?? '';
   const other = (solved ?? q).elsewhere;
   const where = other && [[other.other_latitudes, 'latitudes'], [other.other_angles, 'angles']].filter(([d]) => d !== null && d !== undefined)
     .map(([d, what]) => `degree ${d} at other ${what}`).join('; ');
   putMath(td, '', where ? `${why}; ${where}` : why);
 }
+
+/** Two digits, without an exponent where a number is large. */
+const two = (x) => (x >= 100 && x < 1e7 ? String(Number(x.toPrecision(2))) : x.toPrecision(2));
 
 function drawSigma(td, name) {
   const s = name && verdicts.sigmas?.get(name);
@@ -121,7 +125,7 @@ function drawSigma(td, name) {
   box.setAttribute('role', 'img');
   box.setAttribute('aria-label', `${over ? 'misses' : 'meets'} its requirement: ${ratio.toPrecision(2)} times${prior}`);
   box.title = `required ${s.required_sigma} ${s.unit}${prior}`;
-  td.replaceChildren(box, `${s.sigma.toPrecision(2)} ${s.unit}`);
+  td.replaceChildren(box, `${two(s.sigma)} ${s.unit}`);
 }
 
 /** Arcs beside the table between unknowns that cannot be told apart. */

@@ -27,6 +27,9 @@ function mathOf(expression) {
   return typeset.get(expression);
 }
 
+const cut = (number) => (Number(number) < 1e-6 ? number : String(Number(Number(number).toPrecision(6))));
+const readable = (term) => ({ ...term, coefficient: term.coefficient.replace(/\d+\.\d{6,}/g, cut) });
+
 const KINDS = {
   // the engine, packed; or what another worker compiled of it
   start({ unpack, engine, module }) {
@@ -39,7 +42,7 @@ const KINDS = {
   },
   call: (command, request) => JSON.parse(obsdeg_web.call(command, JSON.stringify(request))),
   toml: (text) => JSON.parse(obsdeg_web.toml_as_json(text)),
-  // an answer with its formulas
+  // an answer with its formulas, whose decimals are cut to what one reads
   verdicts(request) {
     const said = KINDS.call('analyze', request);
     if (said.problem) return said;
@@ -50,7 +53,7 @@ const KINDS = {
       const name = row.name ?? row.expression;
       if (name) math[name] = mathOf(name);
       const terms = row.solution?.terms;
-      if (platform && terms?.length) math[row.solution.text] = obsdeg_web.solution_mathml(JSON.stringify(terms));
+      if (platform && terms?.length) math[row.solution.text] = obsdeg_web.solution_mathml(JSON.stringify(terms.map(readable)));
     }
     return { answer, math, text: said.text };
   },
