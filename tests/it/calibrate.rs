@@ -575,6 +575,17 @@ fn bad_records_are_refused_with_their_place() {
         (with(1, "p7"), "bad.csv: line 3, column `position`: no position is called `p7`; expected p1, p2"),
         (with(1, "p2"), "bad.csv: line 4, column `position`: found `p1`, expected p3 (the scheme's"),
         (right.replace(",p6,", ",,"), "bad.csv: the position p6 of the scheme has no samples"),
+        // other axes, and signs of what gravity pulls instead of what holds against it
+        (
+            right.replace("fx [g],fy [g]", "fy [g],fx [g]"),
+            "no position of the scheme; with fy, fx, fz in the place of fx, fy, fz every position is where",
+        ),
+        (
+            right.replace(",-", ",+").replace(",0.", ",-0.").replace(",+", ","),
+            "no position of the scheme; with -fx, -fy, -fz in the place of fx, fy, fz every position is",
+        ),
+        (right.replace('\n', "\r"), "bad.csv: lines end with CR alone; expected LF or CR LF"),
+        (format!("\0\u{1}{right}"), "bad.csv: line 1 has a byte 0x00 in it, which no text has"),
     ] {
         fs::write(&path, text).expect("written");
         let out = folder.path().join("out").display().to_string();

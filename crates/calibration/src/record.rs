@@ -204,8 +204,24 @@ impl Lines {
                 return Err(wrong(format!("line {} is longer than {LONGEST} bytes", self.line)));
             }
             let text = std::str::from_utf8(&self.buffer)
-                .map_err(|_| wrong(format!("line {} is no UTF-8 text", self.line)))?
+                .map_err(|_| {
+                    let marks = [[0xff, 0xfe], [0xfe, 0xff]];
+                    let utf16 = self.line == 1 && marks.iter().any(|m| self.buffer.starts_with(m));
+                    let hint = if utf16 { " (it begins as UTF-16 does)" } else { "" };
+                    wrong(format!("line {} is no UTF-8 text{hint}", self.line))
+                })?
                 .trim_end_matches(['\n', '\r']);
+            match text.bytes().find(|b| b.is_ascii_control() && *b != b'\t') {
+                Some(b'\r') => {
+                    let reason = "lines end with CR alone; expected LF or CR LF";
+                    return Err(wrong(reason.into()));
+                }
+                Some(b) => {
+                    let reason = format!("line {} has a byte {b:#04x} in it, which no text has", self.line);
+                    return Err(wrong(reason));
+                }
+                None => {}
+            }
             if text.trim().is_empty() || text.starts_with('#') {
                 continue;
             }

@@ -255,15 +255,37 @@ impl Forces {
             }
             let near = |q: &usize| tilt(&attitudes[*q], &force) <= TILT_DEG;
             let like: Vec<&str> = (0..names.len()).filter(near).map(|q| names[q]).collect();
+            let like = if like.is_empty() { "no position of the scheme".into() } else { like.join(" or ") };
             return Err(CalibrationError::Attitude {
                 record: record.into(),
                 line,
                 position: names[p].into(),
                 off_deg: format!("{off:.1}"),
-                like: if like.is_empty() { "no position of the scheme".into() } else { like.join(" or ") },
+                like: format!("{like}{}", self.other_axes(attitudes).unwrap_or_default()),
             });
         }
         Ok(())
+    }
+
+    /// The axes by which every position is where the scheme has it, where others in the place of these do that in one way only.
+    fn other_axes(&self, attitudes: &[Matrix3<f64>]) -> Option<String> {
+        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        let all: Vec<(usize, [f64; 3])> = self.usual().map(|(p, _, force)| (p, force)).collect();
+        let mut ways =
+            ORDERS.iter().flat_map(|order| (0..8).map(move |signs| (order, signs))).filter(|way| {
+                let (order, signs) = *way;
+                let sign = |i: usize| if (signs >> i) & 1 == 1 { -1.0 } else { 1.0 };
+                let turned = |force: &[f64; 3]| std::array::from_fn(|i| sign(i) * force[order[i]]);
+                all.iter().all(|(p, force)| tilt(&attitudes[*p], &turned(force)) <= TILT_DEG)
+            });
+        let (order, signs) = ways.next().filter(|_| ways.next().is_none())?;
+        let name = |i: usize| {
+            format!("{}{}", if (signs >> i) & 1 == 1 { "-" } else { "" }, ["fx", "fy", "fz"][order[i]])
+        };
+        let names = [0, 1, 2].map(name).join(", ");
+        Some(format!(
+            "; with {names} in the place of fx, fy, fz every position is where the scheme has it: axes or signs are others than the header has"
+        ))
     }
 
     /// Refuses positions at whose beginning or end the platform is not there yet, or no longer. One sample is an outlier where bins have so many that it is left out of
