@@ -184,13 +184,13 @@ pub(super) fn read(
         let (last, time) = reached[experiment];
         let mut segment = last;
         if let Some(i) = columns.segment {
-            let most = (last + 2).min(segments);
+            let first = time == f64::NEG_INFINITY;
+            let most = if first { 1 } else { (last + 2).min(segments) };
             let found = row.numbers[i].filter(|n| (last + 1..=most).any(|k| *n == k as f64));
             let expected = match most == last + 1 {
+                true if first && segments > 1 => "1: every segment has a row at least".into(),
                 true => format!("{most}: the model has no more segments"),
-                false => {
-                    format!("{} or {most} (segments follow each other, each with a row at least)", last + 1)
-                }
+                false => format!("{} or {most} (every segment has a row at least)", last + 1),
             };
             let text = row.numbers[i].map_or_else(|| "nothing".into(), |n| n.to_string());
             segment = found.ok_or_else(|| refuse("segment", text, &expected))? as usize - 1;

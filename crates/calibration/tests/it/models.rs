@@ -202,7 +202,12 @@ fn segments_begin_with_their_first_rows() {
         (
             "\n0.6,1,",
             "\n0.6,3,",
-            "line 4, column `segment`: found 3, expected 1 or 2 (segments follow each other, each with a row at least)",
+            "line 4, column `segment`: found 3, expected 1 or 2 (every segment has a row at least)",
+        ),
+        (
+            "\n0,1,",
+            "\n0,2,",
+            "line 2, column `segment`: found 2, expected 1: every segment has a row at least",
         ),
         ("\n0.6,1,", "\n0.6,1.5,", "column `segment`: found 1.5, expected 1 or 2"),
         ("\n6.6,2,", "\n6.6,1,", "column `segment`: found 1, expected 2 or 3"),
