@@ -178,6 +178,27 @@ fn schemes_come_and_go() {
         "name = \"decay\"\n\n[states]\nx = \"-k*x\"\n\n[parameters]\nk = {}\n\n[outputs]\ny = \"x\"\n",
     );
     wait(b, "judged", "document.getElementById('text-verdicts').textContent.includes('rank 2 of 2')");
+    // what is written stays while one looks at the positions, which a model has none of
+    click(b, "#tab-scheme");
+    click(b, "#tab-text");
+    assert!(b.value("document.getElementById('text').value").to_string().contains("decay"));
+    click(b, "#take");
+    wait(b, "no scheme", "document.getElementById('notice').textContent.includes('expected a scheme')");
+    click(b, "#renew");
+    wait(b, "the positions", "document.getElementById('text').value.includes('[[position]]')");
+    // an angle by name stays when another changes, and small ones are decimals
+    write(
+        b,
+        "#text",
+        "[[position]]\nangles_deg = [\"alpha\", 0, 30]\n\n[[position]]\nangles_deg = [0, 0, 0]\n",
+    );
+    wait(b, "judged", "document.getElementById('text-verdicts').textContent.includes(' of 15')");
+    click(b, "#take");
+    wait(b, "taken", "obsdeg.scheme().includes('[\"alpha\", 0, 30]')");
+    write(b, "#beta-number", "0.0000001");
+    wait(b, "small", "obsdeg.scheme().includes('[\"alpha\", 0.0000001, 30]')");
+    wait(b, "judged", "!document.getElementById('verdicts').classList.contains('stale')");
+    click(b, "#tab-text");
     choose(b, "#gallery", "0");
     wait(b, "a scheme", "document.getElementById('text-verdicts').textContent.includes('rank 8 of 15')");
     click(b, "#take");
@@ -256,9 +277,12 @@ fn the_tour_shows_what_it_says() {
     says(b, "psi_y", 3, "not excited");
     // the poles are the latitudes that are marked
     wait(b, "latitudes", "document.getElementById('latitude').title == 'Other verdicts at -90, 90 deg'");
+    // against the first step, not the one before
     for name in ["D_FY", "D_IY"] {
         says(b, name, 3, "not excited");
+        says(b, name, 2, "\u{2013} was 2");
     }
+    says(b, "psi_y", 2, "\u{2013} was inseparable");
     b.value("document.getElementById('latitude').focus(), 1");
     key(b, "ArrowLeft", 37, 0);
     for name in ["D_FY", "D_IY"] {

@@ -29,7 +29,7 @@ fn positions_are_edited() {
     click(b, "#positions li:nth-child(2) .name");
     let (from, to) = (thumb(b, "alpha", 180.0), thumb(b, "alpha", 90.0));
     drag(b, from, to, 20, Duration::from_millis(5));
-    says(b, "psi_y", 2, "0 was none");
+    says(b, "psi_y", 2, "0 was inseparable");
     wait(b, "highlight", "document.querySelector('tr[data-name=psi_y]').classList.contains('changed')");
     let turned = b.value("Number(document.getElementById('alpha').value)").as_f64().expect("a number");
     assert!((turned - 90.0).abs() <= 10.0 && turned % 5.0 == 0.0, "{turned}");

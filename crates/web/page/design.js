@@ -5,7 +5,8 @@ const CARDINAL = Object.keys(LETTERS).flatMap((a) => Object.keys(LETTERS).flatMa
 
 async function search() {
   const k = Number($('design-k').value);
-  if (!Number.isInteger(k) || k < 1) return void say(`K: expected a whole number from 1, found "${$('design-k').value}"`);
+  if (!Number.isInteger(k) || k < 1) return void refuse(`K: expected a whole number from 1, found "${$('design-k').value}"`);
+  say('');
   // the 24 attitudes under the conditions of the scheme
   const { position: _, combinations: __, name: ___, description: ____, ...rest } = copy(state.scheme);
   const candidates = { name: 'cardinal.toml', text: toToml({ ...rest, position: CARDINAL.map((attitude) => ({ name: attitude, attitude })) }) };
@@ -15,6 +16,8 @@ async function search() {
   $('design-go').disabled = true;
   $('design-stop').disabled = false;
   $('found').replaceChildren();
+  foundOf = null;
+  drawFoundOf();
   $('design-progress').removeAttribute('value');
   put($('design-said'), 'searching');
   const began = performance.now();
@@ -27,7 +30,8 @@ async function search() {
   try {
     const said = await searcher.ask('call', ['design', request], { going });
     if (said.problem) throw said.problem;
-    drawFound(JSON.parse(said.text), performance.now() - began);
+    drawFound(JSON.parse(said.text), performance.now() - began, wanted);
+    foundOf = conditions();
     ended = 1;
   } catch (problem) {
     put($('design-said'), problem.message ?? String(problem));
@@ -37,11 +41,21 @@ async function search() {
   $('design-stop').disabled = true;
 }
 
-function drawFound(design, took) {
+// the conditions that what is found is of
+let foundOf = null;
+const conditions = () => JSON.stringify({ ...state.scheme, position: 0, combinations: 0, name: 0, description: 0 });
+
+function drawFoundOf() {
+  const old = foundOf !== null && foundOf !== conditions();
+  $('found').classList.toggle('stale', old);
+  put($('found-old'), old ? 'The conditions have changed since this search: its figures are of those before.' : '');
+}
+
+function drawFound(design, took, wanted) {
   const { search: how, minimum } = design;
   const proven = how.proven ? 'proven best' : 'best found';
   put($('design-said'), `${proven} of ${how.examined} sequences examined in ${(took / 1000).toFixed(1)} s`
-    + (minimum?.proven ? `; no ${minimum.positions - 1} positions make all observable` : ''));
+    + (minimum?.proven ? `; fewer than ${minimum.positions} of these attitudes do not make ${wanted.length ? wanted.join(', ') : 'every coefficient'} observable` : ''));
   const rows = design.found.map((f, i) => {
     const load = element('button', { type: 'button', textContent: 'Load' });
     load.setAttribute('aria-label', `Load scheme ${i + 1} as positions`);
@@ -110,7 +124,7 @@ async function judgeText() {
   const rows = answer.quantities.map((q) => [named(q), q.unit, WORDS[q.status] ?? q.status.replaceAll('_', ' '), String(q.degree ?? '\u2013'),
     q.degree === null ? (q.partners?.length ? `not told from ${q.partners.join(', ')}` : '') : solved(q.solution)]);
   const parts = [tableOf(['unknown', 'unit', 'status', 'degree', 'solution, or why there is none'], rows, `rank ${answer.rank} of ${answer.unknowns.length ?? answer.unknowns}`)];
-  if (answer.schema.startsWith('obsdeg.system') && answer.quantities.some((q) => q.degree !== null && !q.solution)) {
+  if (answer.quantities.some((q) => q.degree !== null && !q.solution)) {
     parts.push(element('p', { className: 'soft', textContent: 'Solutions that are not here need the symbolic engine, which the command line has.' }));
   }
   const list = (title, items) => items?.length && parts.push(element('h3', { textContent: title }), element('ul', {}, ...items.map((t) => element('li', { textContent: t }))));
@@ -132,7 +146,10 @@ function setText(text, name) {
 /** The text as positions. */
 async function take() {
   const name = writing.name;
-  if (await openText($('text').value, name)) show('scheme');
+  if (await openText($('text').value, name)) {
+    writing.own = false;
+    show('scheme');
+  } else if ($('text').getAttribute('aria-invalid') !== 'true') refuse(`${name} is a model; expected a scheme, with [[position]] tables`);
 }
 
 /** Opens a text: a scheme as positions, anything else in the editor. */
@@ -149,7 +166,7 @@ async function openText(text, name) {
   setText(text, name);
   show('text');
   const problem = judged.problem ?? read.problem;
-  if (problem) say(`${name}: ${problem.message}`);
+  if (problem) say(problem.message.startsWith(name) ? problem.message : `${name}: ${problem.message}`);
   return false;
 }
 
@@ -170,4 +187,10 @@ function wireDesign() {
     writing.timer = setTimeout(judgeText, 250);
   });
   $('take').addEventListener('click', take);
+  $('renew').addEventListener('click', () => {
+    writing.own = false;
+    put($('about'), '');
+    setText(toToml(state.scheme), state.name);
+  });
+  listeners.push(drawFoundOf);
 }

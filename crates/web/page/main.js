@@ -10,7 +10,7 @@ function show(tab) {
     $(`panel-${t}`).hidden = !on;
   }
   if (tab === 'text' && !writing.own) setText(toToml(state.scheme), state.name);
-  if (tab === 'scheme') { writing.own = false; canvasSoon(); drawVerdicts(); }
+  if (tab === 'scheme') { canvasSoon(); drawVerdicts(); }
 }
 
 /** Gives a file to whoever asked for it. */
@@ -42,8 +42,7 @@ async function openLink() {
     return false;
   }
   if (text === toToml(state.scheme)) return true;
-  await openText(text, 'scheme.toml');
-  return true;
+  return openText(text, 'scheme.toml');
 }
 
 function wireFiles() {
@@ -93,10 +92,11 @@ function wireFiles() {
 function wireTabs() {
   for (const t of TABS) $(`tab-${t}`).addEventListener('click', () => show(t));
   $('tabs').addEventListener('keydown', (e) => {
-    const by = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
-    if (!by) return;
-    const at = TABS.findIndex((t) => $(`tab-${t}`).getAttribute('aria-selected') === 'true');
-    const next = TABS[(at + by + TABS.length) % TABS.length];
+    const at = TABS.findIndex((t) => $(`tab-${t}`).getAttribute('aria-selected') === 'true'), last = TABS.length - 1;
+    const to = { ArrowLeft: at - 1, ArrowRight: at + 1, Home: 0, End: last }[e.key];
+    if (to === undefined) return;
+    e.preventDefault();
+    const next = TABS[(to + TABS.length) % TABS.length];
     show(next);
     $(`tab-${next}`).focus();
   });

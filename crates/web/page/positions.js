@@ -9,7 +9,8 @@ function element(tag, properties = {}, ...children) {
   return e;
 }
 
-const shown = (x) => String(Math.round(x * 1e6) / 1e6).replace('-', '\u2212');
+// to a billionth of a degree, as angles are kept
+const shown = (x) => decimal(Math.round(x * 1e9) / 1e9).replace('-', '\u2212');
 const chosen = () => state.scheme.position?.[state.selected];
 
 function describe(p) {
@@ -104,7 +105,9 @@ function lift(e) {
 
 /** Gives the chosen position other angles. */
 function setAngle(axis, value, as) {
-  const before = anglesOfPosition(chosen()) ?? [0, 0, 0];
+  // angles by name stay beside it
+  const { angles_deg: own } = chosen();
+  const before = anglesOfPosition(chosen()) ?? (own?.length === 3 ? own : [0, 0, 0]);
   edit(() => {
     const p = chosen();
     delete p.attitude;
@@ -129,7 +132,7 @@ function makeSliders() {
     range.addEventListener('focus', () => { strip.axis = k; drawStrip(); });
     number.addEventListener('change', () => {
       const x = Number(number.value.replace('\u2212', '-'));
-      if (!Number.isFinite(x) || number.value.trim() === '') return void say(`${axis}: expected a number of degrees, found "${number.value}"`);
+      if (!Number.isFinite(x) || number.value.trim() === '') return void refuse(`${axis}: expected a number of degrees, found "${number.value}"`);
       strip.axis = k;
       setAngle(k, x);
     });
@@ -159,7 +162,12 @@ function drawSelected() {
 }
 
 /** A number in a field, or nothing where it is empty; NaN where it is no number. */
-const numberIn = (e) => (e.value.trim() === '' ? undefined : Number(e.value.trim().replace('\u2212', '-')));
+const numberIn = (e) => (e.value.trim() === '' ? undefined : finite(e.value));
+const finite = (text) => {
+  const x = text?.trim() ? Number(text.trim().replace('\u2212', '-')) : NaN;
+  return Number.isFinite(x) ? x : NaN;
+};
+const refuse = (message) => wrong({ message });
 
 /** Puts a value into the scheme, or takes it out. */
 function setKey(path, value, as) {
@@ -171,13 +179,13 @@ function setKey(path, value, as) {
 }
 
 const assignments = (text) => Object.fromEntries(text.split(',').map((t) => t.split('=').map((x) => x.trim())).filter(([k]) => k)
-  .map(([k, v]) => [k, Number(v)]));
+  .map(([k, v]) => [k, finite(v)]));
 
 function wireConditions() {
   const field = (id, path, read) => $(id).addEventListener('change', () => {
     const value = read($(id));
     if (Number.isNaN(value) || (isPlain(value) && Object.values(value).some(Number.isNaN))) {
-      return void say(`${path}: expected ${isPlain(value) ? 'names and numbers such as D = 0.05' : 'a number'}, found "${$(id).value}"`);
+      return void refuse(`${path}: expected ${isPlain(value) ? 'names and numbers such as D = 0.05' : 'a number'}, found "${$(id).value}"`);
     }
     setKey(path, value);
   });
@@ -194,12 +202,12 @@ function wireConditions() {
   $('generic').addEventListener('click', () => setKey('latitude_deg', undefined));
   $('letters').addEventListener('change', () => {
     const letters = $('letters').value.trim().toUpperCase();
-    if (!matrixOfLetters(letters)) return void say(`X_p Y_p Z_p: expected directions of right-handed axes such as NUE, found "${letters}"`);
+    if (!matrixOfLetters(letters)) return void refuse(`X_p Y_p Z_p: expected directions of right-handed axes such as NUE, found "${letters}"`);
     edit(() => { const p = chosen(); delete p.angles_deg; p.attitude = letters; });
   });
   const own = (id, key, read) => $(id).addEventListener('change', () => {
     const value = read($(id));
-    if (Number.isNaN(value)) return void say(`${key}: expected a number, found "${$(id).value}"`);
+    if (Number.isNaN(value)) return void refuse(`${key}: expected a number, found "${$(id).value}"`);
     edit(() => { if (value === undefined) delete chosen()[key]; else chosen()[key] = value; });
   });
   own('name', 'name', text);
@@ -213,7 +221,10 @@ function wireConditions() {
     delete twin.name;
     s.position.splice(++state.selected, 0, twin);
   }));
-  $('delete').addEventListener('click', () => edit((s) => s.position.splice(state.selected, 1)));
+  $('delete').addEventListener('click', () => {
+    edit((s) => s.position.splice(state.selected, 1));
+    if (!state.scheme.position.length) $('add').focus();
+  });
   $('positions').addEventListener('keydown', (e) => {
     const by = { ArrowUp: -1, ArrowDown: 1 }[e.key];
     if (e.key === 'Delete') { e.preventDefault(); return $('delete').click(); }
@@ -235,6 +246,7 @@ function drawConditions() {
   put('drift-noise', run.drift_noise);
   put('latitude-number', s.latitude_deg);
   $('latitude').value = s.latitude_deg ?? 28.2;
+  $('latitude-note').textContent = s.latitude_deg === undefined ? 'Verdicts hold at nearly every latitude; sigmas and the arrow of the earth rate are of 28.2 deg.' : '';
   $('latitude').setAttribute('aria-valuetext', s.latitude_deg === undefined ? 'generic' : `${s.latitude_deg} degrees`);
   put('requirements', Object.entries(s.requirements ?? {}).map(([k, v]) => `${k} = ${v}`).join(', '));
 }

@@ -14,7 +14,15 @@ function tomlValue(v) {
   if (typeof v === 'string') return JSON.stringify(v).replaceAll('\u007f', '\\u007f');
   if (Array.isArray(v)) return `[${v.map(tomlValue).join(', ')}]`;
   if (isPlain(v)) return `{ ${Object.entries(v).map(([k, x]) => `${tomlKey(k)} = ${tomlValue(x)}`).join(', ')} }`;
-  return String(v);
+  return typeof v === 'number' ? decimal(v) : String(v);
+}
+
+/** A number without an exponent where it is small: angles are decimals. */
+function decimal(x) {
+  const [digits, power] = String(x).split('e-');
+  if (!power) return digits;
+  const [, sign, whole, part = ''] = /^(-?)(\d)\.?(\d*)$/.exec(digits);
+  return `${sign}0.${'0'.repeat(power - 1)}${whole}${part}`;
 }
 
 const tomlKey = (k) => (/^[A-Za-z0-9_-]+$/.test(k) ? k : tomlValue(k));

@@ -66,7 +66,7 @@ function drawVerdicts() {
     cell(tr, 0, 'links');
     putName(cell(tr, 1), verdicts.now.math[name], name);
     const degree = cell(tr, 2, 'degree');
-    const text = q.degree ?? '\u2013', was = differs ? ` was ${before.degree ?? 'none'}` : '';
+    const text = q.degree ?? '\u2013', was = differs ? ` was ${verdictOf(before)}` : '';
     if (degree.textContent !== text + was) degree.replaceChildren(String(text), ...(was ? [element('small', { textContent: was })] : []));
     put(cell(tr, 3, 'status'), q.combined ? 'combination' : WORDS[q.status] ?? q.status);
     drawSigma(cell(tr, 4, 'sigma'), q.combined ? null : name);
@@ -79,7 +79,9 @@ function drawVerdicts() {
   table.classList.toggle('old-solutions', verdicts.solutionsOf !== asked);
   const open = rows.filter((q) => q.degree === null).map((q) => q.name);
   const worst = Math.max(0, ...rows.map((q) => q.degree ?? 0));
-  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${open.length} not observable by themselves` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}`);
+  const alone = rows.length - open.length, more = answer.rank - alone;
+  const together = more > 0 ? ` and ${more} combination${more > 1 ? 's' : ''} of the others` : '';
+  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}`);
   offerStrip(rows);
 }
 
@@ -91,7 +93,7 @@ function drawSolution(td, q, name) {
   const solved = verdicts.solutions?.find(name);
   if (q.degree !== null && q.degree !== undefined) {
     const text = solved?.solution?.text ?? '', math = verdicts.solutions?.math[text], terms = solved?.solution?.terms.length ?? 0;
-    if (solved && !solved.solution) return putMath(td, '', 'not written out');
+    if (solved && !solved.solution) return putMath(td, '', 'not written out here: the command line has a symbolic engine too');
     if (terms <= SHORT) return putMath(td, math, text);
     if (td.dataset.of === text) return;
     td.dataset.of = text;
@@ -125,7 +127,7 @@ function drawSigma(td, name) {
   box.setAttribute('role', 'img');
   box.setAttribute('aria-label', `${over ? 'misses' : 'meets'} its requirement: ${ratio.toPrecision(2)} times${prior}`);
   box.title = `required ${s.required_sigma} ${s.unit}${prior}`;
-  td.replaceChildren(box, `${two(s.sigma)} ${s.unit}`);
+  td.replaceChildren(box, `${two(s.sigma)} ${s.unit}`, ...(prior ? [element('small', { textContent: ' prior' })] : []));
 }
 
 /** Arcs beside the table between unknowns that cannot be told apart. */
