@@ -5,13 +5,15 @@
 >>> answer.degrees["D_FX"]
 1
 
-Options are those of the command line in snake case; answers are its JSON, byte for byte, with attributes. Angles are exact: an ``int``,
+Options are those of the command line in snake case; answers are the JSON of a command line without the symbolic engine, byte for byte, with attributes. Angles are exact: an ``int``,
 a ``str``, a ``Decimal``, or a ``float`` by its shortest text. What is wrong with a request is a :class:`ProblemError`, a ``ValueError`` with ``message``,
 ``file``, ``line`` and ``column``.
 """
 
 from __future__ import annotations
 
+import importlib
+import operator
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -46,7 +48,7 @@ from ._results import (
     SystemRun,
     Walks,
 )
-from ._texts import as_json, assignments, attitude, decimal
+from ._texts import as_json, assignments, attitudes, decimal
 
 if TYPE_CHECKING:
     import pandas
@@ -101,11 +103,17 @@ def _texts(value: Any) -> list[str]:
 def _plain(value: Any) -> Any:
     if isinstance(value, (bool, str, int)):
         return value
+    if type(value).__name__ in ("bool_", "bool"):
+        # of numpy
+        return bool(value)
+    if hasattr(value, "__index__"):
+        return operator.index(value)
     return list(value) if isinstance(value, (list, tuple)) else float(decimal(value))
 
 
 def _per_axis(value: Any) -> Any:
-    return ",".join(map(decimal, value)) if isinstance(value, (list, tuple)) else _plain(value)
+    several = isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) == 1
+    return ",".join(map(decimal, value)) if several else _plain(value)
 
 
 def _max_degree(value: Any) -> list[str]:
@@ -114,7 +122,7 @@ def _max_degree(value: Any) -> list[str]:
 
 #: How options are read that are not as JSON has them.
 _READ: dict[str, Callable[[Any], Any]] = {
-    "angles": lambda value: [attitude(a) for a in value],
+    "angles": attitudes,
     "latitude": decimal,
     "filter_latitude": decimal,
     "round": decimal,
@@ -374,6 +382,8 @@ def design(
     if resume is not None:
         files["resume"] = _part(resume, "resume")
     if merge is not None:
+        if not merge:
+            raise ValueError("merge: found no part; expected every part of a search")
         files["merge"] = [_part(p, f"part {i + 1}") for i, p in enumerate(merge)]
     if part is not None:
         options["part"] = list(part)
@@ -384,6 +394,8 @@ def design(
 
 
 def _part(part: Part | str, name: str) -> dict[str, str]:
+    if not isinstance(part, (str, Answer)):
+        raise TypeError(f"{name}: found a {type(part).__name__}; expected a part of a search, or its JSON")
     return {"name": name, "text": part if isinstance(part, str) else part.json()}
 
 
@@ -423,6 +435,8 @@ def calibrate(what: Judged, *records: Any, prior: Any = None, progress: Progress
         files["before"] = {"name": "prior", "text": text}
     request = _request(options, **files)
     given = [_record(r, i) for i, r in enumerate(records)]
+    if not given:
+        raise TypeError("no record; expected files or pandas DataFrames of the runs, after the scheme or model")
     show, bar = heard(progress)
     try:
         return _as(_kinds((what,), Calibration, SystemCalibration), _obsdeg.calibrate(request, given, show), ("calibrate", request, given))
@@ -434,6 +448,9 @@ def calibrate(what: Judged, *records: Any, prior: Any = None, progress: Progress
 def _record(record: Any, i: int) -> tuple[str, bytes | None]:
     if hasattr(record, "to_csv"):
         return f"record {i + 1}", record.to_csv(index=False).encode()
+    if not isinstance(record, (str, os.PathLike)):
+        kind = type(record).__name__
+        raise TypeError(f"record {i + 1}: found a {kind}; expected a file (CSV, Parquet) or a pandas DataFrame, as to_pandas() of others gives")
     return os.fspath(record), None
 
 
@@ -481,3 +498,10 @@ def load(path: str | os.PathLike[str], **options: Any) -> Scheme | Model:
     found = imported(Path(path), **options)
     kind = Scheme if found.kind == "scheme" else Model
     return kind.from_text(found.text, name=os.fspath(path))
+
+
+def __getattr__(name: str) -> Any:
+    # what is not always wanted is loaded when it is asked for
+    if name in ("campaign", "importers"):
+        return importlib.import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

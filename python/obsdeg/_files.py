@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
-from ._texts import Attitude, Number, attitude, decimal, toml
+from ._texts import Attitude, Number, attitudes, decimal, toml
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -90,8 +90,7 @@ class Scheme(Text):
         lines = [f"{key} = {toml(value)}" for key, value in head.items() if value is not None]
         if latitude is not None:
             lines.append(f"latitude_deg = {decimal(latitude)}")
-        for position in angles:
-            text = attitude(position)
+        for text in attitudes(angles):
             lines.append("[[position]]")
             if "@" in text:
                 raise ValueError(f"found {text!r}; expected an attitude (segments that turn are written in a scheme file)")

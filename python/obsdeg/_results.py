@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -321,7 +322,13 @@ class Report(Answer):
         return {"html": self.html}
 
     def write(self, path: Any) -> None:
-        """To a file."""
+        """To a file that ends in ``.html``; one that is there is replaced.
+
+        Raises:
+            ValueError: another ending; PDF, Markdown and LaTeX are written by ``obsdeg report``.
+        """
+        if os.path.splitext(os.fspath(path))[1].lower() not in (".html", ".htm"):
+            raise ValueError(f"found {os.fspath(path)!r}; expected a file that ends in .html (`obsdeg report` writes .pdf, .md and .tex)")
         with open(path, "w", encoding="utf-8", newline="") as file:
             file.write(self.html)
 

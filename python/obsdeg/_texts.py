@@ -36,9 +36,8 @@ def decimal(x: Number) -> str:
         return decimal(Decimal(float.__repr__(x)))
     kind = type(x).__name__
     if kind.startswith("float"):
-        raise TypeError(
-            f"found {x!r} of type {kind}: it holds 28.2 as 28.2000007..., and angles are exact here; expected a str, int, Decimal or 64-bit float"
-        )
+        held = f"it holds {Decimal(float(x))}, which may not be what was written" if float(x) == float(x) else "it is no number"
+        raise TypeError(f"found {x!r} of type {kind}: {held}, and numbers are exact here; expected a str, int, Decimal or 64-bit float")
     try:
         return str(operator.index(x))
     except TypeError:
@@ -53,10 +52,26 @@ def attitude(angles: Attitude) -> str:
     """
     if isinstance(angles, str):
         return angles
-    texts = [decimal(x) for x in angles]
-    if len(texts) != 3:
-        raise ValueError(f"found {len(texts)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
-    return ",".join(texts)
+    if isinstance(angles, (bytes, bytearray, set, frozenset, Mapping)) or not isinstance(angles, Iterable):
+        raise TypeError(f"found the position {angles!r}; expected alpha, beta, gamma in degrees, or letters such as 'NUE'")
+    given = list(angles)
+    if len(given) != 3:
+        raise ValueError(f"found {len(given)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
+    try:
+        return ",".join([decimal(x) for x in given])
+    except (TypeError, ValueError) as e:
+        raise type(e)(f"the position {angles!r}: {e}") from None
+
+
+def attitudes(positions: Iterable[Attitude]) -> list[str]:
+    """Attitudes of positions in their order.
+
+    Raises:
+        TypeError: no list of positions.
+    """
+    if isinstance(positions, (str, bytes, bytearray, set, frozenset, Mapping)) or not isinstance(positions, Iterable):
+        raise TypeError(f"angles: found {positions!r}; expected a list of positions, as in [(0, 0, 0), (180, 0, 0)]")
+    return [attitude(a) for a in positions]
 
 
 def assignments(given: Mapping[str, Any] | Iterable[str]) -> list[str]:

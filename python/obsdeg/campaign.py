@@ -68,6 +68,8 @@ def run(
     Raises:
         CampaignError: a task failed too often.
     """
+    _check("ahead", ahead, 1)
+    _check("retries", retries, 0)
     left = iter(enumerate(tasks))
     again: list[tuple[int, Any]] = []
     tries: dict[int, int] = {}
@@ -111,6 +113,20 @@ def run(
                 pool = _another(pool, executor)
     finally:
         _close(pool)
+
+
+def _check(name: str, found: int, least: int) -> None:
+    if found < least:
+        raise ValueError(f"{name}: found {found}; expected at least {least}")
+
+
+def _is_whole(part: Path) -> bool:
+    """Whether a part is there, as it was written."""
+    try:
+        json.loads(part.read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return False
+    return True
 
 
 def _is_broken(pool: Executor, e: BaseException) -> bool:
@@ -176,8 +192,9 @@ def design(
         CampaignError: a part failed too often.
         obsdeg.ProblemError: what is wrong with the options.
     """
+    _check("parts", parts, 1)
     files = {i: Path(folder) / f"{_digest([options, parts])}-{i}-of-{parts}.json" for i in range(1, parts + 1)}
-    missing = [(options, i, parts) for i, file in files.items() if not file.exists()]
+    missing = [(options, i, parts) for i, file in files.items() if not _is_whole(file)]
     done = parts - len(missing)
     for (_, i, _), text in run(_search, missing, executor=executor, retries=retries):
         _place(files[i], text.encode())
@@ -190,6 +207,9 @@ def design(
 
 def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
     """Every combination of options: ``grid(angles=[...], latitude=range(0, 91), carry=["platform", "inertial"])``."""
+    for name, values_of in axes.items():
+        if isinstance(values_of, (str, bytes)):
+            raise TypeError(f"{name}: found {values_of!r}; expected a list of values, as in [{values_of!r}]")
     names, values = list(axes), [list(v) for v in axes.values()]
     return (dict(zip(names, chosen, strict=True)) for chosen in product(*values))
 
@@ -200,7 +220,8 @@ def _verdicts(tasks: list[dict[str, Any]]) -> bytes:
 
     rows: list[dict[str, Any]] = []
     for task in tasks:
-        given = {name: str(value) for name, value in task.items() if name != "scheme"}
+        asked = json.dumps(task, sort_keys=True, default=str)
+        given = {"task": asked, **{name: str(value) for name, value in task.items() if name != "scheme"}}
         what = [obsdeg.Scheme.from_text(task["scheme"])] if "scheme" in task else []
         answer = obsdeg.analyze(*what, solutions=False, **{k: v for k, v in task.items() if k != "scheme"}).to_dict()
         for q in answer["quantities"]:
@@ -227,6 +248,7 @@ def sweep(
 
     Args:
         folder: holds the files, one a chunk, named by what it asks; those that are there are not asked again. Read all with ``pandas.read_parquet(folder)``.
+            The column ``task`` holds all options of a row as JSON; each option is a column too, in the files whose tasks have it.
         tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is the text of a scheme file.
         chunk: tasks that are judged together.
         heard: told how many tasks are done.
@@ -235,7 +257,9 @@ def sweep(
         CampaignError: a chunk failed too often.
         obsdeg.ProblemError: what is wrong with a task.
     """
+    _check("chunk", chunk, 1)
     folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     done = 0
 
     def missing() -> Iterator[list[dict[str, Any]]]:

@@ -7,7 +7,9 @@ models and schemes. What has no counterpart is refused with an `ImportProblem`, 
 from __future__ import annotations
 
 import importlib
+import json
 import re
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,6 +61,7 @@ def load(path: str | Path, **options: Any) -> Imported:
     if not module:
         if options:
             raise ImportProblem(f"`{next(iter(options))}`", "no options for obsdeg's own files", file=str(path))
+        _own(text, path)
         return Imported(text, source, "obsdeg")
     reader = _needed(module, source)
     try:
@@ -71,6 +74,24 @@ def load(path: str | Path, **options: Any) -> Imported:
         return Imported(_needed("system", source).to_toml(system), "model", source, tuple(system.notes))
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
+
+
+def _own(text: str, path: Path) -> None:
+    """Refuses what is no text of obsdeg's own; what it says is read when it is judged."""
+    is_json = text.lstrip().startswith("{")
+    try:
+        if is_json:
+            found: Any = json.loads(text)
+        elif sys.version_info >= (3, 11):
+            import tomllib
+
+            found = tomllib.loads(text)
+        else:
+            return
+    except ValueError as error:
+        raise ImportProblem(f"a text that is no {'JSON' if is_json else 'TOML'} ({error})", "a model or scheme", file=str(path)) from None
+    if not found:
+        raise ImportProblem("nothing", "a model or scheme", file=str(path))
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,98 @@
+"""What is not what was meant is refused where it is given, with what was expected."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import obsdeg
+import pytest
+from obsdeg import campaign, importers
+
+PAIR = [(0, 0, 0), (180, 0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("angles", "message"),
+    [
+        ([b"NUE"], "found the position b'NUE'; expected alpha, beta, gamma"),
+        ({(0, 0, 0), (180, 0, 0)}, "expected a list of positions"),
+        ((0, 0, 0), "found the position 0; expected alpha"),
+        ("NUE", "found 'NUE'; expected a list of positions"),
+        ([(0, 0)], "found 2 angles"),
+        ([(0, 0, None)], r"the position \(0, 0, None\): found None"),
+        ([(0, float("nan"), 0)], "expected a finite number"),
+    ],
+)
+def test_positions(angles: Any, message: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=message):
+        obsdeg.analyze(angles=angles)
+    with pytest.raises((TypeError, ValueError), match=message):
+        obsdeg.Scheme(angles)
+
+
+def test_numbers_of_numpy() -> None:
+    numpy = pytest.importorskip("numpy")
+    plain = obsdeg.analyze(angles=PAIR, seed=5, measured_azimuth=True)
+    theirs = obsdeg.analyze(angles=numpy.array(PAIR), seed=numpy.int64(5), measured_azimuth=numpy.bool_(True))
+    assert plain.json() == theirs.json()
+    # the reason is that of this number, which a half or 45 has not
+    with pytest.raises(TypeError, match="float32: it holds 30.1000003"):
+        obsdeg.analyze(angles=[(numpy.float32(30.1), 0, 0)])
+
+
+def test_files_and_parts(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"expected a file that ends in .html"):
+        obsdeg.report("examples/pole/scheme.toml", runs=2).write(tmp_path / "x.pdf")
+    assert not any(tmp_path.iterdir())
+    with pytest.raises(ValueError, match="merge: found no part"):
+        obsdeg.design(2, merge=[])
+    with pytest.raises(TypeError, match="part 1: found a int"):
+        obsdeg.design(2, merge=[3])  # type: ignore[list-item]
+    with pytest.raises(TypeError, match="no record; expected files"):
+        obsdeg.calibrate("examples/bench-day/scheme.toml")
+    with pytest.raises(TypeError, match="record 1: found a dict; expected a file"):
+        obsdeg.calibrate("examples/bench-day/scheme.toml", {})  # type: ignore[arg-type]
+
+
+def test_campaigns(tmp_path: Path) -> None:
+    for name, ask in {
+        "ahead": lambda: list(campaign.run(str, [1], ahead=0)),
+        "retries": lambda: list(campaign.run(str, [1], retries=-1)),
+        "chunk": lambda: campaign.sweep(tmp_path, [], chunk=0),
+        "parts": lambda: campaign.design(tmp_path, 0, positions=5),
+    }.items():
+        with pytest.raises(ValueError, match=f"{name}: found -?[01]; expected at least"):
+            ask()
+    with pytest.raises(TypeError, match="carry: found 'platform'; expected a list"):
+        campaign.grid(carry="platform")
+    assert campaign.sweep(tmp_path / "empty", []).is_dir()
+
+
+def test_rows_of_mixed_tasks_are_told_apart(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    tasks: list[dict[str, Any]] = [dict(angles=PAIR), dict(angles=PAIR, latitude=45), dict(angles=PAIR, terms=["F", "I"])]
+    campaign.sweep(tmp_path, tasks, chunk=1, executor=lambda: ThreadPoolExecutor(2))
+    frame = pandas.read_parquet(tmp_path)
+    assert frame["task"].nunique() == 3
+    assert len(frame) == 15 + 15 + 9
+
+
+def test_a_part_that_was_cut_is_made_again(tmp_path: Path) -> None:
+    options: dict[str, Any] = {"positions": 5, "carry": "inertial", "candidates": "examples/six-positions/scheme.toml"}
+
+    def threads() -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(2)
+
+    whole = campaign.design(tmp_path, 2, executor=threads, **options)
+    part = next(tmp_path.glob("*-1-of-2.json"))
+    part.write_text(part.read_text(encoding="utf-8")[:50], encoding="utf-8")
+    assert campaign.design(tmp_path, 2, executor=threads, **options).json() == whole.json()
+
+
+@pytest.mark.parametrize(("name", "text", "found"), [("a.toml", "\x00\x01", "no TOML"), ("a.json", '{"a":', "no JSON"), ("a.yaml", "{{{", "no JSON"), ("b.toml", "", "nothing")])
+def test_what_is_no_scheme_is_not_loaded(tmp_path: Path, name: str, text: str, found: str) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(importers.ImportProblem, match=found):
+        obsdeg.load(tmp_path / name)
