@@ -118,12 +118,12 @@ async function judgeText() {
   const solved = (s) => {
     const text = s === null || s === undefined ? '' : s.text ?? s;
     const e = element('span');
-    putMath(e, math[text], text);
+    putSolution(e, math[text], text, s?.terms?.length ?? 0);
     return e;
   };
   const rows = answer.quantities.map((q) => [named(q), q.unit, WORDS[q.status] ?? q.status.replaceAll('_', ' '), String(q.degree ?? '\u2013'),
     q.degree === null ? (q.partners?.length ? `not told from ${q.partners.join(', ')}` : '') : solved(q.solution)]);
-  const parts = [tableOf(['unknown', 'unit', 'status', 'degree', 'solution, or why there is none'], rows, `rank ${answer.rank} of ${answer.unknowns.length ?? answer.unknowns}`)];
+  const parts = [tableOf(['unknown', 'unit', 'status', 'degree', 'solution, or why none'], rows, `rank ${answer.rank} of ${answer.unknowns.length ?? answer.unknowns}`)];
   if (answer.quantities.some((q) => q.degree !== null && !q.solution)) {
     parts.push(element('p', { className: 'soft', textContent: 'Solutions that are not here need the symbolic engine, which the command line has.' }));
   }

@@ -42,7 +42,7 @@ function drawVerdicts() {
   let table = box.querySelector('table');
   if (!table) {
     table = element('table', {}, element('thead'), element('tbody'));
-    table.tHead.innerHTML = '<tr><td class="links"></td><th scope="col">unknown</th><th scope="col">degree</th><th scope="col">status</th><th scope="col">sigma against requirement</th><th scope="col">solution, or why there is none</th></tr>';
+    table.tHead.innerHTML = '<tr><td class="links"></td><th scope="col">unknown</th><th scope="col">degree</th><th scope="col">status</th><th scope="col">sigma against requirement</th><th scope="col">solution, or why none</th></tr>';
     const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
     svg.id = 'links';
     svg.setAttribute('aria-hidden', 'true');
@@ -89,17 +89,22 @@ const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together 
 // a solution of more terms is folded
 const SHORT = 8;
 
+/** A solution as a formula, folded where it has many terms. */
+function putSolution(e, math, text, terms) {
+  if (terms <= SHORT) return putMath(e, math, text);
+  if (e.dataset.of === text) return;
+  e.dataset.of = text;
+  const inner = element('div'), fold = element('details', {}, element('summary', { textContent: `${terms} terms` }), inner);
+  fold.addEventListener('toggle', () => putMath(inner, math, text), { once: true });
+  e.replaceChildren(fold);
+}
+
 function drawSolution(td, q, name) {
   const solved = verdicts.solutions?.find(name);
   if (q.degree !== null && q.degree !== undefined) {
     const text = solved?.solution?.text ?? '', math = verdicts.solutions?.math[text], terms = solved?.solution?.terms.length ?? 0;
     if (solved && !solved.solution) return putMath(td, '', 'not written out here: the command line has a symbolic engine too');
-    if (terms <= SHORT) return putMath(td, math, text);
-    if (td.dataset.of === text) return;
-    td.dataset.of = text;
-    const inner = element('div'), fold = element('details', {}, element('summary', { textContent: `${terms} terms` }), inner);
-    fold.addEventListener('toggle', () => putMath(inner, math, text), { once: true });
-    return td.replaceChildren(fold);
+    return putSolution(td, math, text, terms);
   }
   const why = q.partners?.length ? `not told from ${q.partners.join(', ')}` : WHY[q.status] ?? '';
   const other = (solved ?? q).elsewhere;

@@ -324,21 +324,26 @@ mod tests {
     use super::super::exact::{Real, effects_of, energy_of, real};
     use super::*;
     use crate::design::Candidates;
-    use obsdeg_core::model::Scheme;
+    use obsdeg_core::model::{Carry, Scheme};
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
+
+    /// No positions under reset carry, with these error terms.
+    fn with(terms: &str) -> Scheme {
+        Scheme {
+            carry: Carry::Reset,
+            latitude: "28.2".parse().ok(),
+            unknowns: terms.parse().expect("terms"),
+            ..Scheme::default()
+        }
+    }
 
     /// What is interpolated is what it is where it is evaluated, whatever the terms; a degree less would not do.
     #[test]
     fn a_net_is_interpolated() {
         let mut rng = SplitMix64::new(3);
         for terms in ["F", "F,I,O,S", "F,II,OO", "F,I,GS,GM", "F,K0,K1,K2,M6"] {
-            let base = Scheme {
-                carry: obsdeg_core::model::Carry::Reset,
-                latitude: "28.2".parse().ok(),
-                unknowns: terms.parse().expect("terms"),
-                ..Scheme::default()
-            };
+            let base = with(terms);
             let some = &Candidates::cardinals().attitudes[..1];
             let evaluator = Evaluator::new(&base, some, &[0], &Conditions::default()).expect("an evaluator");
             let mut draw = || rng.below(1 << 20) as f64 / f64::from(1 << 19) - 1.0;
@@ -364,12 +369,7 @@ mod tests {
         let mut rng = SplitMix64::new(5);
         let mut largest = [0.0f64; 3];
         for terms in ["F", "F,I,O,S", "F,II,OO", "F,I,GS,GM", "F,K0,K1,K2,M6"] {
-            let base = Scheme {
-                carry: obsdeg_core::model::Carry::Reset,
-                latitude: "28.2".parse().ok(),
-                unknowns: terms.parse().expect("terms"),
-                ..Scheme::default()
-            };
+            let base = with(terms);
             let mut below = |n: u64| rng.below(n) as i64;
             let mut candidates: Vec<Euler> = (0..6)
                 .map(|_| std::array::from_fn(|_| Angle::from_nanodeg(below(FULL) - FULL as i64 / 2)))
