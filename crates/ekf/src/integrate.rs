@@ -16,6 +16,54 @@ pub struct Propagated {
     pub q: DMatrix<f64>,
 }
 
+/// What changes in a step: rows that are zero in F, those of constants, are none of it.
+struct Slope {
+    /// `f` (shape n).
+    x: DVector<f64>,
+    /// The rows of F that are not zero (r of n).
+    rows: Vec<usize>,
+    /// Those of `F Phi` (n x r, a column each).
+    phi: DMatrix<f64>,
+    /// Those of `F Q_d` (n x r, a column each), where it is not zero.
+    fq: Option<DMatrix<f64>>,
+    /// `Q`, where it is not zero (n x n).
+    noise: Option<DMatrix<f64>>,
+}
+
+impl Slope {
+    fn of(process: &impl Process, t: f64, y: &Propagated) -> Self {
+        let (f, n) = (process.jacobian(t, &y.x), y.x.len());
+        let rows: Vec<usize> = (0..n).filter(|&i| f.row(i).iter().any(|&a| a != 0.0)).collect();
+        // columns are what lies together
+        let columns = f.select_rows(&rows).transpose();
+        let times = |m: &DMatrix<f64>| m.tr_mul(&columns);
+        let some = |m: &DMatrix<f64>| m.iter().any(|&a| a != 0.0);
+        let noise = Some(process.noise(t)).filter(some);
+        Self { x: process.f(t, &y.x), phi: times(&y.phi), fq: some(&y.q).then(|| times(&y.q)), noise, rows }
+    }
+
+    /// `y + h k`.
+    fn add_to(&self, y: &mut Propagated, h: f64) {
+        y.x.axpy(h, &self.x, 1.0);
+        for (r, &i) in self.rows.iter().enumerate() {
+            for j in 0..y.x.len() {
+                y.phi[(i, j)] += self.phi[(j, r)] * h;
+            }
+        }
+        if let Some(fq) = &self.fq {
+            for (r, &i) in self.rows.iter().enumerate() {
+                for j in 0..y.x.len() {
+                    y.q[(i, j)] += fq[(j, r)] * h;
+                    y.q[(j, i)] += fq[(j, r)] * h;
+                }
+            }
+        }
+        if let Some(noise) = &self.noise {
+            y.q.zip_apply(noise, |q, a| *q += a * h);
+        }
+    }
+}
+
 /// The classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in `substeps` equal parts.
 ///
 /// # Errors
@@ -32,26 +80,24 @@ pub fn runge_kutta(
     check_column("f", process.f(t, x).as_slice(), n)?;
     check("F", &process.jacobian(t, x), (n, n))?;
     check_symmetric("Q", &process.noise(t), n)?;
-    let slope = |t: f64, y: &Propagated| {
-        let f = process.jacobian(t, &y.x);
-        let fq = &f * &y.q;
-        Propagated { x: process.f(t, &y.x), phi: &f * &y.phi, q: &fq + fq.transpose() + process.noise(t) }
-    };
-    let moved = |y: &Propagated, k: &Propagated, h: f64| Propagated {
-        x: &y.x + &k.x * h,
-        phi: &y.phi + &k.phi * h,
-        q: &y.q + &k.q * h,
-    };
+    let slope = |t: f64, y: &Propagated| Slope::of(process, t, y);
     let mut y = Propagated { x: x.clone(), phi: DMatrix::identity(n, n), q: DMatrix::zeros(n, n) };
     let h = dt / substeps.max(1) as f64;
+    let mut between = y.clone();
     for i in 0..substeps.max(1) {
         let t = t + h * i as f64;
         let k1 = slope(t, &y);
-        let k2 = slope(t + h / 2.0, &moved(&y, &k1, h / 2.0));
-        let k3 = slope(t + h / 2.0, &moved(&y, &k2, h / 2.0));
-        let k4 = slope(t + h, &moved(&y, &k3, h));
+        between.clone_from(&y);
+        k1.add_to(&mut between, h / 2.0);
+        let k2 = slope(t + h / 2.0, &between);
+        between.clone_from(&y);
+        k2.add_to(&mut between, h / 2.0);
+        let k3 = slope(t + h / 2.0, &between);
+        between.clone_from(&y);
+        k3.add_to(&mut between, h);
+        let k4 = slope(t + h, &between);
         for (k, weight) in [(k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)] {
-            y = moved(&y, &k, h * weight / 6.0);
+            k.add_to(&mut y, h * weight / 6.0);
         }
     }
     check_column("x", y.x.as_slice(), n)?;

@@ -27,21 +27,25 @@ impl Turn {
 }
 
 /// `a b` in floating point.
+#[inline]
 pub fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
     crate::model::attitude::product(&Float, a, b)
 }
 
 /// `a b`.
+#[inline]
 pub fn apply(a: &Matrix3<f64>, b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|j| a[i][j] * b[j]).sum())
 }
 
 /// The transpose.
+#[inline]
 pub fn transpose(a: &Matrix3<f64>) -> Matrix3<f64> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
 }
 
 /// `exp([v x])`: the active rotation by the vector `v` (rad).
+#[inline]
 pub fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
     let angle = v.iter().map(|x| x * x).sum::<f64>().sqrt();
     // sin(a)/a and (1 - cos a)/a^2
@@ -56,6 +60,7 @@ pub fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
 }
 
 /// `[v x]`.
+#[inline]
 pub fn cross(v: &[f64; 3]) -> Matrix3<f64> {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
