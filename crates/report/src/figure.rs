@@ -89,6 +89,8 @@ const MARGINS: (f64, f64) = (88.0, 28.0);
 /// Longer titles are broken.
 const TITLE: usize = 48;
 pub(crate) const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
+/// How the library's ids of clips begin.
+pub(crate) const CLIP: &str = "kuva-clip-";
 
 impl Figure {
     fn plots(&self) -> Vec<Plot> {
@@ -175,8 +177,24 @@ impl Figure {
     pub(crate) fn svg(&self) -> String {
         let plots = self.plots();
         let layout = self.layout(&plots);
-        kuva::render_to_svg(plots, layout)
+        numbered(&kuva::render_to_svg(plots, layout))
     }
+}
+
+/// The ids of clips, which the library numbers through a process, numbered through the picture: it is the same whenever it is drawn.
+fn numbered(svg: &str) -> String {
+    let mut parts = svg.split(CLIP);
+    let mut out = parts.next().unwrap_or_default().to_string();
+    let mut ids = Vec::new();
+    for part in parts {
+        let (id, rest) = part.split_at(part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len()));
+        let number = ids.iter().position(|known| *known == id).unwrap_or_else(|| {
+            ids.push(id);
+            ids.len() - 1
+        });
+        out.push_str(&format!("{CLIP}{number}{rest}"));
+    }
+    out
 }
 
 /// Several figures in rows of `columns`.
@@ -190,7 +208,7 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
         .with_cell_size(SIZE.0 * 0.75, SIZE.1 * 0.8)
         .with_shared_legend_bottom()
         .render();
-    SvgBackend::new().render_scene(&scene)
+    numbered(&SvgBackend::new().render_scene(&scene))
 }
 
 /// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange, others
@@ -225,7 +243,7 @@ pub(crate) fn heat(
         .with_width(180.0 + 30.0 * columns.len().max(8) as f64)
         .with_height(180.0 + 28.0 * rows.len() as f64)
         .with_font_family(FONT);
-    kuva::render_to_svg(plots, layout)
+    numbered(&kuva::render_to_svg(plots, layout))
 }
 
 /// Blue over white to orange, for 0 to 1.
@@ -276,4 +294,29 @@ pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
     pixels.fill(tiny_skia::Color::WHITE);
     resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixels.as_mut());
     pixels.encode_png().map_err(|e| FigureError(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_the_same_whenever_it_is_drawn() {
+        let line = |end| Line {
+            label: "sigma".into(),
+            color: BLUE,
+            stroke: Stroke::Solid,
+            points: vec![(0.0, 1.0), (1.0, end)],
+        };
+        let figure = |end| Figure { lines: vec![line(end)], ..Figure::default() };
+        let one = figure(2.0).svg();
+        assert_eq!(one, figure(2.0).svg());
+        assert!(one.contains(&format!("id=\"{CLIP}0\"")) && one.contains(&format!("(#{CLIP}0)")), "{one}");
+        // panels have clips of their own
+        let both = grid(&[figure(2.0), figure(3.0)], 2, "both");
+        assert_eq!(both, grid(&[figure(2.0), figure(3.0)], 2, "both"));
+        for i in 0..2 {
+            assert_eq!(both.matches(&format!("id=\"{CLIP}{i}\"")).count(), 1);
+        }
+    }
 }

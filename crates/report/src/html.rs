@@ -12,7 +12,7 @@ use serde_json::{Value as Json, json};
 use crate::document::{
     Block, Document, Drawing, Finding, Part, Picture, Status, Typeset, parts, table_of_page,
 };
-use crate::figure::{Figure, Line, Stroke};
+use crate::figure::{CLIP, Figure, Line, Stroke};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
@@ -211,7 +211,7 @@ fn inlined(p: &Picture) -> String {
             &format!("<svg class=\"still\" role=\"img\" aria-labelledby=\"{}-caption\"{view} ", p.name),
             1,
         )
-        .replace("kuva-clip", &format!("{}-clip", p.name))
+        .replace(CLIP, &format!("{}-clip-", p.name))
         .replacen("<rect width=\"100%\" height=\"100%\" fill=\"white\" />", "", 1);
     in_page_colors(&svg)
 }
