@@ -72,7 +72,7 @@ pub enum RecordError {
         place: Place,
     },
     /// A column that is wanted.
-    #[error("{record}: no column {expected}; found {found}")]
+    #[error("{record}: no column {expected}; found {found}{hint}")]
     Missing {
         /// The record.
         record: String,
@@ -80,6 +80,8 @@ pub enum RecordError {
         expected: String,
         /// What there is.
         found: String,
+        /// What helps.
+        hint: &'static str,
     },
     /// A unit of something else.
     #[error("{place}: expected {expected}")]
@@ -98,10 +100,12 @@ pub enum RecordError {
         found: String,
     },
     /// Not a number.
-    #[error("{place}: expected a number, found `{found}`")]
+    #[error("{place}: expected {expected}, found `{found}`")]
     Number {
         /// Where.
         place: Place,
+        /// What it is to be.
+        expected: &'static str,
         /// What there is.
         found: String,
     },
@@ -355,7 +359,7 @@ impl Record {
         let found: Vec<Option<usize>> = by.columns.values().map(|own| self.find(own)).collect();
         for ((name, own), column) in by.columns.iter().zip(found) {
             let column = column
-                .ok_or_else(|| self.missing(&format!("`{own}`, which record.columns has as `{name}`")))?;
+                .ok_or_else(|| self.without(&format!("`{own}`, which record.columns has as `{name}`"), ""))?;
             self.columns[column].name.clone_from(name);
         }
         let twice = |i: &usize| self.columns[..*i].iter().any(|c| c.name == self.columns[*i].name);
@@ -364,7 +368,7 @@ impl Record {
         }
         for (name, text) in &by.units {
             let column =
-                self.find(name).ok_or_else(|| self.missing(&format!("`{name}`, of record.units")))?;
+                self.find(name).ok_or_else(|| self.without(&format!("`{name}`, of record.units"), ""))?;
             let (count, unit) = match text.trim().split_once(char::is_whitespace) {
                 Some((count, unit)) => (count.parse().unwrap_or(f64::NAN), unit.trim()),
                 None => (1.0, text.trim()),
@@ -401,10 +405,19 @@ impl Record {
         RecordError::Unit { place: self.at(1, column), expected }
     }
 
-    /// A column that is not there.
+    /// A column that is not there, nor under another name.
     pub fn missing(&self, expected: &str) -> RecordError {
+        self.without(expected, "; a column of another name is given under [record.columns]")
+    }
+
+    fn without(&self, expected: &str, hint: &'static str) -> RecordError {
         let found: Vec<String> = self.columns.iter().map(|c| format!("`{}`", c.text)).collect();
-        RecordError::Missing { record: self.name.clone(), expected: expected.into(), found: found.join(", ") }
+        RecordError::Missing {
+            record: self.name.clone(),
+            expected: expected.into(),
+            found: found.join(", "),
+            hint,
+        }
     }
 
     fn at(&self, line: u64, column: usize) -> Place {
@@ -434,7 +447,7 @@ impl Record {
         let mut any = false;
         let mut row = |line: u64, cell: &mut dyn FnMut(usize) -> Cell, label: &str| -> Result<(), E> {
             let mut numbers = [None; MOST];
-            for (slot, w) in numbers.iter_mut().zip(wanted) {
+            for (i, (slot, w)) in numbers.iter_mut().zip(wanted).enumerate() {
                 let at = || place(&name, line, &columns[w.column].text);
                 *slot = match cell(w.column) {
                     Cell::Number(x) if x.is_finite() => Some(x * w.scale),
@@ -443,12 +456,15 @@ impl Record {
                         return Err(RecordError::Value { place: at(), found: x.to_string(), expected }.into());
                     }
                     Cell::Nothing => None,
-                    Cell::Text(found) => return Err(RecordError::Number { place: at(), found }.into()),
+                    Cell::Text(found) => {
+                        let expected = if i == 0 { TIME } else { "a number" };
+                        return Err(RecordError::Number { place: at(), expected, found }.into());
+                    }
                 };
             }
             let at = || place(&name, line, &columns[wanted[0].column].text);
             let Some(t) = numbers[0] else {
-                return Err(RecordError::Number { place: at(), found: String::new() }.into());
+                return Err(RecordError::Number { place: at(), expected: TIME, found: String::new() }.into());
             };
             if anew && label != last {
                 before = f64::NEG_INFINITY;
@@ -507,6 +523,9 @@ impl Record {
 
 /// Most numbers that are wanted of a row.
 pub const MOST: usize = 64;
+
+/// What a time is.
+const TIME: &str = "a number, the time since any moment";
 
 /// What a cell holds.
 enum Cell {
@@ -623,7 +642,10 @@ mod tests {
                 "the record r.csv is empty; expected a header such as `t [s],position,fx [g],fy [g],fz [g]`",
             ),
             ("t [s],f [g]\n", "r.csv: no rows after the header"),
-            ("t [s],g [g]\n0,1\n", "r.csv: no column `f [g]`; found `t [s]`, `g [g]`"),
+            (
+                "t [s],g [g]\n0,1\n",
+                "r.csv: no column `f [g]`; found `t [s]`, `g [g]`; a column of another name is given under [record.columns]",
+            ),
             ("t [s],f\n0,1\n", "r.csv: line 1, column `f`: expected a unit, `f [g]`"),
             ("t [h],f [g]\n0,1\n", "r.csv: line 1, column `t [h]`: expected a unit, `t [s]` or `t [ms]`"),
             (
@@ -633,6 +655,10 @@ mod tests {
             (
                 "t [s],f [g\n0,1\n",
                 "r.csv: line 1, column `f [g`: expected a name, or a name with its unit as in `fx [g]`, once",
+            ),
+            (
+                "t [s],f [g]\n2026-11-23T10:00,1\n",
+                "r.csv: line 2, column `t [s]`: expected a number, the time since any moment, found `2026-11-23T10:00`",
             ),
             ("t [s],f [g]\n0,1\n1,abc\n", "r.csv: line 3, column `f [g]`: expected a number, found `abc`"),
             (
@@ -647,7 +673,10 @@ mod tests {
                 "t [ms],f [g]\n100,1\n100,1\n",
                 "r.csv: line 3, column `t [ms]`: the time 100 is not after that of the row before, 100; expected times that increase",
             ),
-            ("t [s],f [g]\n,1\n", "r.csv: line 2, column `t [s]`: expected a number, found ``"),
+            (
+                "t [s],f [g]\n,1\n",
+                "r.csv: line 2, column `t [s]`: expected a number, the time since any moment, found ``",
+            ),
             ("t [s],f [g]\n0,1\n0.5\n", "r.csv: line 3: 1 cells; expected 2, as in the header"),
             (
                 "t [s],f [g]\n0,1\n0,1\n",
