@@ -146,6 +146,14 @@ function sweepKey(axis) {
   return JSON.stringify([state.selected, s]);
 }
 
+/** The angles that are tried along a slider: multiples of 5, then where it stands as the other positions do, or a quarter turn or more from that. */
+function anglesToTry(axis) {
+  const wrapped = (angle) => +(((angle + 540) % 360) - 180).toFixed(9);
+  const others = state.scheme.position.filter((_, i) => i !== state.selected).map((p) => anglesOfPosition(p)?.[axis] ?? 0);
+  const more = others.flatMap((angle) => [0, 90, 180, 270].map((turn) => wrapped(angle + turn))).filter((angle) => angle % 5 !== 0);
+  return [...GRID, ...new Set(more)];
+}
+
 const degreesOf = (said) => Object.fromEntries(JSON.parse(said.text).quantities.map((q) => [q.name, q.degree]));
 
 async function sweep(axis, mine) {
@@ -153,17 +161,18 @@ async function sweep(axis, mine) {
   if (!key || state.scheme.position.length > MANY) return;
   if (!sweeps.has(key)) {
     if (sweeps.size > 60) sweeps.clear();
-    sweeps.set(key, { degrees: Array(GRID.length).fill(null), sigmas: Array(GRID.length).fill(null) });
+    const grid = anglesToTry(axis);
+    sweeps.set(key, { grid, degrees: Array(grid.length).fill(null), sigmas: Array(GRID.length).fill(null) });
   }
   const found = sweeps.get(key), at = state.selected, angles = anglesOfPosition(chosen());
-  const texts = GRID.map((angle) => {
+  const texts = found.grid.map((angle) => {
     const s = copy(state.scheme);
     delete s.position[at].attitude;
     s.position[at].angles_deg = angles.map((x, k) => (k === axis ? angle : x));
     return source(s);
   });
   const fresh = () => mine === round && sweepKey(axis) === key;
-  for (let i = 0; i < GRID.length; i++) {
+  for (let i = 0; i < found.grid.length; i++) {
     if (found.degrees[i]) continue;
     const said = await behind.ask('call', ['analyze', { sources: [texts[i]], solutions: false }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
     if (!fresh()) return;
@@ -210,8 +219,8 @@ const ranked = (degrees) => Object.values(degrees).filter((d) => d !== null).len
 
 /** Where the verdict is another than nearly everywhere. */
 function drawMarks(axis) {
-  const key = chosen() && sweepKey(axis);
-  mark(AXES[axis], GRID, key && sweeps.get(key)?.degrees);
+  const key = chosen() && sweepKey(axis), found = key && sweeps.get(key);
+  mark(AXES[axis], found?.grid ?? GRID, found?.degrees);
 }
 
 function mark(slider, grid, degrees) {
@@ -222,14 +231,15 @@ function mark(slider, grid, degrees) {
   degrees.forEach((d) => counts.set(signature(d), (counts.get(signature(d)) ?? 0) + 1));
   const common = [...counts].sort((a, b) => b[1] - a[1])[0][0];
   const usual = ranked(degrees.find((d) => signature(d) === common));
-  const other = grid.map((angle, i) => [angle, degrees[i]]).filter(([, d]) => signature(d) !== common);
+  const other = grid.map((angle, i) => [angle, degrees[i]]).filter(([, d]) => signature(d) !== common).sort(([a], [b]) => a - b);
   box.replaceChildren(...other.map(([angle, d]) => {
     const line = element('i', { title: `${angle}\u00b0`, className: ranked(d) > usual ? 'better' : '' });
     line.style.left = `${((angle - from) / range) * 100}%`;
     return line;
   }));
   const at = other.map(([angle]) => angle).join(', ');
-  $(slider).title = at ? `Other verdicts at ${at} deg` : 'The same verdicts at all multiples of 5 deg';
+  const more = grid.length > GRID.length ? ' and where it stands as another position does' : '';
+  $(slider).title = at ? `Other verdicts at ${at} deg` : `The same verdicts at all multiples of 5 deg${more}`;
 }
 
 const LATITUDES = GRID.filter((angle) => Math.abs(angle) <= 90);
@@ -275,7 +285,7 @@ function drawStrip() {
   }
   const x = (i) => left + ((w - left - 4) * i) / GRID.length, step = (w - left - 4) / GRID.length;
   const tones = [color('green'), color('blue'), color('orange'), color('purple')];
-  found.degrees.forEach((d, i) => d && names.forEach((n, j) => {
+  found.degrees.slice(0, GRID.length).forEach((d, i) => d && names.forEach((n, j) => {
     const degree = d[n];
     c.fillStyle = degree === null || degree === undefined ? color('shade') : tones[Math.min(3, degree)];
     c.fillRect(x(i), top + j * cells, step + 0.5, cells - 0.6);
