@@ -27,6 +27,8 @@ from typing import Any
 
 import obsdeg
 
+from .options import Analyze, Simulate
+
 #: Makes an executor; one that is broken, because a worker was killed, is replaced by another.
 Executors = Callable[[], Executor]
 
@@ -214,22 +216,36 @@ def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
     return (dict(zip(names, chosen, strict=True)) for chosen in product(*values))
 
 
+# what only numbers have: noise, dwells, requirements
+_MEASURED = Simulate.__optional_keys__ - Analyze.__optional_keys__
+_JUDGED = Analyze.__optional_keys__ - Simulate.__optional_keys__
+
+
+def _rows(task: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """What is found of a task, a row per unknown."""
+    what = [obsdeg.Scheme.from_text(task["scheme"])] if "scheme" in task else []
+    options = {name: value for name, value in task.items() if name != "scheme"}
+    verdicts = obsdeg.analyze(*what, **{"solutions": False, **{k: v for k, v in options.items() if k not in _MEASURED}}).to_dict()
+    numbers = {}
+    if _MEASURED & options.keys():
+        run = obsdeg.simulate(*what, **{k: v for k, v in options.items() if k not in _JUDGED}).to_dict()
+        numbers = {q["name"]: q for q in run["quantities"]}
+    asked = {"task": json.dumps(task, sort_keys=True, default=str), **{name: str(value) for name, value in options.items()}}
+    for q in verdicts["quantities"]:
+        n = numbers.get(q["name"], {})
+        found = {"rank": verdicts["rank"], "name": q["name"], "status": q["status"], "degree": q.get("degree")}
+        yield {**asked, **found, "sigma": n.get("sigma"), "unit": n.get("unit"), "outcome": n.get("outcome")}
+
+
 def _verdicts(tasks: list[dict[str, Any]]) -> bytes:
     import pyarrow
     import pyarrow.parquet
 
-    rows: list[dict[str, Any]] = []
-    for task in tasks:
-        asked = json.dumps(task, sort_keys=True, default=str)
-        given = {"task": asked, **{name: str(value) for name, value in task.items() if name != "scheme"}}
-        what = [obsdeg.Scheme.from_text(task["scheme"])] if "scheme" in task else []
-        answer = obsdeg.analyze(*what, solutions=False, **{k: v for k, v in task.items() if k != "scheme"}).to_dict()
-        for q in answer["quantities"]:
-            rows.append({**given, "rank": answer["rank"], "name": q["name"], "status": q["status"], "degree": q.get("degree")})
     sink = pyarrow.BufferOutputStream()
-    table = pyarrow.Table.from_pylist(rows)
-    degree = table.schema.get_field_index("degree")
-    table = table.set_column(degree, "degree", table.column("degree").cast(pyarrow.int32()))
+    table = pyarrow.Table.from_pylist([row for task in tasks for row in _rows(task)])
+    # also where no row has one
+    for name, kind in {"degree": pyarrow.int32(), "sigma": pyarrow.float64(), "unit": pyarrow.string(), "outcome": pyarrow.string()}.items():
+        table = table.set_column(table.schema.get_field_index(name), name, table.column(name).cast(kind))
     table = table.replace_schema_metadata({"obsdeg": obsdeg.__version__})
     pyarrow.parquet.write_table(table, sink)
     return bytes(sink.getvalue())
@@ -249,7 +265,9 @@ def sweep(
     Args:
         folder: holds the files, one a chunk, named by what it asks; those that are there are not asked again. Read all with ``pandas.read_parquet(folder)``.
             The column ``task`` holds all options of a row as JSON; each option is a column too, in the files whose tasks have it.
-        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is the text of a scheme file.
+        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is the text of a scheme file. A task with options that only
+            :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated too: ``sigma`` is the standard deviation at the
+            end of the run in ``unit``, and ``outcome`` says whether it is a measured one; elsewhere these are empty.
         chunk: tasks that are judged together.
         heard: told how many tasks are done.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -108,6 +109,32 @@ def test_a_driver_that_was_killed_goes_on(tmp_path: Path) -> None:
         mine = rows[(rows["angles"] == angles) & (rows["latitude"] == latitude)]
         assert dict(zip(mine["name"], mine["status"], strict=True)) == own.statuses
         assert set(mine["rank"]) == {own.rank}
+
+
+def test_noise_is_an_axis(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pair = [(0, 0, 0), (180, 0, 0)]
+    asked: dict[str, Any] = {"angles": pair, "carry": "inertial"}
+    # white noise of Z alone
+    tasks = [asked, *(asked | {"noise": n, "angle_random_walk": 0} for n in (1e-5, 2e-5))]
+    own = {task["noise"]: obsdeg.simulate(**task) for task in tasks[1:]}
+    for chunk in (1, 3):
+        folder = tmp_path / str(chunk)
+        rows = pandas.read_parquet(campaign.sweep(folder, tasks, chunk=chunk, executor=lambda: ThreadPoolExecutor(1)))
+        assert len(rows) == 3 * 15 and set(rows["degree"].dropna()) == {0, 1, 2}
+        noise_of = rows["task"].map(lambda task: json.loads(task).get("noise"))
+        plain = rows[noise_of.isna()]
+        assert len(plain) == 15 and plain["sigma"].isna().all() and plain["outcome"].isna().all()
+        sigma = {}
+        for noise, run in own.items():
+            mine = rows[noise_of == noise].set_index("name")
+            assert dict(mine["sigma"]) == {q.name: q.sigma for q in run.quantities}
+            assert dict(mine["outcome"]) == {q.name: q.outcome for q in run.quantities}
+            assert dict(mine["unit"]) == {q.name: q.unit for q in run.quantities}
+            sigma[noise] = mine["sigma"]
+        # what is measured is as much worse, what only the prior knows is as it was
+        ratio = sigma[2e-5] / sigma[1e-5]
+        assert ratio["D_FX"] == pytest.approx(2, rel=1e-3) and ratio["D_IX"] == pytest.approx(1)
 
 
 def _slowly(task: int) -> int:
