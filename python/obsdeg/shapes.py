@@ -2342,7 +2342,9 @@ class Clock(Record):
     that was run so.
     """
     by_earth: ClockByEarth | None
-    """By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part."""
+    """By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part. Nothing where
+    sigma would be above a third.
+    """
 
 
 class RecordReport(Record):

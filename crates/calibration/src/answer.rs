@@ -404,7 +404,7 @@ pub struct RecordReport {
 pub struct Clock {
     /// By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme that was run so.
     pub by_durations: Option<f64>,
-    /// By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part.
+    /// By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part. Nothing where sigma would be above a third.
     pub by_earth: Option<ClockByEarth>,
 }
 

@@ -69,7 +69,7 @@ fn clock(c: &Clock) -> String {
         ),
         Some(e) => format!(
             "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong by as much{held}",
-            (300.0 * e.sigma).min(100.0)
+            300.0 * e.sigma
         ),
         None => format!("; a wrong clock does not show in it, and would make drifts wrong by as much{held}"),
     }

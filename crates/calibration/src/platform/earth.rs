@@ -16,12 +16,12 @@ use crate::least_squares::Information;
 
 /// By this part the rates are moved to see what that does.
 const MOVED: f64 = 0.005;
-/// A clock of which so little shows may be off by twice as much as it goes.
-const FLAT: f64 = 1e-5;
+/// With a larger sigma the clock may be off by all that it goes (three sigma), which the parabola at rates so near does not reach.
+const LARGEST: f64 = 1.0 / 3.0;
 
 impl Parts<'_> {
     /// The part by which the clock of run `r` is fast, by the rates of the earth and of turns that fit its measurements best when all unknowns follow: of the sum of
-    /// squares at three rates, the lowest point of a parabola; `None` where they are all the same.
+    /// squares at three rates, the lowest point of a parabola; `None` where they are nearly the same.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is none.
@@ -52,10 +52,11 @@ impl Parts<'_> {
         // turns that take longer may not fit between two samples: of faster ones alone
         let [same, fast, faster] = [left(0.0)?, left(MOVED)?, left(2.0 * MOVED)?];
         let curvature = same - 2.0 * fast + faster;
+        let sigma = MOVED * (2.0 / curvature).sqrt();
         // a fast clock makes all rates small
-        Ok((curvature > FLAT).then(|| ClockByEarth {
+        Ok((sigma < LARGEST).then(|| ClockByEarth {
             fast: -MOVED * (3.0 * same - 4.0 * fast + faster) / (2.0 * curvature),
-            sigma: MOVED * (2.0 / curvature).sqrt(),
+            sigma,
         }))
     }
 }
