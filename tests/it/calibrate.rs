@@ -606,3 +606,37 @@ fn bad_records_are_refused_with_their_place() {
         "{text}"
     );
 }
+
+/// Rates that do not fit are put down to the clock where the times of positions say so too.
+#[test]
+fn a_clock_is_blamed_where_times_say_so_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let right = fs::read_to_string(crate_root(RECORD)).expect("read");
+    let fast: String = right
+        .lines()
+        .map(|line| match line.split_once(',') {
+            Some((t, rest)) if t.parse::<f64>().is_ok() => {
+                format!("{},{rest}\n", t.parse::<f64>().expect("a time") * 1.02)
+            }
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let file = folder.path().join("fast.csv");
+    fs::write(&file, fast).expect("written");
+    let said = |arguments: &[&str]| {
+        let output = run(&[&["calibrate", SCHEME], arguments].concat());
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let clock = said(&[&file.display().to_string()]);
+    assert!(clock.contains("the clock: positions begin and end as by a clock that is 1.9"), "{clock}");
+    assert!(clock.contains("those that the earth rate tells by more"), "{clock}");
+    // a right clock, and another latitude or rate of turns than was
+    for wrong in [["--latitude", "49"], ["--slew-rate", "3"]] {
+        let rates = said(&[RECORD, wrong[0], wrong[1]]);
+        assert!(
+            rates.contains("another latitude or rate of turns") && !rates.contains("the clock:"),
+            "{rates}"
+        );
+    }
+}

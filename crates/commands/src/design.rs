@@ -117,8 +117,8 @@ pub struct Search {
     pub front: Vec<usize>,
 
     /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
-    /// interrupted part goes on when the same command is given again. What only the answer has (--refine, --divide, --front, --restarts, --format and
-    /// what goes with it) acts where the parts are merged
+    /// interrupted part goes on when the same command is given again. All options are given to the parts and to their merge alike, but for --format
+    /// and what goes with it; --refine, --divide, --front and --restarts act where the parts are merged
     #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
     pub part: Option<[usize; 2]>,
 

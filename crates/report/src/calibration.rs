@@ -2,8 +2,8 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Clock, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit, PositionsBy,
-    RecordReport, ResidualSeries,
+    Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit,
+    PositionsBy, RecordReport, ResidualSeries,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -56,6 +56,12 @@ fn part(fast: f64) -> String {
 /// From this part on an error of the clock is large.
 const CLOCK: f64 = 0.1;
 
+/// Whether durations and rates tell of the same clock: a quarter of its error is what drifts that follow take of it.
+pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth>) -> bool {
+    let both = by_durations.zip(by_earth);
+    both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
+}
+
 /// What is known of the clock of a record.
 fn clock(c: &Clock) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
@@ -68,10 +74,12 @@ fn clock(c: &Clock) -> String {
             number(100.0 * e.sigma)
         ),
         Some(e) => format!(
-            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong by as much{held}",
+            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong by as much or more{held}",
             300.0 * e.sigma
         ),
-        None => format!("; a wrong clock does not show in it, and would make drifts wrong by as much{held}"),
+        None => format!(
+            "; a wrong clock does not show in it, and would make drifts wrong by as much or more{held}"
+        ),
     }
 }
 
@@ -104,24 +112,24 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
         }
         Finding::Clock { record, by_durations, by_earth } => {
-            let mut says = Vec::new();
-            if let Some(fast) = by_durations {
-                says.push(format!("positions begin and end as by a clock that is {}", part(*fast)));
+            let of = of(record, records);
+            let held = by_durations
+                .map(|fast| format!("positions begin and end as by a clock that is {}", part(fast)));
+            let rates =
+                by_earth.as_ref().map(|e| format!("{} (sigma {} %)", part(e.fast), number(100.0 * e.sigma)));
+            match (held, rates) {
+                (Some(held), Some(rates)) if is_clock(*by_durations, by_earth.as_ref()) => format!(
+                    "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are off by that part, those that the earth rate tells by more"
+                ),
+                (held, Some(rates)) => format!(
+                    "the rates of the earth and of turns{of} are not those of the scheme: they fit best as by a clock that is {rates}{}; another latitude or rate of turns, or an error that no unknown explains, look the same, and are likelier where positions last as in the scheme",
+                    held.map_or_else(String::new, |held| format!(", while {held}"))
+                ),
+                (held, None) => format!(
+                    "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from positions that were held so much longer or shorter: by a clock drifts are off by that part or more, else the scheme has other times than its run",
+                    held.unwrap_or_default()
+                ),
             }
-            if let Some(e) = by_earth {
-                says.push(format!(
-                    "by the rates of the earth and of turns it is {} (sigma {} %)",
-                    part(e.fast),
-                    number(100.0 * e.sigma)
-                ));
-            }
-            let rest = match by_earth {
-                Some(_) => "drifts are off by that part",
-                None => {
-                    "the rates of the earth and of turns do not tell a clock from positions that were held so much longer or shorter: by a clock drifts are off by that part, else the scheme has other times than its run"
-                }
-            };
-            format!("the clock{}: {}; {rest}", of(record, records), says.join(", "))
         }
         Finding::Position { record, position, chi_square, factor } => format!(
             "the model does not explain position {position}{} (chi-square {} per degree of freedom): {} there",

@@ -9,6 +9,7 @@ use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::requirements::Miss;
 
 use super::fewest_of_all;
+use crate::calibration::is_clock;
 use crate::document::number;
 use crate::words;
 
@@ -250,11 +251,20 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         Finding::NotSettled => {
             "a look at units, labels and times of the record, and first estimates near the truth ([simulation.estimates])".into()
         }
-        Finding::Clock { .. } => {
-            "the times of the record set right: its clock is not that of the scheme or of the earth, and drifts are wrong by the same part".into()
+        Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
+            (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
+                "the times of the record set right: its clock is that of neither the scheme nor the earth, and drifts are wrong by the same part or more"
+            }
+            (_, Some(_)) => {
+                "a look at latitude, rate of turns and times of the record, and at errors that are no unknowns: its rates are not those of the scheme"
+            }
+            (_, None) => {
+                "the times of the record held against those of its run: if its clock is wrong so are drifts, by the same part or more"
+            }
         }
+        .into(),
         Finding::Force { .. } => {
-            "scales and zeros of the accelerometers among the unknowns (K1, K0 in `terms`), or the gravity of the place (--gravity)".into()
+            "scales and zeros of the accelerometers among the unknowns (K1, K0 in `terms`), or the gravity of the place (--gravity, of forces in m/s^2)".into()
         }
         Finding::Position { .. } => at_positions(c),
         Finding::Noise { .. } | Finding::Channel { .. } => {
