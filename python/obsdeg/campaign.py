@@ -21,12 +21,14 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from decimal import Decimal
 from itertools import islice, product
 from pathlib import Path
 from typing import Any
 
 import obsdeg
 
+from ._files import Text
 from .options import Analyze, Simulate
 
 #: Makes an executor; one that is broken, because a worker was killed, is replaced by another.
@@ -148,9 +150,26 @@ def _close(pool: Executor) -> None:
         pool.shutdown(wait=False)
 
 
+def _plain(value: Any) -> Any:
+    """What is no JSON by itself, with all its digits."""
+    if isinstance(value, Text):
+        return value.text
+    if isinstance(value, (Decimal, os.PathLike)):
+        return str(value)
+    if isinstance(value, range):
+        return list(value)
+    if hasattr(value, "tolist"):
+        # arrays and numbers of numpy
+        return value.tolist()
+    raise TypeError(f"found {value!r} of type {type(value).__name__}; expected what JSON can hold, a decimal, an array or a Scheme")
+
+
+def _asked(options: Any) -> str:
+    return json.dumps(options, sort_keys=True, default=_plain)
+
+
 def _digest(asked: Any) -> str:
-    text = json.dumps([obsdeg.__version__, asked], sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return hashlib.sha256(_asked([obsdeg.__version__, asked]).encode()).hexdigest()[:16]
 
 
 def _place(path: Path, text: bytes) -> None:
@@ -223,14 +242,15 @@ _JUDGED = Analyze.__optional_keys__ - Simulate.__optional_keys__
 
 def _rows(task: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """What is found of a task, a row per unknown."""
-    what = [obsdeg.Scheme.from_text(task["scheme"])] if "scheme" in task else []
+    given: Any = task.get("scheme")
+    what = [given if isinstance(given, obsdeg.Scheme) else obsdeg.Scheme.from_text(given)] if "scheme" in task else []
     options = {name: value for name, value in task.items() if name != "scheme"}
     verdicts = obsdeg.analyze(*what, **{"solutions": False, **{k: v for k, v in options.items() if k not in _MEASURED}}).to_dict()
     numbers = {}
     if _MEASURED & options.keys():
         run = obsdeg.simulate(*what, **{k: v for k, v in options.items() if k not in _JUDGED}).to_dict()
         numbers = {q["name"]: q for q in run["quantities"]}
-    asked = {"task": json.dumps(task, sort_keys=True, default=str), **{name: str(value) for name, value in options.items()}}
+    asked = {"task": _asked(task), **{name: str(value) for name, value in options.items()}}
     for q in verdicts["quantities"]:
         n = numbers.get(q["name"], {})
         found = {"rank": verdicts["rank"], "name": q["name"], "status": q["status"], "degree": q.get("degree")}
@@ -242,13 +262,26 @@ def _verdicts(tasks: list[dict[str, Any]]) -> bytes:
     import pyarrow.parquet
 
     sink = pyarrow.BufferOutputStream()
-    table = pyarrow.Table.from_pylist([row for task in tasks for row in _rows(task)])
-    # also where no row has one
-    for name, kind in {"degree": pyarrow.int32(), "sigma": pyarrow.float64(), "unit": pyarrow.string(), "outcome": pyarrow.string()}.items():
-        table = table.set_column(table.schema.get_field_index(name), name, table.column(name).cast(kind))
-    table = table.replace_schema_metadata({"obsdeg": obsdeg.__version__})
+    rows = [row for task in tasks for row in _rows(task)]
+    kinds = {"rank": pyarrow.int64(), "degree": pyarrow.int32(), "sigma": pyarrow.float64()}
+    names = dict.fromkeys(name for row in rows for name in row)
+    schema = pyarrow.schema([(name, kinds.get(name, pyarrow.string())) for name in names], {"obsdeg": obsdeg.__version__})
+    table = pyarrow.Table.from_pylist(rows, schema)
     pyarrow.parquet.write_table(table, sink)
     return bytes(sink.getvalue())
+
+
+def _done(folder: Path) -> set[str]:
+    """The tasks of this version that the files of a folder hold."""
+    import pyarrow.parquet
+
+    done: set[str] = set()
+    for file in folder.glob("*.parquet"):
+        head = pyarrow.parquet.read_schema(file)
+        if "task" in head.names and (head.metadata or {}).get(b"obsdeg") == obsdeg.__version__.encode():
+            tasks = pyarrow.parquet.read_table(file, columns=["task"]).column("task").unique().to_pylist()
+            done.update(hashlib.sha256(task.encode()).hexdigest()[:16] for task in tasks)
+    return done
 
 
 def sweep(
@@ -263,9 +296,10 @@ def sweep(
     """Judges many schemes: a row per unknown, in Parquet files that come as they are done.
 
     Args:
-        folder: holds the files, one a chunk, named by what it asks; those that are there are not asked again. Read all with ``pandas.read_parquet(folder)``.
-            The column ``task`` holds all options of a row as JSON; each option is a column too, in the files whose tasks have it.
-        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is the text of a scheme file. A task with options that only
+        folder: holds the files, one a chunk, named by what it asks; tasks that are there are not asked again, whatever the chunks. Read all with
+            ``pandas.read_parquet(folder)``. The column ``task`` holds all options of a row as JSON; each option is a column of text too, in the files
+            where a task has it (pandas shows the columns of one file: where options differ from file to file, take them from ``task``).
+        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is a :class:`obsdeg.Scheme`, or the text of a scheme file. A task with options that only
             :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated too: ``sigma`` is the standard deviation at the
             end of the run in ``unit``, and ``outcome`` says whether it is a measured one; elsewhere these are empty.
         chunk: tasks that are judged together.
@@ -278,22 +312,28 @@ def sweep(
     _check("chunk", chunk, 1)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    done = 0
+    done = told = 0
+    there = _done(folder)
+
+    def is_missing(task: dict[str, Any]) -> bool:
+        nonlocal done
+        known = bool(there) and hashlib.sha256(_asked(task).encode()).hexdigest()[:16] in there
+        done += known
+        return not known
 
     def missing() -> Iterator[list[dict[str, Any]]]:
-        nonlocal done
-        rest = map(dict, tasks)
+        rest = filter(is_missing, map(dict, tasks))
         while some := list(islice(rest, chunk)):
-            if (folder / f"{_digest(some)}.parquet").exists():
-                done += len(some)
-            else:
-                yield some
+            yield some
 
     for some, table in run(_verdicts, missing(), executor=executor, retries=retries):
         _place(folder / f"{_digest(some)}.parquet", table)
         done += len(some)
+        told = done
         if heard is not None:
             heard(done)
+    if heard is not None and told != done:
+        heard(done)
     return folder
 
 

@@ -204,3 +204,49 @@ def test_the_example_in_parts_is_the_whole(tmp_path: Path) -> None:
     assert table.strip() == str(whole).strip() and "proven" in table
     measured = subprocess.run([*command, "--measure", "--positions", "5"], capture_output=True, text=True, check=True)
     assert "all 24 parts: 3.32e+05 sequences" in measured.stdout
+
+
+def test_arrays_are_told_apart_by_all_their_digits(tmp_path: Path) -> None:
+    numpy, pandas = pytest.importorskip("numpy"), pytest.importorskip("pandas")
+    near = [numpy.array([[0, 0, 0], [28.123456789, 0, 0]]), numpy.array([[0, 0, 0], [28.123456788, 0, 0]])]
+    long = [numpy.zeros((400, 3)), numpy.zeros((400, 3))]
+    long[1][200, 0] = 90
+    tasks: list[dict[str, Any]] = [dict(angles=a, terms="F") for a in [*near, *long]]
+    rows = pandas.read_parquet(campaign.sweep(tmp_path, tasks, chunk=1, executor=lambda: ThreadPoolExecutor(1)))
+    assert rows["task"].nunique() == 4
+    # each can be asked again
+    for asked in rows["task"].unique():
+        found = rows[rows["task"] == asked]
+        assert dict(zip(found["name"], found["status"], strict=True)) == obsdeg.analyze(**json.loads(asked), solutions=False).statuses
+    with pytest.raises(TypeError, match="of type set; expected what JSON can hold"):
+        campaign.sweep(tmp_path, [dict(angles={1})])
+
+
+def test_a_sweep_goes_on_with_other_chunks_and_orders(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    tasks = list(campaign.grid(angles=[[(0, 0, 0), (a, 0, 0)] for a in (90, 120, 150)], latitude=[0, 45]))
+
+    def sweep(tasks: list[dict[str, Any]], chunk: int) -> list[int]:
+        heard: list[int] = []
+        campaign.sweep(tmp_path, tasks, chunk=chunk, executor=lambda: ThreadPoolExecutor(1), heard=heard.append)
+        return heard
+
+    assert sweep(tasks[:3], 2) == [2, 3]
+    assert sweep([tasks[5], *tasks[:5]], 4)[-1] == 6
+    assert sweep(tasks[::-1], 1) == [6]
+    rows = pandas.read_parquet(tmp_path)
+    assert len(rows) == 6 * 15 and rows["task"].nunique() == 6
+
+
+def test_options_of_some_tasks_and_schemes(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pair = [(0, 0, 0), (180, 0, 0)]
+    scheme = obsdeg.Scheme(pair, carry="inertial", latitude=28.2)
+    tasks: list[dict[str, Any]] = [dict(angles=pair), dict(angles=pair, latitude=45, noise=2e-5), dict(scheme=scheme), dict(scheme=scheme.text, noise=1e-5)]
+    rows = pandas.read_parquet(campaign.sweep(tmp_path, tasks, executor=lambda: ThreadPoolExecutor(1)))
+    assert rows["latitude"].isna().sum() == 45 and set(rows["latitude"].dropna()) == {"45"}
+    assert set(rows["noise"].dropna()) == {"2e-05", "1e-05"} and rows["sigma"].notna().sum() == 30
+    own = obsdeg.analyze(scheme, solutions=False).statuses
+    asked = rows["task"].map(json.loads)
+    mine = rows[asked.map(lambda task: "scheme" in task and "noise" not in task)]
+    assert dict(zip(mine["name"], mine["status"], strict=True)) == own
