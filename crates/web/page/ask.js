@@ -146,11 +146,11 @@ function sweepKey(axis) {
   return JSON.stringify([state.selected, s]);
 }
 
-/** The angles that are tried along a slider: multiples of 5, then where it stands as the other positions do, or a quarter turn or more from that. */
+/** The angles that are tried along a slider: multiples of 5, then those of the other positions, their mirror images, and quarter turns from both. */
 function anglesToTry(axis) {
   const wrapped = (angle) => +(((angle + 540) % 360) - 180).toFixed(9);
   const others = state.scheme.position.filter((_, i) => i !== state.selected).map((p) => anglesOfPosition(p)?.[axis] ?? 0);
-  const more = others.flatMap((angle) => [0, 90, 180, 270].map((turn) => wrapped(angle + turn))).filter((angle) => angle % 5 !== 0);
+  const more = others.flatMap((angle) => [0, 90, 180, 270].flatMap((turn) => [wrapped(turn + angle), wrapped(turn - angle)])).filter((angle) => angle % 5 !== 0);
   return [...GRID, ...new Set(more)];
 }
 
@@ -238,8 +238,8 @@ function mark(slider, grid, degrees) {
     return line;
   }));
   const at = other.map(([angle]) => angle).join(', ');
-  const more = grid.length > GRID.length ? ' and where it stands as another position does' : '';
-  $(slider).title = at ? `Other verdicts at ${at} deg` : `The same verdicts at all multiples of 5 deg${more}`;
+  const tried = `tried: multiples of 5${grid.length > GRID.length ? ' and the angles of other positions, their mirror images and quarter turns from both' : ''}`;
+  $(slider).title = at ? `Other verdicts at ${at} deg (${tried})` : `The same verdicts at all angles (${tried})`;
 }
 
 const LATITUDES = GRID.filter((angle) => Math.abs(angle) <= 90);

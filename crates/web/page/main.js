@@ -21,8 +21,6 @@ function download(text, name, type) {
   setTimeout(() => URL.revokeObjectURL(url), 10000);
 }
 
-const stem = () => state.name.replace(/\.(toml|json)$/i, '') || 'scheme';
-
 async function openFile(file) {
   if (!file) return;
   if (file.size > 4e6) return void say(`${file.name}: ${file.size} bytes; expected a scheme or a model`);
@@ -37,7 +35,7 @@ async function openLink() {
   if (text === null) { say('This link is damaged: expected an address that this page made.'); return false; }
   if (held.has('text')) {
     writing.own = true;
-    setText(text, 'text.toml');
+    if (text !== $('text').value) setText(text, 'text.toml');
     show('text');
     return false;
   }
@@ -49,6 +47,7 @@ function wireFiles() {
   $('open').addEventListener('click', () => $('file').click());
   $('file').addEventListener('change', () => { openFile($('file').files[0]); $('file').value = ''; });
   const isText = () => !$('panel-text').hidden;
+  const stem = () => (isText() ? writing.name : state.name).replace(/\.(toml|json)$/i, '') || 'scheme';
   $('save').addEventListener('click', () => (isText() ? download($('text').value, writing.name, 'application/toml')
     : download(toToml(state.scheme), `${stem()}.toml`, 'application/toml')));
   const current = () => (isText() ? { name: writing.name, text: $('text').value } : source(state.scheme));
@@ -70,8 +69,8 @@ function wireFiles() {
   });
   $('link').addEventListener('click', () => {
     location.hash = isText() ? `text=${packed($('text').value)}` : `scheme=${packed(toToml(state.scheme))}`;
-    navigator.clipboard?.writeText(location.href).then(() => say('The link to this scheme is in the address bar and copied.', 'fine'),
-      () => say('The link to this scheme is in the address bar.', 'fine'));
+    navigator.clipboard?.writeText(location.href).then(() => say('The link is in the address bar and copied.', 'fine'),
+      () => say('The link is in the address bar.', 'fine'));
   });
   window.addEventListener('hashchange', openLink);
   document.addEventListener('dragover', (e) => { e.preventDefault(); document.body.classList.add('over'); });
