@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command};
 use obsdeg_commands::{Expected, Given, Source};
+use obsdeg_evidence::requirements::Requirements;
 
 use crate::failure::Failure;
 use crate::input::{one_on_stdin, read_all, read_as};
@@ -75,6 +76,38 @@ impl AllFiles {
             }
         }
         Ok(read)
+    }
+}
+
+/// Whether a script is to hear of requirements that are missed.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct RequireMet {
+    /// Exit with 1 where a stated requirement is missed; with 2 where none is stated
+    #[arg(long, help_heading = "Output")]
+    require_met: bool,
+}
+
+impl RequireMet {
+    /// Refuses an answer in which no requirement is stated.
+    ///
+    /// # Errors
+    /// A failure of the input, before anything is written.
+    pub(crate) fn check<'a>(self, all: impl IntoIterator<Item = &'a Requirements>) -> Result<(), Failure> {
+        match self.require_met && all.into_iter().all(|r| r.stated == 0) {
+            true => Err(Failure::input(
+                "--require-met: no requirement is stated; expected --requirement NAME=SIGMA or [requirements] in the scheme file".into(),
+            )),
+            false => Ok(()),
+        }
+    }
+
+    /// Says by the exit code that a requirement is missed.
+    ///
+    /// # Errors
+    /// A failed check, behind the answer.
+    pub(crate) fn decide<'a>(self, all: impl IntoIterator<Item = &'a Requirements>) -> Result<(), Failure> {
+        let missed = self.require_met && all.into_iter().any(Requirements::any_missed);
+        if missed { Err(Failure::check()) } else { Ok(()) }
     }
 }
 

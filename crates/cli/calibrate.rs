@@ -7,6 +7,7 @@ use clap::{Arg, Args};
 use obsdeg_calibration::record::Record;
 use obsdeg_commands::{Calibrate, Expected, Given, Host, Source, calibrate};
 
+use crate::arguments::RequireMet;
 use crate::failure::Failure;
 use crate::input::{Kind, is_stdin, open, read, read_as};
 use crate::interrupt;
@@ -29,7 +30,7 @@ its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of 
 instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv, \
 covariance.csv, residuals.csv and figures.
 
-Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are \
+Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are \
 read).";
 
 #[derive(Debug, Args)]
@@ -54,6 +55,9 @@ pub(crate) struct Arguments {
     /// A calibration of the same platform or system before: the JSON that -o writes (one that was not consistent counts with its sigmas rescaled)
     #[arg(long = "prior", value_name = "FILE")]
     before: Option<PathBuf>,
+
+    #[command(flatten)]
+    met: RequireMet,
 
     #[command(flatten)]
     output: Output,
@@ -85,10 +89,11 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let host = Host { worker: None, going: &going };
     let found = calibrate(&a.asked, named, records, before.as_ref(), &host)?;
     drop(bar);
+    a.met.check(found.requirements())?;
     a.output.write_folder(&found, "calibration.json", || found.files())?;
     match found.passed() {
         _ if found.interrupted() => Err(Failure::unfinished("interrupted".into())),
-        true => Ok(()),
+        true => a.met.decide(found.requirements()),
         false => Err(Failure::check()),
     }
 }

@@ -3,7 +3,7 @@
 use clap::{Arg, Args};
 use obsdeg_commands::{Compare, Source, compare};
 
-use crate::arguments::AllFiles;
+use crate::arguments::{AllFiles, RequireMet};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::Output;
@@ -14,10 +14,10 @@ Examples:
   obsdeg compare examples/five-positions/scheme.toml examples/six-positions/scheme.toml
   obsdeg compare a.toml b.toml --carry inertial --requirement D=0.05 --format markdown -o review.md
 
-Requirements are those of a scheme file, [requirements], or --requirement. Gyro noise adds the noise floor of every coefficient: \
-predicted sigmas are without drift noise.
+Requirements are those of a scheme file, [requirements], or --requirement; without, none is judged. Predicted sigmas are those at the end \
+of the scheme, with the random drift and the priors that are stated. Gyro noise adds the noise floor of every coefficient.
 
-Exit codes: 0 done (whether requirements are met or not), 2 bad input, 3 internal error, 130 interrupted.";
+Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, override_usage = "obsdeg compare [OPTIONS] <FILE>...", mut_args(words))]
@@ -27,6 +27,9 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     files: AllFiles,
+
+    #[command(flatten)]
+    met: RequireMet,
 
     #[command(flatten)]
     output: Output,
@@ -51,5 +54,9 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let spinner = Spinner::start("judging schemes", a.output.target.quiet);
     let comparison = compare(&a.asked, read);
     drop(spinner);
-    a.output.write(&comparison?)
+    let comparison = comparison?;
+    let requirements = || comparison.schemes.iter().map(|s| &s.requirements);
+    a.met.check(requirements())?;
+    a.output.write(&comparison)?;
+    a.met.decide(requirements())
 }

@@ -7,6 +7,7 @@ use clap::{Arg, Args};
 use obsdeg_commands::{Designed, Host, Search, SearchFiles, Source, design, is_word};
 use obsdeg_design::design::Part;
 
+use crate::arguments::RequireMet;
 use crate::failure::Failure;
 use crate::input::{is_stdin, read};
 use crate::interrupt;
@@ -36,7 +37,7 @@ differ (--terms all) the criterion is d or margin; where torquer errors act on s
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json, \
 winner.toml (a scheme file), its positions as a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 
-Exit codes: 0 done (with --minimum also when no positions do), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
+Exit codes: 0 done (with --minimum also when no positions do), 1 the first scheme misses a requirement (with --require-met), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
@@ -47,6 +48,9 @@ pub(crate) struct Arguments {
     /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0); all other options as they were
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = "Parts", conflicts_with_all = ["minimum", "part"])]
     merge: Vec<PathBuf>,
+
+    #[command(flatten)]
+    met: RequireMet,
 
     #[command(flatten)]
     output: Output,
@@ -85,7 +89,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let designed = design(&a.asked, &files, &Host { worker: None, going: &going });
     drop(bar);
     match designed? {
-        Designed::Schemes(found) => a.output.write_folder(&*found, "design.json", || found.files()),
+        Designed::Schemes(found) => {
+            let first = || found.found.found.first().map(|f| &f.requirements);
+            a.met.check(first())?;
+            a.output.write_folder(&*found, "design.json", || found.files())?;
+            a.met.decide(first())
+        }
         Designed::Walks(found) => {
             a.output.write_folder(&*found, "walks.json", || Ok::<_, Failure>(found.files()))
         }

@@ -6,7 +6,7 @@ use clap::{Arg, Args};
 use obsdeg_commands::{CalibrationFile, Given, Host, Report, Source, Word, one_of, origin, report};
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
-use crate::arguments::AllFiles;
+use crate::arguments::{AllFiles, RequireMet};
 use crate::engine::{EngineArguments, notice};
 use crate::failure::Failure;
 use crate::input::read;
@@ -26,7 +26,7 @@ Examples:
 The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their pictures in a \
 folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
 
-Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
+Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 
 /// The words of `--format`.
 const FORMATS: [Word<ReviewFormat>; 4] = [
@@ -55,6 +55,9 @@ pub(crate) struct Arguments {
     /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several times
     #[arg(long, value_name = "FOLDER")]
     calibration: Vec<PathBuf>,
+
+    #[command(flatten)]
+    met: RequireMet,
 
     #[command(flatten)]
     engine: EngineArguments,
@@ -96,12 +99,13 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     };
     let mut host = Host { worker: worker.as_mut(), going: &going };
     let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
+    a.met.check(reviewed.requirements())?;
     bar.says("writing");
     let written = reviewed.files(&origin, format, &folder)?;
     drop(bar);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
     notice(worker.as_ref().map_or(&[], |w| w.banner()), a.target.quiet);
-    Ok(())
+    a.met.decide(reviewed.requirements())
 }
 
 /// A calibration, and what it is called: its folder.

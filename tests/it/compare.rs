@@ -102,11 +102,21 @@ fn requirements_are_those_of_all_unknowns() {
     let psi = |names: &[&str]| -> Vec<(String, Miss)> {
         names.iter().map(|n| (n.to_string(), Miss::TooLarge)).collect()
     };
-    let five = review(&scheme(&S6[..5], Carry::Inertial));
+    let under = |scheme: Scheme, stated: &[(&str, f64)]| {
+        let stated = stated.iter().map(|(name, value)| Assignment { name: (*name).into(), value: *value });
+        let conditions = Conditions { requirements: stated.collect(), ..Conditions::default() };
+        compare(&[Entry { name: "it".into(), scheme, conditions }], 1).expect("compared").schemes.remove(0)
+    };
+    let five = under(scheme(&S6[..5], Carry::Inertial), &[("D", 0.1), ("psi", 0.001)]);
     assert_eq!(missed(&five), psi(&["psi_x", "psi_y", "psi_z"]));
-    let worst = five.requirements.worst.clone().expect("a margin");
-    assert!(worst.name == "psi_y" && (worst.margin - 0.068).abs() < 1e-4, "{worst:?}");
+    assert_eq!((five.requirements.stated, five.requirements.met), (15, 12));
     assert!(!five.meets_requirements && five.worst.as_ref().is_some_and(|w| w.sigma_dph < 0.1));
+    // none stated: none judged
+    let nothing = review(&scheme(&S6[..5], Carry::Inertial));
+    assert_eq!(
+        (nothing.requirements.stated, nothing.meets_requirements, missed(&nothing)),
+        (0, false, vec![])
+    );
     // under reset carry each position has a psi of its own, and a requirement may name one of them
     let of_position = |name: &str| Conditions {
         requirements: vec![Assignment { name: name.into(), value: 1e-3 }],
@@ -121,7 +131,7 @@ fn requirements_are_those_of_all_unknowns() {
     assert_eq!((six.requirements.stated, missed(&six)), (1, psi(&["psi_y@4"])));
     assert_eq!(reset("psi").requirements.stated, 18);
     // one decision: what is met is what has a margin of at least one, by the numbers of the table
-    let paper = review(&scheme(&["0,0,0", "180,0,0"], Carry::Platform));
+    let paper = under(scheme(&["0,0,0", "180,0,0"], Carry::Platform), &[("D", 0.1)]);
     for r in [&five, &six, &paper] {
         let asked = r.quantities.iter().filter(|q| q.requirement.is_some());
         let met: Vec<bool> =
@@ -246,7 +256,7 @@ fn conditions_and_dwell() {
     let given = ["--noise", "2e-6", "--step", "2.5", "--dwell", "300", "--latitude", "40"];
     let text = run(&[&[five][..], &given].concat()).replace("\n      ", " ");
     for said in [
-        "sigma: information of all samples, no prior, no drift noise; psi at the start",
+        "sigma: information of all samples, no prior, no random drift; psi at the end",
         "noise of Z 2e-6 g per sample and axis; steps of at most 2.5 s",
         "300 s at a position unless it says otherwise, repositioning at once",
         "latitude 40 deg",
@@ -333,7 +343,13 @@ fn sigmas_at_the_schemes_own_drifts() {
         let entry = Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions };
         compare(&[entry], 1).expect("compared").schemes.remove(0)
     };
-    let large = compared(Conditions::default());
+    // the drifts of the paper are no scheme's own, unless a scheme states them
+    let drift = |name: &str, value| Assignment { name: name.into(), value };
+    let stated = vec![drift("D_FX", 11.0), drift("D_FY", 12.0), drift("D_FZ", 13.0)];
+    let own = Conditions { values: [Conditions::default().values, stated].concat(), ..Conditions::default() };
+    let nothing = compared(Conditions::default());
+    assert!(nothing.validity.is_none() && nothing.quantities.iter().all(|q| q.sigma_extended.is_none()));
+    let large = compared(own.clone());
     let of =
         |r: &ComparedScheme, name: &str| r.quantities.iter().find(|q| q.name == name).expect("there").clone();
     assert!(!large.validity.as_ref().expect("drifts").holds);
@@ -344,22 +360,15 @@ fn sigmas_at_the_schemes_own_drifts() {
     assert!((0.6..0.9).contains(&of(&large, "D_FY").sigma_extended.expect("beside")));
     assert_eq!(of(&large, "psi_x").sigma_extended, None);
     let text = obsdeg_report::written(
-        &compare(
-            &[Entry {
-                name: "p1p2".into(),
-                scheme: paper(Carry::Platform),
-                conditions: Conditions::default(),
-            }],
-            1,
-        )
-        .expect("compared"),
+        &compare(&[Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions: own }], 1)
+            .expect("compared"),
         Format::Table,
         Layout::default(),
     )
     .expect("text");
     assert!(
-        text.contains("Sigma at the scheme's own drifts")
-            && text.contains("p1p2: at its own drifts |psi| reaches 11.81 deg"),
+        text.contains("Sigma at the drifts that are stated")
+            && text.contains("p1p2: at the drifts that are stated |psi| reaches 11.81 deg"),
         "{text}"
     );
     let psi = Assignment { name: "psi".into(), value: 1e-4 };

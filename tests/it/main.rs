@@ -5,6 +5,7 @@
 mod book;
 mod browser;
 mod calibrate;
+mod chain;
 mod cli;
 mod commands;
 mod compare;

@@ -28,8 +28,9 @@ fn validators() -> BTreeMap<String, Validator> {
     ];
     let of = |kind: &str| {
         let schema = json(&["schema", kind]);
-        assert_eq!(schema["$id"], format!("urn:obsdeg:{kind}:1"));
-        (format!("obsdeg.{kind}/1"), jsonschema::validator_for(&schema).expect("a schema"))
+        let version = if ["comparison", "design", "simulation"].contains(&kind) { 2 } else { 1 };
+        assert_eq!(schema["$id"], format!("urn:obsdeg:{kind}:{version}"));
+        (format!("obsdeg.{kind}/{version}"), jsonschema::validator_for(&schema).expect("a schema"))
     };
     kinds.map(of).into()
 }

@@ -14,6 +14,7 @@ use obsdeg_calibration::{
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges;
 use obsdeg_core::model::settings::{DriftNoise, Settings};
+use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{
     Answer, Document, File, Format, Layout, ReportError, Table, calibration_figures, covariance_csv,
@@ -168,6 +169,14 @@ impl Answer for Calibrated {
 }
 
 impl Calibrated {
+    /// What becomes of the requirements, where some are stated.
+    pub fn requirements(&self) -> Option<&Requirements> {
+        match self {
+            Self::Platform(c) => c.requirements.as_ref(),
+            Self::Model(_) => None,
+        }
+    }
+
     /// Whether the model and its sigmas explain the records.
     pub fn passed(&self) -> bool {
         match self {

@@ -66,8 +66,19 @@ pub struct MeasurementOptions {
     #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
     pub azimuth_noise: Option<f64>,
 
-    /// Largest standard deviation allowed for an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D=0.05, D_FX=0.01, K1=5
-    /// (default: psi 0.01, D 0.1; 1e-12 to 1e9)
+    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
+    /// (default: none in predictions, 0.01 deg/h in simulated runs; 0, or 1e-12 to 1e6)
+    #[arg(long, value_name = "NOISE")]
+    pub drift_noise: Option<DriftNoise>,
+
+    /// Standard deviation of an unknown or family beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_F=0.1, psi=0.05. It counts in sigmas, not in
+    /// what is observable (default: none in predictions; in simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
+    #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
+    #[serde(with = "text::list")]
+    pub prior: Vec<Assignment>,
+
+    /// Largest standard deviation allowed at the end for an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D=0.05, D_FX=0.01, K1=5
+    /// (default: none, so that nothing is judged; 1e-12 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
     #[serde(with = "text::list")]
     pub requirement: Vec<Assignment>,
@@ -136,11 +147,6 @@ pub struct ConditionOptions {
     #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 
-    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
-    /// (default: 0.01 deg/h; 0, or 1e-12 to 1e6)
-    #[arg(long, value_name = "NOISE")]
-    pub drift_noise: Option<DriftNoise>,
-
     /// The datasheet of the gyros.
     #[command(flatten)]
     #[serde(flatten)]
@@ -155,11 +161,6 @@ pub struct ConditionOptions {
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
     #[serde(with = "text::list")]
     pub value: Vec<Assignment>,
-
-    /// Initial standard deviation, likewise (default: psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
-    #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
-    #[serde(with = "text::list")]
-    pub prior: Vec<Assignment>,
 
     /// Initial estimate, likewise (default: 0; -1e6 to 1e6)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
@@ -235,6 +236,7 @@ impl MeasurementOptions {
                 "--accelerometer-correlation-time does nothing here: expected --accelerometer-instability with it",
             ));
         }
+        concern_some("--prior", &self.prior, schemes.clone())?;
         concern_some("--requirement", &self.requirement, schemes)
     }
 
@@ -247,12 +249,14 @@ impl MeasurementOptions {
             ("--accelerometer-instability", self.accelerometer_instability.is_some()),
             ("--accelerometer-correlation-time", self.accelerometer_correlation_time.is_some()),
             ("--azimuth-noise", self.azimuth_noise.is_some()),
+            ("--drift-noise", self.drift_noise.is_some()),
+            ("--prior", !self.prior.is_empty()),
             ("--requirement", !self.requirement.is_empty()),
         ];
         all.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
-    /// The paper's conditions, with what the scheme and the options say.
+    /// What the scheme and the options say; for the rest the paper's conditions.
     pub fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::of(scheme);
         out.apply(&Settings {
@@ -262,8 +266,10 @@ impl MeasurementOptions {
             accelerometer_bias_instability_ug: self.accelerometer_instability,
             accelerometer_correlation_time_s: self.accelerometer_correlation_time,
             azimuth_noise_deg: self.azimuth_noise,
+            drift_noise: self.drift_noise,
             ..Settings::default()
         });
+        out.priors.extend(general_first(self.prior.clone()));
         out.requirements.extend(general_first(self.requirement.clone()));
         out
     }
@@ -276,9 +282,7 @@ impl ConditionOptions {
     /// The assignment that does not, and what it might mean.
     pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
         self.measurement.concern(schemes.clone())?;
-        for (option, given) in
-            [("--value", &self.value), ("--prior", &self.prior), ("--estimate", &self.estimate)]
-        {
+        for (option, given) in [("--value", &self.value), ("--estimate", &self.estimate)] {
             concern_some(option, given, schemes.clone())?;
         }
         Ok(())
@@ -291,13 +295,11 @@ impl ConditionOptions {
             truth: self.truth,
             filter: self.filter,
             slew_rate_deg_s: self.slew_rate,
-            drift_noise: self.drift_noise,
             propagation: self.propagation,
             drift_scale: self.drift_scale,
             ..self.gyro_noise.settings()
         });
         out.values.extend(general_first(self.value.clone()));
-        out.priors.extend(general_first(self.prior.clone()));
         out.estimates.extend(general_first(self.estimate.clone()));
         out
     }

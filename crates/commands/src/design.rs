@@ -6,20 +6,19 @@ use std::str::FromStr;
 use std::ops::RangeInclusive;
 
 use clap::{ArgGroup, Args};
-use obsdeg_core::model::ranges::{PRIOR, SLEW_RATE_DEG_S, TURN_DEG};
+use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
-use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
     Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions, Walks,
-    design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
+    asked, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
-use obsdeg_evidence::simulation::{Conditions, general_first};
+use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, File, Table, design_figures, position_figure, visible};
 use serde::{Deserialize, Serialize};
 
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
-use crate::conditions::{MeasurementOptions, assigned, concern_some, within};
+use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
 use crate::source::Source;
@@ -131,12 +130,6 @@ pub struct Search {
     #[command(flatten)]
     #[serde(flatten)]
     pub measurement: MeasurementOptions,
-
-    /// What is known of an unknown or family beforehand, as standard deviation in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_F=0.1, psi=0.05. It counts in the
-    /// criterion, in sigmas and in the bound, not in what is observable; priors that a scheme file states count too (default: none; 1e-9 to 1e9)
-    #[arg(long, value_name = "NAME=X", help_heading = "Measurement", value_parser = assigned(PRIOR))]
-    #[serde(with = "text::list")]
-    pub prior: Vec<Assignment>,
 }
 
 /// What a scheme must be.
@@ -158,8 +151,7 @@ pub struct WantedOptions {
     #[arg(long, value_name = "HOW", value_parser = one_of(CRITERIA))]
     pub criterion: Option<CriterionName>,
 
-    /// Only schemes that meet every requirement: on all coefficients and psi (default: psi 0.01 deg), or with --observable on those
-    /// coefficients; by prediction: no prior but --prior, no drift noise, psi at the start (`simulate` the winner for the rest)
+    /// Only schemes that meet every stated requirement, with --observable every one on those coefficients
     #[arg(long)]
     pub meet: bool,
 
@@ -201,7 +193,6 @@ impl Default for Search {
             part: None,
             wanted: WantedOptions::default(),
             measurement: MeasurementOptions::default(),
-            prior: Vec::new(),
         }
     }
 }
@@ -359,9 +350,8 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let any = std::array::from_fn(|_| Angle::from_degrees(0));
     let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
     a.measurement.concern(std::iter::once(&with_any))?;
-    concern_some("--prior", &a.prior, std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
-    conditions.priors.extend(general_first(a.prior.clone()));
+    conditions = asked(&base, &conditions, &a.wanted.observable)?;
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
     idle(a, !files.merge.is_empty(), &base, &conditions)?;
     let round = a.round.as_deref().unwrap_or("5");
@@ -430,7 +420,6 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
             ("--max-time", w.max_time.is_some()),
             ("--max-slew", w.max_slew.is_some()),
             ("--slew-rate", w.slew_rate.is_some()),
-            ("--prior", !a.prior.is_empty()),
         ];
         let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
         if let Some(option) = given.chain(a.measurement.given()).next() {
@@ -590,6 +579,8 @@ fn scheme_file(
     let unit = search.and_then(|s| s.unit.as_deref());
     let prior = search.and_then(|s| s.prior.as_ref());
     let prior = prior.map_or_else(|| "no prior".into(), |p| format!("prior {}", visible(p)));
+    let noisy = conditions.as_stated().drift_noise_in_words().is_some() || !conditions.gyro_noise.is_none();
+    let drift = if noisy { "the random drift below" } else { "no random drift" };
     let name = search.map_or("", |s| s.criterion.as_str());
     let largest = |sigma: f64| format!("largest sigma of {what} {sigma:.3e} deg/h (per g)");
     let reached = match (unit, best.worst_sigma_dph) {
@@ -601,7 +592,7 @@ fn scheme_file(
         }
     };
     Ok(format!(
-        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, no drift noise, seed {}\n# {}\n{}",
+        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, {drift}, seed {}\n# {}\n{}",
         found.candidates.len(),
         best.total_s,
         found.seed,

@@ -5,6 +5,7 @@ use obsdeg_calibration::{Calibration, Setup};
 use obsdeg_core::system::SystemModel;
 use obsdeg_design::review::{DesignReview, ReviewError, ReviewOptions, review};
 use obsdeg_evidence::compare::Entry;
+use obsdeg_evidence::requirements::Requirements;
 use obsdeg_report::{File, Origin, ReviewFormat};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -128,6 +129,11 @@ pub fn report(
 }
 
 impl Reviewed {
+    /// What becomes of the requirements of every scheme, by prediction.
+    pub fn requirements(&self) -> impl Iterator<Item = &Requirements> {
+        self.review.comparison.schemes.iter().map(|s| &s.requirements)
+    }
+
     /// Its files: the text first, then the pictures that it refers to, in `folder` beside it.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! One run of the filter against a simulated truth.
 
 use clap::Args;
+use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{Simulation, Traces};
 use obsdeg_evidence::system::{SystemRun, simulate_system};
 use obsdeg_report::{
@@ -46,6 +47,16 @@ pub enum Run {
     Scheme(Box<Simulation>),
     /// Of a model.
     Model(Box<SystemRun>),
+}
+
+impl Run {
+    /// What becomes of the requirements of a scheme, by prediction; a model has none.
+    pub fn requirements(&self) -> Option<&Requirements> {
+        match self {
+            Self::Scheme(run) => Some(&run.requirements),
+            Self::Model(_) => None,
+        }
+    }
 }
 
 impl Answer for Run {

@@ -78,6 +78,25 @@ pub fn covariance_pass(
     Ok(gains)
 }
 
+/// The covariance at the end of `stages`, without the gains that [`covariance_pass`] keeps.
+///
+/// # Errors
+/// [`EkfError`], as [`covariance_pass`].
+pub fn last_covariance(stages: &[Stage], mut p: Covariance) -> Result<Covariance, EkfError> {
+    let n = p.states();
+    for stage in stages {
+        stage.check(n)?;
+    }
+    let mut gain = Gain { k: vec![0.0; n], s: 0.0 };
+    for stage in stages {
+        for _ in 0..stage.steps {
+            p.propagate_checked(&stage.transition, &stage.noise);
+            stage.outputs.iter().for_each(|output| p.update_checked(output, &mut gain));
+        }
+    }
+    Ok(p)
+}
+
 /// The state recursion: `measure` fills in the measurements of a step (its number, the stage, one number per
 /// output), `on_step` sees the estimate and the whitened innovations.
 ///

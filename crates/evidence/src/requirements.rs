@@ -70,16 +70,29 @@ pub struct Margin {
     pub margin: f64,
 }
 
-/// Under what sigmas are held against requirements.
+/// The largest sigma of a drift coefficient.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Worst {
+    /// The coefficient.
+    pub name: String,
+    /// Its sigma in deg/h (per g, per g^2).
+    pub sigma_dph: f64,
+}
+
+/// Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the prediction alone; a run is one
+/// example of it, a record its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
-    /// The information of all samples: no prior, no drift noise, psi at the start (under reset carry at the start of each position).
+    /// The information of all samples with the noise and the random drift that are stated, psi at the end of the scheme (under reset carry at
+    /// the end of each position); nothing is known beforehand.
     Predicted,
     /// The same with the priors that are stated.
     PredictedWithPrior,
-    /// The filter at the end of a run: with prior and drift noise, psi at the end.
+    /// The filter at the end of a simulated run, with its prior and its random drift, whether they are stated or chosen by the program.
     Run,
+    /// The estimates from a record.
+    Record,
 }
 
 /// What became of all requirements.
@@ -95,14 +108,16 @@ pub struct Requirements {
     pub worst: Option<Margin>,
     /// Those that miss theirs, in model order.
     pub missed: Vec<Missed>,
-    /// Nobody stated any: they are those that the program chooses.
-    pub by_default: bool,
+    /// Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated priors alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub on_prior: Vec<String>,
 }
 
 impl Requirements {
     /// Decides about `claims`, in their order.
-    pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = Claim<'a>>, by_default: bool) -> Self {
-        let mut out = Self { basis, stated: 0, met: 0, worst: None, missed: Vec::new(), by_default };
+    pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = Claim<'a>>) -> Self {
+        let mut out =
+            Self { basis, stated: 0, met: 0, worst: None, missed: Vec::new(), on_prior: Vec::new() };
         for claim in claims {
             let Some(required) = claim.required else { continue };
             out.stated += 1;
@@ -119,9 +134,14 @@ impl Requirements {
         out
     }
 
-    /// Whether none is missed.
+    /// True if requirements are stated and every one is met; false where none is stated.
     pub fn all_met(&self) -> bool {
-        self.missed.is_empty()
+        self.stated > 0 && self.missed.is_empty()
+    }
+
+    /// True if a stated requirement is missed.
+    pub fn any_missed(&self) -> bool {
+        !self.missed.is_empty()
     }
 
     /// Whether the worst margin leaves out some that are missed: their sigma does not count.
@@ -152,7 +172,6 @@ mod tests {
                 claim("infinite", Some(0.1), Ok(f64::INFINITY)),
                 claim("exact", Some(0.1), Ok(0.0)),
             ],
-            false,
         );
         assert_eq!((judged.stated, judged.met, judged.all_met()), (7, 3, false));
         let missed: Vec<(&str, Miss)> = judged.missed.iter().map(|m| (m.name.as_str(), m.why)).collect();
@@ -165,9 +184,10 @@ mod tests {
         assert_eq!(missed, expected);
         assert!(judged.leaves_out());
         assert_eq!(judged.worst.map(|w| w.name).as_deref(), Some("above"));
-        assert!(!Requirements::of(Basis::Run, [claim("above", Some(0.1), Ok(0.2))], false).leaves_out());
-        // nothing asked for, nothing missed
-        let none = Requirements::of(Basis::Predicted, [claim("free", None, Ok(1.0))], true);
-        assert_eq!((none.stated, none.met, none.worst.is_none(), none.all_met()), (0, 0, true, true));
+        assert!(!Requirements::of(Basis::Run, [claim("above", Some(0.1), Ok(0.2))]).leaves_out());
+        // nothing asked for: nothing met, nothing missed
+        let none = Requirements::of(Basis::Predicted, [claim("free", None, Ok(1.0))]);
+        assert_eq!((none.stated, none.met, none.worst.is_none()), (0, 0, true));
+        assert!(!none.all_met() && !none.any_missed());
     }
 }

@@ -2,14 +2,14 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit,
+    Assumed, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit,
     PositionsBy, RecordReport, ResidualSeries,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
-use crate::{Answer, ReportError, Table, words};
+use crate::{Answer, ReportError, Table, stated, words};
 
 /// How many outliers are listed.
 const LISTED: usize = 20;
@@ -394,12 +394,29 @@ fn fit(c: &Calibration) -> Vec<String> {
     out
 }
 
+/// The conditions that nobody states, which sigmas and requirements rest on; `None` where all are stated.
+fn by_default(a: &Assumed) -> Option<String> {
+    let value = |key: &String| match key.as_str() {
+        "latitude_deg" => format!("latitude {} deg", a.latitude_deg),
+        "accelerometer_noise_g" => format!("noise of a sample {:e} g", a.accelerometer_noise_g),
+        "drift_noise" => format!("white drift {} deg/sqrt(h)", number(a.drift_noise_deg_sqrt_h)),
+        other => other.into(),
+    };
+    let listed: Vec<String> = a.by_default.iter().map(value).collect();
+    (!listed.is_empty()).then(|| format!("not stated, chosen by the program: {}", listed.join(", ")))
+}
+
 impl Answer for Calibration {
     fn document(&self) -> Document {
         let mut lead = vec![match self.consistent {
             true => "consistent: the model and its sigmas explain the record".to_string(),
             false => "NOT consistent: sigmas are not to be relied upon as they are".into(),
         }];
+        lead.extend(self.requirements.as_ref().map(|r| {
+            let psi = "; those on psi are not judged, since psi here is that of the start of a record";
+            format!("{}{psi}.", stated::capital(&stated::requirements(r)))
+        }));
+        lead.extend(by_default(&self.assumed));
         lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));
         let columns = [
             left("unknown"),

@@ -1,11 +1,11 @@
 //! Schemes side by side.
 
-use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity, Worst};
-use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity};
+use obsdeg_evidence::requirements::{Requirements, Worst};
 use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, words};
+use crate::{Answer, stated, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -23,13 +23,17 @@ pub(crate) fn rank([rank, unknowns]: [usize; 2], with_dwell: bool) -> String {
 /// `met; 2.231 (D_IX)`.
 pub(crate) fn requirements(r: &Requirements) -> String {
     let worst =
-        words::worst_margin(r).map_or_else(String::new, |w| format!(";{} {w}", words::whose_margin(r)));
+        stated::worst_margin(r).map_or_else(String::new, |w| format!(";{} {w}", stated::whose_margin(r)));
     match (r.stated, r.all_met()) {
         (0, _) => "none".into(),
         (_, true) => format!("met{worst}"),
         (stated, false) => format!("NOT met, {} of {stated} missed{worst}", r.missed.len()),
     }
 }
+
+/// Columns that say nothing where no requirement is stated.
+pub(crate) const REQUIREMENTS: [&str; 4] =
+    ["requirements; worst margin", "met without", "required", "margin"];
 
 /// One row per scheme.
 fn overview(schemes: &[ComparedScheme]) -> Block {
@@ -51,7 +55,7 @@ fn overview(schemes: &[ComparedScheme]) -> Block {
         ]
     };
     Block::table(
-        format!("Side by side ({})", words::PREDICTED),
+        format!("Side by side ({})", stated::predicted_of(schemes.iter().map(|r| &r.conditions))),
         [
             left("scheme"),
             left("carry"),
@@ -59,9 +63,9 @@ fn overview(schemes: &[ComparedScheme]) -> Block {
             right("total [s]"),
             right("rank with dwell"),
             left("worst sigma(D)"),
-            left("requirements; worst margin"),
+            left(REQUIREMENTS[0]),
             left("observable without"),
-            left("met without"),
+            left(REQUIREMENTS[1]),
         ],
         schemes.iter().map(row),
     )
@@ -94,7 +98,10 @@ fn by_unknown(schemes: &[ComparedScheme]) -> Block {
         }
     }
     Block::table(
-        format!("By unknown ({}; margin: required over sigma)", words::PREDICTED),
+        format!(
+            "By unknown ({}; margin: required over sigma)",
+            stated::predicted_of(schemes.iter().map(|r| &r.conditions))
+        ),
         [
             left("unknown"),
             left("scheme"),
@@ -102,8 +109,8 @@ fn by_unknown(schemes: &[ComparedScheme]) -> Block {
             right("accuracy"),
             right("sigma"),
             left("unit"),
-            right("required"),
-            right("margin"),
+            right(REQUIREMENTS[2]),
+            right(REQUIREMENTS[3]),
             left("excitation per position"),
             left("only by"),
         ],
@@ -147,22 +154,60 @@ pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
     let reached = |r: &ComparedScheme| {
         let v = r.validity.as_ref()?;
         Some(format!(
-            "{}: at its own drifts |psi| reaches {} deg, and the small-angle model does NOT hold",
+            "{}: at the drifts that are stated |psi| reaches {} deg, and the small-angle model does NOT hold",
             r.name,
             number(v.largest_psi_deg)
         ))
     };
     let means = "full attitudes: sigma at the end of a filter that carries them, with the prior, linearised along the run of \
-                 the scheme's own drifts; an unknown that is not determined at small angles may be seen by large ones";
+                 the drifts that are stated; an unknown that is not determined at small angles may be seen by large ones";
     vec![
-        Block::table("Sigma at the scheme's own drifts", columns, rows),
-        Block::list("What that is", large().filter_map(reached).chain([means.into()]).collect()),
+        Block::table("Sigma at the drifts that are stated", columns, rows),
+        Block::list(
+            "Validity of the small-angle model",
+            large().filter_map(reached).chain([means.into()]).collect(),
+        ),
     ]
+}
+
+/// The answer on every scheme; then the carry, and what nobody states.
+fn lead(c: &Comparison) -> Vec<String> {
+    let of = |text: String, r: &ComparedScheme| match c.schemes.len() {
+        1 => stated::capital(&text),
+        _ => format!("{}: {text}", r.name),
+    };
+    let mut out = Vec::new();
+    if !c.differ.is_empty() {
+        out.push(format!("not like with like: the schemes differ in {}", c.differ.join(", ")));
+    }
+    for r in &c.schemes {
+        let sigma = r.worst.as_ref().map_or_else(
+            || "not every coefficient is determined".into(),
+            |w| format!("worst sigma {} deg/h ({})", number(w.sigma_dph), w.name),
+        );
+        out.push(of(format!("{}; {sigma}.", stated::requirements(&r.requirements)), r));
+    }
+    let mut said: Vec<String> = Vec::new();
+    for r in &c.schemes {
+        let lines =
+            [Some(stated::carry(r.carry).into()), stated::other_carries(&r.other_carries).map(|t| of(t, r))];
+        for line in lines.into_iter().flatten().chain(stated::by_default(&r.conditions)) {
+            if !said.contains(&line) {
+                said.push(line);
+            }
+        }
+    }
+    out.extend(said);
+    out
 }
 
 impl Answer for Comparison {
     fn document(&self) -> Document {
-        let mut blocks = vec![overview(&self.schemes), by_unknown(&self.schemes)];
+        // where nothing is required there is nothing to be met
+        let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);
+        let left_out: &[&str] = if judged { &[] } else { &REQUIREMENTS };
+        let mut blocks =
+            vec![overview(&self.schemes).without(left_out), by_unknown(&self.schemes).without(left_out)];
         blocks.extend(at_own_drifts(&self.schemes));
         let drop_rows = self.schemes.iter().flat_map(|r| {
             r.drop_one.iter().map(|d| {
@@ -175,17 +220,9 @@ impl Answer for Comparison {
                 ]
             })
         });
-        blocks.push(Block::table(
-            "Without one position",
-            [
-                left("scheme"),
-                left("without"),
-                left("not observable any more"),
-                left("worst sigma(D)"),
-                left("requirements; worst margin"),
-            ],
-            drop_rows,
-        ));
+        let columns =
+            ["scheme", "without", "not observable any more", "worst sigma(D)", REQUIREMENTS[0]].map(left);
+        blocks.push(Block::table("Without one position", columns, drop_rows).without(left_out));
         let conditions = self.schemes.first().map_or(&[][..], |r| &r.sensitivity);
         let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
         for s in self.schemes.iter().flat_map(|r| &r.sensitivity) {
@@ -234,26 +271,26 @@ impl Answer for Comparison {
             let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
             blocks.push(Block::list("Noise floor: what it is", means.collect()));
         }
-        let missed = |r: &ComparedScheme| format!("{}: {}", r.name, words::requirements(&r.requirements));
-        blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
+        let missed = |r: &ComparedScheme| format!("{}: {}", r.name, stated::requirements(&r.requirements));
+        if judged {
+            blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
+        }
         let mut lines = Vec::new();
         for r in &self.schemes {
-            // what all schemes share is said once
-            let own = words::measurement(&r.conditions).into_iter().filter(|l| l != words::PREDICTED);
             lines.push(format!(
                 "{}: {}; positions {}{}",
                 r.name,
-                own.collect::<Vec<_>>().join("; "),
+                stated::measurement(&r.conditions).join("; "),
                 r.positions.join(", "),
                 half_turns(r)
             ));
         }
         lines.extend([
-        words::PREDICTED.into(),
+        stated::predicted_of(self.schemes.iter().map(|r| &r.conditions)),
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
             .into(),
-        "observable without, met without: positions that can go, one at a time, so that what is observable stays so, and so \
+        "observable without, met without: positions you can drop (one at a time) so that what is observable stays so, and so \
          that every requirement is met; only by: positions without which the unknown is not observable"
             .into(),
         format!("seed {}", self.seed),
@@ -268,10 +305,7 @@ impl Answer for Comparison {
         let n = self.schemes.len();
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
-            lead: (!self.differ.is_empty())
-                .then(|| format!("not like with like: the schemes differ in {}", self.differ.join(", ")))
-                .into_iter()
-                .collect(),
+            lead: lead(self),
             blocks,
         }
     }

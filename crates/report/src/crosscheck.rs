@@ -229,7 +229,10 @@ impl Answer for CrossCheck {
         blocks.extend(Block::list_if_any("What disagrees", self.disagreements.clone()));
         blocks.push(Block::list("How", self.method.clone()));
         blocks.push(Block::list("Not tested by evidence", self.not_tested.clone()));
-        blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
+        blocks.push(Block::list(
+            "Validity of the small-angle model",
+            validity(&self.validity, &self.conditions),
+        ));
         let mut assumed = conditions(&self.conditions, &self.timeline);
         let drawn = if self.monte_carlo.about_the_truth {
             "runs: the drifts of the scheme, initial estimates drawn about them with the prior"

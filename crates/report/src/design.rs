@@ -8,7 +8,7 @@ use obsdeg_evidence::requirements::{Miss, Requirements};
 use crate::document::{Block, Document, left, number, right};
 use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
-use crate::{Answer, words};
+use crate::{Answer, stated, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -53,16 +53,28 @@ fn margin(r: &Requirements) -> String {
     let unseen: Vec<&str> =
         r.missed.iter().filter(|m| m.why != Miss::TooLarge).map(|m| m.name.as_str()).collect();
     let none = (!unseen.is_empty()).then(|| format!("none ({})", words::names(unseen)));
-    none.or_else(|| words::worst_margin(r)).unwrap_or_else(|| "-".into())
+    none.or_else(|| stated::worst_margin(r)).unwrap_or_else(|| "-".into())
 }
 
-/// What became of the requirements, and what a prediction leaves to be checked.
-fn requirements(r: &Requirements) -> Vec<String> {
-    let check = r.all_met() && r.stated > 0;
-    let check = check.then(|| {
-        "to be checked with prior and drift noise, psi at the end: `obsdeg simulate` of the winner.toml that -o writes".into()
-    });
-    std::iter::once(words::requirements(r)).chain(check).collect()
+/// The answer: the first scheme with what becomes of the requirements; then the carry, and what nobody states.
+fn lead(d: &Design) -> Vec<String> {
+    let mut out = Vec::new();
+    if let (Some(s), Some(first)) = (&d.search, d.found.first()) {
+        let best = if s.proven && !first.refined && first.dwells_s.is_empty() {
+            "Proven best"
+        } else {
+            "Best found"
+        };
+        let sigma = first.worst_sigma_dph.zip(first.worst.as_ref());
+        let sigma = sigma.map_or_else(String::new, |(sigma, name)| {
+            format!(": worst sigma {} deg/h ({name})", number(sigma))
+        });
+        out.push(format!("{best}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
+    }
+    out.push(stated::carry(d.carry).into());
+    out.extend(stated::other_carries(&d.other_carries));
+    out.extend(d.search.as_ref().and_then(|s| stated::by_default(&s.conditions)));
+    out
 }
 
 /// ` (900, 1100 s)`: dwells that are not equal.
@@ -413,21 +425,19 @@ impl Answer for Design {
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         if let Some(s) = &self.search {
-            let sigmas = match s.prior {
-                Some(_) => {
-                    "sigma: information of all samples and the prior that is stated, no drift noise; psi at the start"
-                }
-                None => words::PREDICTED,
-            };
-            blocks.push(table(&format!("Best schemes ({sigmas})"), &self.found));
-            let first = self.found.first().map(|f| requirements(&f.requirements));
-            blocks.extend(first.map(|lines| Block::list("Requirements of the first", lines)));
+            let judged = self.found.first().is_some_and(|f| f.requirements.stated > 0);
+            let left_out: &[&str] = if judged { &[] } else { &["worst margin"] };
+            let heading = format!("Best schemes ({})", stated::predicted(&s.conditions));
+            blocks.push(table(&heading, &self.found).without(left_out));
             blocks.push(Block::list("How", how(self, s)));
             blocks.push(Block::list("How good the best can be", bound(self, s)));
-            blocks.push(table(
-                "Front of total time against the criterion (other dwells by exchange, not proven)",
-                &self.front,
-            ));
+            blocks.push(
+                table(
+                    "Front of total time against the criterion (other dwells by exchange, not proven)",
+                    &self.front,
+                )
+                .without(left_out),
+            );
         }
         blocks.push(Block::list(
             "Fewest positions that make every required coefficient observable",
@@ -454,7 +464,7 @@ impl Answer for Design {
             || "fewest positions".into(),
             |s| format!("{} of {} positions", s.positions, self.candidates.len()),
         );
-        Document { title: format!("Design: {what}, {} carry", self.carry), lead: Vec::new(), blocks }
+        Document { title: format!("Design: {what}, {} carry", self.carry), lead: lead(self), blocks }
     }
 
     fn main_table(&self) -> &'static str {

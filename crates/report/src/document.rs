@@ -38,6 +38,17 @@ impl Block {
         Self::Table { heading: heading.into(), columns: columns.into(), rows: rows.collect() }
     }
 
+    /// The table without the columns of these names.
+    pub(crate) fn without(self, names: &[&str]) -> Self {
+        let Self::Table { heading, columns, rows } = self else { return self };
+        let kept: Vec<bool> = columns.iter().map(|c| !names.contains(&c.name.as_ref())).collect();
+        let keep =
+            |row: Vec<Cell>| row.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(cell, _)| cell).collect();
+        let rows = rows.into_iter().map(keep).collect();
+        let columns = columns.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(column, _)| column).collect();
+        Self::Table { heading, columns, rows }
+    }
+
     pub(crate) fn list(heading: impl Into<String>, lines: Vec<String>) -> Self {
         Self::List { heading: heading.into(), lines }
     }

@@ -32,6 +32,7 @@ mod review;
 mod rows;
 mod series;
 mod simulation;
+mod stated;
 mod system;
 mod system_calibration;
 mod table;

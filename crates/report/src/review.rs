@@ -20,7 +20,7 @@ use obsdeg_evidence::simulation::Outcome;
 use crate::analysis::null_vector;
 use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
-use crate::{Answer, Origin, compare, latex, simulation, words};
+use crate::{Answer, Origin, compare, latex, simulation, stated, words};
 
 /// What a calibration changes of the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
@@ -98,8 +98,8 @@ pub(crate) fn document(
         vec![
             format!("obsdeg {}; seed {}; {} Monte Carlo runs", r.version, r.seed, r.runs),
             format!(
-                "verdicts are exact ranks in prime fields; predicted {}; the filter's runs have both prior and drift noise, psi at the end",
-                words::PREDICTED
+                "verdicts are exact ranks in prime fields; predicted {}",
+                stated::predicted_of(r.comparison.schemes.iter().map(|s| &s.conditions))
             ),
         ],
     ));
@@ -164,12 +164,13 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.push(section(level, "Evidence by a filter"));
     evidence(blocks, s, id);
     blocks.push(section(level, "Validity of the small-angle model"));
-    blocks.push(Block::list("", simulation::validity(&s.simulation.validity)));
+    blocks.push(Block::list("", simulation::validity(&s.simulation.validity, &s.simulation.conditions)));
     blocks.extend(compare::at_own_drifts(std::slice::from_ref(review)));
     blocks.push(section(level, "Assumptions and certainty"));
     let mut assumed = words::assumptions(a);
     // carry, latitude and observation are said above
-    assumed.extend(words::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
+    assumed
+        .extend(stated::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
     assumed.push(words::certainty(a));
     let evidence = s.evidence.as_ref().err().map(words::no_evidence);
@@ -212,7 +213,10 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
         ]
     };
     Block::table(
-        format!("Every unknown, best first (- where it is not determined; {})", words::PREDICTED),
+        format!(
+            "Every unknown, best first (- where it is not determined; {})",
+            stated::predicted(&review.conditions)
+        ),
         [
             left("unknown"),
             left("unit"),
@@ -227,6 +231,12 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
         ],
         a.quantities.iter().map(row),
     )
+    .without(left_out(review))
+}
+
+/// Columns that say nothing where no requirement is stated.
+fn left_out(review: &ComparedScheme) -> &'static [&'static str] {
+    if review.requirements.stated > 0 { &[] } else { &compare::REQUIREMENTS }
 }
 
 fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
@@ -429,16 +439,11 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
         ]
     };
     if !review.drop_one.is_empty() {
-        blocks.push(Block::table(
-            "Without one position",
-            [
-                left("without"),
-                left("not observable any more"),
-                left("worst sigma(D) [deg/h, /g]"),
-                left("requirements; worst margin"),
-            ],
-            review.drop_one.iter().map(row),
-        ));
+        let columns =
+            ["without", "not observable any more", "worst sigma(D) [deg/h, /g]", compare::REQUIREMENTS[0]]
+                .map(left);
+        let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
+        blocks.push(table.without(left_out(review)));
     }
     if !alternatives.front.is_empty() {
         blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));

@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, words};
+use crate::{Answer, stated, words};
 
 /// What a run assumes, a sentence each.
 pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> Vec<String> {
@@ -90,18 +90,21 @@ fn number_short(x: f64) -> String {
 }
 
 /// Why the small-angle model holds or does not, with its figures.
-pub(crate) fn validity(v: &Validity) -> Vec<String> {
+pub(crate) fn validity(v: &Validity, c: &ConditionsReport) -> Vec<String> {
+    let drifts = stated::drifts(c);
     let ratio = v.neglected_g / v.accelerometer_noise_g;
     let required = v
         .smallest_requirement_dph
         .map_or_else(String::new, |t| format!(" against the required {} deg/h", number(t)));
     let head = if v.holds {
-        "the small-angle model holds for these drifts"
+        format!("the small-angle model holds for {drifts}")
     } else {
-        "the small-angle model does NOT hold for these drifts: a real platform would not follow the linear filter"
+        format!(
+            "the small-angle model does NOT hold for {drifts}: a real platform would not follow the linear filter"
+        )
     };
     vec![
-        head.into(),
+        head,
         format!("|psi| reaches {} deg", number(v.largest_psi_deg)),
         format!(
             "the observation (6) leaves out |psi|^2/2 = {} g, {} times the noise of Z ({} g)",
@@ -148,7 +151,11 @@ fn linear(e: &Estimate) -> Option<Vec<String>> {
 fn row(e: &Estimate) -> Vec<String> {
     let mut out = vec![e.name.clone(), e.unit.clone()];
     out.extend(words::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
-    out.extend([optional(e.time_to_requirement_s), words::outcome(e.outcome).into()]);
+    out.extend([
+        optional(e.predicted_sigma),
+        optional(e.time_to_requirement_s),
+        words::outcome(e.outcome).into(),
+    ]);
     out
 }
 
@@ -181,13 +188,18 @@ fn priors(quantities: &[Estimate]) -> Vec<String> {
     groups.into_iter().map(line).collect()
 }
 
-/// What became of the requirements, and what that is worth.
-fn requirements_met(s: &Simulation) -> Vec<String> {
-    let mut out = Vec::new();
+/// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody states.
+fn lead(s: &Simulation) -> Vec<String> {
+    let [predicted, run] = [stated::requirements(&s.requirements), stated::run(&s.run, &s.conditions)]
+        .map(|t| stated::capital(&t));
+    let mut out = vec![format!("{predicted}. {run}.")];
     if !s.consistency.consistent {
-        out.push("the filter is not consistent with this truth: its sigmas are not to be relied upon".into());
+        out.push("Do not use the filter's sigmas: its run is inconsistent with the truth.".into());
     }
-    out.push(words::requirements(&s.requirements));
+    out.push(stated::carry(s.carry).into());
+    out.extend(stated::other_carries(&s.other_carries));
+    out.extend(stated::by_default_in_run(&s.conditions));
+    out.extend(warning(&s.conditions));
     out
 }
 
@@ -195,7 +207,7 @@ impl Answer for Simulation {
     fn document(&self) -> Document {
         let mut columns = vec![left("unknown"), left("unit")];
         columns.extend(words::ESTIMATE.map(right));
-        columns.extend([right("at [s]"), left("outcome")]);
+        columns.extend([right("predicted"), right("at [s]"), left("outcome")]);
         let table =
             |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
         let end = self.timeline.last().map_or(0.0, |t| t.end_s);
@@ -209,17 +221,15 @@ impl Answer for Simulation {
             "exact verdict, - not observable"
         };
         let mut blocks = vec![table(
-            &format!("Estimates at the end (degree: {degree}; at: when sigma met the requirement)"),
+            &format!(
+                "Estimates at the end (degree: {degree}; predicted: sigma by what is stated; at: when sigma met the requirement)"
+            ),
             &self.quantities,
         )];
         if !self.combinations.is_empty() {
             blocks.push(table("Combinations (psi: of the end)", &self.combinations));
         }
         blocks.extend(Block::list_if_any("Known from the prior only: whose", priors(&self.quantities)));
-        blocks.push(Block::list(
-            "Requirements (sigma of the filter at the end of the run)",
-            requirements_met(self),
-        ));
         blocks.push(Block::list("Filter", filter(&self.filter)));
         if self.filter.kind != FilterKind::Linear {
             let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
@@ -228,7 +238,10 @@ impl Answer for Simulation {
             blocks.push(Block::table("Beside it, the linear filter on the same measurements", columns, rows));
         }
         blocks.push(Block::list("Consistency", words::consistency(&self.consistency)));
-        blocks.push(Block::list("Validity of the small-angle model", validity(&self.validity)));
+        blocks.push(Block::list(
+            "Validity of the small-angle model",
+            validity(&self.validity, &self.conditions),
+        ));
         if let Some(f) = &self.noise_floor {
             let mut columns = vec![left("coefficient"), left("unit")];
             columns.extend(words::FLOOR.map(right));
@@ -241,7 +254,10 @@ impl Answer for Simulation {
         }
         let mut assumed = conditions(&self.conditions, &self.timeline);
         assumed.push(format!("carry {}; seed {}", self.carry, self.seed));
-        assumed.push(format!("required sigma {}", requirements(&self.quantities).join(", ")));
+        let required = requirements(&self.quantities);
+        if !required.is_empty() {
+            assumed.push(format!("required sigma {}", required.join(", ")));
+        }
         blocks.push(Block::list("Assumed", assumed));
         let positions = self.timeline.iter().filter(|t| !t.slew).count();
         Document {
@@ -251,7 +267,7 @@ impl Answer for Simulation {
                 self.carry,
                 number_short(end)
             ),
-            lead: warning(&self.conditions).into_iter().collect(),
+            lead: lead(self),
             blocks,
         }
     }

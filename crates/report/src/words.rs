@@ -9,10 +9,9 @@ use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::model::{Carry, Geometry, Scheme, Source, Term, Unknowns, parse_attitude};
 use obsdeg_core::solution::{Frame, Verification};
-use obsdeg_evidence::requirements::{Basis, Miss, Requirements};
 use obsdeg_evidence::simulation::{
-    AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, MeasurementReport, NoiseFloor,
-    Outcome, Reached, SimulationError,
+    AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, NoiseFloor, Outcome, Reached,
+    SimulationError,
 };
 
 use crate::document::{number, optional};
@@ -421,10 +420,6 @@ pub(crate) fn locus(l: &obsdeg_core::solution::Locus) -> String {
     format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))
 }
 
-/// What a predicted sigma is.
-pub(crate) const PREDICTED: &str =
-    "sigma: information of all samples, no prior, no drift noise; psi at the start";
-
 /// At most a dozen names.
 pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     const SHOWN: usize = 12;
@@ -435,69 +430,12 @@ pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     format!("{}{tail}", all[..shown].join(", "))
 }
 
-/// What misses its requirement, by reason.
-pub(crate) fn missed(r: &Requirements) -> String {
-    let reasons = [
-        (Miss::TooLarge, ""),
-        (Miss::NotObservable, " (not determined)"),
-        (Miss::RestsOnPrior, " (resting on the prior)"),
-        (Miss::Inconsistent, " (the filter is wrong about it)"),
-        (Miss::NoNumber, " (no number)"),
-    ];
-    let of = |(why, words): (Miss, &str)| {
-        let mut concerned = r.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).peekable();
-        concerned.peek()?;
-        Some(format!("{}{words}", names(concerned)))
-    };
-    reasons.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
-}
-
-/// `0.06798 (psi_y)`; `None` when nothing has a margin.
-pub(crate) fn worst_margin(r: &Requirements) -> Option<String> {
-    r.worst.as_ref().map(|w| format!("{} ({})", number(w.margin), w.name))
-}
-
-/// Whose margin is the worst: ` of the others` where some that are missed have none.
-pub(crate) fn whose_margin(r: &Requirements) -> &'static str {
-    if r.leaves_out() { " of the others" } else { "" }
-}
-
-/// Under what requirements are decided.
-pub(crate) fn basis(b: Basis) -> &'static str {
-    match b {
-        Basis::Predicted => "by prediction (no prior, no drift noise, psi at the start)",
-        Basis::PredictedWithPrior => {
-            "by prediction (the prior that is stated, no drift noise, psi at the start)"
-        }
-        Basis::Run => "in the run (with prior and drift noise, psi at the end)",
-    }
-}
-
-/// What became of the requirements, and under what.
-pub(crate) fn requirements(r: &Requirements) -> String {
-    if r.stated == 0 {
-        return "no requirement is stated".into();
-    }
-    let whose = if r.by_default { " (the program's own: none is stated)" } else { "" };
-    let basis = basis(r.basis);
-    let worst =
-        worst_margin(r).map_or_else(String::new, |w| format!("; worst margin{} {w}", whose_margin(r)));
-    if r.all_met() {
-        return format!("{basis} every requirement{whose} is met, {} of {}{worst}", r.met, r.stated);
-    }
-    format!(
-        "{basis} requirements{whose} are NOT met, {} of {} missed: {}{worst}",
-        r.missed.len(),
-        r.stated,
-        missed(r)
-    )
-}
-
 /// What a run makes of an unknown.
 pub(crate) fn outcome(o: Outcome) -> &'static str {
     match o {
         Outcome::Reached => "reached",
         Outcome::Converging => "converging",
+        Outcome::Determined => "determined",
         Outcome::RestsOnPrior => "rests on the prior",
         Outcome::PriorOnly => "known from the prior only",
         Outcome::LargeAnglesOnly => "large angles only",
@@ -572,36 +510,6 @@ pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
         ),
         format!("innovations white: probability {}", number(c.whiteness_probability)),
     ]
-}
-
-/// What predicted sigmas rest on, a sentence each.
-pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
-    let by = if m.latitude_by_default { " (chosen here: the scheme names none)" } else { "" };
-    let azimuth = m.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
-    let slews = m.slew_rate_deg_s.map_or_else(
-        || "repositioning at once unless a position says otherwise".into(),
-        |r| {
-            format!(
-                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, accuracy orders and ranks: of \
-                 repositioning at once, with torquer errors of turns fast against the earth rate; what has a sigma: with the slews, in \
-                 floating point)"
-            )
-        },
-    );
-    let mut out = vec![
-        PREDICTED.into(),
-        format!(
-            "noise of Z {:e} g per sample and axis{azimuth}; steps of at most {} s, a sample after each",
-            m.accelerometer_noise_g, m.step_s
-        ),
-        format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
-        format!("latitude {} deg{by}", m.latitude_deg),
-    ];
-    let left_out = |b: &AccelerometerBias| {
-        format!("left out: {} (a run has it, and `design` counts it)", accelerometer_bias(b))
-    };
-    out.extend(m.accelerometer_bias.as_ref().map(left_out));
-    out
 }
 
 /// The bias instability of the accelerometers.

@@ -70,6 +70,7 @@ function askRest() {
       const { quantities, requirements } = JSON.parse(run.text);
       const missed = new Map(requirements.missed.map((m) => [m.name, m.why]));
       verdicts.sigmas = new Map(quantities.map((q) => [q.name, { ...q, missed: missed.get(q.name) }]));
+      verdicts.requirements = requirements;
     }
     drawVerdicts();
     const solved = await behind.ask('verdicts', [{ sources: named }], { lane: 'solutions' }).catch(failed);
@@ -187,7 +188,7 @@ async function sweep(axis, mine) {
     const said = await behind.ask('call', ['simulate', { sources: [texts[i]] }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
     if (!fresh()) return;
     if (!said?.text) return;
-    found.sigmas[i] = Object.fromEntries(JSON.parse(said.text).quantities.map((q) => [q.name, [q.sigma, q.required_sigma]]));
+    found.sigmas[i] = Object.fromEntries(JSON.parse(said.text).quantities.map((q) => [q.name, [q.predicted_sigma, q.required_sigma]]));
     if (i % 6 === 0) drawStrip();
   }
   drawStrip();

@@ -60,11 +60,16 @@ function drawFound(design, took, wanted) {
     const load = element('button', { type: 'button', textContent: 'Load' });
     load.setAttribute('aria-label', `Load scheme ${i + 1} as positions`);
     load.addEventListener('click', () => {
-      edit((s) => { s.position = f.angles.map((a) => positionOf(a)); state.selected = 0; });
+      edit((s) => {
+        s.position = f.angles.map((a) => positionOf(a));
+        // the direction of a half turn belongs to the scheme
+        f.half_turns.forEach((t) => { s.position[t.to - 1].slew = { about: t.about, angle_deg: 180 }; });
+        state.selected = 0;
+      });
       show('scheme');
       say(`Scheme ${i + 1} of the search is loaded.`, 'fine');
     });
-    return [load, f.positions.join(' '), `${f.value.toPrecision(4)} ${how.unit ?? ''}`, f.worst ?? '', String(f.worst_degree), `${f.requirements.met} of ${f.requirements.stated}`];
+    return [load, f.positions.join(' '), `${f.value.toPrecision(4)} ${how.unit ?? ''}`, f.worst ?? '', String(f.worst_degree), f.requirements.stated ? `${f.requirements.met} of ${f.requirements.stated}` : 'none stated'];
   });
   $('found').replaceChildren(tableOf(['', 'positions', 'criterion', 'worst', 'largest degree', 'requirements met'], rows));
 }

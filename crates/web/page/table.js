@@ -42,7 +42,7 @@ function drawVerdicts() {
   let table = box.querySelector('table');
   if (!table) {
     table = element('table', {}, element('thead'), element('tbody'));
-    table.tHead.innerHTML = '<tr><td class="links"></td><th scope="col">unknown</th><th scope="col">degree</th><th scope="col">status</th><th scope="col">sigma against requirement</th><th scope="col">solution, or why none</th></tr>';
+    table.tHead.innerHTML = '<tr><td class="links"></td><th scope="col">unknown</th><th scope="col">degree</th><th scope="col">status</th><th scope="col">predicted sigma</th><th scope="col">solution, or why none</th></tr>';
     const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
     svg.id = 'links';
     svg.setAttribute('aria-hidden', 'true');
@@ -81,7 +81,9 @@ function drawVerdicts() {
   const worst = Math.max(0, ...rows.map((q) => q.degree ?? 0));
   const alone = rows.length - open.length, more = answer.rank - alone;
   const together = more > 0 ? ` and ${more} combination${more > 1 ? 's' : ''} of the others` : '';
-  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}`);
+  const judged = verdicts.sigmasOf === asked && verdicts.sigmas && verdicts.requirements?.stated ? verdicts.requirements : null;
+  const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}` : '';
+  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}`);
   offerStrip(rows);
 }
 
@@ -118,21 +120,27 @@ const two = (x) => (x >= 100 && x < 1e7 ? String(Number(x.toPrecision(2))) : x.t
 
 function drawSigma(td, name) {
   const s = name && verdicts.sigmas?.get(name);
-  const key = s ? `${s.sigma} ${s.required_sigma} ${s.missed}` : '';
+  const key = s ? `${s.predicted_sigma} ${s.required_sigma} ${s.missed}` : '';
   if (td.dataset.of === key) return;
   td.dataset.of = key;
   if (!s) return td.replaceChildren();
-  const ratio = s.sigma / s.required_sigma;
+  const sigma = s.predicted_sigma;
+  const said = sigma === null ? 'not determined' : `${two(sigma)} ${s.unit}`;
+  if (s.required_sigma === null || sigma === null) {
+    td.title = s.required_sigma === null ? 'no requirement is stated' : `misses its requirement, ${s.required_sigma} ${s.unit}: the samples do not determine it`;
+    return td.replaceChildren(said);
+  }
+  td.title = '';
+  const ratio = sigma / s.required_sigma;
   // three decades, two of them below the requirement
   const part = Math.max(0.01, Math.min(1, (Math.log10(ratio) + 2) / 3));
-  // what samples do not determine misses its requirement, whatever a prior makes of sigma
-  const over = s.missed !== undefined, prior = s.missed && s.missed !== 'too_large' ? ', from the prior only' : '';
+  const over = s.missed !== undefined;
   const bar = element('i'), box = element('span', { className: `against${over ? ' over' : ''}` }, bar, element('b'));
   bar.style.width = `${part * 100}%`;
   box.setAttribute('role', 'img');
-  box.setAttribute('aria-label', `${over ? 'misses' : 'meets'} its requirement: ${ratio.toPrecision(2)} times${prior}`);
-  box.title = `required ${s.required_sigma} ${s.unit}${prior}`;
-  td.replaceChildren(box, `${two(s.sigma)} ${s.unit}`, ...(prior ? [element('small', { textContent: ' prior' })] : []));
+  box.setAttribute('aria-label', `${over ? 'misses' : 'meets'} its requirement: ${ratio.toPrecision(2)} times`);
+  box.title = `required ${s.required_sigma} ${s.unit}`;
+  td.replaceChildren(box, said);
 }
 
 /** Arcs beside the table between unknowns that cannot be told apart. */

@@ -21,8 +21,9 @@ pub(super) fn attitude(degrees: [f64; 3]) -> Matrix3<f64> {
     x * y * z
 }
 
-/// What a position says of its psi (in n, rad) and the drift (in n, rad/s): information, by Taylor series of the motion.
-fn of_a_dwell(latitude: f64, dwell: f64, step: f64, noise: f64) -> SMatrix<f64, 6, 6> {
+/// Information of a position on psi at its start (in n, rad) and the drift (in n, rad/s), and both at its end by both at its start, by Taylor series
+/// of the motion.
+fn of_a_dwell(latitude: f64, dwell: f64, step: f64, noise: f64) -> [SMatrix<f64, 6, 6>; 2] {
     let (north, up) = (EARTH * latitude.to_radians().cos(), EARTH * latitude.to_radians().sin());
     let mut f = SMatrix::<f64, 6, 6>::zeros();
     for (i, j, x) in
@@ -33,9 +34,11 @@ fn of_a_dwell(latitude: f64, dwell: f64, step: f64, noise: f64) -> SMatrix<f64, 
     let samples = (dwell / step).ceil();
     let h = dwell / samples;
     let mut out = SMatrix::<f64, 6, 6>::zeros();
+    let mut phi = SMatrix::<f64, 6, 6>::identity();
     for k in 1..=samples as usize {
         let t = h * k as f64;
-        let (mut phi, mut term) = (SMatrix::<f64, 6, 6>::identity(), SMatrix::<f64, 6, 6>::identity());
+        let mut term = SMatrix::<f64, 6, 6>::identity();
+        phi = term;
         for order in 1..14 {
             term = term * f * (t / f64::from(order));
             phi += term;
@@ -45,7 +48,7 @@ fn of_a_dwell(latitude: f64, dwell: f64, step: f64, noise: f64) -> SMatrix<f64, 
             out += row.transpose() * row / (noise * noise);
         }
     }
-    out
+    [out, phi]
 }
 
 /// `eps^n = C E(g^c) D`, with D of the terms asked for, in the order F, I, O, S; D in deg/h (per g).
@@ -64,13 +67,13 @@ pub(super) fn drift(c: &Matrix3<f64>, terms: &str) -> DMatrix<f64> {
 
 /// Candidates as matrices, and all that their information needs.
 pub(super) struct Oracle {
-    dwell: SMatrix<f64, 6, 6>,
+    dwell: [SMatrix<f64, 6, 6>; 2],
     attitudes: Vec<Matrix3<f64>>,
     terms: String,
     /// What is known beforehand of psi (platform axes, rad) and of every coefficient (deg/h): sigmas, infinite where nothing is.
     prior: (f64, Vec<f64>),
     /// Of every candidate: the diagonal of the information where psi is known, the information where it is not; the
-    /// covariance of psi where the coefficients are known, and how they move it.
+    /// covariance of psi at its end where the coefficients are known, and how they move it.
     positions: Vec<Option<OfPosition>>,
     /// What is smaller of a scaled matrix is rounding.
     least: f64,
@@ -104,7 +107,7 @@ impl Oracle {
         let mut l = DMatrix::zeros(6, 3 + m);
         l.view_mut((0, 0), (3, 3)).copy_from(c);
         l.view_mut((3, 3), (3, m)).copy_from(&drift(c, &self.terms));
-        let mut out = l.transpose() * self.dwell * l;
+        let mut out = l.transpose() * self.dwell[0] * l;
         (0..3).for_each(|k| out[(k, k)] += self.prior.0.powi(-2));
         out
     }
@@ -120,7 +123,13 @@ impl Oracle {
             let cross = all.view((0, 3), (3, m)).into_owned();
             let unreduced = all.view((3, 3), (m, m)).into_owned();
             let reduced = &unreduced - cross.transpose() * &own * &cross;
-            Some((unreduced.diagonal(), reduced, own.clone(), own * cross))
+            // in platform axes: psi at the end by psi at the start and the coefficients
+            let (c, phi) = (&self.attitudes[candidate], &self.dwell[1]);
+            let turned = c.transpose() * phi.fixed_view::<3, 3>(0, 0) * c;
+            let turned = DMatrix::from_fn(3, 3, |i, j| turned[(i, j)]);
+            let moved = c.transpose() * phi.fixed_view::<3, 3>(0, 3) * drift(c, &self.terms);
+            let by = &turned * &own * &cross - DMatrix::from_fn(3, m, |i, j| moved[(i, j)]);
+            Some((unreduced.diagonal(), reduced, &turned * own * turned.transpose(), by))
         };
         self.positions = (0..self.attitudes.len()).map(position).collect();
         self

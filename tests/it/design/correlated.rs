@@ -25,7 +25,7 @@ fn correlated(instability_ug: f64, correlation_s: f64) -> Conditions {
     }
 }
 
-/// Sigmas of psi (deg, platform axes; under reset carry of every position) and the coefficients (deg/h) by generalised least squares: every sample
+/// Sigmas of psi at the end (deg, platform axes; under reset carry of every position) and the coefficients (deg/h) by generalised least squares: every sample
 /// is a row of (psi, D), and the noise of any two has the covariance of the biases of three accelerometers between them.
 fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64, c: &Conditions) -> Vec<f64> {
     let (north, up) = (EARTH * latitude.to_radians().cos(), EARTH * latitude.to_radians().sin());
@@ -50,6 +50,8 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     let mut before = Matrix3::identity();
     // psi^n as a functional of the unknowns
     let mut psi = Matrix3xX::<f64>::zeros(n);
+    // psi in platform axes at the end: of the scheme, in axes of the first position where it goes on in n; of every position under reset carry
+    let mut ends: Vec<Matrix3xX<f64>> = Vec::new();
     for (i, d) in degrees.iter().enumerate() {
         let turn = attitude(*d);
         let eps = drift(&turn, terms);
@@ -73,6 +75,12 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
                 at.push(((i * samples + s) as f64 * h, [turn[(axis, 0)], turn[(axis, 1)], turn[(axis, 2)]]));
             }
         }
+        match carry {
+            Carry::Reset => ends.push(turn.transpose() * &psi),
+            Carry::Platform if i + 1 == k => ends.push(turn.transpose() * &psi),
+            Carry::Inertial if i + 1 == k => ends.push(attitude(degrees[0]).transpose() * &psi),
+            _ => {}
+        }
     }
     let sigma = c.accelerometer_instability_ug * 1e-6 * OF_B;
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
@@ -86,7 +94,14 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     let root = covariance.cholesky().expect("positive").l();
     let whitened = root.solve_lower_triangular(&design).expect("regular");
     let inverse = whitened.qr().r().try_inverse().expect("determined");
-    inverse.row_iter().map(|r| r.norm()).collect()
+    let at_end = |functional: Vec<f64>| {
+        let shown = DVector::from_iterator(n, functional.iter().zip(&scale).map(|(x, s)| x * s));
+        inverse.tr_mul(&shown).norm().to_degrees()
+    };
+    let psi = ends
+        .iter()
+        .flat_map(|e| e.row_iter().map(|r| at_end(r.iter().copied().collect())).collect::<Vec<_>>());
+    psi.chain(inverse.row_iter().skip(psis).map(|r| r.norm())).collect()
 }
 
 /// Sequences drawn at random, all carries, correlation times from one sample to a whole run and beyond, instability from nothing to a hundred

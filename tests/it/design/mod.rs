@@ -13,6 +13,7 @@ mod search;
 mod sigmas;
 mod whole;
 
+use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo, cardinal};
 use obsdeg_design::design::{Candidates, Design, DesignOptions, Evaluator, Found, Progress, Rows, design};
 use obsdeg_evidence::simulation::Conditions;
@@ -56,7 +57,12 @@ fn scheme_of(names: &[String], carry: Carry) -> Scheme {
 }
 
 fn quiet() -> Conditions {
-    Conditions { drift_noise: "0 deg/h".parse().expect("a drift noise"), ..Conditions::default() }
+    let require = |name: &str, value| Assignment { name: name.into(), value };
+    Conditions {
+        drift_noise: "0 deg/h".parse().expect("a drift noise"),
+        requirements: vec![require("D", 0.1), require("psi", 0.01)],
+        ..Conditions::default()
+    }
 }
 
 /// Its largest sigma of a drift.

@@ -35,12 +35,14 @@ fn scheme(like: &Scheme, candidates: &Candidates, sequence: &[usize], slew: Opti
     out
 }
 
-/// Sigmas of all unknowns as they are shown: by all samples and the prior of the run, its every prior stated.
+/// Sigmas of all unknowns at the end as they are shown: by all samples and the prior of the run, its every prior stated.
 fn by_samples(scheme: &Scheme, conditions: &Conditions) -> Vec<(String, f64)> {
     let plan = Plan::new(scheme, conditions).expect("a plan");
     let prior = RunStart::new(&plan, conditions).expect("a start").sigma;
     let prior = SquareRootInformation::prior(&prior).expect("a prior");
-    let sigmas = batch(&plan, prior).expect("a batch").information.sigmas().expect("regular");
+    let batch = batch(&plan, prior).expect("a batch");
+    let root = &batch.to_end * batch.information.inverse_root().expect("regular");
+    let sigmas: Vec<f64> = root.row_iter().map(|row| row.norm()).collect();
     let units = plan.platform.units().iter().map(|u| match *u {
         "rad" => 1f64.to_radians(),
         "ug" | "ppm" => 1e-6,

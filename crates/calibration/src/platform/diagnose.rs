@@ -3,11 +3,13 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
+use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{AZIMUTH, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
+use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
@@ -19,7 +21,7 @@ use crate::answer::{
     PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
-use crate::setup::{Basis, Setup};
+use crate::setup::{self, Setup};
 
 /// How many times wider than the prior that of the filter is.
 const WIDE: f64 = 100.0;
@@ -171,7 +173,7 @@ pub(crate) struct Parts<'a> {
     pub found: &'a Diagnosed,
     pub too_many: Option<usize>,
     pub known: Vec<String>,
-    pub rests_on: Vec<Basis>,
+    pub rests_on: Vec<setup::Basis>,
     pub interrupted: bool,
 }
 
@@ -312,6 +314,7 @@ impl Parts<'_> {
             consistent: true,
             findings: Vec::new(),
             quantities: unknowns.iter().map(estimated).collect(),
+            requirements: None,
             combinations: combinations.iter().map(estimated).collect(),
             covariance,
             fit,
@@ -330,7 +333,23 @@ impl Parts<'_> {
         };
         out.findings = self.findings(&out);
         out.consistent = out.findings.is_empty();
+        out.requirements = self.requirements(&out.quantities);
         Ok(out)
+    }
+
+    /// What becomes of the requirements on coefficients; none where none is stated.
+    fn requirements(&self, quantities: &[Estimated]) -> Option<Requirements> {
+        let stated = |name: &str| {
+            let of = |a: &&Assignment| concerns(&a.name, name) && !name.starts_with("psi");
+            self.conditions.requirements.iter().rfind(of).map(|a| a.value)
+        };
+        let sigma = |e: &Estimated| e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
+        let claims = quantities.iter().map(|e| Claim {
+            name: &e.name,
+            required: stated(&e.name),
+            sigma: sigma(e).ok_or(Miss::NotObservable),
+        });
+        Some(Requirements::of(Basis::Record, claims)).filter(|r| r.stated > 0)
     }
 
     /// Chi-square of everything: degrees of freedom are measurements minus what they determine.
@@ -519,6 +538,17 @@ impl Parts<'_> {
         }
     }
 
+    /// Keys of the conditions that nobody states.
+    fn chosen(&self) -> Vec<String> {
+        let stated = self.conditions.states();
+        let all = [
+            ("latitude_deg", self.scheme.latitude.is_none()),
+            ("accelerometer_noise_g", !stated.accelerometer_noise && !self.options.estimate_noise),
+            ("drift_noise", !stated.drift_noise && self.conditions.drift_noise.amount() > 0.0),
+        ];
+        all.into_iter().filter_map(|(key, by_default)| by_default.then(|| key.into())).collect()
+    }
+
     fn assumed(&self, unknowns: &[Asked]) -> Assumed {
         let c = self.conditions;
         let open = unknowns.iter().filter(|a| !a.determined);
@@ -542,6 +572,7 @@ impl Parts<'_> {
                 differs.map(|terms| format!("terms {terms} instead of {}", own.terms)).into_iter().collect()
             }),
             held: held.collect(),
+            by_default: self.chosen(),
             seed: self.options.seed,
         }
     }

@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 
 use obsdeg_core::model::{Carry, Geometry};
 use obsdeg_evidence::requirements::Requirements;
-use obsdeg_evidence::simulation::MeasurementReport;
+use obsdeg_evidence::simulation::{MeasurementReport, OtherCarry};
 
 /// Name and version of the JSON layout.
-pub const SCHEMA: &str = "obsdeg.design/1";
+pub const SCHEMA: &str = "obsdeg.design/2";
 
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Design {
-    /// `obsdeg.design/1`.
+    /// `obsdeg.design/2`.
     pub schema: String,
     /// Version of the program.
     pub version: String,
@@ -43,6 +43,9 @@ pub struct Design {
     pub found: Vec<Found>,
     /// Schemes that none found beats in both total time and criterion, by total time.
     pub front: Vec<Found>,
+    /// The first scheme under the other carries; empty where none was searched.
+    #[serde(default)]
+    pub other_carries: Vec<OtherCarry>,
     /// How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so.
     pub primes: usize,
     /// Bound on the probability that an observable set was overlooked, or a degree taken too large; nothing is called proven unless it is
@@ -77,10 +80,10 @@ pub struct Minimum {
 pub struct SearchReport {
     /// The number of positions.
     pub positions: usize,
-    /// What every sigma rests on: the information of all samples on psi and all coefficients, and the prior. Every position has the dwell, slews
-    /// are about the eigenaxis, Z is not used meanwhile.
+    /// What every sigma rests on: the information of all samples on psi and all coefficients, with the random drift and the priors that are
+    /// stated. Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
     pub conditions: MeasurementReport,
-    /// Random drift that sigmas allow for; null: none.
+    /// Random drift that is stated: the search leaves it out, and the figures of all schemes that are listed count it; null: none.
     pub drift_noise: Option<String>,
     /// Knowledge beforehand that sigmas and the bound count beside the samples: the priors that are stated; null: none. What is observable is
     /// by the samples alone.

@@ -2,6 +2,9 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::Carry;
+use obsdeg_ekf::EkfError;
+use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::{Attained, si_per_shown};
 
 use super::information::{Evaluator, MAX, MAX_DRIFTS, State};
 use super::ways::Stop;
@@ -27,7 +30,7 @@ pub enum Criterion {
 pub struct Limits {
     /// Of the coefficients that count, in deg/h (per g) (shape d).
     pub coefficients: Vec<f64>,
-    /// Of psi_x, psi_y, psi_z at the start, under reset carry at the start of every position, in deg.
+    /// Of psi_x, psi_y, psi_z at the end, under reset carry at the end of every position, in deg.
     pub psi: [f64; 3],
 }
 
@@ -41,6 +44,38 @@ impl Criterion {
             Self::E => "E",
             Self::Margin(_) => "margin",
         }
+    }
+}
+
+impl Criterion {
+    /// The criterion of a scheme by its covariance at the end, random drift included; `counts` names the coefficients that count.
+    pub(super) fn of_attained(
+        &self,
+        attained: &Attained,
+        requirements: &Requirements,
+        counts: &dyn Fn(&String) -> bool,
+    ) -> Result<f64, EkfError> {
+        let (names, units) = (attained.plan.platform.names(), attained.plan.platform.units());
+        let counted: Vec<usize> = (0..names.len()).filter(|&c| counts(&names[c])).collect();
+        if let Self::Margin(_) = self {
+            return Ok(match &requirements.worst {
+                Some(worst) if !requirements.leaves_out() => 1.0 / worst.margin,
+                _ => f64::INFINITY,
+            });
+        }
+        if counted.iter().any(|&c| attained.sigmas[c].is_none()) {
+            return Ok(f64::INFINITY);
+        }
+        let scale = |k: usize| 1.0 / si_per_shown(units[counted[k]]);
+        let own = attained.covariance_of(&counted)?;
+        let shown = DMatrix::from_fn(own.nrows(), own.ncols(), |i, j| own[(i, j)] * scale(i) * scale(j));
+        let n = shown.nrows() as f64;
+        Ok(match self {
+            Self::A => (shown.trace() / n).sqrt(),
+            Self::D => shown.symmetric_eigenvalues().iter().map(|x| x.ln() / (2.0 * n)).sum::<f64>().exp(),
+            Self::E => shown.symmetric_eigenvalues().max().sqrt(),
+            _ => shown.diagonal().max().sqrt(),
+        })
     }
 }
 

@@ -58,13 +58,14 @@ pub enum DesignError {
         /// The coefficients.
         known: String,
     },
-    /// A requirement that cannot be.
-    #[error("the requirement for {name} is {found}; expected a sigma above 0")]
-    Requirement {
-        /// The coefficient.
-        name: String,
-        /// The number found.
-        found: f64,
+    /// Requirements decide, and none is stated.
+    #[error(
+        "{what} needs a requirement, and none is stated; expected --requirement NAME=SIGMA (as in --requirement D=0.05 for all drift \
+         coefficients, psi=0.01 for psi), or [requirements] in a scheme file"
+    )]
+    NoRequirement {
+        /// The option that needs it.
+        what: &'static str,
     },
     /// Positions are what is searched for.
     #[error(

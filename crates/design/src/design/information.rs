@@ -49,7 +49,7 @@ pub(super) struct Dwelling {
     /// Information of the position on its local unknowns.
     pub(super) local: [[f64; LOCAL]; LOCAL],
     /// `psi^n` behind it as a function of `(psi^n, eps^n)` before.
-    phi: [[f64; PSI_EPS]; 3],
+    pub(super) phi: [[f64; PSI_EPS]; 3],
     /// What its samples say where the noise of Z is correlated.
     pub(super) correlated: Option<Box<OfDwell>>,
 }

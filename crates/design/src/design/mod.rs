@@ -54,10 +54,11 @@ pub use winner::scheme as scheme_found;
 
 use certify::excess;
 use obsdeg_core::model::{Euler, Path, Scheme, c_n_f64};
-use obsdeg_evidence::simulation::{Conditions, MeasurementReport, latitude_of};
+use obsdeg_evidence::simulation::{Conditions, MeasurementReport, latitude_of, other_carries};
 use rounding::Free;
 use serde::{Deserialize, Serialize};
 use task::Task;
+pub use task::asked;
 use ties::TIE;
 
 /// Most sequences that are searched exhaustively, up to symmetry.
@@ -329,6 +330,7 @@ fn answered(
     progress: &(dyn Fn(Progress) -> bool + Sync),
     elsewhere: Option<Elsewhere<'_>>,
 ) -> Result<Design, DesignError> {
+    let conditions = &asked(base, conditions, &options.required)?;
     watched(progress, |progress, stopped| {
         let going = || progress(NOTHING_YET);
         let free =
@@ -356,6 +358,7 @@ fn answered(
             search: None,
             found: Vec::new(),
             front: Vec::new(),
+            other_carries: Vec::new(),
             primes: task.rows.fields(),
             error_bound: task.rows.error_bound(sets),
             seed: options.seed,
@@ -377,6 +380,9 @@ fn answered(
         }
         let all = exhaustive.is_some() && best.complete;
         out.found = task.all_found(evaluator, &best.found)?;
+        if task.is_noisy() {
+            out.found.sort_by(|a, b| a.worst_degree.cmp(&b.worst_degree).then(a.value.total_cmp(&b.value)));
+        }
         task.mark_images(&mut out.found, evaluator.ordered());
         let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
             let (positions, wanted) = (k, task.wanted());
@@ -391,7 +397,9 @@ fn answered(
             });
         };
         out.front = task.all_found(evaluator, &best.front)?;
-        let mut certificate = bound.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
+        // the bound is of samples without random drift: it says nothing of how far above it figures with it may be
+        let certified = bound.filter(|_| !task.is_noisy());
+        let mut certificate = certified.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {
             let of = (k, conditions.dwell_s);
             let wanted = certificate.is_some() && options.everywhere && free.is_none();
@@ -420,17 +428,24 @@ fn answered(
             put_first(&mut out.found, divided);
         }
         out.front = pareto(std::mem::take(&mut out.front));
+        out.other_carries = match out.found.first() {
+            Some(best) => {
+                let scheme = winner::scheme(best, base, conditions)?;
+                other_carries(&scheme, &Conditions::of(&scheme), options.seed)?
+            }
+            None => Vec::new(),
+        };
         out.search = Some(SearchReport {
             positions: k,
             conditions: MeasurementReport::new(base, conditions),
-            drift_noise: None,
-            prior: prior_in_words(conditions),
+            drift_noise: conditions.as_stated().drift_noise_in_words(),
+            prior: conditions.stated_prior_in_words(),
             criterion: task.criterion.name().into(),
             unit: task.unit().ok().flatten().map(Into::into),
             examined: best.examined,
             excluded: best.excluded,
             lost: best.lost,
-            proven: all && out.error_bound < PROOF,
+            proven: all && out.error_bound < PROOF && !task.is_noisy(),
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),
             interrupted: stopped.load(Ordering::Relaxed),
@@ -440,17 +455,6 @@ fn answered(
         });
         Ok(out)
     })
-}
-
-/// `psi 0.05 deg, D_F 20`: the priors that are stated, later ones over earlier ones.
-fn prior_in_words(conditions: &Conditions) -> Option<String> {
-    let stated = conditions.stated_priors();
-    let scale = match conditions.drift_scale {
-        1.0 => String::new(),
-        factor => format!(", those of drifts times {factor}"),
-    };
-    let listed: Vec<String> = stated.iter().map(|a| format!("{} {}", a.name, a.value)).collect();
-    (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
 }
 
 /// Why an exhaustive search found nothing.

@@ -165,8 +165,9 @@ fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BT
         estimates,
         priors,
         requirements: required_sigmas,
+        stated,
     } = conditions;
-    let of: [(&str, &dyn std::fmt::Debug); 45] = [
+    let of: [(&str, &dyn std::fmt::Debug); 46] = [
         ("version", &env!("CARGO_PKG_VERSION")),
         ("carry", carry),
         ("latitude", latitude),
@@ -212,6 +213,7 @@ fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BT
         ("estimates", estimates),
         ("prior", priors),
         ("requirement", required_sigmas),
+        ("stated conditions", stated),
     ];
     of.into_iter().map(|(name, value)| (name.into(), format!("{value:?}"))).collect()
 }

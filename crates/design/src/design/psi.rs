@@ -1,11 +1,11 @@
-//! The accuracy of psi: what requirements on it are held against.
+//! The accuracy of psi at the end of a scheme, with which the platform is used: what requirements on it are held against.
 
-use obsdeg_core::model::Carry;
+use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
-use super::information::{Evaluator, MAX, State};
+use super::information::{Candidate, Evaluator, MAX, State};
 use super::ways::Stop;
 
-/// A position's own psi in platform axes.
+/// A position's own psi in platform axes, at the end of the position.
 #[derive(Debug, Clone)]
 pub(super) struct OwnPsi {
     /// The variance in rad^2 of every component, prior included, where the coefficients are known; infinite where it is not determined.
@@ -16,8 +16,8 @@ pub(super) struct OwnPsi {
 }
 
 impl Evaluator {
-    /// Sigma in deg of psi in platform axes at the start of a whole sequence, or of its every position under reset
-    /// carry; infinite where it is not determined, none when a coefficient that counts is not.
+    /// Sigma in deg of psi in platform axes at the end of a whole sequence (inertial carry: in those of its first position), under reset carry
+    /// at the end of its every position; infinite where it is not determined, none when a coefficient that counts is not.
     pub fn psi_sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<[f64; 3]> {
         let (state, mut root) = (self.state_of(sequence), Vec::new());
         if self.root(&state, &mut root) { self.psi_of(&state, &root) } else { Vec::new() }
@@ -32,37 +32,72 @@ impl Evaluator {
         self.psi_of(state, root).into_iter().map(over).fold(0.0, f64::max)
     }
 
-    /// Sigma in deg of psi in platform axes at the start, or of every position under reset carry; infinite where it is
-    /// not determined.
+    /// The same from the root of the information behind the sequence.
     fn psi_of(&self, state: &State, root: &[f64]) -> Vec<[f64; 3]> {
         let n = self.n;
-        let unit = |k: usize| -> [f64; 3] { std::array::from_fn(|r| f64::from(u8::from(r == k))) };
+        let sigma = |root: &[f64], psi: &[f64]| {
+            solved(root, n, psi.iter().copied()).map_or(f64::INFINITY, |y| norm(&y).to_degrees())
+        };
         match (self.carry(), state.path.first()) {
             (Carry::Reset, _) if let Some(bias) = &self.bias => (0..state.path.len())
-                .map(|i| {
-                    let root = self.root_with_psi(bias, &state.path, i);
-                    let sigma = |root: &Vec<f64>, k| {
-                        let psi = unit(k).into_iter().chain(std::iter::repeat_n(0.0, n - 3));
-                        Some(norm(&solved(root, n, psi)?).to_degrees())
-                    };
-                    [0, 1, 2].map(|k| root.as_ref().and_then(|r| sigma(r, k)).unwrap_or(f64::INFINITY))
+                .map(|i| match self.root_with_psi(bias, &state.path, i) {
+                    Some(root) => self.own_psi_at_end(state.path[i]).map(|psi| sigma(&root, &psi)),
+                    None => [f64::INFINITY; 3],
                 })
                 .collect(),
             (Carry::Reset, _) => state.path.iter().map(|&c| self.psi_of_position(c, root)).collect(),
-            (carry, first) => {
-                // psi is carried in platform axes, or in n: psi^c = C^T psi^n
-                let inertial = first.filter(|_| carry == Carry::Inertial);
-                let c = inertial.map_or_else(|| [0, 1, 2].map(unit), |&c| self.candidates[c].c);
-                let sigma = |k: usize| {
-                    let psi = (0..n).map(|r| if r < 3 { c[r][k] } else { 0.0 });
-                    solved(root, n, psi).map_or(f64::INFINITY, |y| norm(&y).to_degrees())
-                };
-                vec![[0, 1, 2].map(sigma)]
+            // psi is carried in n: psi^c = C^T psi^n
+            (Carry::Inertial, Some(&first)) => {
+                let psi = self.in_platform_axes(first, &state.psi.each_ref().map(Vec::as_slice));
+                vec![psi.map(|psi| sigma(root, &psi))]
             }
+            _ => vec![state.psi.each_ref().map(|psi| sigma(root, psi))],
         }
     }
 
-    /// Sigma in deg of psi of a position with a psi of its own, when the rest of the scheme knows the coefficients as
+    /// `C^T X` of rows in n (3 x m), C the attitude of a candidate.
+    fn in_platform_axes(&self, candidate: usize, rows: &[&[f64]; 3]) -> [Vec<f64>; 3] {
+        let c = &self.candidates[candidate].c;
+        let row = |k: usize| (0..rows[0].len()).map(|j| (0..3).map(|r| c[r][k] * rows[r][j]).sum()).collect();
+        std::array::from_fn(row)
+    }
+
+    /// psi in platform axes at the end of a position by its own psi in these axes at its start and the coefficients (3 x n).
+    fn own_psi_at_end(&self, candidate: usize) -> [Vec<f64>; 3] {
+        let Candidate { c, effects, .. } = &self.candidates[candidate];
+        let phi = &self.dwelling_of(candidate).phi;
+        let entry = |r: usize, j: usize| match j.checked_sub(3) {
+            None => (0..3).map(|i| phi[r][i] * c[i][j]).sum::<f64>(),
+            Some(d) => (0..3).map(|i| phi[r][3 + i] * effects[i][d]).sum(),
+        };
+        let rows: [Vec<f64>; 3] = std::array::from_fn(|r| (0..self.n).map(|j| entry(r, j)).collect());
+        self.in_platform_axes(candidate, &rows.each_ref().map(Vec::as_slice))
+    }
+
+    /// Information of a position, with the prior of its psi, on psi^n at its end: with itself and with the other local unknowns (3 x L).
+    /// `psi(end) = A psi(start) + B eps` with a rotation A, so psi(start) is `A^T (psi(end) - B eps)`.
+    fn information_at_end(&self, candidate: usize) -> [[f64; LOCAL]; 3] {
+        let (c, dwelling) = self.stands(candidate);
+        let phi = &dwelling.phi;
+        let mut start: [[f64; LOCAL]; 3] = std::array::from_fn(|i| dwelling.local[i]);
+        for (i, row) in start.iter_mut().enumerate() {
+            for (j, x) in row[..3].iter_mut().enumerate() {
+                *x += self.prior.psi.iter().enumerate().map(|(k, p)| c[i][k] * p * c[j][k]).sum::<f64>();
+            }
+        }
+        // of psi(start) with psi(end) and what else there is
+        let with: [[f64; LOCAL]; 3] = std::array::from_fn(|i| {
+            let psi: [f64; 3] = std::array::from_fn(|j| (0..3).map(|k| start[i][k] * phi[j][k]).sum());
+            std::array::from_fn(|j| match j {
+                0..3 => psi[j],
+                3..PSI_EPS => start[i][j] - (0..3).map(|k| psi[k] * phi[k][j]).sum::<f64>(),
+                _ => start[i][j],
+            })
+        });
+        std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| phi[i][k] * with[k][j]).sum()))
+    }
+
+    /// Sigma in deg of psi at the end of a position with a psi of its own, when the rest of the scheme knows the coefficients as
     /// `root` says.
     fn psi_of_position(&self, candidate: usize, root: &[f64]) -> [f64; 3] {
         let OwnPsi { variances, moved } = self.own_psi(candidate);
@@ -94,12 +129,10 @@ impl Evaluator {
     fn psi_alone(&self, candidate: usize) -> OwnPsi {
         let (n, c) = (self.n, &self.candidates[candidate].c);
         let effects = &self.candidates[candidate].effects;
-        let dwelling = self.dwelling_of(candidate);
-        let local = |i: usize, j: usize| dwelling.local[i][j];
+        let local = self.information_at_end(candidate);
         // information on psi^c, and between psi^c and the coefficients
-        let weighted = |k: usize, j: usize| (0..3).map(|r| c[r][k] * local(r, j)).sum::<f64>();
-        let prior = |i: usize, k: usize| if i == k { self.prior.psi[k] } else { 0.0 };
-        let own = |i: usize, k: usize| prior(i, k) + (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();
+        let weighted = |k: usize, j: usize| (0..3).map(|r| c[r][k] * local[r][j]).sum::<f64>();
+        let own = |i: usize, k: usize| (0..3).map(|r| weighted(i, r) * c[r][k]).sum::<f64>();
         let cross = |i: usize, d: usize| {
             let of = |(r, row): (usize, &Vec<f64>)| row.get(d).map_or(0.0, |x| weighted(i, 3 + r) * x);
             effects.iter().enumerate().map(of).sum::<f64>()

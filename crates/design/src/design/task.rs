@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::degree::judge;
-use obsdeg_core::model::settings::concerns;
-use obsdeg_core::model::{Carry, Euler, Path, Platform, Scheme, Unknowns, c_n_f64};
-use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
-use obsdeg_evidence::simulation::{Conditions, PRIOR, latitude_of, resolve};
+use obsdeg_core::model::settings::{Assignment, concerns};
+use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, c_n_f64};
+use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
 use rayon::prelude::*;
 
 use super::answer::{Found, HalfTurn, Minimum};
@@ -31,6 +31,28 @@ pub(super) const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Restarts of the exchange at each of them, besides those from the schemes found.
 const FRONT_RESTARTS: u64 = 8;
 
+/// Conditions of a search: where only some coefficients are asked for, requirements on psi and on the others are left out, also of the file that
+/// is written, so that every command judges the same.
+///
+/// # Errors
+/// [`DesignError::Scheme`] for a base that is no platform.
+pub fn asked(base: &Scheme, conditions: &Conditions, required: &[String]) -> Result<Conditions, DesignError> {
+    if required.is_empty() {
+        return Ok(conditions.clone());
+    }
+    let any = std::array::from_fn(|_| Angle::from_degrees(0));
+    let positions = Scheme::of_angles([any]).positions;
+    let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
+    let counts = |name: &&String| required.iter().any(|asked| concerns(asked, name));
+    let names: Vec<&String> = platform.names().iter().filter(counts).collect();
+    let of = |a: &Assignment| -> Vec<Assignment> {
+        let concerned = names.iter().filter(|name| concerns(&a.name, name));
+        concerned.map(|name| Assignment { name: name.to_string(), value: a.value }).collect()
+    };
+    let requirements = conditions.requirements.iter().flat_map(of).collect();
+    Ok(Conditions { requirements, ..conditions.clone() })
+}
+
 /// A search in preparation: names resolved, candidates ordered by orbits.
 pub(super) struct Task<'a> {
     pub(super) base: &'a Scheme,
@@ -40,12 +62,7 @@ pub(super) struct Task<'a> {
     pub(super) required: Vec<(String, usize)>,
     pub(super) criterion: Criterion,
     pub(super) constraints: Constraints,
-    /// Requirements on what must be observable; on psi when that is everything.
-    limits: Limits,
-    /// Whether the requirements are those of the program.
-    by_default: bool,
-    /// Whether priors are stated.
-    has_prior: bool,
+    conditions: &'a Conditions,
     pub(super) rows: Rows,
     pub(super) symmetry: Symmetry,
     /// Whether repositioning takes time.
@@ -59,7 +76,7 @@ pub(super) struct Task<'a> {
 impl<'a> Task<'a> {
     pub(super) fn new(
         base: &'a Scheme,
-        conditions: &Conditions,
+        conditions: &'a Conditions,
         options: &'a DesignOptions,
         candidates: Candidates,
     ) -> Result<Self, DesignError> {
@@ -116,19 +133,15 @@ impl<'a> Task<'a> {
             }
         }
         let priors = resolve(PRIOR, &platform, conditions.stated_priors(), f64::INFINITY)?;
-        let all_requirements = resolve("required sigma", &platform, &conditions.requirements, f64::NAN)?;
-        let requirements: Vec<f64> = required.iter().map(|c| all_requirements[first + c.1]).collect();
-        // with some coefficients asked for, psi is not
-        let psi = |k: usize| Some(all_requirements[k]).filter(|x| !x.is_nan() && options.required.is_empty());
+        let limits_of = resolve("required sigma", &platform, &conditions.requirements, f64::INFINITY)?;
         let limits = Limits {
-            coefficients: requirements.iter().map(|x| if x.is_nan() { f64::INFINITY } else { *x }).collect(),
-            psi: [0, 1, 2].map(|k| psi(k).unwrap_or(f64::INFINITY)),
+            coefficients: required.iter().map(|c| limits_of[first + c.1]).collect(),
+            psi: [0, 1, 2].map(|k| limits_of[k]),
         };
-        if options.meet || options.criterion == CriterionName::Margin {
-            let wrong = |x: &f64| !(x.is_finite() && *x > 0.0);
-            if let Some((c, found)) = required.iter().zip(&requirements).find(|(_, x)| wrong(x)) {
-                return Err(DesignError::Requirement { name: c.0.clone(), found: *found });
-            }
+        let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
+        if uses_requirements && limits.coefficients.iter().chain(&limits.psi).all(|l| l.is_infinite()) {
+            let what = if options.meet { "--meet" } else { "--criterion margin" };
+            return Err(DesignError::NoRequirement { what });
         }
         let criterion = match options.criterion {
             CriterionName::Worst => Criterion::Worst,
@@ -146,7 +159,6 @@ impl<'a> Task<'a> {
         let repeated = rows.repeated();
         let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
         let place = |c: usize| required.iter().position(|r| r.1 == c);
-        let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
         // a turn of the platform axes renames psi as well
         let turned = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
             && priors[..3].iter().all(|p| *p == priors[0]);
@@ -154,7 +166,7 @@ impl<'a> Task<'a> {
             _ if (!turned || priors[first + i] != priors[first + j]) && i != j => false,
             (None, None) => true,
             (Some(i), Some(j)) => {
-                caps[i] == caps[j] && (!uses_requirements || requirements[i] == requirements[j])
+                caps[i] == caps[j] && (!uses_requirements || limits.coefficients[i] == limits.coefficients[j])
             }
             _ => false,
         };
@@ -168,20 +180,17 @@ impl<'a> Task<'a> {
         let constraints = Constraints {
             total_s: options.total_s,
             slew_s: options.slew_s,
-            sigmas: options.meet.then(|| limits.clone()),
+            sigmas: options.meet.then_some(limits),
             degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
         };
-        let by_default = conditions.requires_by_default();
         Ok(Self {
             base,
+            conditions,
             options,
             candidates,
             required,
             criterion,
             constraints,
-            limits,
-            by_default,
-            has_prior: !conditions.stated_priors().is_empty(),
             rows,
             symmetry,
             slews: conditions.slew_rate_deg_s.is_some(),
@@ -286,7 +295,7 @@ impl<'a> Task<'a> {
         let attitudes: Vec<Euler> =
             scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
         let names = scored.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
-        self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)
+        self.attained(self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)?)
     }
 
     /// Those of some sequences that are what they seem.
@@ -361,37 +370,7 @@ impl<'a> Task<'a> {
         let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
         let order_of = |c: usize| accuracy.as_ref().and_then(|a| a.order[c]);
         let orders = columns().map(order_of).collect::<Option<Vec<_>>>();
-        let sigmas = evaluator.sigmas(sequence);
-        if sigmas.is_empty() {
-            return Ok(None);
-        }
-        let drifts = sigmas.iter().zip(&self.required).filter(|(_, r)| self.units[r.1].starts_with("deg/h"));
-        let (worst_sigma_dph, worst) =
-            drifts.max_by(|a, b| a.0.total_cmp(b.0)).map(|(s, r)| (*s, r.0.clone())).unzip();
-        let determined = |c: usize| match accuracy {
-            Some(_) => order_of(c).is_some(),
-            None => verdicts.degrees.degree[c].is_some(),
-        };
-        let limit = |x: f64| Some(x).filter(|x| x.is_finite());
-        let psi: Vec<f64> = evaluator.psi_sigmas(sequence).concat();
-        let psi = platform.names()[..first].iter().enumerate().map(|(c, name)| Claim {
-            name,
-            required: limit(self.limits.psi[c % 3]),
-            sigma: if determined(c) {
-                Ok(psi.get(c).copied().unwrap_or(f64::NAN))
-            } else {
-                Err(Miss::NotObservable)
-            },
-        });
-        let coefficients = self.required.iter().zip(&sigmas).zip(&self.limits.coefficients);
-        let coefficients = coefficients.map(|(((name, c), sigma), required)| Claim {
-            name,
-            required: limit(*required),
-            sigma: if determined(first + c) { Ok(*sigma) } else { Err(Miss::NotObservable) },
-        });
-        let basis = if self.has_prior { Basis::PredictedWithPrior } else { Basis::Predicted };
-        let requirements = Requirements::of(basis, psi.chain(coefficients), self.by_default);
-        if self.options.meet && !requirements.all_met() {
+        if evaluator.sigmas(sequence).is_empty() {
             return Ok(None);
         }
         Ok(Some(Found {
@@ -407,13 +386,44 @@ impl<'a> Task<'a> {
             dwells_s: Vec::new(),
             total_s: evaluator.state_of(sequence).seconds,
             value,
-            worst_sigma_dph,
-            worst,
-            requirements,
+            worst_sigma_dph: None,
+            worst: None,
+            requirements: Requirements::of(self.conditions.basis(), []),
             worst_degree: degrees.into_iter().max().unwrap_or(0),
             worst_accuracy_order: orders.and_then(|o| o.into_iter().max()),
             rank: [verdicts.degrees.rank(), platform.names().len()],
         }))
+    }
+
+    /// What was found with the figures that every other command gives of its file; `None` where requirements are a constraint and one is
+    /// missed.
+    ///
+    /// # Errors
+    /// [`DesignError`] for a scheme that cannot be run.
+    pub(super) fn attained(&self, found: Option<Found>) -> Result<Option<Found>, DesignError> {
+        let Some(found) = found else { return Ok(None) };
+        let scheme = winner::scheme(&found, self.base, self.conditions)?;
+        let conditions = Conditions::of(&scheme);
+        let attained = Attained::new(&scheme, &conditions, self.options.seed)?;
+        let requirements = attained.requirements(&conditions)?;
+        if self.options.meet && !requirements.all_met() {
+            return Ok(None);
+        }
+        let counts = |name: &String| self.required.iter().any(|r| r.0 == *name);
+        let (worst, worst_sigma_dph) = attained.worst_of(&counts).map(|w| (w.name, w.sigma_dph)).unzip();
+        let value = match self.is_noisy() {
+            false => found.value,
+            true => self
+                .criterion
+                .of_attained(&attained, &requirements, &counts)
+                .map_err(SimulationError::from)?,
+        };
+        Ok(Some(Found { requirements, worst, worst_sigma_dph, value, ..found }))
+    }
+
+    /// True if random drift is stated: the search leaves it out, and what it finds is evaluated with it.
+    pub(super) fn is_noisy(&self) -> bool {
+        !self.conditions.gyro_noise.is_none() || self.conditions.as_stated().drift_noise.amount() > 0.0
     }
 
     /// What is found at other dwells and numbers of positions.
@@ -472,7 +482,7 @@ impl<'a> Task<'a> {
         let names = best.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
         let found = self.judged(&there, &path, attitudes, names, value)?;
         let dwells_s: Vec<f64> = (0..path.len()).map(|i| there.dwelling_of(i).seconds).collect();
-        Ok(found.map(|f| Found { dwells_s, dwell_s: evaluator.dwell_s(), ..f }))
+        self.attained(found.map(|f| Found { dwells_s, dwell_s: evaluator.dwell_s(), ..f }))
     }
 
     /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a
@@ -494,7 +504,7 @@ impl<'a> Task<'a> {
         attitudes.iter().for_each(|a| names.add(a.clone()));
         let found = self.judged(&there, &path, attitudes, names.names, value)?;
         let found = found.filter(|f| f.worst_degree <= best.worth.degree);
-        Ok(found.map(|f| Found { refined: true, ..f }))
+        self.attained(found.map(|f| Found { refined: true, ..f }))
     }
 
     /// `makes D_FX, D_FY observable with at most 10 s in all`.
@@ -515,11 +525,8 @@ impl<'a> Task<'a> {
         out.extend(c.slew_s.map(|s| format!("slews of at most {s} s")));
         if c.sigmas.is_some() {
             out.push(match self.options.required.is_empty() {
-                true => "every requirement met as predicted, on psi (at the start) too".into(),
-                false => {
-                    "the requirements on what must be observable met as predicted; those on psi and the rest do not count"
-                        .into()
-                }
+                true => "every stated requirement met as predicted".into(),
+                false => "every stated requirement on what must be observable met as predicted".into(),
             });
         }
         for (name, cap) in &self.options.degree_caps {

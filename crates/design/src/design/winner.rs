@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::model::settings::{Settings, concerns};
+use obsdeg_core::model::settings::{Assignment, Settings, concerns};
 use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, parse_attitude};
 use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 
@@ -30,15 +30,9 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             p.slew = Some(half_turn(&turn.about));
         }
     }
-    let mut priors = BTreeMap::new();
-    for a in conditions.stated_priors() {
-        // in a file what is of one unknown counts before what is of its family, whichever comes first
-        priors.retain(|name: &String, _| !concerns(&a.name, name));
-        priors.insert(a.name.clone(), a.value);
-    }
+    let priors = by_name(conditions.stated_priors());
     let bias = AccelerometerBias::of(conditions);
-    // the defaults come first
-    let given = conditions.requirements.iter().skip(Conditions::default().requirements.len());
+    let gyros = (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise);
     Ok(Scheme {
         name: String::new(),
         description: String::new(),
@@ -54,11 +48,28 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             accelerometer_bias_instability_ug: bias.map(|b| b.instability_ug),
             accelerometer_correlation_time_s: bias.map(|b| b.correlation_time_s),
             azimuth_noise_deg: base.measured_azimuth.then_some(conditions.azimuth_noise_deg),
+            // no random drift is a condition too
+            drift_noise: Some(conditions.as_stated().drift_noise),
+            angle_random_walk_deg_sqrt_h: gyros.map(|g| g.angle_random_walk_deg_sqrt_h),
+            rate_random_walk_dph_sqrt_h: gyros.map(|g| g.rate_random_walk_dph_sqrt_h),
+            bias_instability_dph: gyros.map(|g| g.bias_instability_dph),
+            correlation_time_s: gyros.map(|g| g.correlation_time_s),
+            drift_scale: (conditions.drift_scale != 1.0).then_some(conditions.drift_scale),
             ..base.simulation.clone()
         },
-        requirements: given.map(|r| (r.name.clone(), r.value)).collect(),
+        requirements: by_name(&conditions.requirements),
         ..base.clone()
     })
+}
+
+/// Assignments as a file states them: there what is of one unknown counts before what is of its family, whichever comes first.
+fn by_name(given: &[Assignment]) -> BTreeMap<String, f64> {
+    let mut out = BTreeMap::new();
+    for a in given {
+        out.retain(|name: &String, _| !concerns(&a.name, name));
+        out.insert(a.name.clone(), a.value);
+    }
+    out
 }
 
 /// Half a turn about a direction in n: an axis by its name, others by components of which the largest is 1.

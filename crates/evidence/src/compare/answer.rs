@@ -6,17 +6,17 @@ use obsdeg_core::model::slew::Turn;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::requirements::{Claim, Miss, Requirements};
-use crate::simulation::NoiseFloor;
+use crate::requirements::{Requirements, Worst};
 use crate::simulation::answer::{MeasurementReport, Validity};
+use crate::simulation::{NoiseFloor, OtherCarry};
 
 /// Name and version of the JSON layout.
-pub const SCHEMA: &str = "obsdeg.comparison/1";
+pub const SCHEMA: &str = "obsdeg.comparison/2";
 
 /// Several schemes, judged alike.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
-    /// `obsdeg.comparison/1`.
+    /// `obsdeg.comparison/2`.
     pub schema: String,
     /// Version of the program.
     pub version: String,
@@ -50,14 +50,15 @@ pub struct ComparedScheme {
     pub quantities: Vec<Quantity>,
     /// The largest sigma of a coefficient; null when one is not observable.
     pub worst: Option<Worst>,
-    /// Whether every unknown with a requirement meets it.
+    /// True if requirements are stated and every one is met.
     pub meets_requirements: bool,
-    /// What became of the requirements: predicted sigma (psi: of the start, under reset carry of the start of each position).
+    /// What becomes of the requirements by the predicted sigmas.
     pub requirements: Requirements,
+    /// The same scheme under the other carries.
+    pub other_carries: Vec<OtherCarry>,
     /// Whether accuracy orders are computed: none are for rotating segments.
     pub has_accuracy_orders: bool,
-    /// Whether the small-angle model holds at the scheme's own drifts; null where they have no true values, or for very many
-    /// steps.
+    /// Whether the small-angle model holds at the drifts that are stated; null where none are (`values`), or for very many steps.
     pub validity: Option<Validity>,
     /// What happens without each of the positions.
     pub drop_one: Vec<DropOne>,
@@ -90,9 +91,12 @@ pub struct Quantity {
     pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
-    /// Standard deviation by the information of all samples, without prior and drift noise; null when these do not determine it.
+    /// Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when neither samples nor stated
+    /// priors bound it.
     pub sigma: Option<f64>,
-    /// Of a coefficient, where the small-angle model does not hold for the scheme's own drifts: the standard deviation of a
+    /// True if the samples do not determine it, so that sigma rests on stated priors alone.
+    pub by_prior: bool,
+    /// Of a coefficient, where the small-angle model does not hold for the drifts that are stated: the standard deviation of a
     /// filter with full attitudes at the end, with the prior.
     pub sigma_extended: Option<f64>,
     /// The largest sigma allowed.
@@ -104,22 +108,6 @@ pub struct Quantity {
     pub excitation: Vec<f64>,
     /// Positions without which it is not observable.
     pub carried_by: Vec<String>,
-}
-
-impl Quantity {
-    /// What is held against its requirement.
-    pub(super) fn claim(&self) -> Claim<'_> {
-        Claim { name: &self.name, required: self.requirement, sigma: self.sigma.ok_or(Miss::NotObservable) }
-    }
-}
-
-/// The largest sigma of a coefficient.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Worst {
-    /// The coefficient.
-    pub name: String,
-    /// Its sigma in deg/h (per g).
-    pub sigma_dph: f64,
 }
 
 /// A scheme without one of its positions.

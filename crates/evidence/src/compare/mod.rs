@@ -10,17 +10,15 @@ use std::collections::BTreeMap;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, Source, slew};
-use obsdeg_ekf::SquareRootInformation;
 use rayon::prelude::*;
 
-use crate::prediction::Prediction;
-use crate::requirements::{Basis, Requirements};
+use crate::requirements::{Claim, Miss};
 use crate::simulation::answer::MeasurementReport;
-use crate::simulation::batch::batch;
-use crate::simulation::conditions::{Conditions, is_rate, resolve, shown_unit, si_per_shown};
+use crate::simulation::carries::under;
+use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::iterated::at_own_drifts;
 use crate::simulation::plan::MAX_UNKNOWNS;
-use crate::simulation::{Plan, SimulationError, no_prior, noise_floor, predict};
+use crate::simulation::{Attained, SimulationError, noise_floor, other_carries};
 
 /// Latitudes of the sweep, in degrees.
 const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
@@ -88,8 +86,8 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
 }
 
-/// Every unknown with its standard deviation in deg, deg/h, deg/h/g by the information of all samples, without prior
-/// and drift noise; `None` when it is not observable.
+/// Every unknown with its predicted standard deviation in deg, deg/h, deg/h/g at the end, by the conditions that are stated; `None` where
+/// neither samples nor stated priors bound it.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -98,90 +96,46 @@ pub fn predicted(
     conditions: &Conditions,
     seed: u64,
 ) -> Result<Vec<(String, Option<f64>)>, SimulationError> {
-    let judged = Judged::new(scheme, conditions, seed)?;
-    Ok(judged.platform().names().iter().cloned().zip(judged.sigmas.iter().copied()).collect())
+    let judged = judged(scheme, conditions, seed)?;
+    Ok(judged.plan.platform.names().iter().cloned().zip(judged.sigmas.iter().copied()).collect())
 }
 
-/// The verdicts and the accuracy of one scheme.
-struct Judged {
-    plan: Plan,
-    prediction: Prediction,
-    /// Per unknown, in its own unit; `None` when it is not observable.
-    sigmas: Vec<Option<f64>>,
+/// The accuracy of a scheme under conditions of which those count that concern its unknowns: other carries and fewer positions have others.
+fn judged(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Attained, SimulationError> {
+    Attained::new(scheme, &conditions.within(&Platform::new(scheme.clone())?), seed)
 }
 
-impl Judged {
-    fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
-        // other carries and fewer positions have other unknowns
-        let conditions = conditions.within(&Platform::new(scheme.clone())?);
-        let plan = Plan::new(scheme, &conditions.without_drift_noise())?;
-        let prediction = predict(&plan, seed)?;
-        let prior = SquareRootInformation::prior(&no_prior(&plan)?)?;
-        let sigmas = batch(&plan, prior)?.information.sigmas()?;
-        let units = plan.platform.units().iter();
-        let sigmas = sigmas
-            .iter()
-            .zip(units)
-            .zip(&prediction.unknowns)
-            .map(|((s, unit), u)| u.determined.then(|| s / si_per_shown(unit)))
-            .collect();
-        Ok(Self { plan, prediction, sigmas })
-    }
+/// The rank with dwell and the number of unknowns.
+fn rank(of: &Attained) -> [usize; 2] {
+    [of.prediction.rank, of.prediction.unknowns.len()]
+}
 
-    fn platform(&self) -> &Platform {
-        &self.plan.platform
-    }
-
-    fn rank(&self) -> [usize; 2] {
-        [self.prediction.rank, self.platform().names().len()]
-    }
-
-    /// The largest sigma of a drift coefficient, if all are observable.
-    fn worst(&self) -> Option<Worst> {
-        self.worst_of(&|_| true)
-    }
-
-    /// Names of the coefficients that are observable.
-    fn determined(&self) -> Vec<String> {
-        let (names, units) = (self.platform().names(), self.platform().units());
-        let determined = (0..names.len()).filter(|&c| units[c] != "rad" && self.sigmas[c].is_some());
-        determined.map(|c| names[c].clone()).collect()
-    }
-
-    /// The largest sigma of a drift coefficient that counts, if all of these are observable: other coefficients have other units.
-    fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
-        let units = self.platform().units();
-        let counts = |c: &usize| is_rate(units[*c]) && counts(&self.platform().names()[*c]);
-        let drifts = (0..units.len()).filter(counts);
-        let mut worst: Option<Worst> = None;
-        for c in drifts {
-            let sigma_dph = self.sigmas[c]?;
-            if worst.as_ref().is_none_or(|w| sigma_dph > w.sigma_dph) {
-                worst = Some(Worst { name: self.platform().names()[c].clone(), sigma_dph });
-            }
-        }
-        worst
-    }
+/// Names of the coefficients that have a sigma.
+fn determined(of: &Attained) -> Vec<String> {
+    let (names, units) = (of.plan.platform.names(), of.plan.platform.units());
+    let determined = (0..names.len()).filter(|&c| units[c] != "rad" && of.sigmas[c].is_some());
+    determined.map(|c| names[c].clone()).collect()
 }
 
 fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
     let Entry { name, scheme, conditions } = entry;
-    let judged = Judged::new(scheme, conditions, seed)?;
-    conditions.concern(judged.platform())?;
+    let judged = judged(scheme, conditions, seed)?;
+    conditions.concern(&judged.plan.platform)?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
     let mut quantities = quantities(&judged, conditions, &drop_one)?;
-    let own = match at_own_drifts(&judged.plan, conditions) {
-        // drifts that no run can have say nothing of the scheme
-        Err(e) if e.is_numeric() => None,
-        own => own?,
+    // drifts that nobody states, or that no run can have, say nothing of the scheme
+    let states_drifts = !conditions.stated_values().is_empty();
+    let own = match states_drifts.then(|| at_own_drifts(&judged.plan, conditions)) {
+        None => None,
+        Some(Err(e)) if e.is_numeric() => None,
+        Some(own) => own?,
     };
     if let Some((_, sigmas)) = own.as_ref().filter(|(validity, _)| !validity.holds) {
-        // psi there is that of the end
-        for ((q, sigma), unit) in quantities.iter_mut().zip(sigmas).zip(judged.platform().units()) {
+        for ((q, sigma), unit) in quantities.iter_mut().zip(sigmas).zip(judged.plan.platform.units()) {
             q.sigma_extended = (*unit != "rad").then(|| sigma / si_per_shown(unit));
         }
     }
-    let requirements = required(&quantities, conditions);
+    let requirements = judged.requirements(conditions)?;
     let slews = judged.plan.slews();
     let has_slews = judged.plan.slews().next().is_some();
     Ok(ComparedScheme {
@@ -191,34 +145,26 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         positions: scheme.positions.iter().map(|p| p.name.clone()).collect(),
         slews: slews.map(|(p, turn)| Slew { to: scheme.positions[p].name.clone(), turn }).collect(),
         total_s: judged.plan.duration_s(),
-        rank: judged.rank(),
+        rank: rank(&judged),
         meets_requirements: requirements.all_met(),
         requirements,
+        other_carries: other_carries(scheme, conditions, seed)?,
         has_accuracy_orders: judged.prediction.has_accuracy_orders,
         quantities,
-        worst: judged.worst(),
+        worst: judged.worst_of(&|_| true),
         validity: own.map(|(validity, _)| validity),
         noise_floor: noise_floor(scheme, conditions, &judged.prediction)?,
         drop_one,
-        sensitivity: sensitivity(scheme, conditions, &judged.determined(), has_slews, seed)?,
+        sensitivity: sensitivity(scheme, conditions, &determined(&judged), has_slews, seed)?,
     })
 }
 
-/// The requirements of `conditions` against predicted sigmas.
-fn required(quantities: &[Quantity], conditions: &Conditions) -> Requirements {
-    Requirements::of(
-        Basis::Predicted,
-        quantities.iter().map(Quantity::claim),
-        conditions.requires_by_default(),
-    )
-}
-
 fn quantities(
-    judged: &Judged,
+    judged: &Attained,
     conditions: &Conditions,
     drop_one: &[DropOne],
 ) -> Result<Vec<Quantity>, SimulationError> {
-    let platform = judged.platform();
+    let platform = &judged.plan.platform;
     let requirements = resolve("required sigma", platform, &conditions.requirements, f64::NAN)?;
     let first_d = platform.names().len() - platform.coefficients();
     let excitations = excitations(judged);
@@ -231,21 +177,20 @@ fn quantities(
         let requirement = Some(requirements[c]).filter(|r| !r.is_nan());
         let sigma = judged.sigmas[c];
         let carries = drop_one.iter().filter(|d| d.lost.contains(name));
-        let mut out = Quantity {
+        Quantity {
             name: name.clone(),
             unit: shown_unit(platform.units()[c]).into(),
             status: u.status,
             degree: u.degree,
             accuracy_order: u.accuracy_order,
             sigma,
+            by_prior: judged.by_prior[c],
             sigma_extended: None,
             requirement,
-            margin: None,
+            margin: Claim { name, required: requirement, sigma: sigma.ok_or(Miss::NotObservable) }.margin(),
             excitation: excitation(c),
             carried_by: carries.map(|d| d.position.clone()).collect(),
-        };
-        out.margin = out.claim().margin();
-        out
+        }
     };
     Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
 }
@@ -253,8 +198,8 @@ fn quantities(
 /// Per position and coefficient: the length of its column of `eps^n = C E D` or of the error of the accelerometers at a position, its root
 /// mean square over the arc of a rotating segment (the columns of C are orthonormal, so this is the product of components of g, f, or of the
 /// earth rate).
-fn excitations(judged: &Judged) -> Vec<Vec<f64>> {
-    let (plan, platform) = (&judged.plan, judged.platform());
+fn excitations(judged: &Attained) -> Vec<Vec<f64>> {
+    let (plan, platform) = (&judged.plan, &judged.plan.platform);
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
         let rows = plan.drift_rows(c, None);
         let seen = platform.errors().accelerometer_rows(&Float, c);
@@ -299,28 +244,28 @@ fn quadrature(arc: f64) -> Vec<(f64, f64)> {
 fn drop_one(
     scheme: &Scheme,
     conditions: &Conditions,
-    whole: &Judged,
+    whole: &Attained,
     seed: u64,
 ) -> Result<Vec<DropOne>, SimulationError> {
     if scheme.positions.len() < 2 {
         return Ok(Vec::new());
     }
-    let observable = |j: &Judged, name: &String| {
-        let c = j.platform().names().iter().position(|n| n == name);
-        c.is_some_and(|c| j.prediction.unknowns[c].status == Status::Observable || j.sigmas[c].is_some())
+    let observable = |of: &Attained, name: &String| {
+        let c = of.plan.platform.names().iter().position(|n| n == name);
+        let unknown = |c: usize| &of.prediction.unknowns[c];
+        c.is_some_and(|c| unknown(c).status == Status::Observable || unknown(c).determined)
     };
     (0..scheme.positions.len())
         .into_par_iter()
         .map(|i| {
             let position = scheme.positions[i].name.clone();
-            let judged = Judged::new(&scheme.without_position(i), conditions, seed)?;
-            let names = whole.platform().names().iter();
+            let judged = judged(&scheme.without_position(i), conditions, seed)?;
+            let names = whole.plan.platform.names().iter();
             // under reset carry every position has a psi of its own
             let names = names.filter(|n| !n.contains('@'));
             let lost = names.filter(|n| observable(whole, n) && !observable(&judged, n)).cloned().collect();
-            let still = conditions.within(judged.platform());
-            let requirements = required(&quantities(&judged, &still, &[])?, conditions);
-            Ok(DropOne { position, lost, worst: judged.worst(), requirements })
+            let requirements = judged.requirements(conditions)?;
+            Ok(DropOne { position, lost, worst: judged.worst_of(&|_| true), requirements })
         })
         .collect()
 }
@@ -343,17 +288,19 @@ fn sensitivity(
         others.push((format!("dwell x {factor}"), other, conditions.clone()));
     }
     let without = if slews { ", no slews" } else { "" };
-    // torquer errors act on ways that a scheme of another carry need not state
-    let stated = |carry: &Carry| Scheme { carry: *carry, ..scheme.clone() }.paths().is_ok();
-    for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry && stated(c)) {
-        // slews carry psi^n: without them another carry can be asked for
-        let still = Conditions { slews: false, ..conditions.clone() };
-        others.push((format!("{carry} carry{without}"), Scheme { carry, ..scheme.clone() }, still));
+    for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {
+        let other = under(scheme, conditions, carry);
+        others.extend(other.map(|(other, still)| (format!("{carry} carry{without}"), other, still)));
     }
-    let judged = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
-        let judged = Judged::new(&scheme, &conditions, seed)?;
+    let of = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
+        let judged = judged(&scheme, &conditions, seed)?;
         let worst_determined = judged.worst_of(&|name| determined.contains(name));
-        Ok(Sensitivity { condition, rank: judged.rank(), worst: judged.worst(), worst_determined })
+        Ok(Sensitivity {
+            condition,
+            rank: rank(&judged),
+            worst: judged.worst_of(&|_| true),
+            worst_determined,
+        })
     };
-    others.into_par_iter().map(judged).collect()
+    others.into_par_iter().map(of).collect()
 }

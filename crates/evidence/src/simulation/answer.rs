@@ -7,6 +7,7 @@ use obsdeg_core::model::{Carry, Scheme};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::carries::OtherCarry;
 use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
 use super::floor::NoiseFloor;
@@ -14,12 +15,12 @@ use super::gyro_noise::GyroNoise;
 use crate::requirements::{Miss, Requirements, meets};
 
 /// Name and version of the JSON layout.
-pub const SCHEMA: &str = "obsdeg.simulation/1";
+pub const SCHEMA: &str = "obsdeg.simulation/2";
 
 /// One run of the filter against a simulated truth.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Simulation {
-    /// `obsdeg.simulation/1`.
+    /// `obsdeg.simulation/2`.
     pub schema: String,
     /// Version of the program.
     pub version: String,
@@ -33,8 +34,13 @@ pub struct Simulation {
     pub quantities: Vec<Estimate>,
     /// Observable combinations of unknowns that are not observable alone.
     pub combinations: Vec<Estimate>,
-    /// What became of the requirements: sigma of the filter at the end, with prior and drift noise.
+    /// What becomes of the requirements by prediction, as in every other command: the information of all samples with the noise, the random
+    /// drift and the priors that are stated.
     pub requirements: Requirements,
+    /// What became of them in this run, by sigma of its filter at the end.
+    pub run: RunRequirements,
+    /// The same scheme under the other carries.
+    pub other_carries: Vec<OtherCarry>,
     /// Whether errors and innovations are what the filter believes.
     pub consistency: Consistency,
     /// Which filter it is, and why.
@@ -46,6 +52,40 @@ pub struct Simulation {
     pub noise_floor: Option<NoiseFloor>,
     /// Seed of the noise.
     pub seed: u64,
+}
+
+/// A run's sigmas against the requirements, beside the prediction.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RunRequirements {
+    /// What became of the requirements in the run.
+    pub requirements: Requirements,
+    /// The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null where none has.
+    pub largest_ratio: Option<SigmaRatio>,
+    /// The smallest such ratio; null where no unknown has both.
+    pub smallest_ratio: Option<SigmaRatio>,
+    /// Reasons why the sigmas of the run may differ from the predicted ones.
+    pub differs: Vec<RunDiffers>,
+}
+
+/// The ratio of a run's sigma to the predicted one.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SigmaRatio {
+    /// The unknown.
+    pub name: String,
+    /// Sigma of the run over the predicted sigma, dimensionless.
+    pub ratio: f64,
+}
+
+/// What a run assumes besides the conditions that are stated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RunDiffers {
+    /// The random drift of the program: none is stated.
+    RandomDrift,
+    /// Priors of the program: not every unknown has a stated one.
+    Prior,
+    /// A filter with full attitudes: the prediction is that of small angles.
+    FullAttitudes,
 }
 
 /// The conditions of a run with their units.
@@ -81,6 +121,9 @@ pub struct ConditionsReport {
     pub propagation: Propagation,
     /// Factor on true drifts and their priors.
     pub drift_scale: f64,
+    /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
+    /// dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    pub by_default: Vec<String>,
 }
 
 /// The bias instability of the accelerometers: a first-order Gauss-Markov process of each, which goes on in platform axes.
@@ -102,7 +145,7 @@ impl AccelerometerBias {
     }
 }
 
-/// What a predicted sigma rests on: the information of all samples, without prior and without drift noise.
+/// What a predicted sigma rests on: the information of all samples with the noise, the random drift and the priors that are stated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasurementReport {
     /// Latitude in degrees.
@@ -115,13 +158,26 @@ pub struct MeasurementReport {
     pub step_s: f64,
     /// Noise of the observation per sample and axis in g.
     pub accelerometer_noise_g: f64,
-    /// Bias instability of the accelerometers: `design` counts it, a comparison leaves it out; left out where there is none.
+    /// Bias instability of the accelerometers; left out where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accelerometer_bias: Option<AccelerometerBias>,
     /// Noise of the azimuth per sample in deg; null where it is not measured.
     pub azimuth_noise_deg: Option<f64>,
     /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
     pub slew_rate_deg_s: Option<f64>,
+    /// Random drift that is stated, with its unit; null: none counts.
+    #[serde(default)]
+    pub drift_noise: Option<String>,
+    /// Datasheet of the gyros; left out where they have no noise of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyro_noise: Option<GyroNoise>,
+    /// Priors that are stated, as 1 sigma in the units of the unknowns; null: none counts.
+    #[serde(default)]
+    pub prior: Option<String>,
+    /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
+    /// dwell_s, azimuth_noise_deg.
+    #[serde(default)]
+    pub by_default: Vec<String>,
 }
 
 impl MeasurementReport {
@@ -136,8 +192,26 @@ impl MeasurementReport {
             accelerometer_bias: AccelerometerBias::of(conditions),
             azimuth_noise_deg: scheme.measured_azimuth.then_some(conditions.azimuth_noise_deg),
             slew_rate_deg_s: conditions.slew_rate_deg_s.filter(|_| conditions.slews),
+            drift_noise: conditions.as_stated().drift_noise_in_words(),
+            gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
+            prior: conditions.stated_prior_in_words(),
+            by_default: chosen(scheme, conditions),
         }
     }
+}
+
+/// Keys of the conditions of a prediction that nobody states.
+pub(super) fn chosen(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
+    let stated = conditions.states();
+    let needs_dwell = scheme.positions.iter().any(|p| p.dwell.is_none());
+    let all = [
+        ("latitude_deg", scheme.latitude.is_none()),
+        ("accelerometer_noise_g", !stated.accelerometer_noise),
+        ("step_s", !stated.step),
+        ("dwell_s", !stated.dwell && needs_dwell),
+        ("azimuth_noise_deg", !stated.azimuth_noise && scheme.measured_azimuth),
+    ];
+    all.into_iter().filter_map(|(key, by_default)| by_default.then(|| key.into())).collect()
 }
 
 /// A position or slew of the timeline.
@@ -176,6 +250,8 @@ pub struct Estimate {
     pub error: f64,
     /// What the filter believes of the error.
     pub sigma: f64,
+    /// Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound it.
+    pub predicted_sigma: Option<f64>,
     /// Error over sigma.
     pub error_over_sigma: f64,
     /// What the linear filter makes of the same measurements; null where it is the filter.
@@ -234,8 +310,10 @@ pub enum FilterReason {
 pub enum Outcome {
     /// Sigma is at or below what is required.
     Reached,
-    /// Sigma fell, but not to what is required, or nothing is.
+    /// Sigma fell, but not to what is required.
     Converging,
+    /// Sigma fell; nothing is required of it.
+    Determined,
     /// The samples determine it, but sigma is (nearly) that of the prior.
     RestsOnPrior,
     /// The samples do not determine it: whatever sigma says, it comes of the prior.
@@ -270,15 +348,17 @@ impl Outcome {
             Self::RestsOnPrior
         } else if required.is_some_and(|r| meets(sigma, r)) {
             Self::Reached
-        } else {
+        } else if required.is_some() {
             Self::Converging
+        } else {
+            Self::Determined
         }
     }
 
     /// Why it meets no requirement, whatever sigma is.
     pub(crate) fn miss(self) -> Option<Miss> {
         match self {
-            Self::Reached | Self::Converging => None,
+            Self::Reached | Self::Converging | Self::Determined => None,
             Self::RestsOnPrior => Some(Miss::RestsOnPrior),
             Self::PriorOnly | Self::LargeAnglesOnly => Some(Miss::NotObservable),
             Self::Inconsistent => Some(Miss::Inconsistent),

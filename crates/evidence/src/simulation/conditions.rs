@@ -12,6 +12,7 @@ use obsdeg_ekf::SensorNoise;
 
 use super::SimulationError;
 use super::gyro_noise::GyroNoise;
+use crate::requirements::Basis;
 
 /// Everything that a run needs besides the scheme.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,8 +53,26 @@ pub struct Conditions {
     pub estimates: Vec<Assignment>,
     /// Initial standard deviations.
     pub priors: Vec<Assignment>,
-    /// The largest standard deviations allowed.
+    /// The largest standard deviations allowed: those that are stated, since the program has none of its own.
     pub requirements: Vec<Assignment>,
+    /// Conditions that a file or an option states, whatever their values are: see [`Self::states`].
+    pub stated: Stated,
+}
+
+/// Conditions that a file or an option states. What it leaves out is chosen by the program, is named by every answer, and (random drift,
+/// priors, true values) counts in runs only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stated {
+    /// Largest step between samples.
+    pub step: bool,
+    /// Dwell of positions that do not say theirs.
+    pub dwell: bool,
+    /// White noise of the accelerometers.
+    pub accelerometer_noise: bool,
+    /// Noise of a measured azimuth.
+    pub azimuth_noise: bool,
+    /// Random drift, `drift_noise` or an angle random walk of the gyros.
+    pub drift_noise: bool,
 }
 
 /// The latitude of a scheme that names none, in degrees (the paper's is not given).
@@ -64,22 +83,22 @@ fn assign(name: &str, value: f64) -> Assignment {
 }
 
 impl Default for Conditions {
-    /// The paper's run; what it does not give (prior, latitude, requirements) is chosen here.
+    /// The paper's run; what it does not give (prior, latitude) is chosen here. Nothing is required.
     fn default() -> Self {
         let first_order = |value| ["D_I", "D_O", "D_S"].map(|name| assign(name, value));
         let drift = [("D_FX", 11.0), ("D_FY", 12.0), ("D_FZ", 13.0)].map(|(n, v)| assign(n, v));
         let values = [assign("D", 0.5), assign("psi", 0.1), assign("eps", 10.0)].into_iter();
         let priors = [assign("D", 1.0), assign("psi", 0.1), assign("eps", 20.0), assign("D_F", 20.0)];
-        // ppm, arcsec, ug, ug/g^2, ug/g^3: true value, prior, requirement
+        // ppm, arcsec, ug, ug/g^2, ug/g^3: true value, prior
         let others = [
-            ("GS", 100.0, 300.0, 10.0),
-            ("GM", 60.0, 120.0, 10.0),
-            ("K0", 300.0, 1000.0, 10.0),
-            ("K1", 100.0, 300.0, 10.0),
-            ("M", 60.0, 120.0, 10.0),
-            ("K2", 20.0, 50.0, 10.0),
-            ("K3", 10.0, 30.0, 10.0),
-            ("Kx", 10.0, 30.0, 10.0),
+            ("GS", 100.0, 300.0),
+            ("GM", 60.0, 120.0),
+            ("K0", 300.0, 1000.0),
+            ("K1", 100.0, 300.0),
+            ("M", 60.0, 120.0),
+            ("K2", 20.0, 50.0),
+            ("K3", 10.0, 30.0),
+            ("Kx", 10.0, 30.0),
         ];
         Self {
             truth: Truth::Linear,
@@ -99,19 +118,17 @@ impl Default for Conditions {
             values: values
                 .chain(first_order(5.0))
                 .chain(drift)
-                .chain(others.map(|(name, value, ..)| assign(name, value)))
+                .chain(others.map(|(name, value, _)| assign(name, value)))
                 .collect(),
             drift_scale: 1.0,
             estimates: Vec::new(),
             priors: priors
                 .into_iter()
                 .chain(first_order(10.0))
-                .chain(others.map(|(name, _, prior, _)| assign(name, prior)))
+                .chain(others.map(|(name, _, prior)| assign(name, prior)))
                 .collect(),
-            requirements: [assign("D", 0.1), assign("eps", 0.1), assign("psi", 0.01)]
-                .into_iter()
-                .chain(others.map(|(name, .., required)| assign(name, required)))
-                .collect(),
+            requirements: Vec::new(),
+            stated: Stated::default(),
         }
     }
 }
@@ -135,6 +152,13 @@ impl Conditions {
                 *slot = value;
             }
         }
+        let stated = &mut self.stated;
+        stated.step |= settings.step_s.is_some();
+        stated.dwell |= settings.dwell_s.is_some();
+        stated.accelerometer_noise |= settings.accelerometer_noise_g.is_some();
+        stated.azimuth_noise |= settings.azimuth_noise_deg.is_some();
+        stated.drift_noise |=
+            settings.drift_noise.is_some() || settings.angle_random_walk_deg_sqrt_h.is_some();
         set(&mut self.truth, settings.truth);
         self.filter = settings.filter.or(self.filter);
         set(&mut self.step_s, settings.step_s);
@@ -176,14 +200,56 @@ impl Conditions {
         out
     }
 
-    /// Whether the requirements are those of the program: neither file nor option states one.
-    pub fn requires_by_default(&self) -> bool {
-        self.requirements == Self::default().requirements
-    }
-
     /// The priors that a file or an option states: all but those of the program.
     pub fn stated_priors(&self) -> &[Assignment] {
         self.priors.strip_prefix(&Self::default().priors[..]).unwrap_or(&self.priors)
+    }
+
+    /// The true values that a file or an option states: all but those of the paper.
+    pub fn stated_values(&self) -> &[Assignment] {
+        self.values.strip_prefix(&Self::default().values[..]).unwrap_or(&self.values)
+    }
+
+    /// What a prediction under these conditions rests on.
+    pub fn basis(&self) -> Basis {
+        if self.stated_priors().is_empty() { Basis::Predicted } else { Basis::PredictedWithPrior }
+    }
+
+    /// `psi 0.05, D_F 20`: the priors that are stated, each in the unit of its unknown; `None` where none is.
+    pub fn stated_prior_in_words(&self) -> Option<String> {
+        let scale = match self.drift_scale {
+            1.0 => String::new(),
+            factor => format!(", those of drifts times {factor}"),
+        };
+        let listed: Vec<String> =
+            self.stated_priors().iter().map(|a| format!("{} {}", a.name, a.value)).collect();
+        (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
+    }
+
+    /// The random drift with its unit; `None` where there is none.
+    pub fn drift_noise_in_words(&self) -> Option<String> {
+        (self.drift_noise.amount() > 0.0).then(|| self.drift_noise.to_string())
+    }
+
+    /// The conditions that are stated; what differs from the program's own values is.
+    pub fn states(&self) -> Stated {
+        let own = Self::default();
+        let Stated { step, dwell, accelerometer_noise, azimuth_noise, drift_noise } = self.stated;
+        Stated {
+            step: step || self.step_s != own.step_s,
+            dwell: dwell || self.dwell_s != own.dwell_s,
+            accelerometer_noise: accelerometer_noise
+                || self.accelerometer_noise_g != own.accelerometer_noise_g,
+            azimuth_noise: azimuth_noise || self.azimuth_noise_deg != own.azimuth_noise_deg,
+            drift_noise: drift_noise || self.drift_noise != own.drift_noise,
+        }
+    }
+
+    /// The conditions that requirements are judged by: random drift that nobody states is none. (Priors that nobody states do not count
+    /// either: see [`Self::stated_priors`].)
+    pub fn as_stated(&self) -> Self {
+        let drift_noise = if self.states().drift_noise { self.drift_noise } else { DriftNoise::OneStep(0.0) };
+        Self { drift_noise, ..self.clone() }
     }
 
     /// The rate in deg/s at which a position is reached; `None`: at once.

@@ -24,7 +24,7 @@
 
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Scheme, ranges};
-use obsdeg_ekf::linear::covariance_pass;
+use obsdeg_ekf::linear::last_covariance;
 use obsdeg_ekf::{Form, SquareRootInformation};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -173,18 +173,26 @@ pub fn sigmas_without_prior(
             output.r *= own_step(dwell, conditions.step_s) / segment.dt;
         }
     }
-    // what the samples say is worth no more than the random drift of the run lets it be
-    let information = batch(&plan, SquareRootInformation::none(plan.unknowns()))?.information;
-    let duration = plan.duration_s();
-    let random = plan.random_rate(duration) + 6.0 * drift_noise.held_rad_s(duration);
-    let width = WIDTH * (1.0 + random * duration / conditions.accelerometer_noise_g);
-    let mut sigma = wider(&plan, &information, width, width);
+    let mut sigma = wide_prior(&plan, &whole)?;
     sigma.extend(plan.bias_sigmas());
     let prior = RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)?;
-    let mut last = Vec::new();
-    covariance_pass(&plan.stages, prior, |_, p| last = p.sigmas())?;
+    let mut last = last_covariance(&plan.stages, prior)?.sigmas();
     last.truncate(plan.unknowns());
     Ok(last)
+}
+
+/// Standard deviations that say nothing beside the samples of `plan` under random drift (shape n): what the samples say is worth no more
+/// than the random drift of the run lets it be.
+///
+/// # Errors
+/// [`SimulationError::Filter`] when a number is not finite.
+pub(super) fn wide_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<f64>, SimulationError> {
+    let information = batch(plan, SquareRootInformation::none(plan.unknowns()))?.information;
+    let duration = plan.duration_s();
+    let density = DriftNoise::RandomWalk(conditions.drift_noise.density_deg_sqrt_h(conditions.step_s));
+    let random = plan.random_rate(duration) + 6.0 * density.held_rad_s(duration);
+    let width = WIDTH * (1.0 + random * duration / conditions.accelerometer_noise_g);
+    Ok(wider(plan, &information, width, width))
 }
 
 /// The equal steps of at most `step` that a dwell is divided into, in s.

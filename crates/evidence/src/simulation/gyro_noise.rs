@@ -12,14 +12,14 @@ use obsdeg_core::model::{Float, GYROS, Matrix3, PerGyro, local_dynamics};
 use obsdeg_ekf::noise::discretised;
 use obsdeg_ekf::{BiasState, SensorNoise};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::SimulationError;
 use super::plan::{Plan, SegmentKind};
 use super::truth::Noise;
 
 /// The datasheet of the gyros X, Y, Z.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GyroNoise {
     /// Angle random walk in deg/sqrt(h).
     pub angle_random_walk_deg_sqrt_h: PerGyro,

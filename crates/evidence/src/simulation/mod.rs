@@ -1,7 +1,9 @@
 //! A torquing scheme run through the filter: one run against one truth, and what it says.
 
 pub(crate) mod answer;
+pub(crate) mod attained;
 pub(crate) mod batch;
+pub(crate) mod carries;
 pub(crate) mod conditions;
 pub(crate) mod consistency;
 mod curvature;
@@ -16,9 +18,11 @@ pub(crate) mod state;
 pub(crate) mod truth;
 
 pub use answer::*;
+pub use attained::Attained;
 pub use batch::{Batch, batch, diffuse_prior};
+pub use carries::{OtherCarry, other_carries};
 pub use conditions::{
-    Conditions, PRIOR, general_first, is_rate, latitude_of, resolve, shown_unit, si_per_shown,
+    Conditions, PRIOR, Stated, general_first, is_rate, latitude_of, resolve, shown_unit, si_per_shown,
 };
 pub use consistency::{Consistency, Doubt};
 pub use extended::{Ended, Extended, PlatformMotion};
@@ -32,12 +36,13 @@ pub use state::PlatformState;
 pub use truth::{Noise, TruthModel};
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::settings::{DriftNoise, FilterKind};
 use obsdeg_core::model::{Carry, Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
 
-use crate::prediction::{Prediction, PredictionError};
+use crate::prediction::{PredictedCombination, Prediction, PredictionError};
 use crate::requirements::{Basis, Claim, Requirements, meets};
+use answer::chosen;
 use conditions::REQUIRED;
 use consistency::Outcomes;
 
@@ -182,9 +187,11 @@ fn summary(
     let (names, units) = (plan.platform.names(), plan.platform.units());
     let requirements = resolve(REQUIRED, &plan.platform, &conditions.requirements, f64::NAN)?;
     let required = |c: usize| Some(requirements[c]).filter(|r| !r.is_nan());
+    let attained = Attained::new(scheme, conditions, seed)?;
     let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
         let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
-        estimate(&names[c], units[c], verdict, c, record, required(c))
+        let wanted = [required(c), attained.sigmas[c]];
+        estimate(&names[c], units[c], verdict, c, record, wanted)
     });
     let mut quantities: Vec<Estimate> = unknowns.collect();
     for (q, u) in
@@ -193,12 +200,15 @@ fn summary(
         let unseen = u.partners.iter().filter(|&&p| !prediction.unknowns[p].determined_at_end);
         q.prior_of = unseen.map(|&p| names[p].clone()).collect();
     }
-    let combinations = prediction.combinations.iter().enumerate().map(|(i, c)| {
+    let combination = |(i, c): (usize, &PredictedCombination)| -> Result<Estimate, SimulationError> {
         let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
         let lead = c.terms[0].0;
-        estimate(&c.expression, units[lead], verdict, n + i, record, required(lead))
-    });
-    let combinations: Vec<Estimate> = combinations.collect();
+        let predicted = attained.sigma_of(&c.terms)? / si_per_shown(units[lead]);
+        let wanted = [required(lead), c.determined_at_end.then_some(predicted)];
+        Ok(estimate(&c.expression, units[lead], verdict, n + i, record, wanted))
+    };
+    let combinations = prediction.combinations.iter().enumerate();
+    let combinations: Vec<Estimate> = combinations.map(combination).collect::<Result<_, _>>()?;
     let consistency = Consistency::of(Outcomes {
         whitened: &record.whitened,
         outputs: plan.components.len(),
@@ -214,15 +224,9 @@ fn summary(
         carry: scheme.carry,
         conditions: conditions_report(scheme, plan, conditions),
         timeline: timeline_report(plan),
-        requirements: Requirements::of(
-            Basis::Run,
-            quantities.iter().map(|q| Claim {
-                name: &q.name,
-                required: q.required_sigma,
-                sigma: q.outcome.miss().map_or(Ok(q.sigma), Err),
-            }),
-            conditions.requires_by_default(),
-        ),
+        requirements: attained.requirements(conditions)?,
+        run: run_requirements(plan, conditions, &quantities, record)?,
+        other_carries: other_carries(scheme, conditions, seed)?,
         quantities,
         combinations,
         consistency,
@@ -230,6 +234,37 @@ fn summary(
         validity: record.validity.clone(),
         noise_floor,
         seed,
+    })
+}
+
+/// What became of the requirements in the run, and why its sigmas may differ from the predicted ones.
+fn run_requirements(
+    plan: &Plan,
+    conditions: &Conditions,
+    quantities: &[Estimate],
+    record: &Record,
+) -> Result<RunRequirements, SimulationError> {
+    let claims = quantities.iter().map(|q| Claim {
+        name: &q.name,
+        required: q.required_sigma,
+        sigma: q.outcome.miss().map_or(Ok(q.sigma), Err),
+    });
+    let ratio = |q: &Estimate| {
+        let ratio = q.sigma / q.predicted_sigma?;
+        ratio.is_finite().then(|| SigmaRatio { name: q.name.clone(), ratio })
+    };
+    let by_ratio = |a: &SigmaRatio, b: &SigmaRatio| a.ratio.total_cmp(&b.ratio);
+    let priors = resolve(PRIOR, &plan.platform, conditions.stated_priors(), f64::NAN)?;
+    let differs = [
+        (RunDiffers::RandomDrift, !conditions.states().drift_noise && conditions.drift_noise.amount() > 0.0),
+        (RunDiffers::Prior, priors.iter().any(|p| p.is_nan())),
+        (RunDiffers::FullAttitudes, record.filter.kind != FilterKind::Linear),
+    ];
+    Ok(RunRequirements {
+        requirements: Requirements::of(Basis::Run, claims),
+        largest_ratio: quantities.iter().filter_map(ratio).max_by(by_ratio),
+        smallest_ratio: quantities.iter().filter_map(ratio).min_by(by_ratio),
+        differs: differs.into_iter().filter_map(|(reason, here)| here.then_some(reason)).collect(),
     })
 }
 
@@ -260,7 +295,20 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
         propagation: conditions.propagation,
         drift_scale: conditions.drift_scale,
+        by_default: chosen_for_run(scheme, conditions),
     }
+}
+
+/// Keys of the conditions of a run that nobody states.
+fn chosen_for_run(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
+    let mut out = chosen(scheme, conditions);
+    let own = [
+        ("drift_noise", !conditions.states().drift_noise && conditions.drift_noise.amount() > 0.0),
+        ("values", conditions.stated_values().is_empty()),
+        ("priors", conditions.stated_priors().is_empty()),
+    ];
+    out.extend(own.into_iter().filter_map(|(key, by_default)| by_default.then(|| key.into())));
+    out
 }
 
 /// The timeline as it is reported.
@@ -288,14 +336,15 @@ pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     out
 }
 
-/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it.
+/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it, the last are the required and the
+/// predicted sigma.
 fn estimate(
     name: &str,
     unit: &str,
     verdict: (Status, Option<usize>, Option<usize>, bool),
     i: usize,
     record: &Record,
-    required_sigma: Option<f64>,
+    [required_sigma, predicted_sigma]: [Option<f64>; 2],
 ) -> Estimate {
     let (status, degree, accuracy_order, determined) = verdict;
     let (series, scale) = (&record.traces.series[i], si_per_shown(unit));
@@ -323,6 +372,7 @@ fn estimate(
         estimate,
         error,
         sigma,
+        predicted_sigma,
         error_over_sigma,
         linear,
         prior_sigma,

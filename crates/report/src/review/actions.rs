@@ -11,7 +11,7 @@ use obsdeg_evidence::requirements::Miss;
 use super::fewest_of_all;
 use crate::calibration::is_clock;
 use crate::document::number;
-use crate::words;
+use crate::{stated, words};
 
 /// What follows from what was found of a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
@@ -29,12 +29,13 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         out.push(longer(s, review, &large));
     }
     let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
-    let in_run = s.simulation.requirements.missed.iter().map(|m| m.name.as_str());
+    let in_run = s.simulation.run.requirements.missed.iter().map(|m| m.name.as_str());
     let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
     if !only_there.is_empty() {
         out.push(format!(
-            "a look at the run, which misses {} although the prediction does not: it has drift noise, the prior, and psi at the end",
-            words::names(only_there)
+            "a look at the run, which misses {} although the prediction does not: {}",
+            words::names(only_there),
+            stated::run(&s.simulation.run, &s.simulation.conditions)
         ));
     }
     if !s.simulation.validity.holds {
@@ -54,13 +55,13 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
             .push("the checks of the filter that fail to be understood first (Evidence by a filter)".into()),
         _ => {}
     }
-    let met = [&review.requirements, &s.simulation.requirements].iter().all(|r| r.all_met());
+    let met = review.requirements.all_met();
     if out.is_empty() {
         out.push(match (review.requirements.stated, met, &s.evidence) {
             (0, ..) => "requirements to be stated: nothing says yet what is good enough".into(),
             (_, false, _) => "the unknowns without a number to be looked at (Unknowns, Evidence by a filter)".into(),
-            (_, _, Ok(_)) => "none: every requirement is met by prediction and in the run, and no check fails".into(),
-            (_, _, Err(_)) => "none from what was computed: every requirement is met by prediction and in the run; evidence by a filter is not taken".into(),
+            (_, _, Ok(_)) => "none: every requirement is met, in the run too, and no check fails".into(),
+            (_, _, Err(_)) => "none from what was computed: every requirement is met, in the run too; evidence by a filter is not taken".into(),
         });
     }
     out

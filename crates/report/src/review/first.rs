@@ -36,8 +36,12 @@ fn chart(name: &str, caption: String, chart: Chart, all: usize) -> Block {
     still(name, format!("{caption}{part}"), chart.svg())
 }
 
-/// Degree and margin of every unknown of a scheme, best first.
+/// Degree and margin of every unknown of a scheme, best first; degrees alone where nothing is required.
 pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Block {
+    let all = &s.analysis.quantities;
+    if review.requirements.stated == 0 {
+        return degrees(all.iter().map(|q| (q.name.as_str(), q.status, q.degree)), all.len(), id);
+    }
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
         let (text, grade) = predicted.map_or_else(|| ("-".into(), Grade::Open), margin);
@@ -130,7 +134,6 @@ fn choice(r: &DesignReview) -> (Grade, String) {
         return (Grade::Open, "none: no requirement says what is good enough".into());
     }
     let worst = |s: &ComparedScheme| s.requirements.worst.as_ref().map_or(0.0, |w| w.margin);
-    let own = if schemes.iter().any(|s| s.requirements.by_default) { " (the program's own)" } else { "" };
     let meeting: Vec<usize> = (0..schemes.len()).filter(|&i| schemes[i].requirements.all_met()).collect();
     let best = meeting.iter().copied().min_by(|&i, &k| {
         let (a, b) = (&schemes[i], &schemes[k]);
@@ -140,13 +143,13 @@ fn choice(r: &DesignReview) -> (Grade, String) {
         let s = &schemes[best];
         let as_short = meeting.iter().filter(|&&i| schemes[i].total_s == s.total_s).count();
         let why = match (meeting.len(), as_short) {
-            (1, _) => format!("the only one that meets every requirement{own} by prediction"),
+            (1, _) => format!("the only one that meets every requirement by prediction"),
             (n, 1) => format!(
-                "the shortest of {n} that meet every requirement{own} by prediction, {} s",
+                "the shortest of {n} that meet every requirement by prediction, {} s",
                 seconds(s.total_s)
             ),
             (n, k) => format!(
-                "of {n} that meet every requirement{own} by prediction, {k} of them equally short, the one with the largest worst margin"
+                "of {n} that meet every requirement by prediction, {k} of them equally short, the one with the largest worst margin"
             ),
         };
         let doubts = doubts(&r.schemes[best]);
@@ -161,7 +164,7 @@ fn choice(r: &DesignReview) -> (Grade, String) {
     (
         Grade::Missed,
         format!(
-            "none: no scheme meets every requirement{own} by prediction; fewest are missed by {names} ({fewest})"
+            "none: no scheme meets every requirement by prediction; fewest are missed by {names} ({fewest})"
         ),
     )
 }
@@ -170,7 +173,7 @@ fn choice(r: &DesignReview) -> (Grade, String) {
 fn doubts(s: &SchemeReview) -> String {
     let run = &s.simulation;
     let found = [
-        (!run.requirements.all_met(), "its run misses some"),
+        (run.run.requirements.any_missed(), "its run misses some"),
         (!run.validity.holds, "the small-angle model does not hold at its drifts"),
         (!run.consistency.consistent, "its run is not consistent with its truth"),
         (s.evidence.as_ref().is_ok_and(|e| !e.passed), "checks of the filter fail"),
@@ -234,7 +237,8 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
             Cell::graded(kept(&s.requirements), grade)
         }),
     ];
-    for of in unknowns(schemes) {
+    let judged = schemes.iter().any(|s| s.requirements.stated > 0);
+    for of in unknowns(schemes).into_iter().filter(|_| judged) {
         rows.push(line(&of.name, &|s| match s.quantities.iter().find(|q| q.name == of.name) {
             None => "no unknown".into(),
             Some(q) => {
@@ -243,7 +247,9 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
             }
         }));
     }
-    Block::table("Margins (required over predicted sigma: 1 or more is met)", columns, rows)
+    let heading =
+        if judged { "Margins (required over predicted sigma: 1 or more is met)" } else { "Side by side" };
+    Block::table(heading, columns, rows)
 }
 
 /// The sigma of every unknown in every scheme, with what is required where all require the same.

@@ -7,13 +7,7 @@ use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};
-use crate::words;
-
-/// A sentence with its first letter large.
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
-}
+use crate::{stated, words};
 
 /// What the unknowns besides psi are.
 fn kind(coefficients: &[&Quantity]) -> &'static str {
@@ -29,8 +23,9 @@ fn small_angles(s: &SchemeReview) -> Option<String> {
     let v = &s.simulation.validity;
     (!v.holds).then(|| {
         format!(
-            "the small-angle model does NOT hold for these drifts: |psi| reaches {} deg, which leaves out {} times the noise of Z and {} \
-             deg/h of drift",
+            "the small-angle model does NOT hold for {}: |psi| reaches {} deg, which leaves out {} times the noise of Z and {} deg/h of \
+             drift",
+            stated::drifts(&s.simulation.conditions),
             number(v.largest_psi_deg),
             number(v.neglected_g / v.accelerometer_noise_g),
             number(v.neglected_dph)
@@ -111,15 +106,15 @@ fn dwell_or_slews(s: &SchemeReview) -> &'static str {
     if s.simulation.timeline.iter().any(|t| t.slew) { "dwell and slews" } else { "dwell" }
 }
 
-/// Requirements by prediction and in the run, what is missed first.
+/// Requirements by prediction, which decides, and in the run.
 fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
-    let mut both = [&review.requirements, &s.simulation.requirements];
-    if both.iter().all(|r| r.stated == 0) {
-        return (Grade::Open, words::requirements(both[0]));
+    let predicted = stated::requirements(&review.requirements);
+    let run = stated::run(&s.simulation.run, &s.simulation.conditions);
+    match (review.requirements.stated, review.requirements.all_met()) {
+        (0, _) => (Grade::Open, predicted),
+        (_, true) => (Grade::Good, format!("{predicted}; {run}")),
+        (_, false) => (Grade::Missed, format!("{predicted}; {run}")),
     }
-    both.sort_by_key(|r| r.all_met());
-    let grade = if both.iter().all(|r| r.all_met()) { Grade::Good } else { Grade::Missed };
-    (grade, both.map(words::requirements).join("; "))
 }
 
 /// The verdict: what is missed, what limits it, what is determined, and how well.
@@ -180,7 +175,7 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
     let (grade, requirements) = requirements(s, review);
     let (missed, others) = match grade {
-        Grade::Missed => (format!("{}. ", capital(&requirements)), String::new()),
+        Grade::Missed => (format!("{}. ", stated::capital(&requirements)), String::new()),
         _ => (String::new(), format!("; {requirements}")),
     };
     format!("{missed}{lead}{first}. {accuracy}{others}{filter}.")
@@ -225,7 +220,8 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
             row(
                 "Small-angle model",
                 grade(s.simulation.validity.holds),
-                small_angles(s).unwrap_or_else(|| "holds for these drifts".into()),
+                small_angles(s)
+                    .unwrap_or_else(|| format!("holds for {}", stated::drifts(&s.simulation.conditions))),
             ),
             row(
                 "Filter, one run",

@@ -1,0 +1,175 @@
+//! The accuracy that a scheme attains at its end by what is stated: the one figure that requirements are held against.
+//!
+//! All samples count with the noise, the random drift and the biases that are stated, and nothing is known beforehand but the priors that
+//! are stated. Coefficients are constants; psi is that of the end of the scheme, with which the platform is used (under reset carry that of
+//! the end of each position, since each has a psi of its own).
+
+use nalgebra::{DMatrix, RowDVector};
+use obsdeg_core::model::Scheme;
+use obsdeg_ekf::linear::last_covariance;
+use obsdeg_ekf::{Covariance, EkfError, Form, SquareRootInformation};
+
+use super::SimulationError;
+use super::batch::{Batch, batch};
+use super::conditions::{Conditions, PRIOR, REQUIRED, is_rate, resolve, si_per_shown};
+use super::floor::wide_prior;
+use super::plan::Plan;
+use super::record::RunStart;
+use super::seen::{no_prior, predict};
+use crate::prediction::Prediction;
+use crate::requirements::{Claim, Miss, Requirements, Worst};
+
+/// How many times narrower a second prior that says nothing is: what it narrows is bounded by nothing else.
+const NARROWER: f64 = 100.0;
+/// Largest ratio of the sigmas by both for an unknown that samples and stated priors bound.
+const BOUNDED: f64 = 1.05;
+
+/// The accuracy of a scheme at its end.
+#[derive(Debug, Clone)]
+pub struct Attained {
+    /// The scheme in numbers, without random drift that nobody states.
+    pub plan: Plan,
+    /// The exact verdicts.
+    pub prediction: Prediction,
+    /// Sigma of every unknown in its shown unit (deg, deg/h, ...); `None` where neither samples nor stated priors bound it.
+    pub sigmas: Vec<Option<f64>>,
+    /// True for an unknown that the samples do not determine and stated priors bound.
+    pub by_prior: Vec<bool>,
+    known: Known,
+}
+
+/// Covariance of the unknowns at the end in SI units, as a root: what is not bounded has huge variances, which cancel in a determined
+/// combination of such unknowns only before they are squared.
+#[derive(Debug, Clone)]
+enum Known {
+    /// A root of the covariance (n x n).
+    Root(DMatrix<f64>),
+    /// The covariance of a filter as `U diag(d) U^T`; biases behind the unknowns.
+    Filter(Covariance),
+}
+
+impl Known {
+    /// Variance of a combination of unknowns, `(unknown, coefficient)`.
+    fn variance(&self, terms: &[(usize, f64)]) -> Result<f64, EkfError> {
+        match self {
+            Self::Root(root) => {
+                let zero = RowDVector::zeros(root.ncols());
+                Ok(terms.iter().fold(zero, |sum, &(c, k)| sum + root.row(c) * k).norm_squared())
+            }
+            Self::Filter(p) => p.variance(terms),
+        }
+    }
+}
+
+impl Attained {
+    /// The accuracy of `scheme` by what `conditions` state.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    pub fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
+        let conditions = conditions.as_stated();
+        let plan = Plan::new(scheme, &conditions)?;
+        let prediction = predict(&plan, seed)?;
+        let stated = stated_prior(&plan, &conditions)?;
+        let noisy = conditions.drift_noise.amount() > 0.0 || plan.is_noisy();
+        let wide = if noisy { wide_prior(&plan, &conditions)? } else { no_prior(&plan)? };
+        let with = |narrower: f64| -> Result<Known, SimulationError> {
+            let sigma = stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect();
+            if noisy { filtered(&plan, sigma) } else { by_information(&plan, sigma) }
+        };
+        let known = with(1.0)?;
+        let determined: Vec<bool> = prediction.unknowns.iter().map(|u| u.determined_at_end).collect();
+        let n = determined.len();
+        let mut by_prior = vec![false; n];
+        if stated.iter().any(Option::is_some) && determined.contains(&false) {
+            let narrow = with(NARROWER)?;
+            for c in (0..n).filter(|&c| !determined[c]) {
+                let [wide, narrow] = [known.variance(&[(c, 1.0)])?, narrow.variance(&[(c, 1.0)])?];
+                by_prior[c] = wide <= BOUNDED * BOUNDED * narrow;
+            }
+        }
+        let units = plan.platform.units();
+        let mut sigmas = vec![None; n];
+        for c in (0..n).filter(|&c| determined[c] || by_prior[c]) {
+            sigmas[c] = Some(known.variance(&[(c, 1.0)])?.max(0.0).sqrt() / si_per_shown(units[c]));
+        }
+        Ok(Self { plan, prediction, sigmas, by_prior, known })
+    }
+
+    /// Sigma of a combination of unknowns, `(unknown, coefficient)` in SI units, in SI units.
+    ///
+    /// # Errors
+    /// [`EkfError`] for a coefficient that is not finite, or of no unknown.
+    pub fn sigma_of(&self, terms: &[(usize, f64)]) -> Result<f64, EkfError> {
+        Ok(self.known.variance(terms)?.max(0.0).sqrt())
+    }
+
+    /// Covariance of some unknowns in SI units, in their order.
+    ///
+    /// # Errors
+    /// [`EkfError`] for what is no unknown.
+    pub fn covariance_of(&self, unknowns: &[usize]) -> Result<DMatrix<f64>, EkfError> {
+        let n = unknowns.len();
+        let mut out = DMatrix::zeros(n, n);
+        for (i, &a) in unknowns.iter().enumerate() {
+            for (j, &b) in unknowns.iter().enumerate() {
+                let [sum, difference] = [1.0, -1.0].map(|k| self.known.variance(&[(a, 0.5), (b, 0.5 * k)]));
+                out[(i, j)] = sum? - difference?;
+            }
+        }
+        Ok(out)
+    }
+
+    /// What becomes of the requirements that `conditions` state; those on unknowns that the scheme does not have are left out.
+    ///
+    /// # Errors
+    /// [`SimulationError::UnknownName`] for a requirement on what no scheme has.
+    pub fn requirements(&self, conditions: &Conditions) -> Result<Requirements, SimulationError> {
+        let conditions = conditions.within(&self.plan.platform);
+        let required = resolve(REQUIRED, &self.plan.platform, &conditions.requirements, f64::NAN)?;
+        let names = self.plan.platform.names();
+        let claims = (0..names.len()).map(|c| Claim {
+            name: &names[c],
+            required: Some(required[c]).filter(|r| !r.is_nan()),
+            sigma: self.sigmas[c].ok_or(Miss::NotObservable),
+        });
+        let mut out = Requirements::of(conditions.basis(), claims);
+        let rests = |c: &usize| self.by_prior[*c] && !required[*c].is_nan();
+        out.on_prior = (0..names.len()).filter(rests).map(|c| names[c].clone()).collect();
+        Ok(out)
+    }
+
+    /// The largest sigma of a drift coefficient that counts, if all of these have one: other coefficients have other units.
+    pub fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
+        let (units, names) = (self.plan.platform.units(), self.plan.platform.names());
+        let mut worst: Option<Worst> = None;
+        for c in (0..units.len()).filter(|c| is_rate(units[*c]) && counts(&names[*c])) {
+            let sigma_dph = self.sigmas[c]?;
+            if worst.as_ref().is_none_or(|w| sigma_dph > w.sigma_dph) {
+                worst = Some(Worst { name: names[c].clone(), sigma_dph });
+            }
+        }
+        worst
+    }
+}
+
+/// Standard deviations of the stated priors in SI units (shape n); `None` where none is stated.
+fn stated_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<Option<f64>>, SimulationError> {
+    let sigmas = resolve(PRIOR, &plan.platform, conditions.stated_priors(), f64::INFINITY)?;
+    let scale = |unit: &str| si_per_shown(unit) * if is_rate(unit) { conditions.drift_scale } else { 1.0 };
+    let units = plan.platform.units().iter();
+    Ok(sigmas.iter().zip(units).map(|(s, unit)| s.is_finite().then(|| s * scale(unit))).collect())
+}
+
+/// Covariance at the end by the information of all samples: nothing is random but the noise of the samples.
+fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<Known, SimulationError> {
+    let Batch { information, to_end } = batch(plan, SquareRootInformation::prior(&prior)?)?;
+    Ok(Known::Root(to_end * information.inverse_root()?))
+}
+
+/// Covariance at the end of a filter, with random drift and biases.
+fn filtered(plan: &Plan, mut sigma: Vec<f64>) -> Result<Known, SimulationError> {
+    sigma.extend(plan.bias_sigmas());
+    let prior = RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)?;
+    Ok(Known::Filter(last_covariance(&plan.stages, prior)?))
+}

@@ -1,0 +1,64 @@
+//! The same scheme under the other carries: what the assumption about repositioning is worth.
+
+use obsdeg_core::model::{Carry, Platform, Scheme};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::SimulationError;
+use super::attained::Attained;
+use super::conditions::Conditions;
+use super::plan::MAX_UNKNOWNS;
+use crate::requirements::{Requirements, Worst};
+
+/// A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has, are
+/// left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OtherCarry {
+    /// What is carried between positions there.
+    pub carry: Carry,
+    /// The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was judged.
+    pub worst: Option<Worst>,
+    /// What becomes of the requirements; null where nothing was judged.
+    pub requirements: Option<Requirements>,
+    /// The reason why nothing was judged; left out where it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<String>,
+}
+
+/// A scheme and its conditions under another carry; `None` where torquer errors act on turns that the scheme does not state.
+pub(crate) fn under(scheme: &Scheme, conditions: &Conditions, carry: Carry) -> Option<(Scheme, Conditions)> {
+    let other = Scheme { carry, ..scheme.clone() };
+    other.paths().is_ok().then(|| (other, Conditions { slews: false, ..conditions.clone() }))
+}
+
+/// The scheme under every carry but its own.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn other_carries(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<Vec<OtherCarry>, SimulationError> {
+    let judged = |carry: Carry| {
+        let nothing =
+            |why: String| OtherCarry { carry, worst: None, requirements: None, not_judged: Some(why) };
+        let Some((scheme, conditions)) = under(scheme, conditions, carry) else {
+            return Ok(nothing("torquer errors act in turns that the scheme does not state".into()));
+        };
+        let platform = Platform::new(scheme.clone())?;
+        let unknowns = platform.names().len();
+        if unknowns > MAX_UNKNOWNS {
+            return Ok(nothing(format!("{unknowns} unknowns, more than {MAX_UNKNOWNS}")));
+        }
+        let conditions = conditions.within(&platform);
+        let attained = Attained::new(&scheme, &conditions, seed)?;
+        Ok(OtherCarry {
+            carry,
+            worst: attained.worst_of(&|_| true),
+            requirements: Some(attained.requirements(&conditions)?),
+            not_judged: None,
+        })
+    };
+    Carry::ALL.into_iter().filter(|c| *c != scheme.carry).map(judged).collect()
+}

@@ -1,0 +1,242 @@
+//! Sentences on what is stated and what is not: requirements, conditions, carry.
+
+use obsdeg_core::model::Carry;
+use obsdeg_evidence::requirements::{Basis, Miss, Requirements, Worst};
+use obsdeg_evidence::simulation::{
+    ConditionsReport, MeasurementReport, OtherCarry, RunDiffers, RunRequirements, SigmaRatio,
+};
+
+use crate::document::number;
+use crate::words::{accelerometer_bias, gyro_noise, names};
+
+/// Largest part by which the sigmas of a run may differ from the predicted ones to be called equal to them.
+const EQUAL: f64 = 0.01;
+
+/// A sentence with its first letter large.
+pub(crate) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
+}
+
+/// The unknowns that miss their requirements, by reason.
+pub(crate) fn missed(r: &Requirements) -> String {
+    let reasons = [
+        (Miss::TooLarge, ""),
+        (Miss::NotObservable, " (not determined)"),
+        (Miss::RestsOnPrior, " (resting on the prior)"),
+        (Miss::Inconsistent, " (the filter is wrong about it)"),
+        (Miss::NoNumber, " (no number)"),
+    ];
+    let of = |(why, words): (Miss, &str)| {
+        let mut concerned = r.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).peekable();
+        concerned.peek()?;
+        Some(format!("{}{words}", names(concerned)))
+    };
+    reasons.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// `0.06798 (psi_y)`; `None` when nothing has a margin.
+pub(crate) fn worst_margin(r: &Requirements) -> Option<String> {
+    r.worst.as_ref().map(|w| format!("{} ({})", number(w.margin), w.name))
+}
+
+/// Whose margin is the smallest: ` of the others` where some that are missed have none.
+pub(crate) fn whose_margin(r: &Requirements) -> &'static str {
+    if r.leaves_out() { " of the others" } else { "" }
+}
+
+/// `every requirement is met, 15 of 15; smallest margin 1.245 (D_OZ)`.
+pub(crate) fn requirements(r: &Requirements) -> String {
+    if r.stated == 0 {
+        return "no requirement is stated, so none is judged".into();
+    }
+    let basis = match r.basis {
+        Basis::Predicted | Basis::PredictedWithPrior => "",
+        Basis::Run => "in this run ",
+        Basis::Record => "by this record ",
+    };
+    let margin =
+        worst_margin(r).map_or_else(String::new, |w| format!("; smallest margin{} {w}", whose_margin(r)));
+    let prior = match r.on_prior.is_empty() {
+        true => String::new(),
+        false => format!("; by the stated prior alone: {}", names(r.on_prior.iter().map(String::as_str))),
+    };
+    if r.all_met() {
+        return format!("{basis}every requirement is met, {} of {}{margin}{prior}", r.met, r.stated);
+    }
+    format!(
+        "{basis}requirements are NOT met, {} of {} missed: {}{margin}{prior}",
+        r.missed.len(),
+        r.stated,
+        missed(r)
+    )
+}
+
+/// What becomes of the requirements in a run, beside the prediction, and why its sigmas differ from the predicted ones.
+pub(crate) fn run(r: &RunRequirements, c: &ConditionsReport) -> String {
+    let verdict = match r.requirements.stated {
+        0 => "in this run".into(),
+        _ => format!("{};", requirements(&r.requirements)),
+    };
+    let (Some(low), Some(high)) = (&r.smallest_ratio, &r.largest_ratio) else {
+        return format!("{verdict} no sigma is predicted");
+    };
+    if low.ratio > 1.0 - EQUAL && high.ratio < 1.0 + EQUAL {
+        return format!("{verdict} its sigmas are the predicted ones within 1 %");
+    }
+    let of = |r: &SigmaRatio| format!("{} ({})", ratio(r.ratio), r.name);
+    let reasons: Vec<String> = r.differs.iter().map(|why| reason(*why, c)).collect();
+    let why = match reasons.is_empty() {
+        true => String::new(),
+        false => format!(", since the run has {}", reasons.join(" and ")),
+    };
+    format!("{verdict} its sigmas are {} to {} times the predicted ones{why}", of(low), of(high))
+}
+
+/// `3.92`, `0.0012`: three digits are enough for a ratio.
+fn ratio(x: f64) -> String {
+    if (0.01..1000.0).contains(&x) { format!("{x:.2}") } else { format!("{x:.1e}") }
+}
+
+fn reason(why: RunDiffers, c: &ConditionsReport) -> String {
+    match why {
+        RunDiffers::RandomDrift => format!("a random drift of {}, which nothing states", c.drift_noise),
+        RunDiffers::Prior => "priors that nothing states".into(),
+        RunDiffers::FullAttitudes => "full attitudes, where the prediction is that of small angles".into(),
+    }
+}
+
+/// A carry by its name with what it assumes of the platform.
+pub(crate) fn carry(c: Carry) -> &'static str {
+    match c {
+        Carry::Platform => {
+            "platform carry: psi goes on unchanged in platform axes from position to position, as in the paper; a platform that is torqued from \
+             one to the next has inertial carry"
+        }
+        Carry::Inertial => {
+            "inertial carry: psi goes on in geographic axes from position to position, as on a platform that is torqued from one to the next"
+        }
+        Carry::Reset => {
+            "reset carry: the platform is levelled and aligned anew at every position, so that each has a psi of its own"
+        }
+    }
+}
+
+/// `0.002237 deg/h (D_SX)`.
+fn worst_sigma(w: &Worst) -> String {
+    format!("{} deg/h ({})", number(w.sigma_dph), w.name)
+}
+
+/// The same scheme under the other carries, in one line; empty where nothing was judged.
+pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
+    let of = |o: &OtherCarry| {
+        let Some(r) = &o.requirements else {
+            return format!("{}: not judged ({})", o.carry, o.not_judged.as_deref().unwrap_or("unknown"));
+        };
+        let sigma = o.worst.as_ref().map_or_else(
+            || "not every coefficient is determined".into(),
+            |w| format!("worst sigma {}", worst_sigma(w)),
+        );
+        let met = match (r.stated, r.all_met()) {
+            (0, _) => String::new(),
+            (n, true) => format!(", every requirement met ({n})"),
+            (n, false) => format!(", requirements NOT met ({} of {n} missed)", r.missed.len()),
+        };
+        format!("{}: {sigma}{met}", o.carry)
+    };
+    let listed: Vec<String> = carries.iter().map(of).collect();
+    (!listed.is_empty()).then(|| format!("under the other carries, {}", listed.join("; ")))
+}
+
+/// What a predicted sigma is, in the heading of a table.
+pub(crate) fn predicted(m: &MeasurementReport) -> String {
+    let drift = match (&m.drift_noise, &m.gyro_noise) {
+        (None, None) => "no random drift",
+        _ => "the random drift that is stated",
+    };
+    let prior = if m.prior.is_some() { "the priors that are stated" } else { "no prior" };
+    format!("sigma: information of all samples, {prior}, {drift}; psi at the end")
+}
+
+/// The same of several schemes, whose conditions may differ.
+pub(crate) fn predicted_of<'a>(all: impl IntoIterator<Item = &'a MeasurementReport>) -> String {
+    let mut said: Vec<String> = all.into_iter().map(predicted).collect();
+    said.dedup();
+    match said.len() {
+        1 => said.remove(0),
+        _ => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end".into(),
+    }
+}
+
+/// Values of the conditions that nobody states, by their keys: `latitude 28.2 deg, noise of Z 1e-5 g`; `None` where all are stated.
+fn chosen(m: &MeasurementReport) -> Option<String> {
+    let value = |key: &String| match key.as_str() {
+        "latitude_deg" => format!("latitude {} deg", m.latitude_deg),
+        "accelerometer_noise_g" => format!("noise of Z {:e} g", m.accelerometer_noise_g),
+        "step_s" => format!("a sample every {} s", m.step_s),
+        "dwell_s" => format!("{} s at a position", m.dwell_s),
+        "azimuth_noise_deg" => format!("noise of the azimuth {:e} deg", m.azimuth_noise_deg.unwrap_or(0.0)),
+        other => other.into(),
+    };
+    let listed: Vec<String> = m.by_default.iter().map(value).collect();
+    (!listed.is_empty()).then(|| listed.join(", "))
+}
+
+/// The conditions of predicted sigmas that nobody states, in a sentence; `None` where all are stated.
+pub(crate) fn by_default(m: &MeasurementReport) -> Option<String> {
+    chosen(m).map(|listed| format!("not stated, chosen by the program: {listed}"))
+}
+
+/// The conditions of a run that nobody states, in a sentence; `None` where all are stated.
+pub(crate) fn by_default_in_run(c: &ConditionsReport) -> Option<String> {
+    let value = |key: &String| match key.as_str() {
+        "latitude_deg" => format!("latitude {} deg", c.latitude_deg),
+        "accelerometer_noise_g" => format!("noise of Z {:e} g", c.accelerometer_noise_g),
+        "step_s" => format!("steps of {} s", c.step_s),
+        "dwell_s" => "1000 s at a position".into(),
+        "drift_noise" => format!("random drift {}", c.drift_noise),
+        "values" => "the paper's drifts (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g)".into(),
+        "priors" => "priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)".into(),
+        "azimuth_noise_deg" => "noise of the azimuth 0.001 deg".into(),
+        other => other.to_string(),
+    };
+    let listed: Vec<String> = c.by_default.iter().map(value).collect();
+    (!listed.is_empty()).then(|| format!("not stated, chosen by the program: {}", listed.join(", ")))
+}
+
+/// The drifts of a run: those that are stated, or the paper's.
+pub(crate) fn drifts(c: &ConditionsReport) -> &'static str {
+    match c.by_default.iter().any(|key| key == "values") {
+        true => "the drifts of the paper (11 to 13 deg/h; none are stated)",
+        false => "these drifts",
+    }
+}
+
+/// Conditions that predicted sigmas rest on, a sentence each, behind that of [`predicted`].
+pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
+    let by = if m.latitude_by_default { " (chosen here: the scheme names none)" } else { "" };
+    let azimuth = m.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
+    let slews = m.slew_rate_deg_s.map_or_else(
+        || "repositioning at once unless a position says otherwise".into(),
+        |r| {
+            format!(
+                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, accuracy orders and ranks: of \
+                 repositioning at once, with torquer errors of turns fast against the earth rate; what has a sigma: with the slews, in \
+                 floating point)"
+            )
+        },
+    );
+    let mut out = vec![
+        format!(
+            "noise of Z {:e} g per sample and axis{azimuth}; steps of at most {} s, a sample after each",
+            m.accelerometer_noise_g, m.step_s
+        ),
+        format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
+        format!("latitude {} deg{by}", m.latitude_deg),
+    ];
+    out.extend(m.accelerometer_bias.as_ref().map(accelerometer_bias));
+    out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
+    out.extend(m.gyro_noise.as_ref().map(gyro_noise));
+    out.extend(m.prior.as_ref().map(|prior| format!("prior {prior} (deg, deg/h, ... as stated)")));
+    out
+}
