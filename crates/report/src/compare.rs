@@ -5,7 +5,7 @@ use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, words};
+use crate::{Answer, gimbals, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -234,6 +234,10 @@ impl Answer for Comparison {
             let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
             blocks.push(Block::list("Noise floor: what it is", means.collect()));
         }
+        for r in &self.schemes {
+            let lines = gimbals::lines(r.gimbals.as_ref());
+            blocks.extend(Block::list_if_any(format!("Gimbals of {}", r.name), lines));
+        }
         let missed = |r: &ComparedScheme| format!("{}: {}", r.name, words::requirements(&r.requirements));
         blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
         let mut lines = Vec::new();
@@ -266,11 +270,14 @@ impl Answer for Comparison {
         }
         blocks.push(Block::list("Assumed", lines));
         let n = self.schemes.len();
+        let beyond = self.schemes.iter().filter_map(|r| Some((r, gimbals::lead(r.gimbals.as_ref())?)));
+        let beyond = beyond.map(|(r, text)| format!("{}: {text}", r.name));
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
             lead: (!self.differ.is_empty())
                 .then(|| format!("not like with like: the schemes differ in {}", self.differ.join(", ")))
                 .into_iter()
+                .chain(beyond)
                 .collect(),
             blocks,
         }

@@ -8,7 +8,7 @@ use obsdeg_evidence::requirements::{Miss, Requirements};
 use crate::document::{Block, Document, left, number, right};
 use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
-use crate::{Answer, words};
+use crate::{Answer, gimbals, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -113,6 +113,18 @@ fn table(heading: &str, found: &[Found]) -> Block {
         ],
         found.iter().enumerate().map(row),
     )
+}
+
+/// What the operator sets at each position of a scheme.
+fn gimbal_angles(f: &Found) -> Block {
+    let columns =
+        [left(""), left("position")].into_iter().chain(gimbals::NAMES.map(right)).collect::<Vec<_>>();
+    let row = |(i, (name, angles)): (usize, (&String, &String))| {
+        let set = angles.split(',').map(String::from);
+        [format!("p{}", i + 1), name.clone()].into_iter().chain(set).collect::<Vec<_>>()
+    };
+    let rows = f.positions.iter().zip(&f.angles).enumerate().map(row);
+    Block::table("Gimbal angles of the first [deg]", columns, rows)
 }
 
 fn how(d: &Design, s: &SearchReport) -> Vec<String> {
@@ -420,6 +432,8 @@ impl Answer for Design {
                 None => words::PREDICTED,
             };
             blocks.push(table(&format!("Best schemes ({sigmas})"), &self.found));
+            blocks.extend(self.found.first().map(gimbal_angles));
+            blocks.extend(gimbals::block(self.gimbals.as_ref()));
             let first = self.found.first().map(|f| requirements(&f.requirements));
             blocks.extend(first.map(|lines| Block::list("Requirements of the first", lines)));
             blocks.push(Block::list("How", how(self, s)));
@@ -454,7 +468,11 @@ impl Answer for Design {
             || "fewest positions".into(),
             |s| format!("{} of {} positions", s.positions, self.candidates.len()),
         );
-        Document { title: format!("Design: {what}, {} carry", self.carry), lead: Vec::new(), blocks }
+        Document {
+            title: format!("Design: {what}, {} carry", self.carry),
+            lead: gimbals::lead(self.gimbals.as_ref()).into_iter().collect(),
+            blocks,
+        }
     }
 
     fn main_table(&self) -> &'static str {

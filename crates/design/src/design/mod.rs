@@ -356,6 +356,7 @@ fn answered(
             search: None,
             found: Vec::new(),
             front: Vec::new(),
+            gimbals: None,
             primes: task.rows.fields(),
             error_bound: task.rows.error_bound(sets),
             seed: options.seed,
@@ -438,6 +439,7 @@ fn answered(
             constraints: task.constraints_in_words(),
             certificate,
         });
+        winner::within_gimbals(&mut out, base, conditions)?;
         Ok(out)
     })
 }

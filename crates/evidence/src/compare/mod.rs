@@ -199,6 +199,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         worst: judged.worst(),
         validity: own.map(|(validity, _)| validity),
         noise_floor: noise_floor(scheme, conditions, &judged.prediction)?,
+        gimbals: scheme.gimbal_report(),
         drop_one,
         sensitivity: sensitivity(scheme, conditions, &judged.determined(), has_slews, seed)?,
     })

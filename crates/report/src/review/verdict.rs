@@ -7,7 +7,7 @@ use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};
-use crate::words;
+use crate::{gimbals, words};
 
 /// A sentence with its first letter large.
 fn capital(text: &str) -> String {
@@ -77,6 +77,7 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
 /// What limits the verdict, the gravest first.
 fn limits(s: &SchemeReview) -> Vec<String> {
     let mut out: Vec<String> = small_angles(s).into_iter().collect();
+    out.extend(gimbals::lead(s.analysis.gimbals.as_ref()));
     if !s.simulation.consistency.consistent {
         out.push(format!(
             "the run of the filter is NOT consistent with its truth ({})",
