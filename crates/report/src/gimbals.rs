@@ -42,16 +42,16 @@ fn turn(t: &GimbalTurn) -> Option<String> {
         format!("; gimbal by gimbal it stays within them: {}", by_gimbals(change))
     });
     let what = match (&t.stop, t.ends_deg) {
-        (Some(GimbalStop::Limit { gimbal, limit_deg, after_deg }), _) => format!(
+        (Some(GimbalStop { gimbal: Some(gimbal), at_deg, after_deg }), _) => format!(
             "does NOT stay within the limits: {gimbal} reaches {} deg after {} deg of it{instead}",
-            deg(*limit_deg),
+            deg(*at_deg),
             deg(*after_deg)
         ),
-        (Some(GimbalStop::Lock { beta_deg, after_deg }), _) => format!(
+        (Some(GimbalStop { gimbal: None, at_deg, after_deg }), _) => format!(
             "cannot be made: after {} deg of it, at beta = {} deg, alpha and gamma would have to turn more than 100 times as fast as the \
              platform{instead}",
             deg(*after_deg),
-            deg(*beta_deg)
+            deg(*at_deg)
         ),
         (None, Some(ends)) => format!(
             "stays within the limits and ends at {}, other angles of the same attitude than those listed{instead}",
@@ -73,7 +73,7 @@ pub(crate) fn block(report: Option<&GimbalReport>) -> Option<Block> {
 /// The limits, and what turns do on their way; nothing without limits.
 pub(crate) fn lines(report: Option<&GimbalReport>) -> Vec<String> {
     let Some(report) = report else { return Vec::new() };
-    let mut lines = vec![format!("limits: {}; {}", report.limits, NAMES.join(", "))];
+    let mut lines = vec![format!("limits: {}; gimbals: {}", report.limits, NAMES.join(", "))];
     let listed: Vec<String> = report.turns.iter().filter_map(turn).collect();
     let stay = |rotation: bool, by: bool| -> Vec<&str> {
         let stays = |t: &&GimbalTurn| (t.rotation, t.by_gimbals) == (rotation, by) && turn(t).is_none();

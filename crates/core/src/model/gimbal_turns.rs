@@ -64,26 +64,16 @@ pub struct GimbalTurn {
     pub gimbals_deg: Option<[f64; 3]>,
 }
 
-/// Why a turn about one axis cannot go on.
+/// Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to turn more
+/// than a hundred times as fast as the platform.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum GimbalStop {
-    /// A gimbal reaches its limit.
-    Limit {
-        /// alpha, beta or gamma.
-        gimbal: String,
-        /// The limit in degrees.
-        limit_deg: f64,
-        /// Angle that the platform has turned by, in degrees.
-        after_deg: f64,
-    },
-    /// Near `beta = +-90` degrees alpha and gamma would have to turn more than a hundred times as fast as the platform.
-    Lock {
-        /// beta in degrees.
-        beta_deg: f64,
-        /// Angle that the platform has turned by, in degrees.
-        after_deg: f64,
-    },
+pub struct GimbalStop {
+    /// The gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees.
+    pub gimbal: Option<String>,
+    /// The limit in degrees; without a gimbal beta in degrees.
+    pub at_deg: f64,
+    /// Angle that the platform has turned by, in degrees.
+    pub after_deg: f64,
 }
 
 impl Scheme {
@@ -233,12 +223,12 @@ impl Gimbals {
             let next = self.beside(&slew.at((done + step) / whole * slew.duration_s), at);
             let swing = [0, 2].into_iter().map(|k| (next[k] - at[k]).abs()).fold(0.0, f64::max);
             if swing > FASTEST * step.max(LEAST_DEG) {
-                let beta_deg = clean(at[1]);
-                return (Some(GimbalStop::Lock { beta_deg, after_deg: clean(done) }), at);
+                let stop = GimbalStop { gimbal: None, at_deg: clean(at[1]), after_deg: clean(done) };
+                return (Some(stop), at);
             }
-            if let Some((k, limit_deg, part)) = self.first_passed(&at, &next) {
+            if let Some((k, at_deg, part)) = self.first_passed(&at, &next) {
                 let after_deg = clean(done + part * step);
-                return (Some(GimbalStop::Limit { gimbal: NAMES[k].into(), limit_deg, after_deg }), at);
+                return (Some(GimbalStop { gimbal: Some(NAMES[k].into()), at_deg, after_deg }), at);
             }
             (at, done) = (next, done + step);
         }
@@ -276,10 +266,18 @@ mod tests {
         scheme_file::read(&text).expect("a scheme").gimbal_report().expect("limits")
     }
 
+    /// The gimbal that stops a turn, the size of its limit and where the turn stops, in whole degrees.
+    fn stopped(turn: &GimbalTurn) -> (Option<&str>, i32, i32) {
+        let stop = turn.stop.as_ref().expect("a stop");
+        let whole =
+            [stop.at_deg.abs(), stop.after_deg].map(|x| (x.round() as i32, (x - x.round()).abs() < 1e-3));
+        assert!(!turn.stays && whole.iter().all(|w| w.1), "{stop:?}");
+        (stop.gimbal.as_deref(), whole[0].0, whole[1].0)
+    }
+
     /// Rates of alpha, beta, gamma for a rate `w` of the platform in n: the gimbals turn left-handed about North, the middle axis and Z_p.
-    fn rates([a, b, g]: [f64; 3], w: [f64; 3]) -> [f64; 3] {
+    fn rates([a, b, _]: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let [(sa, ca), (sb, cb)] = [a, b].map(|x| x.to_radians().sin_cos());
-        let _ = g;
         // w = -a' (1, 0, 0) - b' (0, ca, -sa) - g' (-sb, sa cb, ca cb)
         let inner = -(w[1] * sa + w[2] * ca) / cb;
         [-w[0] + inner * sb, -(w[1] * ca - w[2] * sa), inner]
@@ -317,10 +315,11 @@ mod tests {
                 let k4 = rates(shifted(k3, 1.0), unit);
                 at = std::array::from_fn(|i| at[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
                 if let Some(k) = (0..3).find(|&k| at[k].abs() > limits[k] as f64 + 0.001) {
-                    let Some(GimbalStop::Limit { gimbal, limit_deg, after_deg }) = &stop else {
-                        return Err(TestCaseError::fail(format!("{stop:?} at {at:?}")));
+                    let Some(stop) = stop else {
+                        return Err(TestCaseError::fail(format!("no stop at {at:?}")));
                     };
-                    prop_assert_eq!((gimbal.as_str(), *limit_deg), (NAMES[k], limits[k] as f64 * at[k].signum()));
+                    let after_deg = stop.after_deg;
+                    prop_assert_eq!((stop.gimbal.as_deref(), stop.at_deg), (Some(NAMES[k]), limits[k] as f64 * at[k].signum()));
                     prop_assert!((after_deg - (step + 1) as f64 * h).abs() < 0.5, "{after_deg}");
                     return Ok(());
                 }
@@ -350,9 +349,7 @@ mod tests {
         assert_eq!((found.limits.as_str(), &found.beyond[..]), ("alpha from -90 to 90 deg", &[beyond][..]));
         let [turn] = &found.turns[..] else { panic!("{found:?}") };
         assert_eq!((turn.stays, turn.ends_deg, turn.gimbals_deg), (false, None, Some([0.0, 180.0, 180.0])));
-        let Some(GimbalStop::Limit { gimbal, limit_deg, after_deg }) = &turn.stop else { panic!("{turn:?}") };
-        assert_eq!((gimbal.as_str(), limit_deg.abs()), ("alpha", 90.0));
-        assert!((after_deg - 90.0).abs() < 1e-3, "{after_deg}");
+        assert_eq!(stopped(turn), (Some("alpha"), 90, 90));
         // gimbal by gimbal, but as the file has the angles
         let found = report(&format!("path = 'gimbals'\n{head}"), &["attitude = 'NUE'", "attitude = 'NDW'"]);
         assert_eq!((found.turns[0].by_gimbals, found.turns[0].stays), (true, false));
@@ -373,16 +370,11 @@ mod tests {
         assert_eq!((found.turns[0].stays, found.turns[0].ends_deg), (true, None));
         let found = straight("gimbals = { beta_deg = [-90, 90] }");
         assert_eq!(found.beyond[0].within, "180,60,180");
-        let limit = |after_deg| GimbalStop::Limit { gimbal: "beta".into(), limit_deg: 90.0, after_deg };
-        assert!(
-            matches!(&found.turns[0].stop, Some(s @ GimbalStop::Limit { after_deg, .. })
-            if (after_deg - 90.0).abs() < 1e-3 && *s == limit(*after_deg)),
-            "{found:?}"
-        );
+        assert_eq!(stopped(&found.turns[0]), (Some("beta"), 90, 90));
         // at beta = 90, alpha = 0 the middle axis is Up and Z_p is South: a turn about East is across
         let across =
             report(wide, &["angles_deg = [0, 90, 0]", "angles_deg = [90, 50, 90]\nslew = { about = 'E' }"]);
-        let lock = GimbalStop::Lock { beta_deg: 90.0, after_deg: 0.0 };
+        let lock = GimbalStop { gimbal: None, at_deg: 90.0, after_deg: 0.0 };
         assert_eq!(
             (across.turns[0].stop.as_ref(), across.turns[0].gimbals_deg),
             (Some(&lock), Some([90.0, -40.0, 90.0]))
@@ -425,6 +417,6 @@ mod tests {
         );
         assert_eq!(found.turns[1].gimbals_deg, Some([60.0, 0.0, 0.0]));
         let found = report("gimbals = { alpha_deg = [-200, 90] }", &positions[..1]);
-        assert!(matches!(&found.turns[0].stop, Some(GimbalStop::Limit { limit_deg: 90.0, .. })), "{found:?}");
+        assert_eq!(stopped(&found.turns[0]), (Some("alpha"), 90, 90));
     }
 }
