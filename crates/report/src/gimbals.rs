@@ -89,7 +89,7 @@ pub(crate) fn lines(report: Option<&GimbalReport>) -> Vec<String> {
     let instead = report.turns.iter().any(|t| turn(t).is_some() && !t.by_gimbals && t.gimbals_deg.is_some());
     lines.extend(listed);
     lines.extend(instead.then(|| {
-        "`path = \"gimbals\"` in the scheme file turns gimbal by gimbal, alpha, beta, gamma one after another".into()
+        "`path = \"gimbals\"` in the scheme file turns gimbal by gimbal, alpha, beta, gamma one after another, to positions without a slew axis of their own".into()
     }));
     lines
 }

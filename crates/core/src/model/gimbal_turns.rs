@@ -17,6 +17,8 @@ use super::slew::{Slew, Turn};
 const STEP_DEG: f64 = 1.0;
 /// Smallest step, in degrees of the turn.
 const LEAST_DEG: f64 = 0.01;
+/// Smallest step as a part of the turn.
+const LEAST_PART: f64 = 1e-5;
 /// A gimbal that turns so many times as fast as the platform cannot follow.
 const FASTEST: f64 = 100.0;
 
@@ -218,11 +220,14 @@ impl Gimbals {
     fn follow(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3]) {
         let whole = slew.turn().angle_deg;
         let (mut at, mut done) = (start, 0.0);
+        // of very many turns fewer steps
+        let least = LEAST_DEG.max(whole * LEAST_PART);
+        let most = STEP_DEG.max(least);
         while done < whole {
-            let step = (from_lock(at[1]) / 4.0).clamp(LEAST_DEG, STEP_DEG).min(whole - done);
+            let step = (from_lock(at[1]) / 4.0).clamp(least, most).min(whole - done);
             let next = self.beside(&slew.at((done + step) / whole * slew.duration_s), at);
             let swing = [0, 2].into_iter().map(|k| (next[k] - at[k]).abs()).fold(0.0, f64::max);
-            if swing > FASTEST * step.max(LEAST_DEG) {
+            if swing > FASTEST * step.max(least) {
                 let stop = GimbalStop { gimbal: None, at_deg: clean(at[1]), after_deg: clean(done) };
                 return (Some(stop), at);
             }
