@@ -31,7 +31,7 @@ fn task(rng: &mut SplitMix64) -> (Vec<String>, Search) {
     });
     if candidates == "free" {
         asked["round"] = ["5", "7", "12.5"][rng.below(3) as usize].into();
-    } else if rng.below(2) == 0 {
+    } else if candidates != "grid:45" && rng.below(2) == 0 {
         asked["slew_rate"] = if carry == "inertial" { 0.5.into() } else { serde_json::Value::Null };
     }
     (limits, serde_json::from_value(asked).expect("options"))
