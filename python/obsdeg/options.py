@@ -211,7 +211,8 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     slew_rate: Real
     """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
     gimbal: Names
-    """How far gimbals turn in degrees: ``["alpha=-180:180", "beta=-80:80"]``."""
+    """How far gimbals turn in degrees: ``["alpha=-90:90", "beta=-80:80"]``; alpha is the outer gimbal, about North, beta the middle one,
+    gamma the inner one, about Z_p. Schemes have angles within the limits."""
     prior: ByName
     """Initial standard deviations in deg, deg/h, deg/h/g, ppm, arcsec, ug."""
 

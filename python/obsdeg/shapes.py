@@ -303,6 +303,74 @@ Frame = Literal["n", "platform"]
 """
 
 
+class BeyondLimits(Record):
+    """A position written with angles beyond a gimbal limit."""
+
+    __slots__ = ()
+
+    position: str
+    """Name of the position."""
+    angles: str
+    """Its Euler angles as written, in degrees."""
+    within: str
+    """Euler angles of the same attitude within the limits, in degrees."""
+
+
+class GimbalStop(Record):
+    """Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to
+    turn more than a hundred times as fast as the platform.
+    """
+
+    __slots__ = ()
+
+    gimbal: str | None
+    """The gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees."""
+    at_deg: float
+    """The limit in degrees; without a gimbal beta in degrees."""
+    after_deg: float
+    """Angle that the platform has turned by, in degrees."""
+
+
+class GimbalTurn(Record):
+    """A turn of the platform, followed from gimbal angles within the limits."""
+
+    __slots__ = ()
+
+    position: str
+    """Name of the position that it leads to, or whose rotation it is."""
+    rotation: bool
+    """True for the rotation of a segment."""
+    by_gimbals: bool
+    """True if the scheme states that the platform turns gimbal by gimbal."""
+    turn: Turn | None
+    """The turn about one axis; null where the attitude stays, and gimbal by gimbal."""
+    stays: bool
+    """True if all gimbal angles stay within their limits on the way; gimbal by gimbal, of the angles as they are written."""
+    stop: GimbalStop | None
+    """Where the turn about one axis cannot go on; null where it stays within the limits, and gimbal by gimbal."""
+    ends_deg: tuple[float, float, float] | None
+    """Gimbal angles at the end of the turn in degrees (alpha, beta, gamma), where they are others of the same attitude than those
+    listed.
+    """
+    gimbals_deg: tuple[float, float, float] | None
+    """Change of alpha, beta and gamma in degrees of the way gimbal by gimbal (`path = 'gimbals'`) between angles within the limits,
+    which stays within them; null for a rotation.
+    """
+
+
+class GimbalReport(Record):
+    """Gimbal limits and a scheme: which angles and which turns lie beyond."""
+
+    __slots__ = ()
+
+    limits: str
+    """The limits in words, in degrees."""
+    beyond: list[BeyondLimits]
+    """Positions whose angles, as they are written, lie beyond a limit, with angles of the same attitude that do not."""
+    turns: list[GimbalTurn]
+    """The turn to every position but the first, and the rotation of every segment that turns; none for generic angles."""
+
+
 class Certainty(Record):
     """How certain the verdicts are."""
 
@@ -361,6 +429,8 @@ class Analysis(Shape):
     """Formulas of Z and its derivatives, position by position."""
     frame: Frame
     """Axes of Z in solutions."""
+    gimbals: GimbalReport | None
+    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
     certainty: Certainty
     """How certain all this is."""
     notes: list[str]
@@ -809,6 +879,8 @@ class Review(Record):
     """How well coefficients can be known under random drift, however long the dwells; left out where the gyros have no noise of their
     own.
     """
+    gimbals: GimbalReport | None
+    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
 
 
 class Comparison(Shape):
@@ -888,7 +960,9 @@ class Rounded(Record):
     __slots__ = ()
 
     step_deg: float
-    """Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too."""
+    """Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too, and for what gimbal limits ask
+    for: the twin (alpha+180, 180-beta, gamma+180) of such angles, and at beta = +-90 another alpha.
+    """
     finer: Finer | None
     """A better scheme, by the same search with angles in hundredths of a degree; null where none was found."""
 
@@ -1027,7 +1101,9 @@ class Found(Record):
     in other axes; null: none.
     """
     angles: list[str]
-    """Their Euler angles in degrees."""
+    """Their gimbal angles alpha,beta,gamma in degrees: within the gimbal limits, each with the shortest gimbal way from the position
+    before (without limits as the candidates have them, in (-180, 180]).
+    """
     half_turns: list[HalfTurn]
     """The half turns between them, each with its direction: the other one is another scheme."""
     refined: bool
@@ -1093,6 +1169,10 @@ class Design(Shape):
     """The best schemes, best first."""
     front: list[Found]
     """Schemes that none found beats in both total time and criterion, by total time."""
+    gimbals: GimbalReport | None
+    """Of the first scheme: turns beyond the gimbal limits; and positions of the file of candidates whose angles lie beyond. Left out
+    where no limits are stated.
+    """
     primes: int
     """How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so."""
     error_bound: float
@@ -1463,6 +1543,8 @@ class Simulation(Shape):
     """Whether the linear model holds for these drifts."""
     noise_floor: NoiseFloor | None
     """How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own."""
+    gimbals: GimbalReport | None
+    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
     seed: int
     """Seed of the noise."""
 

@@ -98,7 +98,8 @@ impl Given {
 #[command(next_help_heading = "What is judged")]
 #[serde(default)]
 pub struct InputOptions {
-    /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz); once per position.
+    /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz): those of the outer gimbal, about North, of the middle one, and of the
+    /// inner one, about Z_p; once per position.
     /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE). A,B,G@X_p:360 turns from there, at a constant
     /// rate for its dwell, about a platform axis (X_p, Y_p, Z_p) or a geographic one (N, U, E)
     #[arg(long, value_name = "A,B,G", allow_hyphen_values = true)]
@@ -136,8 +137,12 @@ pub struct InputOptions {
 
 /// The words of `--path`.
 const PATHS: [Word<Path>; 2] = [
-    ("one-axis", "the shortest way", Path::OneAxis),
-    ("gimbals", "alpha, beta, gamma, one after another", Path::Gimbals),
+    ("one-axis", "the shortest way, by one turn", Path::OneAxis),
+    (
+        "gimbals",
+        "alpha (outer), beta (middle), gamma (inner), one after another; within gimbal limits if both ends are",
+        Path::Gimbals,
+    ),
 ];
 
 /// The words of `--carry`.

@@ -167,7 +167,9 @@ pub struct WantedOptions {
     #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 
-    /// How far a gimbal turns in degrees, as alpha=-180:180, beta=-80:80; attitudes beyond are left out
+    /// How far a gimbal turns in degrees, as alpha=-90:90, beta=-80:80. alpha is the outer gimbal, about North, beta the middle one, gamma the
+    /// inner one, about Z_p. Attitudes beyond are left out; the others are printed, written and drawn with angles within the limits, those with the
+    /// shortest gimbal way from the position before
     #[arg(long, value_name = "ANGLE=LOW:HIGH", allow_hyphen_values = true)]
     pub gimbal: Vec<String>,
 }

@@ -5,10 +5,10 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::solution::Formula;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right};
-use crate::{Answer, latex, words};
+use crate::{Answer, gimbals, latex, words};
 
 /// Three decimals, without trailing zeros.
-fn short(x: f64) -> String {
+pub(crate) fn short(x: f64) -> String {
     let text = format!("{x:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".into() } else { text.into() }
@@ -126,12 +126,13 @@ impl Answer for Analysis {
             self.formulas.iter().flatten().map(formula),
         ));
         blocks.extend(Block::list_if_any("Under the other carries", words::carries(self)));
+        blocks.extend(gimbals::block(self.gimbals.as_ref()));
         blocks.push(Block::list("Assumed", words::assumptions(self)));
         let notes = self.notes.iter().map(|n| format!("note: {n}"));
         blocks.push(Block::list("Certainty", std::iter::once(words::certainty(self)).chain(notes).collect()));
         Document {
             title: format!("Observable degrees: {}", words::headline(self)),
-            lead: vec![words::rank(self)],
+            lead: std::iter::once(words::rank(self)).chain(gimbals::lead(self.gimbals.as_ref())).collect(),
             blocks,
         }
     }

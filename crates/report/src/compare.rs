@@ -5,7 +5,7 @@ use obsdeg_evidence::requirements::{Requirements, Worst};
 use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, stated, words};
+use crate::{Answer, gimbals, stated, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -271,6 +271,10 @@ impl Answer for Comparison {
             let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
             blocks.push(Block::list("Noise floor: what it is", means.collect()));
         }
+        for r in &self.schemes {
+            let lines = gimbals::lines(r.gimbals.as_ref());
+            blocks.extend(Block::list_if_any(format!("Gimbals of {}", r.name), lines));
+        }
         let missed = |r: &ComparedScheme| format!("{}: {}", r.name, stated::requirements(&r.requirements));
         if judged {
             blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
@@ -303,9 +307,11 @@ impl Answer for Comparison {
         }
         blocks.push(Block::list("Assumed", lines));
         let n = self.schemes.len();
+        let beyond = self.schemes.iter().filter_map(|r| Some((r, gimbals::lead(r.gimbals.as_ref())?)));
+        let beyond = beyond.map(|(r, text)| format!("{}: {text}", r.name));
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
-            lead: lead(self),
+            lead: lead(self).into_iter().chain(beyond).collect(),
             blocks,
         }
     }

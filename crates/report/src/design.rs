@@ -8,7 +8,7 @@ use obsdeg_evidence::requirements::{Miss, Requirements};
 use crate::document::{Block, Document, left, number, right};
 use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
-use crate::{Answer, stated, words};
+use crate::{Answer, gimbals, stated, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -125,6 +125,18 @@ fn table(heading: &str, found: &[Found]) -> Block {
         ],
         found.iter().enumerate().map(row),
     )
+}
+
+/// What the operator sets at each position of a scheme.
+fn gimbal_angles(f: &Found) -> Block {
+    let columns =
+        [left(""), left("position")].into_iter().chain(gimbals::NAMES.map(right)).collect::<Vec<_>>();
+    let row = |(i, (name, angles)): (usize, (&String, &String))| {
+        let set = angles.split(',').map(String::from);
+        [format!("p{}", i + 1), name.clone()].into_iter().chain(set).collect::<Vec<_>>()
+    };
+    let rows = f.positions.iter().zip(&f.angles).enumerate().map(row);
+    Block::table("Gimbal angles of the first [deg]", columns, rows)
 }
 
 fn how(d: &Design, s: &SearchReport) -> Vec<String> {
@@ -429,6 +441,8 @@ impl Answer for Design {
             let left_out: &[&str] = if judged { &[] } else { &["worst margin"] };
             let heading = format!("Best schemes ({})", stated::predicted(&s.conditions));
             blocks.push(table(&heading, &self.found).without(left_out));
+            blocks.extend(self.found.first().map(gimbal_angles));
+            blocks.extend(gimbals::block(self.gimbals.as_ref()));
             blocks.push(Block::list("How", how(self, s)));
             blocks.push(Block::list("How good the best can be", bound(self, s)));
             blocks.push(
@@ -464,7 +478,11 @@ impl Answer for Design {
             || "fewest positions".into(),
             |s| format!("{} of {} positions", s.positions, self.candidates.len()),
         );
-        Document { title: format!("Design: {what}, {} carry", self.carry), lead: lead(self), blocks }
+        Document {
+            title: format!("Design: {what}, {} carry", self.carry),
+            lead: lead(self).into_iter().chain(gimbals::lead(self.gimbals.as_ref())).collect(),
+            blocks,
+        }
     }
 
     fn main_table(&self) -> &'static str {

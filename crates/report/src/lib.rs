@@ -22,6 +22,7 @@ mod design;
 mod document;
 mod figure;
 mod figures;
+mod gimbals;
 mod html;
 mod latex;
 mod markdown;

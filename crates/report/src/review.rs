@@ -20,7 +20,7 @@ use obsdeg_evidence::simulation::Outcome;
 use crate::analysis::null_vector;
 use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
-use crate::{Answer, Origin, compare, latex, simulation, stated, words};
+use crate::{Answer, Origin, compare, gimbals, latex, simulation, stated, words};
 
 /// What a calibration changes of the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
@@ -336,6 +336,7 @@ fn positions(
         ],
         rows,
     ));
+    blocks.extend(gimbals::block(s.analysis.gimbals.as_ref()));
     let at = &s.simulation.conditions;
     blocks.extend(pictures::poses(&s.poses, at.latitude_deg, at.latitude_by_default, id));
     blocks.push(pictures::attitudes(s, &format!("{id}_attitude")));

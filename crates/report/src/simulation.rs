@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, stated, words};
+use crate::{Answer, gimbals, stated, words};
 
 /// What a run assumes, a sentence each.
 pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> Vec<String> {
@@ -252,6 +252,7 @@ impl Answer for Simulation {
             let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(words::floor_of(f));
             blocks.push(Block::list("Noise floor: what it is", means.collect()));
         }
+        blocks.extend(gimbals::block(self.gimbals.as_ref()));
         let mut assumed = conditions(&self.conditions, &self.timeline);
         assumed.push(format!("carry {}; seed {}", self.carry, self.seed));
         let required = requirements(&self.quantities);
@@ -267,7 +268,7 @@ impl Answer for Simulation {
                 self.carry,
                 number_short(end)
             ),
-            lead: lead(self),
+            lead: lead(self).into_iter().chain(gimbals::lead(self.gimbals.as_ref())).collect(),
             blocks,
         }
     }

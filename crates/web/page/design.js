@@ -61,7 +61,7 @@ function drawFound(design, took, wanted) {
     load.setAttribute('aria-label', `Load scheme ${i + 1} as positions`);
     load.addEventListener('click', () => {
       edit((s) => {
-        s.position = f.angles.map((a) => positionOf(a));
+        s.position = f.angles.map((a) => positionOf(a, s.gimbals));
         // the direction of a half turn belongs to the scheme
         f.half_turns.forEach((t) => { s.position[t.to - 1].slew = { about: t.about, angle_deg: 180 }; });
         state.selected = 0;
@@ -74,10 +74,10 @@ function drawFound(design, took, wanted) {
   $('found').replaceChildren(tableOf(['', 'positions', 'criterion', 'worst', 'largest degree', 'requirements met'], rows));
 }
 
-/** A position from angles as the answer has them. */
-function positionOf(text) {
+/** A position from angles as the answer has them: by letters only where no gimbal limits ask for these angles. */
+function positionOf(text, gimbals) {
   const angles = text.split(',').map(Number);
-  const letters = angles.every(Number.isFinite) ? lettersOf(matrixOf(angles)) : null;
+  const letters = !gimbals && angles.every(Number.isFinite) ? lettersOf(matrixOf(angles)) : null;
   return letters ? { attitude: letters } : { angles_deg: text.split(',').map((t) => (Number.isFinite(Number(t)) ? Number(t) : t.trim())) };
 }
 

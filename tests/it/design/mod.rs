@@ -6,6 +6,7 @@ mod command;
 mod correlated;
 mod divide;
 mod free;
+mod gimbals;
 mod orders;
 mod parts;
 mod prior;

@@ -1,7 +1,7 @@
 //! The order of the criteria, constraints, worst degree, criterion, against every sequence of small random tasks, one by one.
 
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::{Angle, Carry, Scheme};
+use obsdeg_core::model::{Angle, Carry, Euler, Scheme, c_n_f64, cardinal, parse_attitude};
 use obsdeg_design::design::{
     Candidates, Constraints, Criterion, CriterionName, Design, DesignError, DesignOptions, Evaluator, Limits,
     Rows, Search, Stop, Symmetry, design,
@@ -252,6 +252,19 @@ fn close(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < 1e-8
 }
 
+impl Judged {
+    /// The candidates that positions are: gimbal limits may ask for other angles of the same attitude, which name it then.
+    fn named(&self, positions: &[String]) -> Vec<String> {
+        let matrix = |e: &Euler| c_n_f64(e).map(|row| row.map(|x| (x * 1e9).round() as i64));
+        let name = |position: &String| {
+            let angles = cardinal(position).unwrap_or_else(|| parse_attitude(position).expect("angles"));
+            let at = self.candidates.attitudes.iter().position(|c| matrix(c) == matrix(&angles));
+            self.candidates.names[at.expect("a candidate")].clone()
+        };
+        positions.iter().map(name).collect()
+    }
+}
+
 /// What exhaustion found is the best of all, in its order; it says nothing that is not so.
 fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, DesignError>) {
     let Some((degree, value)) = all.best() else {
@@ -273,8 +286,9 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
     let near = |k: &&Kept| k.degree == degree && k.value <= value * (1.0 + ties.within);
     assert_eq!(ties.sequences, all.kept.iter().filter(near).count() as u64, "{seed}");
     for f in &plain {
+        let names = all.named(&f.positions);
         let is = |k: &&Kept| {
-            k.names == f.positions
+            k.names == names
                 && k.degree == f.worst_degree
                 && close(k.value, f.value)
                 && close(k.seconds, f.total_s)

@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use crate::degree::coefficient::Form;
 use crate::degree::status::{Difference, Status};
-use crate::model::Carry;
 use crate::model::geometry::Geometry;
 use crate::model::slew::Turn;
+use crate::model::{Carry, GimbalReport};
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
@@ -57,6 +57,9 @@ pub struct Analysis {
     pub formulas: Option<Vec<Formula>>,
     /// Axes of Z in solutions.
     pub frame: Frame,
+    /// Angles and turns beyond the gimbal limits that the scheme states; left out where it states none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gimbals: Option<GimbalReport>,
     /// How certain all this is.
     pub certainty: Certainty,
     /// What could not be said, and why.

@@ -119,6 +119,7 @@ pub fn analyze(
         degenerate_loci: found.loci,
         formulas,
         frame: options.frame,
+        gimbals: scheme.gimbal_report(),
         certainty: Certainty {
             method: "exact ranks modulo two random 61-bit primes that agree".into(),
             error_bound: findings.certainty.error_bound,

@@ -10,6 +10,11 @@ pub type Matrix3<E> = [[E; 3]; 3];
 /// The three Euler angles `(alpha, beta, gamma)` of (19).
 pub type Euler = [Angle; 3];
 
+/// `alpha,beta,gamma` in degrees.
+pub fn angles_text(angles: &Euler) -> String {
+    angles.each_ref().map(ToString::to_string).join(",")
+}
+
 /// `a b`.
 pub fn product<R: Ring>(ring: &R, a: &Matrix3<R::Element>, b: &Matrix3<R::Element>) -> Matrix3<R::Element> {
     std::array::from_fn(|i| std::array::from_fn(|j| ring.dot((0..3).map(|k| (&a[i][k], &b[k][j])))))

@@ -32,7 +32,7 @@ impl Scheme {
         }
         out.push(self.positions.len().to_string());
         for p in &self.positions {
-            out.push(p.angles_text());
+            out.push(super::attitude::angles_text(&p.angles));
             out.push(p.rotation.as_ref().map_or_else(String::new, ToString::to_string));
             out.push(p.dwell.map_or_else(String::new, |d| d.to_string()));
         }

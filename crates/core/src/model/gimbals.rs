@@ -1,9 +1,15 @@
-//! How far the gimbals turn: limits on the Euler angles of (19).
+//! The gimbals: which turns about which axis, how far each turns, and the gimbal angles of an attitude.
+//!
+//! `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19) takes platform components to geographic ones. Its first factor acts on geographic
+//! components: a change of alpha turns everything inside about North, an axis fixed to the base, so alpha is the *outer* gimbal. Its last
+//! factor acts on platform components: a change of gamma turns the platform alone, about Z_p, so gamma is the *inner* gimbal. Beta turns
+//! the *middle* gimbal about the axis `Mx(alpha) e_y`, which the outer gimbal carries along and the inner one does not move: Up where
+//! alpha = 0. The matrices are passive: a positive angle turns the platform left-handed about these axes.
 
 use std::fmt;
 
-use super::angle::{format_decimal, parse_decimal};
-use super::attitude::{Euler, Matrix3, c_n_f64};
+use super::angle::{Angle, format_decimal, parse_decimal};
+use super::attitude::{Euler, Matrix3, angles_text, c_n_f64};
 use super::scheme::Position;
 use crate::model::slew::Slew;
 
@@ -12,12 +18,12 @@ const TURN: i64 = 360_000_000_000;
 /// Half a turn.
 const HALF: i64 = TURN / 2;
 /// Rounding of angles taken from a matrix, in 1e-9 degrees.
-const ROUNDING: i64 = 100_000;
+pub(super) const ROUNDING: i64 = 100_000;
 
 /// Limits on alpha, beta, gamma as `[low, high]` in 1e-9 degrees; `None`: the gimbal turns freely.
 ///
-/// An attitude has two sets of Euler angles, `(a, b, g)` and `(a+180, 180-b, g+180)`, and at `b = +-90` infinitely
-/// many: it is reached when one of them lies within the limits, whole turns left out of account.
+/// An attitude has two sets of Euler angles, `(a, b, g)` and its twin `(a+180, 180-b, g+180)`, each up to whole turns, and at
+/// `b = +-90` infinitely many: it is reached when one of them lies within the limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gimbals {
     /// Of alpha, beta and gamma.
@@ -33,7 +39,7 @@ pub struct GimbalError {
 }
 
 /// The names of the Euler angles.
-const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
+pub(super) const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
 
 impl Gimbals {
     /// Sets one limit from a text such as `beta=-80:80`.
@@ -53,6 +59,105 @@ impl Gimbals {
         Ok(())
     }
 
+    /// True if the angles lie within the limits as they are written, whole turns counted; generic angles count as within.
+    pub fn hold(&self, angles: &Euler) -> bool {
+        let within = |(a, limit): (&Angle, Option<[i64; 2]>)| {
+            a.generic().is_some() || limit.is_none_or(|[low, high]| (low..=high).contains(&a.nanodeg()))
+        };
+        angles.iter().zip(self.limits).all(within)
+    }
+
+    /// The gimbal angles of the attitude of `angles`, within the limits, with the shortest gimbal way from `before`: exact, of the same
+    /// attitude. `None` where the gimbals do not reach the attitude; generic angles stay as they are.
+    ///
+    /// The gimbal way is the sum of what the three gimbals turn. Of equal ways, the one whose largest turn is smaller, then the one with
+    /// beta in -90..90 is taken. A gimbal without a limit turns the shorter way round, and its angle lies in (-180, 180]. At `beta = +-90`
+    /// alpha and gamma turn about one line: alpha is kept, and where gamma cannot follow, changed as little as possible.
+    pub fn nearest(&self, angles: &Euler, before: &Euler) -> Option<Euler> {
+        if angles.iter().any(|a| a.generic().is_some()) {
+            return Some(angles.clone());
+        }
+        let from: [i64; 3] =
+            std::array::from_fn(|k| if before[k].generic().is_some() { 0 } else { before[k].nanodeg() });
+        let [a, b, g] = std::array::from_fn(|k| angles[k].nanodeg());
+        let way = |to: &[i64; 3]| -> [i64; 3] { std::array::from_fn(|k| (to[k] - from[k]).abs()) };
+        let found = if is_singular(b) {
+            let along = self.locked([a, b, g], from);
+            along.into_iter().min_by_key(|to| (way(to)[0], way(to).iter().sum::<i64>()))
+        } else {
+            let twins = [[a, b, g], [a + HALF, HALF - b, g + HALF]];
+            let placed = twins.iter().filter_map(|twin| self.placed(*twin, from));
+            placed.min_by_key(|to| {
+                let way = way(to);
+                (way.iter().sum::<i64>(), way.into_iter().max(), wrapped(to[1]).abs() > HALF / 2)
+            })
+        }?;
+        let shown = |k: usize| if self.limits[k].is_some() { found[k] } else { wrapped(found[k]) };
+        Some(std::array::from_fn(|k| Angle::from_nanodeg(shown(k))))
+    }
+
+    /// The gimbal angles of successive attitudes, each with the shortest gimbal way from the one before, the first from (0, 0, 0).
+    /// Attitudes that the gimbals do not reach stay as they are. Without limits angles are brought into (-180, 180].
+    pub fn along(&self, attitudes: &[Euler]) -> Vec<Euler> {
+        let mut out: Vec<Euler> = Vec::with_capacity(attitudes.len());
+        let zero: Euler = std::array::from_fn(|_| Angle::from_degrees(0));
+        for angles in attitudes {
+            let before = out.last().unwrap_or(&zero);
+            let chosen = if self.are_free() { normalised(angles) } else { self.nearest(angles, before) };
+            out.push(chosen.unwrap_or_else(|| angles.clone()));
+        }
+        out
+    }
+
+    /// Every angle by whole turns at its place within the limits that is nearest to `from`.
+    fn placed(&self, angles: [i64; 3], from: [i64; 3]) -> Option<[i64; 3]> {
+        let mut out = angles;
+        for k in 0..3 {
+            out[k] = self.place(k, angles[k], from[k])?;
+        }
+        Some(out)
+    }
+
+    /// The angle `x` of gimbal `k` by whole turns at its place within the limits that is nearest to `near`.
+    fn place(&self, k: usize, x: i64, near: i64) -> Option<i64> {
+        let at = near + wrapped(x - near);
+        let Some([low, high]) = self.limits[k] else { return Some(at) };
+        // the place nearest to `near`, or the one that is first inside
+        let inside = if at < low {
+            low + (x - low).rem_euclid(TURN)
+        } else if at > high {
+            high - (high - x).rem_euclid(TURN)
+        } else {
+            at
+        };
+        (low..=high).contains(&inside).then_some(inside)
+    }
+
+    /// The angles at `beta = +-90` within the limits: of every place of gamma the alpha nearest to that of `from`.
+    fn locked(&self, [a, b, g]: [i64; 3], from: [i64; 3]) -> Vec<[i64; 3]> {
+        let Some(beta) = self.place(1, b, from[1]) else { return Vec::new() };
+        // at b = 90 only a - g counts, at b = -90 only a + g
+        let up = wrapped(b) == HALF / 2;
+        let (fixed, sign) = if up { (a - g, 1) } else { (a + g, -1) };
+        let [low, high] = self.limits[0].unwrap_or([from[0] - HALF, from[0] + HALF]);
+        let Some([gl, gh]) = self.limits[2] else {
+            let alpha = from[0].clamp(low, high);
+            let gamma = from[2] + wrapped(sign * (alpha - fixed) - from[2]);
+            return vec![[alpha, beta, gamma]];
+        };
+        // the alphas of gamma's range, moved by whole turns over those of alpha's
+        let (first, last) = if up { (gl + fixed, gh + fixed) } else { (fixed - gh, fixed - gl) };
+        let turns = -(last - low).div_euclid(TURN)..=(high - first).div_euclid(TURN);
+        let of = |n: i64| {
+            let (least, most) = ((first + n * TURN).max(low), (last + n * TURN).min(high));
+            (least <= most).then(|| {
+                let alpha = from[0].clamp(least, most);
+                [alpha, beta, sign * (alpha - n * TURN - fixed)]
+            })
+        };
+        turns.filter_map(of).collect()
+    }
+
     /// Whether nothing is limited.
     pub fn are_free(&self) -> bool {
         self.limits.iter().all(Option::is_none)
@@ -69,7 +174,7 @@ impl Gimbals {
     fn reach_nanodeg(&self, [a, b, g]: [i64; 3], slack: i64) -> bool {
         let limit = |k: usize| self.limits[k].map_or([0, TURN], |[low, high]| [low - slack, high + slack]);
         let within = |x: i64, [low, high]: [i64; 2]| (x - low).rem_euclid(TURN) <= high - low;
-        if (b + HALF / 2).rem_euclid(HALF) == 0 {
+        if is_singular(b) {
             // at b = 90 only a - g counts, at b = -90 only a + g
             let [[al, ah], [gl, gh]] = [limit(0), limit(2)];
             let (sum, range) = if (b - HALF / 2).rem_euclid(TURN) == 0 {
@@ -89,7 +194,7 @@ impl Gimbals {
     pub fn beyond(&self, position: &Position) -> Option<(String, String)> {
         let name = || position.name.clone();
         if !self.reach(&position.angles) {
-            return Some((name(), position.angles_text()));
+            return Some((name(), angles_text(&position.angles)));
         }
         let r = position.rotation.as_ref().filter(|_| !self.are_free())?;
         if position.angles.iter().any(|a| a.generic().is_some()) {
@@ -105,9 +210,28 @@ impl Gimbals {
             let angles = euler_angles(&path.at(t)).map(|x| (x.to_degrees() * 1e9).round() as i64);
             let turned = if whole < 0.0 { -t } else { t };
             (!self.reach_nanodeg(angles, ROUNDING))
-                .then(|| (name(), format!("{} turned by {turned:.0} deg", position.angles_text())))
+                .then(|| (name(), format!("{} turned by {turned:.0} deg", angles_text(&position.angles))))
         })
     }
+}
+
+/// An angle in 1e-9 degrees by whole turns within (-180, 180] degrees.
+fn wrapped(x: i64) -> i64 {
+    HALF - (HALF - x).rem_euclid(TURN)
+}
+
+/// Every constant angle by whole turns within (-180, 180].
+fn normalised(angles: &Euler) -> Option<Euler> {
+    let shown = |a: &Angle| match a.generic() {
+        None => Angle::from_nanodeg(wrapped(a.nanodeg())),
+        Some(_) => a.clone(),
+    };
+    Some(angles.each_ref().map(shown))
+}
+
+/// True at `beta = +-90` degrees, where alpha and gamma turn about one line.
+fn is_singular(beta: i64) -> bool {
+    (beta + HALF / 2).rem_euclid(HALF) == 0
 }
 
 impl fmt::Display for Gimbals {
@@ -121,11 +245,16 @@ impl fmt::Display for Gimbals {
     }
 }
 
+/// True where beta is `+-90` degrees up to rounding.
+pub(super) fn is_locked(c: &Matrix3<f64>) -> bool {
+    c[0][2].abs() > 1.0 - 1e-12
+}
+
 /// Euler angles (rad) of `C_c^n`, beta in -90..90 degrees.
 pub(crate) fn euler_angles(c: &Matrix3<f64>) -> [f64; 3] {
     // C = Mx My Mz: row 0 is (cb cg, cb sg, -sb), column 2 is (-sb, sa cb, ca cb)
     let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
-    if c[0][2].abs() > 1.0 - 1e-12 {
+    if is_locked(c) {
         // only a -+ g is determined: gamma = 0, and the middle column of Mx My is (0, ca, -sa)
         return [(-c[2][1]).atan2(c[1][1]), beta, 0.0];
     }
@@ -179,6 +308,135 @@ mod tests {
             })));
             prop_assert_eq!(gimbals.reach(&euler), found);
         }
+    }
+
+    /// Columns of `C_c^n` by turning a platform whose axes lie along North, Up, East and the gimbals around it, from the inside out: the inner one
+    /// turns the platform about its own Z, the middle one all of that about its own Y, the outer one all about North.
+    fn nested([a, b, g]: [f64; 3]) -> Matrix3<f64> {
+        // Rodrigues: v cos + (k x v) sin + k (k v) (1 - cos), left-handed
+        let turned = |v: [f64; 3], k: [f64; 3], degrees: f64| -> [f64; 3] {
+            let (s, c) = (-degrees).to_radians().sin_cos();
+            let dot: f64 = (0..3).map(|i| k[i] * v[i]).sum();
+            std::array::from_fn(|i| {
+                let (j, l) = ((i + 1) % 3, (i + 2) % 3);
+                v[i] * c + (k[j] * v[l] - k[l] * v[j]) * s + k[i] * dot * (1.0 - c)
+            })
+        };
+        let unit = |i: usize| -> [f64; 3] { std::array::from_fn(|j| f64::from(u8::from(i == j))) };
+        let axes = [0, 1, 2].map(|i| turned(turned(turned(unit(i), unit(2), g), unit(1), b), unit(0), a));
+        std::array::from_fn(|i| std::array::from_fn(|j| axes[j][i]))
+    }
+
+    proptest! {
+        /// Alpha is the outer gimbal, about North; beta the middle, about an axis that alpha alone moves; gamma the inner, about Z_p.
+        #[test]
+        fn gimbals_from_the_inside_out(at in prop::array::uniform3(-180.0f64..180.0), by in -90.0f64..90.0) {
+            let c = of_degrees(at);
+            prop_assert!(distance(&c, &nested(at)) < 1e-12);
+            let changed = |k: usize| of_degrees(std::array::from_fn(|i| at[i] + if i == k { by } else { 0.0 }));
+            // what a turn about an axis leaves is the axis: rows are along North, columns platform axes
+            prop_assert!((0..3).all(|j| (changed(0)[0][j] - c[0][j]).abs() < 1e-12));
+            prop_assert!((0..3).all(|i| (changed(2)[i][2] - c[i][2]).abs() < 1e-12));
+            let (s, cos) = at[0].to_radians().sin_cos();
+            let middle = |c: &Matrix3<f64>, j: usize| cos * c[1][j] - s * c[2][j];
+            prop_assert!((0..3).all(|j| (middle(&changed(1), j) - middle(&c, j)).abs() < 1e-12));
+        }
+
+        /// Of all gimbal angles within the limits that give the attitude, those with the shortest way; at beta = +-90 first those that keep alpha.
+        #[test]
+        fn the_nearest_angles_are_what_a_search_over_gimbal_angles_finds(
+            angles in prop::array::uniform3(-24i64..=24),
+            before in prop::array::uniform3(-12i64..=12),
+            low in prop::array::uniform3(-24i64..=6),
+            width in prop::array::uniform3(prop::option::weighted(0.8, 0i64..=20)),
+        ) {
+            let limits = std::array::from_fn(|k| width[k].map(|w| [low[k] * 15, (low[k] + w) * 15]));
+            let gimbals = limited(limits);
+            let of = |angles: [i64; 3]| angles.map(|a| Angle::from_nanodeg(a * 15 * DEG));
+            let target = of_degrees(angles.map(|a| (a * 15) as f64));
+            // a free gimbal turns up to half a turn either way
+            let range = |k: usize| match limits[k] {
+                Some([low, high]) => low / 15..=high / 15,
+                None => before[k] - 12..=before[k] + 12,
+            };
+            let way = |to: [i64; 3]| -> [i64; 3] { std::array::from_fn(|k| (to[k] - before[k]).abs()) };
+            let locked = angles[1].rem_euclid(12) == 6;
+            let key = |to: [i64; 3]| (if locked { way(to)[0] } else { 0 }, way(to).iter().sum::<i64>());
+            let mut best: Option<(i64, i64)> = None;
+            for a in range(0) {
+                for b in range(1) {
+                    for g in range(2) {
+                        let here = key([a, b, g]);
+                        let better = best.is_none_or(|best| here < best);
+                        if better && distance(&of_degrees([a, b, g].map(|x| (x * 15) as f64)), &target) < 1e-9 {
+                            best = Some(here);
+                        }
+                    }
+                }
+            }
+            let found = gimbals.nearest(&of(angles), &of(before));
+            prop_assert_eq!(found.is_some(), gimbals.reach(&of(angles)));
+            prop_assert_eq!(found.is_some(), best.is_some());
+            let Some(found) = found else { return Ok(()) };
+            prop_assert!(gimbals.hold(&found), "{found:?} {gimbals}");
+            let found: [i64; 3] = std::array::from_fn(|k| found[k].nanodeg() / DEG / 15);
+            prop_assert!(distance(&of_degrees(found.map(|x| (x * 15) as f64)), &target) < 1e-9);
+            let round = |k: usize| if width[k].is_some() { found[k] } else { before[k] + wrapped((found[k] - before[k]) * 15 * DEG) / DEG / 15 };
+            prop_assert_eq!(Some(key(std::array::from_fn(round))), best);
+            prop_assert!((0..3).all(|k| width[k].is_some() || (-11..=12).contains(&found[k])));
+        }
+
+        /// The attitude is the same, exactly: the matrices are equal in a prime field that holds the sines of all angles.
+        #[test]
+        fn the_nearest_angles_give_the_same_attitude(
+            angles in prop::array::uniform3(-400_000_000_000i64..400_000_000_000),
+            right in prop::option::of(-2i64..=2),
+            before in prop::array::uniform3(-400_000_000_000i64..400_000_000_000),
+            low in -180_000_000_000i64..0,
+            width in 0i64..300_000_000_000,
+            k in 0usize..3,
+            seed in 0u64..1000,
+        ) {
+            let of = |angles: [i64; 3]| angles.map(Angle::from_nanodeg);
+            let [a, b, g] = angles;
+            let euler = of([a, right.map_or(b, |r| (2 * r + 1) * HALF / 2), g]);
+            let mut gimbals = Gimbals::default();
+            gimbals.limits[k] = Some([low, low + width]);
+            let Some(found) = gimbals.nearest(&euler, &of(before)) else { return Ok(()) };
+            prop_assert!(gimbals.hold(&found));
+            let turns = euler.iter().chain(&found).map(Angle::turn);
+            let mut rng = obsdeg_exact::SplitMix64::new(seed);
+            let roots = obsdeg_exact::RootField::random(obsdeg_exact::turn::common_order(turns), &mut rng).expect("a field");
+            let matrix = |euler: &Euler| {
+                let cs = euler.each_ref().map(|a| roots.cos_sin(roots.unit_circle(a.turn()).expect("held")));
+                crate::model::attitude::c_n_from_euler(&roots.field, &cs)
+            };
+            prop_assert_eq!(matrix(&euler), matrix(&found), "{:?} {:?}", euler, found);
+        }
+    }
+
+    /// By hand: 135 of a gimbal that stops at 90 is its twin -45, whose way from the position before decides where both are within.
+    #[test]
+    fn twins_by_hand() {
+        let gimbals = limited([Some([-90, 90]), None, None]);
+        let near = |gimbals: &Gimbals, angles: &str, before: &str| {
+            let of = |text: &str| parse_attitude(text).expect("angles");
+            gimbals.nearest(&of(angles), &of(before)).map(|e| e.map(|a| a.to_string()).join(","))
+        };
+        assert_eq!(near(&gimbals, "135,0,0", "0,0,0").as_deref(), Some("-45,180,180"));
+        assert_eq!(near(&gimbals, "180,0,0", "0,0,0").as_deref(), Some("0,180,180"));
+        assert_eq!(near(&gimbals, "361.13,10,0", "0,0,0").as_deref(), Some("1.13,10,0"));
+        // 90 and -90 are both within
+        assert_eq!(near(&gimbals, "90,0,0", "90,0,0").as_deref(), Some("90,0,0"));
+        assert_eq!(near(&gimbals, "90,0,0", "-90,180,180").as_deref(), Some("-90,180,180"));
+        // at beta = 90 alpha - gamma counts: alpha stays
+        assert_eq!(near(&gimbals, "180,90,0", "30,0,0").as_deref(), Some("30,90,-150"));
+        let narrow = limited([Some([-90, 90]), None, Some([-100, 100])]);
+        assert_eq!(near(&narrow, "180,90,0", "30,0,0").as_deref(), Some("80,90,-100"));
+        // whole turns of a gimbal that turns further than one
+        let wide = limited([Some([-270, 270]), Some([-80, 80]), None]);
+        assert_eq!(near(&wide, "-170,0,0", "150,0,0").as_deref(), Some("190,0,0"));
+        assert_eq!(near(&wide, "0,90,0", "0,0,0"), None);
     }
 
     #[test]

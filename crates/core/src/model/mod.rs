@@ -9,6 +9,7 @@ pub(crate) mod error_model;
 pub mod expression;
 pub(crate) mod file_error;
 pub(crate) mod geometry;
+mod gimbal_turns;
 pub(crate) mod gimbals;
 mod parser;
 pub(crate) mod path;
@@ -29,11 +30,13 @@ pub(crate) mod vectors;
 
 pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
 pub use attitude::{
-    Euler, Matrix3, Turned, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary, product,
+    Euler, Matrix3, Turned, angles_text, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary,
+    product,
 };
 pub use dwell::{Dwell, DwellError};
 pub use error_model::{Columns, ErrorModel};
 pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, SignedAxis};
+pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
 pub use gimbals::{GimbalError, Gimbals};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};

@@ -252,11 +252,6 @@ pub fn parse_attitude(text: &str) -> Result<Euler, PositionError> {
 }
 
 impl Position {
-    /// The angles as `a,b,g`.
-    pub(crate) fn angles_text(&self) -> String {
-        self.angles.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")
-    }
-
     /// Direction letters when all angles are multiples of 90 degrees.
     pub fn cardinal(&self) -> Option<String> {
         cardinal_name(&self.angles)

@@ -1,7 +1,7 @@
 //! The computed attitude over time: constant at a position, turning about an eigenaxis during a slew.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::attitude::Matrix3;
 use super::ring::Float;
@@ -11,7 +11,7 @@ use super::rotation::{Axis, Rotation, SlewAxis, SlewTo};
 pub const W_IE: f64 = 7.292115e-5;
 
 /// A turn about a fixed axis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Turn {
     /// The axis: a unit vector (North, Up, East).
     pub about: [f64; 3],

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use obsdeg_core::model::{Carry, Geometry};
+use obsdeg_core::model::{Carry, Geometry, GimbalReport};
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{MeasurementReport, OtherCarry};
 
@@ -46,6 +46,10 @@ pub struct Design {
     /// The first scheme under the other carries; empty where none was searched.
     #[serde(default)]
     pub other_carries: Vec<OtherCarry>,
+    /// Of the first scheme: turns beyond the gimbal limits; and positions of the file of candidates whose angles lie beyond. Left out where no
+    /// limits are stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gimbals: Option<GimbalReport>,
     /// How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so.
     pub primes: usize,
     /// Bound on the probability that an observable set was overlooked, or a degree taken too large; nothing is called proven unless it is
@@ -167,7 +171,8 @@ pub struct EverywhereReport {
 /// Free attitudes with rounded angles: every scheme is evaluated at the angles as they are rounded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rounded {
-    /// Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too.
+    /// Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too, and for what gimbal limits ask for: the
+    /// twin (alpha+180, 180-beta, gamma+180) of such angles, and at beta = +-90 another alpha.
     pub step_deg: f64,
     /// A better scheme, by the same search with angles in hundredths of a degree; null where none was found.
     pub finer: Option<Finer>,
@@ -208,7 +213,8 @@ pub struct Found {
     /// Which of those listed before it, counted from 1, a turn of the platform axes turns into it (coefficients renamed): the same scheme in
     /// other axes; null: none.
     pub image_of: Option<usize>,
-    /// Their Euler angles in degrees.
+    /// Their gimbal angles alpha,beta,gamma in degrees: within the gimbal limits, each with the shortest gimbal way from the position before
+    /// (without limits as the candidates have them, in (-180, 180]).
     pub angles: Vec<String>,
     /// The half turns between them, each with its direction: the other one is another scheme.
     pub half_turns: Vec<HalfTurn>,

@@ -1,6 +1,8 @@
 //! The attitudes that a design may choose from.
 
-use obsdeg_core::model::{Angle, Euler, Gimbals, Scheme, cardinal, cardinal_name, cardinal_names};
+use obsdeg_core::model::{
+    Angle, Euler, Gimbals, Scheme, angles_text, cardinal, cardinal_name, cardinal_names,
+};
 
 use super::DesignError;
 
@@ -70,18 +72,22 @@ impl Candidates {
 
     /// Adds an attitude under the name of its directions, or of its angles.
     pub fn add(&mut self, attitude: Euler) {
-        let angles = || attitude.each_ref().map(ToString::to_string).join(",");
-        self.names.push(cardinal_name(&attitude).unwrap_or_else(angles));
+        self.names.push(cardinal_name(&attitude).unwrap_or_else(|| angles_text(&attitude)));
         self.attitudes.push(attitude);
     }
 
-    /// Those that the gimbals reach, and the names of the others.
+    /// Those that the gimbals reach, with angles within the limits, and the names of the others. An attitude whose own angles lie beyond them has
+    /// those with the shortest gimbal way from (0, 0, 0), and their name where it was named by its angles.
     pub fn within(self, gimbals: &Gimbals) -> (Self, Vec<String>) {
         let (mut reached, mut beyond) = (Self::default(), Vec::new());
+        let zero: Euler = std::array::from_fn(|_| Angle::from_degrees(0));
         for (name, attitude) in self.names.into_iter().zip(self.attitudes) {
-            if gimbals.reach(&attitude) {
+            if gimbals.hold(&attitude) {
                 reached.names.push(name);
                 reached.attitudes.push(attitude);
+            } else if let Some(within) = gimbals.nearest(&attitude, &zero) {
+                reached.names.push(if name == angles_text(&attitude) { angles_text(&within) } else { name });
+                reached.attitudes.push(within);
             } else {
                 beyond.push(name);
             }

@@ -1,6 +1,6 @@
 //! What is said of how good the best can be: bounds on the schemes of a task.
 
-use obsdeg_core::model::Euler;
+use obsdeg_core::model::{Euler, angles_text};
 use rayon::prelude::*;
 
 use super::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
@@ -40,10 +40,7 @@ pub(super) fn everywhere(
     value: Value,
     rounded: Option<(i64, Option<&Moved>)>,
 ) -> EverywhereReport {
-    let weight = |(euler, weight): &(Euler, f64)| Weight {
-        candidate: euler.each_ref().map(ToString::to_string).join(","),
-        weight: *weight,
-    };
+    let weight = |(euler, weight): &(Euler, f64)| Weight { candidate: angles_text(euler), weight: *weight };
     EverywhereReport {
         best_possible: found.value,
         within_percent: 100.0 * excess(value.at_most, found.value),
@@ -52,10 +49,9 @@ pub(super) fn everywhere(
         weights: found.support.iter().map(weight).collect(),
         rounded: rounded.map(|(step, finer)| Rounded {
             step_deg: step as f64 / 1e9,
-            finer: finer.filter(|f| f.value < value.computed).map(|f| Finer {
-                value: f.value,
-                angles: f.scheme.iter().map(|e| e.each_ref().map(ToString::to_string).join(",")).collect(),
-            }),
+            finer: finer
+                .filter(|f| f.value < value.computed)
+                .map(|f| Finer { value: f.value, angles: f.scheme.iter().map(angles_text).collect() }),
         }),
     }
 }

@@ -359,6 +359,7 @@ fn answered(
             found: Vec::new(),
             front: Vec::new(),
             other_carries: Vec::new(),
+            gimbals: None,
             primes: task.rows.fields(),
             error_bound: task.rows.error_bound(sets),
             seed: options.seed,
@@ -453,6 +454,7 @@ fn answered(
             constraints: task.constraints_in_words(),
             certificate,
         });
+        winner::within_gimbals(&mut out, base, conditions)?;
         Ok(out)
     })
 }

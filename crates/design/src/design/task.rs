@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::{Assignment, concerns};
-use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, c_n_f64};
+use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, angles_text, c_n_f64};
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
 use rayon::prelude::*;
@@ -346,8 +346,7 @@ impl<'a> Task<'a> {
         positions: Vec<String>,
         value: f64,
     ) -> Result<Option<Found>, DesignError> {
-        let angles = attitudes.iter().map(|a| a.each_ref().map(ToString::to_string).join(","));
-        let angles = angles.collect();
+        let angles = attitudes.iter().map(angles_text).collect();
         let mut stops = Scheme::of_angles(attitudes).positions;
         let half_turns = evaluator.half_turns(sequence);
         for (k, turn) in &half_turns {

@@ -417,7 +417,7 @@ pub fn walks(
     if let Some(places) = &best {
         out.positions = Some(places.len());
         out.rank[0] = space.along(places).basis.rank();
-        let angles = |&c: &usize| attitudes[c].each_ref().map(ToString::to_string).join(",");
+        let angles = |&c: &usize| obsdeg_core::model::angles_text(&attitudes[c]);
         out.angles = places.iter().map(angles).collect();
         out.walk = places.iter().map(|&c| names[c].clone()).collect();
     }

@@ -3,14 +3,54 @@
 use std::collections::BTreeMap;
 
 use obsdeg_core::model::settings::{Assignment, Settings, concerns};
-use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, parse_attitude};
+use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, angles_text, parse_attitude};
 use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 
 use super::DesignError;
-use super::answer::Found;
+use super::answer::{Design, Found};
 
 /// Half a turn in degrees.
 const HALF: i32 = 180;
+
+/// Gives every scheme of an answer the gimbal angles of its attitudes within the limits of `base`, each with the shortest gimbal way from the
+/// position before; what was named by its angles has the name of these.
+///
+/// # Errors
+/// [`DesignError::Scheme`] for a dwell that no scheme has.
+pub(super) fn within_gimbals(
+    out: &mut Design,
+    base: &Scheme,
+    conditions: &Conditions,
+) -> Result<(), DesignError> {
+    for found in out.found.iter_mut().chain(&mut out.front) {
+        let within = chosen(&found.angles, base);
+        for ((name, angles), within) in found.positions.iter_mut().zip(&found.angles).zip(&within) {
+            if name == angles {
+                name.clone_from(within);
+            }
+        }
+        found.angles = within;
+    }
+    let certificate = out.search.as_mut().and_then(|s| s.certificate.as_mut());
+    let rounded = certificate.and_then(|c| c.everywhere.as_mut()?.rounded.as_mut());
+    if let Some(finer) = rounded.and_then(|r| r.finer.as_mut()) {
+        finer.angles = chosen(&finer.angles, base);
+    }
+    if let Some(first) = out.found.first() {
+        out.gimbals = scheme(first, base, conditions)?.gimbal_report();
+    }
+    // angles of a user's own file stay as they are, and are pointed out
+    if let (Some(report), Some(own)) = (&mut out.gimbals, base.gimbal_report()) {
+        report.beyond = own.beyond;
+    }
+    Ok(())
+}
+
+/// The gimbal angles of successive attitudes, from their angles.
+fn chosen(angles: &[String], base: &Scheme) -> Vec<String> {
+    let attitudes: Vec<_> = angles.iter().filter_map(|text| parse_attitude(text).ok()).collect();
+    base.gimbals.along(&attitudes).iter().map(angles_text).collect()
+}
 
 /// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of half
 /// turns: its sigmas are those that the search gave. Positions are p1, p2, ...

@@ -1,8 +1,8 @@
 //! Schemes side by side: plain data.
 
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::Carry;
 use obsdeg_core::model::slew::Turn;
+use obsdeg_core::model::{Carry, GimbalReport};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -67,6 +67,9 @@ pub struct ComparedScheme {
     /// How well coefficients can be known under random drift, however long the dwells; left out where the gyros have no noise of their own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_floor: Option<NoiseFloor>,
+    /// Angles and turns beyond the gimbal limits that the scheme states; left out where it states none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gimbals: Option<GimbalReport>,
 }
 
 /// A turn to a position.

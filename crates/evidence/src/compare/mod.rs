@@ -154,6 +154,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         worst: judged.worst_of(&|_| true),
         validity: own.map(|(validity, _)| validity),
         noise_floor: noise_floor(scheme, conditions, &judged.prediction)?,
+        gimbals: scheme.gimbal_report(),
         drop_one,
         sensitivity: sensitivity(scheme, conditions, &determined(&judged), has_slews, seed)?,
     })

@@ -3,7 +3,7 @@
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::model::{Carry, GimbalReport, Scheme};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +50,9 @@ pub struct Simulation {
     /// How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_floor: Option<NoiseFloor>,
+    /// Angles and turns beyond the gimbal limits that the scheme states; left out where it states none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gimbals: Option<GimbalReport>,
     /// Seed of the noise.
     pub seed: u64,
 }

@@ -233,6 +233,7 @@ fn summary(
         filter: record.filter,
         validity: record.validity.clone(),
         noise_floor,
+        gimbals: scheme.gimbal_report(),
         seed,
     })
 }

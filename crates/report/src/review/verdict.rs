@@ -7,7 +7,7 @@ use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};
-use crate::{stated, words};
+use crate::{gimbals, stated, words};
 
 /// What the unknowns besides psi are.
 fn kind(coefficients: &[&Quantity]) -> &'static str {
@@ -72,6 +72,7 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
 /// What limits the verdict, the gravest first.
 fn limits(s: &SchemeReview) -> Vec<String> {
     let mut out: Vec<String> = small_angles(s).into_iter().collect();
+    out.extend(gimbals::lead(s.analysis.gimbals.as_ref()));
     if !s.simulation.consistency.consistent {
         out.push(format!(
             "the run of the filter is NOT consistent with its truth ({})",

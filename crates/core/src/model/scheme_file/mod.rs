@@ -315,9 +315,12 @@ alpha_deg = [-180, 180.5]
         assert_eq!(scheme.carry, Carry::Inertial);
         assert_eq!(scheme.latitude.map(|l| l.to_string()), Some("28.2".into()));
         assert_eq!(scheme.unknowns.to_string(), "F,I,SS");
-        assert_eq!(scheme.positions[0].angles_text(), "0,-12.123456789,alpha");
+        assert_eq!(crate::model::angles_text(&scheme.positions[0].angles), "0,-12.123456789,alpha");
         assert_eq!(
-            (scheme.positions[1].name.as_str(), scheme.positions[1].angles_text().as_str()),
+            (
+                scheme.positions[1].name.as_str(),
+                crate::model::angles_text(&scheme.positions[1].angles).as_str()
+            ),
             ("upside down", "180,0,0")
         );
         let [_, p2, p3] = &scheme.positions[..] else { panic!("three positions") };
