@@ -5,7 +5,7 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::solution::Formula;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right};
-use crate::{Answer, latex, words};
+use crate::{Answer, latex, resolve, words};
 
 /// Three decimals, without trailing zeros.
 fn short(x: f64) -> String {
@@ -131,8 +131,12 @@ impl Answer for Analysis {
         blocks.push(Block::list("Certainty", std::iter::once(words::certainty(self)).chain(notes).collect()));
         Document {
             title: format!("Observable degrees: {}", words::headline(self)),
-            lead: vec![words::rank(self)],
+            lead: self.sentences().into_iter().chain([words::rank(self)]).collect(),
             blocks,
         }
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        resolve::of_scheme(self)
     }
 }

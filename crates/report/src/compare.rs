@@ -5,7 +5,7 @@ use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, words};
+use crate::{Answer, resolve, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -268,10 +268,13 @@ impl Answer for Comparison {
         let n = self.schemes.len();
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
-            lead: (!self.differ.is_empty())
-                .then(|| format!("not like with like: the schemes differ in {}", self.differ.join(", ")))
-                .into_iter()
-                .collect(),
+            lead: match &self.schemes[..] {
+                [one] => resolve::position_to_drop(one).into_iter().collect(),
+                _ => (!self.differ.is_empty())
+                    .then(|| format!("not like with like: the schemes differ in {}", self.differ.join(", ")))
+                    .into_iter()
+                    .collect(),
+            },
             blocks,
         }
     }

@@ -344,6 +344,24 @@ fn weights(list: &[Weight]) -> String {
 /// Candidates whose best is so many times worse than what other attitudes could do are said to cost.
 const FAR: f64 = 1.1;
 
+/// The answer of `design --minimum` in a sentence.
+fn fewest(d: &Design) -> String {
+    let m = &d.minimum;
+    let proven = if m.proven { "proven" } else { "not proven" };
+    match m.positions {
+        _ if !m.never.is_empty() => {
+            format!(
+                "No number of these candidates is enough: {} stay unobservable; {proven}",
+                words::names(m.never.iter().map(String::as_str))
+            )
+        }
+        Some(1) => format!("1 position is needed; {proven}"),
+        Some(k) if m.proven => format!("{k} positions are needed; proven"),
+        Some(k) => format!("{k} positions are enough; that fewer are not is not proven"),
+        None => "How many positions are needed is not known".into(),
+    }
+}
+
 fn minimum(d: &Design) -> Vec<String> {
     let m = &d.minimum;
     let chance = format!("not proven: wrong with a probability of up to {:.0e}", d.error_bound);
@@ -454,7 +472,8 @@ impl Answer for Design {
             || "fewest positions".into(),
             |s| format!("{} of {} positions", s.positions, self.candidates.len()),
         );
-        Document { title: format!("Design: {what}, {} carry", self.carry), lead: Vec::new(), blocks }
+        let lead = self.search.is_none().then(|| fewest(self)).into_iter().collect();
+        Document { title: format!("Design: {what}, {} carry", self.carry), lead, blocks }
     }
 
     fn main_table(&self) -> &'static str {
