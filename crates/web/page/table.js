@@ -82,7 +82,15 @@ function drawVerdicts() {
   const alone = rows.length - open.length, more = answer.rank - alone;
   const together = more > 0 ? ` and ${more} combination${more > 1 ? 's' : ''} of the others` : '';
   put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}`);
+  drawSentences($('sentences'), verdicts.now.sentences);
   offerStrip(rows);
+}
+
+/** The first lines of the answer: the answer, and what resolves what is not observable. */
+function drawSentences(e, sentences = []) {
+  if (e.dataset.of === sentences.join('\n')) return;
+  e.dataset.of = sentences.join('\n');
+  e.replaceChildren(...sentences.map((text) => element('p', { textContent: `${text}.` })));
 }
 
 const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together with others', not_seen: 'not seen up to the last derivative' };
