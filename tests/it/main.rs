@@ -25,6 +25,7 @@ mod models;
 mod program;
 mod reference_verdicts;
 mod release;
+mod remedies;
 mod report;
 mod report_page;
 mod rotation;
