@@ -36,7 +36,7 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
     };
     Some(match (&r.worst, &d.worst) {
         (Some(now), Some(then)) if then.sigma_dph <= now.sigma_dph * SAME => {
-            format!("Drop {}: nothing is lost", d.position)
+            format!("Drop {}: {kept}, and the largest predicted sigma of a coefficient stays", d.position)
         }
         (Some(_), Some(_)) => format!(
             "Drop {}: {kept}; the largest predicted sigma of a coefficient grows from {} to {}",
