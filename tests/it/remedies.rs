@@ -1,5 +1,7 @@
 //! What is said to resolve an unknown does: every change is made in the text of the scheme or model, and judged from there.
 
+use std::collections::BTreeSet;
+
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::degree::{DerivativeRows, PlatformRows};
 use obsdeg_core::model::{Carry, Platform, RandomValues, Scheme, cardinal_names, scheme_file};
@@ -29,9 +31,9 @@ fn wrong(remedy: &Remedy, before: &Degrees, after: &Degrees) -> Vec<String> {
         }
     }
     let lost = before.iter().filter(|q| q.1.is_some() && after.iter().any(|a| a.0 == q.0 && a.1.is_none()));
-    let lost: Vec<&String> = lost.map(|q| &q.0).collect();
+    let lost: BTreeSet<&String> = lost.map(|q| &q.0).collect();
     // psi of a position under reset carry stands for psi
-    let said: Vec<&String> = remedy.loses.iter().filter(|name| !name.contains('@')).collect();
+    let said: BTreeSet<&String> = remedy.loses.iter().filter(|name| !name.contains('@')).collect();
     if lost != said {
         out.push(format!("loses {lost:?}, not {said:?}: {:?}", remedy.changes));
     }
