@@ -266,6 +266,92 @@ class CarryReport(Record):
     """The unknowns of both carries whose verdict differs."""
 
 
+class ChangeKnown(Record):
+    """The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of every experiment, of an
+    input at all times.
+    """
+
+    __slots__ = ()
+
+    kind: Literal["known"]
+    name: str
+    """Name of the unknown."""
+
+
+class ChangeOutput(Record):
+    """A state is one more output of the model."""
+
+    __slots__ = ()
+
+    kind: Literal["output"]
+    state: str
+    """Name of the state."""
+
+
+class ChangeAttitude(Record):
+    """One more position at the end of the scheme."""
+
+    __slots__ = ()
+
+    kind: Literal["attitude"]
+    position: str
+    """Name of the new position."""
+    attitude: str
+    """Cardinal attitude: where X_p, Y_p and Z_p point."""
+
+
+class ChangeCarry(Record):
+    """Another carry between positions."""
+
+    __slots__ = ()
+
+    kind: Literal["carry"]
+    carry: Carry
+    """The carry."""
+
+Change = Union[ChangeKnown, ChangeOutput, ChangeAttitude, ChangeCarry]
+"""A change of a scheme or model."""
+
+
+class Resolved(Record):
+    """An unknown that a remedy makes observable."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown."""
+    degree: int
+    """Observable degree of the unknown after the change."""
+
+
+class Remedy(Record):
+    """One change, or two changes that are needed together."""
+
+    __slots__ = ()
+
+    changes: list[Change]
+    """The changes."""
+    resolves: list[Resolved]
+    """Unknowns that are observable with the changes and not without them, in model order; without those whose value is given."""
+    loses: list[str]
+    """Unknowns that are observable without the changes and not with them: possible under another carry only."""
+
+
+class Remedies(Record):
+    """What resolves the unknowns that are not observable."""
+
+    __slots__ = ()
+
+    remedies: list[Remedy]
+    """Remedies, each tried by the exact engine: single changes first, then pairs for unknowns that no single change resolves."""
+    unresolved: list[str]
+    """Unobservable unknowns without a remedy: of the changes that were tried only the value of the unknown itself resolves them."""
+    not_tried: list[str]
+    """Candidates left out because of the limits on the work, one sentence for each kind; empty when all were tried."""
+    verdicts: int
+    """Number of changed schemes or models that the exact engine judged."""
+
+
 class Locus(Record):
     """A condition and what it does."""
 
@@ -423,6 +509,8 @@ class Analysis(Shape):
     """Basis of the directions that Z does not see (unknowns that are not excited left out)."""
     carries: list[CarryReport]
     """The verdicts under the other carries, where they differ."""
+    to_resolve: Remedies
+    """Changes that make the unobservable unknowns observable."""
     degenerate_loci: list[Locus] | None
     """Conditions on generic angles under which the verdict changes."""
     formulas: list[Formula] | None
@@ -569,6 +657,8 @@ class SystemAnalysis(Shape):
     """Functions of unknowns that have branches (abs, sign, roots, asin, acos): the verdicts are those of the branch that points near one
     lie in, or where the model is not defined there, of the first that was found.
     """
+    to_resolve: Remedies
+    """Changes that make the unobservable unknowns observable."""
     note: str | None
     """Why there are no solving expressions, if there are none."""
     counting_order: int | None

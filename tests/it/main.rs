@@ -26,6 +26,7 @@ mod models;
 mod program;
 mod reference_verdicts;
 mod release;
+mod remedies;
 mod report;
 mod report_page;
 mod rotation;

@@ -92,6 +92,13 @@ impl Answer for Judged {
             Self::Model(a) => a.document(),
         }
     }
+
+    fn sentences(&self) -> Vec<String> {
+        match self {
+            Self::Scheme(a) => a.sentences(),
+            Self::Model(a) => a.sentences(),
+        }
+    }
 }
 
 /// The answers on all that was asked about: one alone is as it is, several are a list by their names.
@@ -109,6 +116,13 @@ impl Answer for Judgements {
         match self {
             Self::One(one) => one.document(),
             Self::Several(several) => several.document(),
+        }
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        match self {
+            Self::One(one) => one.sentences(),
+            Self::Several(_) => Vec::new(),
         }
     }
 

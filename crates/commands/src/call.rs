@@ -156,30 +156,40 @@ impl Wanted for All {
     }
 }
 
+/// An answer as JSON.
+pub struct InJson {
+    /// The JSON, as the command line prints it.
+    pub text: String,
+    /// The answer in sentences ([`Answer::sentences`]).
+    pub sentences: Vec<String>,
+    /// Whether the command line would exit with 0.
+    pub passed: bool,
+}
+
 /// Only its text: a program that asks for no more holds no writer of anything else.
 struct JsonOnly;
 
 impl Wanted for JsonOnly {
-    type Out = (String, bool);
+    type Out = InJson;
 
     fn whole<A: Answer + Send + Sync + 'static>(
         answer: A,
         passed: bool,
         _: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Self::Out, Problem> {
-        Ok((obsdeg_report::json(&answer)?, passed))
+        Ok(InJson { text: obsdeg_report::json(&answer)?, sentences: answer.sentences(), passed })
     }
 
     fn text(text: String, passed: bool) -> Result<Self::Out, Problem> {
-        Ok((text, passed))
+        Ok(InJson { text, sentences: Vec::new(), passed })
     }
 }
 
-/// The text of an answer ([`Answered::text`]) alone, and whether the command line would exit with 0.
+/// The text of an answer ([`Answered::text`]) and its sentences alone, and whether the command line would exit with 0.
 ///
 /// # Errors
 /// As [`call`].
-pub fn call_json(command: &str, request: &str, host: &mut Host<'_>) -> Result<(String, bool), Problem> {
+pub fn call_json(command: &str, request: &str, host: &mut Host<'_>) -> Result<InJson, Problem> {
     object(request).and_then(|request| answered::<JsonOnly>(command, request, host)).map_err(in_snake_case)
 }
 

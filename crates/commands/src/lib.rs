@@ -32,7 +32,7 @@ mod text;
 pub use analyze::{Analyze, Judged, Judgements, analyze};
 pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions, Word, one_of, whole};
 pub use calibrate::{Calibrate, Calibrated, calibrate};
-pub use call::{Answered, COMMANDS, Rendered, call, call_calibrate, call_json};
+pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_calibrate, call_json};
 pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};

@@ -42,5 +42,6 @@ pub mod analysis;
 pub mod degree;
 pub mod findings;
 pub mod model;
+pub mod remedies;
 pub mod solution;
 pub mod system;

@@ -5,7 +5,7 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::solution::Formula;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right};
-use crate::{Answer, gimbals, latex, words};
+use crate::{Answer, gimbals, latex, resolve, words};
 
 /// Three decimals, without trailing zeros.
 pub(crate) fn short(x: f64) -> String {
@@ -132,8 +132,15 @@ impl Answer for Analysis {
         blocks.push(Block::list("Certainty", std::iter::once(words::certainty(self)).chain(notes).collect()));
         Document {
             title: format!("Observable degrees: {}", words::headline(self)),
-            lead: std::iter::once(words::rank(self)).chain(gimbals::lead(self.gimbals.as_ref())).collect(),
+            lead: (self.sentences().into_iter())
+                .chain([words::rank(self)])
+                .chain(gimbals::lead(self.gimbals.as_ref()))
+                .collect(),
             blocks,
         }
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        resolve::of_scheme(self)
     }
 }

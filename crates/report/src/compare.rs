@@ -5,7 +5,7 @@ use obsdeg_evidence::requirements::{Requirements, Worst};
 use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, gimbals, stated, words};
+use crate::{Answer, gimbals, resolve, stated, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -177,6 +177,9 @@ fn lead(c: &Comparison) -> Vec<String> {
         _ => format!("{}: {text}", r.name),
     };
     let mut out = Vec::new();
+    if let [one] = &c.schemes[..] {
+        out.extend(resolve::position_to_drop(one));
+    }
     if !c.differ.is_empty() {
         out.push(format!("not like with like: the schemes differ in {}", c.differ.join(", ")));
     }

@@ -71,6 +71,9 @@ fn lead(d: &Design) -> Vec<String> {
         });
         out.push(format!("{best}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
     }
+    if d.search.is_none() {
+        out.push(fewest(d));
+    }
     out.push(stated::carry(d.carry).into());
     out.extend(stated::other_carries(&d.other_carries));
     out.extend(d.search.as_ref().and_then(|s| stated::by_default(&s.conditions)));
@@ -367,6 +370,24 @@ fn weights(list: &[Weight]) -> String {
 
 /// Candidates whose best is so many times worse than what other attitudes could do are said to cost.
 const FAR: f64 = 1.1;
+
+/// The answer of `design --minimum` in a sentence.
+fn fewest(d: &Design) -> String {
+    let m = &d.minimum;
+    let proven = if m.proven { "proven" } else { "not proven" };
+    match m.positions {
+        _ if !m.never.is_empty() => {
+            format!(
+                "No number of these candidates is enough: {} stay unobservable; {proven}",
+                words::names(m.never.iter().map(String::as_str))
+            )
+        }
+        Some(1) => format!("1 position is needed; {proven}"),
+        Some(k) if m.proven => format!("{k} positions are needed; proven"),
+        Some(k) => format!("{k} positions are enough; that fewer are not is not proven"),
+        None => "How many positions are needed is not known".into(),
+    }
+}
 
 fn minimum(d: &Design) -> Vec<String> {
     let m = &d.minimum;

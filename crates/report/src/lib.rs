@@ -29,6 +29,7 @@ mod markdown;
 #[cfg(feature = "pdf")]
 mod pdf;
 mod poses;
+mod resolve;
 mod review;
 mod rows;
 mod series;
@@ -170,6 +171,11 @@ pub enum ReportError {
 pub trait Answer: serde::Serialize {
     /// What it says, in no format.
     fn document(&self) -> Document;
+
+    /// The answer in sentences, where it has some that stand alone: the first is the answer.
+    fn sentences(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Its tables: what is listed in its JSON.
     ///

@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
 use crate::document::{Block, Document, Typeset, left, number, right};
-use crate::{Answer, latex, words};
+use crate::{Answer, latex, resolve, words};
 
 /// Longest solving expression that a reader is shown.
 const READABLE: usize = 240;
@@ -204,11 +204,14 @@ impl Answer for SystemAnalysis {
         });
         blocks.push(Block::list("Assumed", assumed));
         let profile = words::list(&self.rank_profile);
-        let mut lead = vec![format!("rank {} of {}; rank profile {profile}", self.rank, self.unknowns)];
-        if !self.description.is_empty() {
-            lead.insert(0, self.description.clone());
-        }
+        let mut lead = self.sentences();
+        lead.extend((!self.description.is_empty()).then(|| self.description.clone()));
+        lead.push(format!("rank {} of {}; rank profile {profile}", self.rank, self.unknowns));
         Document { title: format!("Observable degrees: {}", self.name), lead, blocks }
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        resolve::of_model(self)
     }
 }
 

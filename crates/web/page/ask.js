@@ -21,6 +21,7 @@ async function verdictsNow() {
   if (!scheme.position?.length) {
     verdicts.now = null;
     $('verdicts').replaceChildren();
+    drawSentences($('sentences'));
     put($('summary'), 'no position yet: add one');
     return;
   }

@@ -94,7 +94,7 @@ async function judgeText() {
   const text = $('text').value;
   const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { lane: 'text' }).catch((p) => ({ problem: p }));
   if (!found || text !== $('text').value) return;
-  const area = $('text'), { problem, answer, math } = found;
+  const area = $('text'), { problem, answer, math, sentences } = found;
   area.setAttribute('aria-invalid', problem ? 'true' : 'false');
   $('text-problem').replaceChildren();
   if (problem) {
@@ -129,6 +129,7 @@ async function judgeText() {
   const rows = answer.quantities.map((q) => [named(q), q.unit, WORDS[q.status] ?? q.status.replaceAll('_', ' '), String(q.degree ?? '\u2013'),
     q.degree === null ? (q.partners?.length ? `not told from ${q.partners.join(', ')}` : '') : solved(q.solution)]);
   const parts = [tableOf(['unknown', 'unit', 'status', 'degree', 'solution, or why none'], rows, `rank ${answer.rank} of ${answer.unknowns.length ?? answer.unknowns}`)];
+  parts.unshift(...(sentences ?? []).map((text) => element('p', { textContent: `${text}.` })));
   if (answer.quantities.some((q) => q.degree !== null && !q.solution)) {
     parts.push(element('p', { className: 'soft', textContent: 'Solutions that are not here need the symbolic engine, which the command line has.' }));
   }

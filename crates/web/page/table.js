@@ -84,7 +84,15 @@ function drawVerdicts() {
   const judged = verdicts.sigmasOf === asked && verdicts.sigmas && verdicts.requirements?.stated ? verdicts.requirements : null;
   const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}` : '';
   put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}`);
+  drawSentences($('sentences'), verdicts.now.sentences);
   offerStrip(rows);
+}
+
+/** The first lines of the answer: the answer, and what resolves what is not observable. */
+function drawSentences(e, sentences = []) {
+  if (e.dataset.of === sentences.join('\n')) return;
+  e.dataset.of = sentences.join('\n');
+  e.replaceChildren(...sentences.map((text) => element('p', { textContent: `${text}.` })));
 }
 
 const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together with others', not_seen: 'not seen up to the last derivative' };

@@ -55,7 +55,7 @@ const KINDS = {
       const terms = row.solution?.terms;
       if (platform && terms?.length) math[row.solution.text] = obsdeg_web.solution_mathml(JSON.stringify(terms.map(readable)));
     }
-    return { answer, math, text: said.text };
+    return { answer, math, text: said.text, sentences: said.sentences };
   },
 };
 

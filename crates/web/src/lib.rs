@@ -11,14 +11,14 @@ extern "C" {
     fn going(now: &str) -> bool;
 }
 
-/// A command by its name, with options and files as JSON. The answer is `{"text", "passed"}`, the text being the command line's with
-/// `--format json`, or `{"problem": {"kind", "message", "place"}}`.
+/// A command by its name, with options and files as JSON. The answer is `{"text", "sentences", "passed"}`: the text is the command
+/// line's with `--format json`, the sentences are its first lines; or `{"problem": {"kind", "message", "place"}}`.
 #[wasm_bindgen]
 pub fn call(command: &str, request: &str) -> String {
     let hears = |now: Now| going(&serde_json::to_string(&now).unwrap_or_default());
     let mut host = Host { worker: None, going: &hears };
     match obsdeg_commands::call_json(command, request, &mut host) {
-        Ok((text, passed)) => json!({ "text": text, "passed": passed }),
+        Ok(a) => json!({ "text": a.text, "sentences": a.sentences, "passed": a.passed }),
         Err(problem) => json!({ "problem": said(&problem) }),
     }
     .to_string()

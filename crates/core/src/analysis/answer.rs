@@ -8,6 +8,7 @@ use crate::degree::status::{Difference, Status};
 use crate::model::geometry::Geometry;
 use crate::model::slew::Turn;
 use crate::model::{Carry, GimbalReport};
+use crate::remedies::Remedies;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
@@ -51,6 +52,8 @@ pub struct Analysis {
     pub null_space: Vec<Vec<Component>>,
     /// The verdicts under the other carries, where they differ.
     pub carries: Vec<CarryReport>,
+    /// Changes that make the unobservable unknowns observable.
+    pub to_resolve: Remedies,
     /// Conditions on generic angles under which the verdict changes.
     pub degenerate_loci: Option<Vec<Locus>>,
     /// Formulas of Z and its derivatives, position by position.

@@ -1,6 +1,7 @@
 //! The main job: everything that is said about one scheme, as plain data.
 
 mod answer;
+mod remedies;
 
 use obsdeg_symbolic::{Worker, WorkerError};
 
@@ -81,6 +82,7 @@ pub fn analyze(
     let formulas = formulas.and_then(|f| printer.noted(f));
     printer.notes.extend(term_notes(scheme));
     let (carries, untold) = carry_reports(&platform, &findings.verdicts)?;
+    let to_resolve = remedies::remedies(&platform, verdicts, &findings.verdicts, &carries);
     printer.notes.extend(untold);
     if scheme.slews() && !scheme.torquers_act() {
         printer.notes.push(
@@ -116,6 +118,7 @@ pub fn analyze(
         combinations,
         null_space: findings.null_space.iter().map(|v| null_report(&platform, v)).collect(),
         carries,
+        to_resolve,
         degenerate_loci: found.loci,
         formulas,
         frame: options.frame,

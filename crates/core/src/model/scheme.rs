@@ -600,6 +600,15 @@ impl Scheme {
         rest
     }
 
+    /// Name of a further position: `p3` for the third, unless another position has it.
+    pub(crate) fn free_name(&self, number: usize) -> String {
+        let mut name = format!("p{number}");
+        while self.positions.iter().any(|p| p.name == name) {
+            name.push('_');
+        }
+        name
+    }
+
     /// Whether a segment rotates.
     pub fn rotates(&self) -> bool {
         self.positions.iter().any(|p| p.rotation.is_some())

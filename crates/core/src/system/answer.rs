@@ -9,11 +9,13 @@ use super::dag::Op;
 use super::fibre::{Count, values_taken};
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
 use super::model::{Compiled, ModelError, Role, StateStart, SystemModel};
+use super::remedies::remedies;
 use super::rows::Unknown;
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};
 use crate::model::expression::Function;
+use crate::remedies::Remedies;
 
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
@@ -67,6 +69,8 @@ pub struct SystemAnalysis {
     /// Functions of unknowns that have branches (abs, sign, roots, asin, acos): the verdicts are those of the branch that points near one lie
     /// in, or where the model is not defined there, of the first that was found.
     pub branches: Vec<String>,
+    /// Changes that make the unobservable unknowns observable.
+    pub to_resolve: Remedies,
     /// Why there are no solving expressions, if there are none.
     pub note: Option<String>,
     /// The order of the derivatives with which solutions were counted by elimination; null when none were.
@@ -215,6 +219,7 @@ pub fn analyze_system(
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let mut out = answer(model, &judged, &symmetries);
     out.branches = branches(&compiled);
+    out.to_resolve = remedies(model, &compiled, &judged, seed, order);
     if !options.solutions {
         return Ok(out);
     }
@@ -339,6 +344,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
         branches: Vec::new(),
+        to_resolve: Remedies::default(),
         note: None,
         counting_order: None,
         independent_functions: judged.independent_functions,

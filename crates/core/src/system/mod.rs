@@ -19,6 +19,7 @@ pub(crate) mod model;
 pub mod model_file;
 mod nominal;
 mod reader;
+mod remedies;
 pub(crate) mod rows;
 mod solutions;
 pub(crate) mod symmetry;

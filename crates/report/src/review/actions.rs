@@ -3,7 +3,7 @@
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Estimated, Finding, PositionFit};
 use obsdeg_core::degree::Status as Exact;
-use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
+use obsdeg_core::system::{NumberOfSolutions, SystemQuantity};
 use obsdeg_design::review::{ModelReview, SchemeReview};
 use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::requirements::Miss;
@@ -11,7 +11,7 @@ use obsdeg_evidence::requirements::Miss;
 use super::fewest_of_all;
 use crate::calibration::is_clock;
 use crate::document::number;
-use crate::{stated, words};
+use crate::{resolve, stated, words};
 
 /// What follows from what was found of a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
@@ -23,6 +23,7 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     if !unseen.is_empty() {
         let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
         out.push(format!("other positions: these do not determine {}{fewest}", words::names(unseen)));
+        out.extend(resolve::to_resolve_in_scheme(&s.analysis));
     }
     let large = missed(Miss::TooLarge);
     if !large.is_empty() {
@@ -103,14 +104,7 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     if m.evidence.as_ref().is_some_and(|e| !e.passed) {
         out.push("the checks of the filter that fail to be understood first (Evidence by a filter)".into());
     }
-    out.extend(known_beforehand(a));
-    let silent = named(&|q| q.status == Exact::NotExcited);
-    if !silent.is_empty() {
-        out.push(format!(
-            "another output, or given values, for {}: no output moves with these",
-            words::names(silent)
-        ));
-    }
+    out.extend(resolve::to_resolve_in_model(a));
     let unseen = named(&|q| q.status == Exact::NotSeen);
     if !unseen.is_empty() {
         out.push(format!(
@@ -148,41 +142,6 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
         });
     }
     out
-}
-
-/// What has to be known of unknowns that are not told apart: of a group with one direction any one, since without the column of that the rest is
-/// independent (a circuit of the matroid of columns); of more directions as many at least.
-fn known_beforehand(a: &SystemAnalysis) -> Vec<String> {
-    let mut groups: Vec<Vec<&str>> = Vec::new();
-    for q in a.quantities.iter().filter(|q| q.status == Exact::Inseparable) {
-        if !groups.iter().flatten().any(|name| *name == q.name) {
-            groups.push(std::iter::once(&q.name).chain(&q.partners).map(String::as_str).collect());
-        }
-    }
-    let silent = a.quantities.iter().filter(|q| q.status == Exact::NotExcited).count();
-    let all_shown = a.quantities.len() == a.unknowns;
-    let one_each = all_shown && a.unobservable_directions == groups.len() + silent;
-    let instead = || -> String {
-        let asked: Vec<_> = a.combinations.iter().filter(|c| c.degree.is_some()).collect();
-        let of = if asked.is_empty() { a.invariants.iter().collect() } else { asked };
-        let names: Vec<&str> = of.iter().map(|c| c.expression.as_str()).collect();
-        if names.is_empty() {
-            String::new()
-        } else {
-            format!("; observable without is {}", words::names(names))
-        }
-    };
-    let group = |names: &Vec<&str>| {
-        let list = words::names(names.iter().copied());
-        match one_each {
-            true => format!("one of {list} known beforehand: each then determines the others{}", instead()),
-            false => format!(
-                "some of {list} known beforehand, or another output: they are not told apart{}",
-                instead()
-            ),
-        }
-    };
-    groups.iter().map(group).collect()
 }
 
 /// What follows from what was found of a calibration, the gravest first.

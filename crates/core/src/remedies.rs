@@ -1,0 +1,200 @@
+//! Remedies: changes of a scheme or model that make unobservable unknowns observable. Plain data, and the linear algebra that
+//! proposes candidates; the exact engine tries every candidate before it becomes a remedy.
+
+use std::cmp::Reverse;
+
+use obsdeg_exact::{RowSpace, Scalars};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::model::Carry;
+
+/// Most candidates of which pairs are formed.
+const MOST_PAIRED: usize = 48;
+
+/// What resolves the unknowns that are not observable.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub struct Remedies {
+    /// Remedies, each tried by the exact engine: single changes first, then pairs for unknowns that no single change resolves.
+    pub remedies: Vec<Remedy>,
+    /// Unobservable unknowns without a remedy: of the changes that were tried only the value of the unknown itself resolves them.
+    pub unresolved: Vec<String>,
+    /// Candidates left out because of the limits on the work, one sentence for each kind; empty when all were tried.
+    pub not_tried: Vec<String>,
+    /// Number of changed schemes or models that the exact engine judged.
+    pub verdicts: usize,
+}
+
+/// One change, or two changes that are needed together.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Remedy {
+    /// The changes.
+    pub changes: Vec<Change>,
+    /// Unknowns that are observable with the changes and not without them, in model order; without those whose value is given.
+    pub resolves: Vec<Resolved>,
+    /// Unknowns that are observable without the changes and not with them: possible under another carry only.
+    pub loses: Vec<String>,
+}
+
+/// An unknown that a remedy makes observable.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Resolved {
+    /// Name of the unknown.
+    pub name: String,
+    /// Observable degree of the unknown after the change.
+    pub degree: usize,
+}
+
+/// A change of a scheme or model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Change {
+    /// The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of every experiment,
+    /// of an input at all times.
+    Known {
+        /// Name of the unknown.
+        name: String,
+    },
+    /// A state is one more output of the model.
+    Output {
+        /// Name of the state.
+        state: String,
+    },
+    /// One more position at the end of the scheme.
+    Attitude {
+        /// Name of the new position.
+        position: String,
+        /// Cardinal attitude: where X_p, Y_p and Z_p point.
+        attitude: String,
+    },
+    /// Another carry between positions.
+    Carry {
+        /// The carry.
+        carry: Carry,
+    },
+}
+
+impl Change {
+    /// The unknown whose value this change gives, if it gives one.
+    pub fn known(&self) -> Option<&str> {
+        match self {
+            Self::Known { name } => Some(name),
+            _ => None,
+        }
+    }
+}
+
+impl Remedies {
+    /// True if a remedy resolves the unknown of this name.
+    pub(crate) fn resolves(&self, name: &str) -> bool {
+        self.remedies.iter().any(|r| r.resolves.iter().any(|x| x.name == name))
+    }
+
+    /// Closes the list: of `open` unknowns, those without a remedy.
+    pub(crate) fn close(&mut self, open: impl Iterator<Item = String>) {
+        self.unresolved = open.filter(|name| !self.resolves(name)).collect();
+    }
+}
+
+/// The unobservable directions: for every unknown its entries in a basis of the null space. A row `c` of further information has the
+/// entries `c N`, and with such rows an unknown becomes observable if its own entries lie in their span.
+pub(crate) struct Directions<S: Scalars> {
+    field: S,
+    /// Null vectors, one after the other.
+    basis: Vec<Vec<S::Element>>,
+}
+
+impl<S: Scalars> Directions<S> {
+    /// The directions that no row of a space sees.
+    pub(crate) fn of(field: S, space: &S::Space) -> Self {
+        Self { field, basis: space.null_space() }
+    }
+
+    /// Entries of the value of an unknown.
+    fn unit(&self, column: usize) -> Vec<S::Element> {
+        self.basis.iter().map(|v| v[column]).collect()
+    }
+
+    /// What the values of some unknowns tell.
+    pub(crate) fn known(&self, columns: &[usize]) -> Told<S> {
+        let mut space = <S::Space as RowSpace>::new(self.field.clone(), self.basis.len());
+        for &c in columns {
+            space.insert(&self.unit(c));
+        }
+        Told { space, given: columns.to_vec() }
+    }
+
+    /// What rows of further information tell.
+    pub(crate) fn rows<'a>(&self, rows: impl Iterator<Item = &'a [S::Element]>) -> Told<S>
+    where
+        S::Element: 'a,
+    {
+        let mut told = self.known(&[]);
+        let zero = self.field.zero();
+        for row in rows {
+            let entries: Vec<_> =
+                self.basis.iter().map(|v| self.field.dot(&zero, row.iter().zip(v))).collect();
+            told.space.insert(&entries);
+        }
+        told
+    }
+
+    /// Which of `open` become observable by that, and are not given.
+    pub(crate) fn resolved(&self, by: &Told<S>, open: &[usize]) -> Vec<usize> {
+        let resolved = |c: &usize| !by.given.contains(c) && by.space.contains(&self.unit(*c));
+        open.iter().copied().filter(resolved).collect()
+    }
+
+    /// Pairs of one candidate of `left` and one of `right` (of one list where `right` is missing), the pair that resolves most of what is
+    /// open first: `judge` gets their indices and says what the engine finds resolved, or `None` at the end of its work. False if candidates
+    /// were left out: more than `MOST_PAIRED` in a list, or the end of the work.
+    pub(crate) fn pairs(
+        &self,
+        left: &[Told<S>],
+        right: Option<&[Told<S>]>,
+        mut open: Vec<usize>,
+        mut judge: impl FnMut(usize, usize) -> Option<Vec<usize>>,
+    ) -> bool {
+        let second = right.unwrap_or(left);
+        let [rows, columns] = [left, second].map(|list| list.len().min(MOST_PAIRED));
+        let mut found: Vec<(usize, usize, Vec<usize>)> = Vec::new();
+        for i in 0..rows {
+            for j in if right.is_some() { 0 } else { i + 1 }..columns {
+                let resolved = self.resolved(&left[i].and(&second[j]), &open);
+                if !resolved.is_empty() {
+                    found.push((i, j, resolved));
+                }
+            }
+        }
+        let count = |of: &[usize], open: &[usize]| of.iter().filter(|c| open.contains(c)).count();
+        loop {
+            found.retain(|pair| count(&pair.2, &open) > 0);
+            // the first of those that resolve most
+            let best = (0..found.len()).max_by_key(|&k| (count(&found[k].2, &open), Reverse(k)));
+            let Some(k) = best else { break };
+            let (i, j, _) = found.remove(k);
+            let Some(resolved) = judge(i, j) else { return false };
+            open.retain(|c| !resolved.contains(c));
+        }
+        left.len() <= MOST_PAIRED && second.len() <= MOST_PAIRED
+    }
+}
+
+/// What a candidate tells of the unobservable directions.
+pub(crate) struct Told<S: Scalars> {
+    /// Span of its rows, in entries.
+    space: S::Space,
+    /// Unknowns whose values it gives.
+    given: Vec<usize>,
+}
+
+impl<S: Scalars> Told<S> {
+    /// What two candidates tell together.
+    fn and(&self, other: &Self) -> Self {
+        let mut space = self.space.clone();
+        (0..other.space.rank()).for_each(|k| {
+            space.insert(other.space.row(k));
+        });
+        Self { space, given: [self.given.as_slice(), &other.given].concat() }
+    }
+}

@@ -1,0 +1,245 @@
+//! Remedies of a model: one value known, one more output that is a state, or two of these.
+
+use std::cmp::Reverse;
+
+use obsdeg_exact::Reals;
+
+use super::judge::{Judgement, climb_at, judge};
+use super::model::{
+    Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
+};
+use super::values::Values;
+use crate::model::expression::{Expression, Node};
+use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
+
+/// Most verdicts on single changes, and half as many on pairs, of a model of up to `UNKNOWNS`; beyond, the number falls as the square of
+/// the unknowns, as the work of a verdict grows at least: 10 of a model of 90 unknowns, none from 300 on.
+const MOST_VERDICTS: usize = 24;
+/// Unknowns up to which that many verdicts are computed.
+const UNKNOWNS: usize = 60;
+/// Most verdicts of a model whose functions are evaluated in many digits.
+const MOST_IN_DIGITS: usize = 12;
+/// Most values that are tried of unknowns that determine each other.
+const MOST_ALIKE: usize = 6;
+
+/// What is searched for one model.
+struct Search<'a> {
+    model: &'a SystemModel,
+    judged: &'a Judgement,
+    seed: u64,
+    order: Option<usize>,
+    /// Columns of unknowns that are not observable and are spoken of.
+    open: Vec<usize>,
+    /// What these are, each once, with all columns of it.
+    roles: Vec<(Role, Vec<usize>)>,
+    /// Verdicts that may still be computed.
+    budget: usize,
+    out: Remedies,
+}
+
+/// The remedies of a model that was judged; bounds of the work stand at the head of this file.
+pub(super) fn remedies(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    seed: u64,
+    order: Option<usize>,
+) -> Remedies {
+    let unknowns = &judged.layout.unknowns;
+    let open: Vec<usize> = (0..unknowns.len())
+        .filter(|&c| judged.shown(model, c) && judged.verdict_on(c).degree.is_none())
+        .collect();
+    if open.is_empty() {
+        return Remedies::default();
+    }
+    let mut roles: Vec<(Role, Vec<usize>)> = Vec::new();
+    for &c in &open {
+        let role = unknowns[c].role;
+        if roles.iter().all(|(known, _)| *known != role) {
+            roles.push((role, (0..unknowns.len()).filter(|&k| unknowns[k].role == role).collect()));
+        }
+    }
+    let n = unknowns.len().max(UNKNOWNS);
+    let in_digits = judged.digits().map_or(MOST_VERDICTS, |_| MOST_IN_DIGITS);
+    let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
+    let out = Remedies::default();
+    let mut search = Search { model, judged, seed, order, open, roles, budget, out };
+    match (judged.fields, &judged.span) {
+        (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
+        _ => {
+            let field = Reals::<8>;
+            let mut rng = model.random(seed, "remedies");
+            if let Ok(at) = climb_at(model, compiled, &judged.layout, field, &mut rng) {
+                search.all(&Directions::of(field, &at.span));
+            }
+        }
+    }
+    let open = search.open.iter().map(|&c| unknowns[c].name.clone());
+    search.out.close(open);
+    search.out
+}
+
+impl Search<'_> {
+    /// Single changes, then pairs for what these do not resolve.
+    fn all<S: Values>(&mut self, directions: &Directions<S>) {
+        let singles = self.singles(directions);
+        let (count, tried) = (singles.len(), singles.len().min(self.budget));
+        for change in singles.into_iter().take(tried) {
+            self.judge(vec![change]);
+        }
+        if tried < count {
+            let text = format!(
+                "{} of {count} known values and outputs: at most {} are tried",
+                count - tried,
+                self.budget
+            );
+            self.out.not_tried.push(text);
+        }
+        let states = self.roles.iter().map(|r| r.0).filter(|r| matches!(r, Role::State(_)));
+        self.two(directions, &states.collect::<Vec<_>>());
+    }
+
+    /// Single changes in the order in which they are tried: a value of every set of unknowns that determine each other, parameters first;
+    /// then outputs, those first whose value alone resolves most; then other values of the sets.
+    fn singles<S: Values>(&self, directions: &Directions<S>) -> Vec<Change> {
+        let resolves = |columns: &[usize]| directions.resolved(&directions.known(columns), &self.open);
+        let mut sets: Vec<(Vec<usize>, Vec<Role>)> = Vec::new();
+        let mut states: Vec<(usize, Role)> = Vec::new();
+        for (role, columns) in &self.roles {
+            let mut set = resolves(columns);
+            let is_state = matches!(role, Role::State(_));
+            states.extend(is_state.then_some((set.len(), *role)));
+            if set.is_empty() {
+                continue;
+            }
+            set.extend(columns.iter().filter(|c| self.open.contains(c)));
+            set.sort_unstable();
+            match sets.iter_mut().find(|(other, _)| *other == set) {
+                Some((_, roles)) => roles.push(*role),
+                None => sets.push((set, vec![*role])),
+            }
+        }
+        sets.sort_by_key(|(set, _)| Reverse(set.len()));
+        states.sort_by_key(|(count, _)| Reverse(*count));
+        for (_, roles) in &mut sets {
+            roles.sort_by_key(|r| matches!(r, Role::State(_)));
+        }
+        let alike = |k: usize| sets.iter().filter_map(move |(_, roles)| roles.get(k)).map(|r| self.known(*r));
+        let outputs = states.iter().map(|(_, role)| self.output(*role));
+        alike(0).chain(outputs).chain((1..MOST_ALIKE).flat_map(alike)).collect()
+    }
+
+    /// Two values known, or two outputs more, for what no single change resolves.
+    fn two<S: Values>(&mut self, directions: &Directions<S>, outputs: &[Role]) {
+        let values: Vec<Told<S>> = self.roles.iter().map(|(_, columns)| directions.known(columns)).collect();
+        let most = self.budget.div_ceil(2);
+        let mut work = most;
+        let mut complete = directions.pairs(&values, None, self.left(), |i, j| {
+            work = work.checked_sub(1)?;
+            let changes = [i, j].map(|k| self.known(self.roles[k].0));
+            Some(self.judge(changes.into()))
+        });
+        // rows of an output more are those of another random point: only the engine can say what two of them tell
+        for (i, j) in (0..outputs.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
+            if self.left().is_empty() {
+                break;
+            }
+            complete &= work > 0;
+            if let Some(left) = work.checked_sub(1) {
+                work = left;
+                self.judge([i, j].map(|k| self.output(outputs[k])).into());
+            }
+        }
+        if !complete {
+            self.out.not_tried.push(format!("some pairs of changes: at most {most} are judged"));
+        }
+    }
+
+    /// Unknowns that no remedy resolves so far.
+    fn left(&self) -> Vec<usize> {
+        let name = |c: usize| &self.judged.layout.unknowns[c].name;
+        self.open.iter().copied().filter(|&c| !self.out.resolves(name(c))).collect()
+    }
+
+    fn named(&self, role: Role) -> &Named {
+        match role {
+            Role::State(i) => &self.model.states[i].named,
+            Role::Parameter(i) => &self.model.parameters[i],
+            Role::UnknownInput(i) => &self.model.unknown_inputs[i].0,
+            Role::KnownInput(i) => &self.model.known_inputs[i].0,
+            Role::Constant(i) => &self.model.constants[i].0,
+            // no unknown
+            Role::Time => &self.model.outputs[0].0,
+        }
+    }
+
+    fn known(&self, role: Role) -> Change {
+        Change::Known { name: self.named(role).name.clone() }
+    }
+
+    fn output(&self, role: Role) -> Change {
+        Change::Output { state: self.named(role).name.clone() }
+    }
+
+    /// Judges the model with some changes, and enters what they resolve.
+    fn judge(&mut self, changes: Vec<Change>) -> Vec<usize> {
+        self.out.verdicts += 1;
+        let model = changed(self.model, &changes);
+        // given values add nothing beyond the last order of the model itself
+        let closed = !self.judged.rests_on_bound && changes.iter().all(|c| c.known().is_some());
+        let last = self.judged.findings.degrees.rank_profile.len().saturating_sub(1);
+        let order = if closed { Some(last) } else { self.order };
+        let Ok(judged) = judge(&model, self.seed, order) else { return Vec::new() };
+        let unknowns = &self.judged.layout.unknowns;
+        let found: Vec<(usize, usize)> = (self.open.iter())
+            .filter_map(|&c| Some((c, judged.verdict(&model, &unknowns[c].name)?.degree?)))
+            .collect();
+        let resolve = |&(c, degree): &(usize, usize)| Resolved { name: unknowns[c].name.clone(), degree };
+        let resolves: Vec<Resolved> = found.iter().map(resolve).collect();
+        if !resolves.is_empty() {
+            self.out.remedies.push(Remedy { changes, resolves, loses: Vec::new() });
+        }
+        found.into_iter().map(|(c, _)| c).collect()
+    }
+}
+
+/// The model with some changes, without the combinations that it asks for.
+fn changed(model: &SystemModel, changes: &[Change]) -> SystemModel {
+    let mut out = SystemModel { combinations: Vec::new(), ..model.clone() };
+    for change in changes {
+        match change {
+            Change::Known { name } => know(&mut out, name),
+            Change::Output { state } => measure(&mut out, state),
+            // of schemes
+            Change::Attitude { .. } | Change::Carry { .. } => {}
+        }
+    }
+    out
+}
+
+/// Makes the value of an unknown known.
+fn know(model: &mut SystemModel, name: &str) {
+    if let Some(state) = model.states.iter_mut().find(|s| s.named.name == name) {
+        state.start = StateStart::Known;
+    } else if let Some(i) = model.parameters.iter().position(|p| p.name == name) {
+        model.constants.push((model.parameters.remove(i), Constant::Generic));
+    } else if let Some(i) = model.unknown_inputs.iter().position(|u| u.0.name == name) {
+        let (named, degree) = model.unknown_inputs.remove(i);
+        model.known_inputs.push((named, degree.map_or(KnownInput::Generic, KnownInput::Polynomial)));
+    }
+}
+
+/// Adds an output that is a state.
+fn measure(model: &mut SystemModel, state: &str) {
+    let mut name = state.split('[').next().unwrap_or(state).to_string();
+    while model.outputs.iter().any(|o| o.0.name == name) {
+        name.push('_');
+    }
+    let expression = Expression {
+        nodes: vec![Node::Name(state.into())],
+        spans: std::iter::once(0..state.len()).collect(),
+    };
+    let place = Place { what: format!("the output {name}"), offset: None };
+    let named = Named { name, ..Named::default() };
+    model.outputs.push((named, PlacedExpression { text: state.into(), expression, place }));
+}
