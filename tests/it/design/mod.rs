@@ -11,6 +11,8 @@ mod parts;
 mod prior;
 mod search;
 mod sigmas;
+mod speed;
+mod unmet;
 mod whole;
 
 use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo, cardinal};
