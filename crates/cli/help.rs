@@ -62,6 +62,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("gate", ASSUMED, "Probability that no good sample is taken as outlier"),
     ("runs", ASSUMED, "Number of Monte Carlo runs"),
     ("monte_carlo", ASSUMED, "Number of Monte Carlo runs of the evidence"),
+    ("paper.seed", None, "Seed of the random points and of the noise"),
     ("seed", ASSUMED, "Seed of all random choices"),
     ("dwell", MEASURED, "Dwell of positions that do not say theirs, in s (default: 1000)"),
     ("step", MEASURED, "Largest time between samples, in s (default: 10)"),

@@ -48,7 +48,7 @@ fn help_is_in_lines() {
         assert!(short.lines().count() <= most, "{command}: {} lines", short.lines().count());
     }
     let design = text(&["design", "--help"]);
-    for part in ["0.001 to 1e6 s", "- inertial:", "- grid:45: Euler angles", "Exit codes: 0 done"] {
+    for part in ["0.001 to 1e6 s", "- inertial:", "- grid:45:", "Exit codes: 0 done"] {
         assert!(design.contains(part), "{part}");
     }
     let lines: Vec<String> = text(&["design", "-h"]).lines().map(Into::into).collect();

@@ -434,8 +434,8 @@ struct Asked {
 }
 
 impl Asked {
-    /// The same as JSON: only what differs from what holds without options.
-    fn of(a: &Search, files: &SearchFiles) -> Result<Value, Problem> {
+    /// The same as JSON text: only what differs from what holds without options.
+    fn of(a: &Search, files: &SearchFiles) -> Result<String, Problem> {
         let mut asked = serde_json::Map::new();
         asked.insert("options".into(), Value::Object(stated(&Search { part: None, ..a.clone() })?));
         let of_files =
@@ -445,7 +445,7 @@ impl Asked {
                 asked.insert(name.into(), serde_json::to_value(file).map_err(no_json)?);
             }
         }
-        Ok(Value::Object(asked))
+        Ok(Value::Object(asked).to_string())
     }
 
     /// The files that were given, or else those of the part.
@@ -479,7 +479,7 @@ fn known(a: &Search, files: &SearchFiles) -> Result<Asked, Problem> {
         && let Some(of_part) = read_part(first)?.asked
     {
         let wrong = |e: serde_json::Error| Problem::input(format!("{}: its options: {e}", first.name));
-        asked = serde_json::from_value(of_part).map_err(wrong)?;
+        asked = serde_json::from_str(&of_part).map_err(wrong)?;
         let mut options = stated(&asked.options)?;
         options.extend(stated(a)?);
         asked.options = serde_json::from_value(Value::Object(options)).map_err(no_json)?;
