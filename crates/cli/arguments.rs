@@ -120,3 +120,11 @@ pub(crate) fn one_file(arg: Arg) -> Arg {
         false => arg,
     }
 }
+
+/// What a command says of the latitude whose numbers need one.
+pub(crate) fn with_latitude(arg: Arg) -> Arg {
+    match arg.get_id() == "latitude" {
+        true => arg.help("Latitude in degrees (default: that of the file, or 28.2)"),
+        false => arg,
+    }
+}

@@ -65,9 +65,10 @@ fn pages(command: &clap::Command) -> impl Iterator<Item = (String, clap::Command
 
 /// A page; what stands after the help has sections of its own, in which examples keep their lines.
 fn page(command: clap::Command) -> std::io::Result<Vec<u8>> {
-    let footer = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    let footer = command.get_after_long_help().or(command.get_after_help());
+    let footer = footer.map(ToString::to_string).unwrap_or_default();
     let mut text = Vec::new();
-    Man::new(command.after_help(None::<&str>)).render(&mut text)?;
+    Man::new(command.after_help(None::<&str>).after_long_help(None::<&str>)).render(&mut text)?;
     let mut roff = Roff::new();
     for part in footer.split("\n\n") {
         let (first, rest) = part.split_once('\n').unwrap_or((part, ""));

@@ -3,7 +3,7 @@
 use clap::Args;
 use obsdeg_commands::{Crosscheck, Given, Host, crosscheck, crosscheck_files};
 
-use crate::arguments::{Files, one_file};
+use crate::arguments::{Files, one_file, with_latitude};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
@@ -26,7 +26,7 @@ figures as SVG and PNG.
 Exit codes: 0 nothing disagrees, 1 something disagrees, 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder))]
+#[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder), mut_args(with_latitude))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     asked: Crosscheck,

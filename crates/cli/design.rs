@@ -28,7 +28,8 @@ Examples:
   obsdeg design --positions 8 --carry platform --within 0
   obsdeg design --positions 5 --carry inertial --divide
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
-  obsdeg design --positions 7 --carry inertial --merge part-*.json
+  obsdeg design --merge part-*.json
+  obsdeg design scheme.toml --candidates grid:45        with carry, dwell, noise, requirements and gimbals of the file
 
 Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random \
 starts. Where order matters and repositioning takes no time, a bound on what the last two positions can add leaves most of many sequences out (branch \
@@ -42,10 +43,16 @@ Exit codes: 0 done (with --minimum also when no positions do), 1 the first schem
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
+    /// Scheme file whose carry, latitude, geometry, terms, conditions, requirements and gimbal limits hold; - is stdin. Its positions are not chosen from
+    /// (--candidates), and as many are searched where no number is asked for
+    #[arg(value_name = "SCHEME", id = "conditions", conflicts_with = "merge")]
+    scheme: Option<PathBuf>,
+
     #[command(flatten)]
     asked: Search,
 
-    /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0); all other options as they were
+    /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0). No other option is needed: the parts know
+    /// theirs
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = "Parts", conflicts_with_all = ["minimum", "part"])]
     merge: Vec<PathBuf>,
 
@@ -76,6 +83,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let candidates = Some(&a.asked.candidates).filter(|text| !is_word(text)).filter(file);
     let part = |path: &Path| read(path, "part");
     let files = SearchFiles {
+        conditions_file: a.scheme.as_deref().map(|file| read(file, "scheme")).transpose()?,
         candidates_file: candidates.map(|file| read(Path::new(file), "scheme")).transpose()?,
         merge: a.merge.iter().map(|path| part(path)).collect::<Result<Vec<Source>, _>>()?,
         resume: a.asked.part.and_then(|_| a.output.target.existing()).map(part).transpose()?,

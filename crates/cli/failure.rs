@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+use clap::builder::styling::AnsiColor;
 use obsdeg_commands::{Kind, Place, Problem};
 use obsdeg_report::{ReportError, in_ascii, visible};
 
@@ -20,39 +21,68 @@ pub(crate) const INTERRUPTED: u8 = 130;
 /// Says something of several lines on stderr. Names, paths and keys come from whoever wrote the input: nothing in them reaches a
 /// terminal but text.
 pub(crate) fn say(message: &str) {
+    say_as(message, |line| line.into());
+}
+
+/// The same, every line made of what it is without anything that a terminal would obey.
+fn say_as(message: &str, made: impl Fn(&str) -> String) {
     let plain = plain_messages();
     for line in message.lines() {
         let line = visible(line);
-        eprintln!("{}", if plain { in_ascii(&line).into() } else { line });
+        eprintln!("{}", made(&if plain { in_ascii(&line).into() } else { line }));
     }
+}
+
+/// A line in the colours of clap's errors; `drawn`: one that may draw a place of a text, with a margin and marks below what is meant.
+fn colored(line: &str, drawn: bool) -> String {
+    let error = AnsiColor::Red.on_default().bold();
+    let margin = AnsiColor::BrightBlue.on_default().bold();
+    for title in ["error:", "internal error:"] {
+        if let Some(rest) = line.strip_prefix(title) {
+            return format!("{error}{title}{error:#}{rest}");
+        }
+    }
+    let behind = line.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
+    let end = match () {
+        () if !drawn => 0,
+        () if behind.starts_with("-->") => line.len() - behind.len() + "-->".len(),
+        () if behind.starts_with('|') => line.len() - behind.len() + 1,
+        () => 0,
+    };
+    let (before, text) = line.split_at(end);
+    let marks = end > 0 && text.contains('^') && text.chars().all(|c| c == ' ' || c == '^');
+    let text = if marks { format!("{error}{text}{error:#}") } else { text.into() };
+    if end > 0 { format!("{margin}{before}{margin:#}{text}") } else { text }
 }
 
 /// Why a command stopped.
 #[derive(Debug)]
 pub(crate) struct Failure {
     message: String,
+    /// True if the lines behind the first draw a place of a text.
+    drawn: bool,
     code: u8,
 }
 
 impl Failure {
     /// The input is wrong.
     pub(crate) fn input(message: String) -> Self {
-        Self { message: format!("error: {message}"), code: INPUT }
+        Self { message: format!("error: {message}"), drawn: false, code: INPUT }
     }
 
     /// A check failed: what was printed says which.
     pub(crate) fn check() -> Self {
-        Self { message: String::new(), code: CHECK }
+        Self { message: String::new(), drawn: false, code: CHECK }
     }
 
     /// Interrupted with something written that another run goes on with.
     pub(crate) fn unfinished(message: String) -> Self {
-        Self { message, code: INTERRUPTED }
+        Self { message, drawn: false, code: INTERRUPTED }
     }
 
     /// The program is wrong.
     pub(crate) fn internal(message: String) -> Self {
-        Self { message: format!("internal error: {message}"), code: INTERNAL }
+        Self { message: format!("internal error: {message}"), drawn: false, code: INTERNAL }
     }
 
     /// The input is wrong at a place of a text, which is drawn.
@@ -60,11 +90,13 @@ impl Failure {
         let annotation = AnnotationKind::Primary.span(place.span.clone());
         let snippet = Snippet::source(&place.text).path(&place.name).annotation(annotation);
         let report = [Level::ERROR.primary_title(message).element(snippet)];
-        Self { message: Renderer::plain().render(&report).to_string(), code: INPUT }
+        Self { message: Renderer::plain().render(&report).to_string(), drawn: true, code: INPUT }
     }
 
     pub(crate) fn report(&self) -> ExitCode {
-        say(&self.message);
+        let in_color = anstream::AutoStream::choice(&std::io::stderr()) != anstream::ColorChoice::Never;
+        let drawn = self.drawn;
+        say_as(&self.message, |line| if in_color { colored(line, drawn) } else { line.into() });
         ExitCode::from(self.code)
     }
 }
@@ -83,5 +115,30 @@ impl From<Problem> for Failure {
 impl From<ReportError> for Failure {
     fn from(e: ReportError) -> Self {
         Problem::from(e).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Colours add nothing but themselves, and stand where clap has them: title, margin, marks.
+    #[test]
+    fn messages_are_coloured() {
+        let place = Place { name: "a.toml".into(), text: "carry = \"x | ^\"\n".into(), span: 8..15 };
+        let failure = Failure::at("expected a carry", &place);
+        let plain = |text: &str| anstream::adapter::strip_str(text).to_string();
+        let lines: Vec<String> = failure.message.lines().map(|line| colored(line, true)).collect();
+        for (line, colored) in failure.message.lines().zip(&lines) {
+            assert_eq!(plain(colored), line);
+        }
+        assert_eq!(lines[0], "\u{1b}[1m\u{1b}[31merror:\u{1b}[0m expected a carry");
+        assert!(
+            lines[1].starts_with("\u{1b}[1m\u{1b}[94m ") && lines[1].contains("-->\u{1b}[0m a.toml:1:9"),
+            "{lines:?}"
+        );
+        assert!(lines[3].ends_with("|\u{1b}[0m carry = \"x | ^\""), "{lines:?}");
+        assert!(lines[4].contains("\u{1b}[31m         ^^^^^^^"), "{lines:?}");
+        assert_eq!(colored("1 | of a list --> there", false), "1 | of a list --> there");
     }
 }

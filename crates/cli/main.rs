@@ -11,6 +11,7 @@ mod design;
 mod engine;
 mod failure;
 mod files;
+mod help;
 mod input;
 mod interrupt;
 #[cfg(feature = "symbolica")]
@@ -63,9 +64,9 @@ enum Command {
     Analyze(analyze::Arguments),
     /// Run a Kalman filter against a simulated truth: the paper's run, or any scheme
     Simulate(simulate::Arguments),
-    /// Hold the exact verdicts against a filter; exit code 1 when anything disagrees
+    /// Hold the exact verdicts against a filter: evidence of several kinds
     Crosscheck(crosscheck::Arguments),
-    /// Estimate what a scheme determines from the record of its run; exit code 1 when the model does not explain it
+    /// Estimate what a scheme or model determines from records of its runs
     Calibrate(calibrate::Arguments),
     /// Judge schemes side by side: verdicts, predicted accuracy, what each position is for
     Compare(compare::Arguments),
@@ -73,7 +74,7 @@ enum Command {
     Design(design::Arguments),
     /// Write the design review of schemes and models: HTML, PDF, Markdown or LaTeX
     Report(report::Arguments),
-    /// Recompute the equations and claims of the paper: what agrees, what does not, and what is not covered
+    /// Recompute the equations and claims of the paper: what agrees, and what does not
     Paper(paper::Arguments),
     /// Print the completion script of a shell
     Completions(completions::Arguments),
@@ -89,7 +90,9 @@ fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
     let number = ValueParser::from(clap::value_parser!(f64)).type_id();
+    let short = std::env::args_os().any(|a| a == "-h");
     let command = Cli::command().mut_subcommands(move |command| {
+        let command = help::in_lines(command, short);
         command.mut_args(|a| match takes(&a) && !a.is_allow_hyphen_values_set() {
             true if a.get_value_parser().type_id() == number => a.allow_hyphen_values(true),
             true => a.allow_negative_numbers(true),
@@ -102,8 +105,8 @@ fn command() -> clap::Command {
     })
 }
 
-/// Where an argument belongs that a command does not know: the commands that have such an option, where a file goes that no command is named
-/// for, or where the positions of a scheme file go that was given to `design`.
+/// Where an argument belongs that a command does not know: the commands that have such an option, or where a file goes that no command is named
+/// for.
 fn hint(e: &clap::Error) -> Option<String> {
     let is_file =
         |text: &str| std::path::Path::new(text).extension().is_some_and(|x| x == "toml" || x == "json");
@@ -128,12 +131,7 @@ fn hint(e: &clap::Error) -> Option<String> {
         let named = names.iter().map(|name| format!("`obsdeg {name}`")).collect::<Vec<_>>().join(", ");
         return (!names.is_empty()).then(|| format!("{found} is an option of {named}"));
     }
-    if !is_file(found) {
-        return None;
-    }
-    let asked = std::env::args().skip(1).find_map(|a| command.find_subcommand(a).cloned())?;
-    let chooses = asked.get_arguments().any(|a| a.get_id() == "candidates");
-    chooses.then(|| format!("the positions of a scheme file are chosen from with --candidates {found}"))
+    None
 }
 
 /// The arguments, and which of them concern one kind of file; what is wrong with them is said, and nothing of theirs but text.

@@ -3,7 +3,7 @@
 use clap::Args;
 use obsdeg_commands::{Given, Simulate, simulate, simulation_files};
 
-use crate::arguments::{Files, RequireMet, one_file};
+use crate::arguments::{Files, RequireMet, one_file, with_latitude};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
@@ -23,7 +23,7 @@ figures per unknown (estimate, .error), all in one, and those of the paper.
 Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder))]
+#[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder), mut_args(with_latitude))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     asked: Simulate,

@@ -315,6 +315,7 @@ def design(
     positions: int | None = None,
     *,
     part: tuple[int, int],
+    conditions: Scheme | str | os.PathLike[str] | None = ...,
     candidates: Literal["cardinal", "free"] | str | Scheme | os.PathLike[str] | None = ...,
     resume: Part | str | None = ...,
     progress: Progress | bool | None = ...,
@@ -328,6 +329,7 @@ def design(
     *,
     candidates: Literal["cardinal", "free"] | str | Scheme | os.PathLike[str] | None = ...,
     part: None = ...,
+    conditions: Scheme | str | os.PathLike[str] | None = ...,
     merge: Iterable[Part | str] | None = ...,
     progress: Progress | bool | None = ...,
     **options: Unpack[options.Design],
@@ -340,6 +342,7 @@ def design(
     *,
     candidates: Literal["cardinal", "free"] | str | Scheme | os.PathLike[str] | None = ...,
     part: None = ...,
+    conditions: Scheme | str | os.PathLike[str] | None = ...,
     merge: Iterable[Part | str] | None = ...,
     progress: Progress | bool | None = ...,
     **options: Unpack[options.Design],
@@ -351,6 +354,7 @@ def design(
     *,
     candidates: str | Scheme | os.PathLike[str] | None = None,
     part: tuple[int, int] | None = None,
+    conditions: Scheme | str | os.PathLike[str] | None = None,
     resume: Part | str | None = None,
     merge: Iterable[Part | str] | None = None,
     progress: Progress | bool | None = None,
@@ -361,9 +365,10 @@ def design(
     Args:
         positions: how many.
         candidates: ``"cardinal"``, ``"grid:45"``, ``"free"``, or a scheme whose positions are chosen from.
+        conditions: a scheme whose conditions hold; as many positions as it has are searched where no number is asked for.
         part: (I, N): only part I of N of all sequences; the answer is a :class:`Part`.
         resume: that part as far as it came.
-        merge: the parts, put together to the answer of the whole.
+        merge: the parts, put together to the answer of the whole; they know the options of their search.
         progress: hears how far the search is; ``True`` for a bar of tqdm. Where it returns False, and on a keyboard interrupt, the search ends
             with the best so far.
         options: the others of ``obsdeg design``.
@@ -379,6 +384,8 @@ def design(
         options["candidates"] = candidates
     elif candidates is not None:
         files["candidates_file"] = source(candidates)
+    if conditions is not None:
+        files["conditions_file"] = source(conditions)
     if resume is not None:
         files["resume"] = _part(resume, "resume")
     if merge is not None:

@@ -1072,11 +1072,18 @@ class EverywhereReport(Record):
     rounding: float | None
     """What rounding may hide of that criterion, as a part of it: as above, that of the attitudes of the scheme with it."""
     attained: float
-    """The criterion that the weights would have as a scheme, exactly as they and their angles are listed."""
-    weights: list[Weight]
-    """The attitudes with weights, Euler angles in degrees: parts of their sum, rounded to two digits, or to as many as lose no more than
-    a thousandth of the variance; those below 1e-7 are left out.
+    """The criterion that the weights would have as a scheme: all of them, with angles to hundredths of a degree and weights as they are
+    rounded here.
     """
+    weights: list[Weight]
+    """The ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others
+    above -180 and up to 180. Weights are parts of the sum of all, rounded to two digits, or to as many as lose no more than a
+    thousandth of the variance; those below 1e-7 are left out.
+    """
+    lighter: int
+    """Number of lighter attitudes, which are not listed."""
+    lighter_weight: float
+    """Sum of the weights of the lighter attitudes."""
     rounded: Rounded | None
     """Where attitudes were free: how their angles were rounded, and what that costs; null where candidates were given."""
 
@@ -1141,6 +1148,10 @@ class SearchReport(Record):
     lost: int
     """Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
     required coefficient as far as double precision tells: they count as worse than all others.
+    """
+    sequences: int | None
+    """Number of sequences, up to turns of the platform axes, that a search of all would go through where not all were searched (`within`
+    0); null where all were, and where they are too many to be held or counted.
     """
     excluded: int
     """Sequences, observable or not, that were not examined because a bound leaves no doubt: as far as double precision tells their
@@ -1413,6 +1424,10 @@ class Part(Shape):
     """SHA-256 of all inputs: the parts of one search have the same."""
     inputs: dict[str, str]
     """The inputs by name, as the library writes them: which differ, where digests do."""
+    asked: str | None
+    """Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null where no
+    command did.
+    """
     part: tuple[int, int]
     """Which part, counted from 1, of how many."""
     starts: tuple[int, int, int]

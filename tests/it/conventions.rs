@@ -40,7 +40,7 @@ fn one_way_to_name_files() {
     refused(&["simulate", scheme, scheme], &["no more were expected"]);
     refused(&["report", model, "-o", "x.html", "--carry", "reset"], &["--carry is about schemes"]);
     refused(&["calibrate", scheme], &["no record"]);
-    refused(&["design", scheme], &["--candidates"]);
+    refused(&["design", scheme, scheme], &["unexpected argument"]);
     // the options of kinds everywhere
     let compared = plain(&["compare", scheme, "examples/six-positions/scheme.toml"]);
     assert_eq!(plain(&["compare", scheme, "--scheme", "examples/six-positions/scheme.toml"]), compared);
@@ -154,7 +154,7 @@ fn completions_and_manual() {
         }
     }
     let bash = stdout(&run(&["completions", "bash"]));
-    assert!(bash.contains(r#"compgen -W "cardinal free grid:""#), "{bash}");
+    assert!(bash.contains(r#"compgen -W "cardinal free grid:45""#), "{bash}");
     assert!(bash.contains("--output --force --help analyze simulate crosscheck"), "{bash}");
     let missing = ["design", "--positions", "5", "--candidates", "foo"];
     refused(&missing, &["--candidates foo", "cardinal", "free", "grid:45", "a scheme file that exists"]);

@@ -19,6 +19,7 @@ mod files;
 mod formulas;
 mod functions;
 mod grammar;
+mod help;
 mod hostile;
 mod language;
 mod laws;

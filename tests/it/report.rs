@@ -458,7 +458,10 @@ fn what_cannot_be_reported_is_refused_and_nothing_is_written() {
     refused(&["examples/wrong-gimbals/scheme.toml", PAPER, "-o", &at("a.html")], "wrong-gimbals");
     assert_eq!(std::fs::read_to_string(at("taken.html")).expect("still there"), "mine");
     if cfg!(not(feature = "pdf")) {
-        refused(&[PAPER, "-o", &at("a.pdf")], "without the feature `pdf`");
+        refused(
+            &[PAPER, "-o", &at("a.pdf")],
+            "build it with `--features pdf`, or write HTML (-o review.html) and print it",
+        );
     }
 }
 

@@ -14,8 +14,9 @@ use obsdeg_design::design::{
     asked, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::Conditions;
-use obsdeg_report::{Answer, Document, File, Table, design_figures, position_figure, visible};
+use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
@@ -35,7 +36,7 @@ const RESTARTS: RangeInclusive<u64> = 1..=1_000_000;
 const CANDIDATES: [(&str, &str); 3] = [
     (CARDINAL, "the 24 attitudes along North, Up, East, South, Down, West"),
     ("free", "the attitudes that weights on all attitudes need, reset carry"),
-    ("grid:", "and a step in degrees, as in grid:45: Euler angles in steps"),
+    ("grid:45", "Euler angles in steps of 45 degrees, or of another number that divides 90"),
 ];
 
 /// The words of `--criterion`.
@@ -49,7 +50,7 @@ const CRITERIA: [Word<CriterionName>; 5] = [
 
 /// What `design` is asked.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
-#[command(group(ArgGroup::new("asked").required(true).args(["positions", "minimum"])))]
+#[command(group(ArgGroup::new("asked").args(["positions", "minimum"])))]
 #[serde(default)]
 pub struct Search {
     /// Seed of all random choices; the result does not depend on the number of threads
@@ -64,7 +65,7 @@ pub struct Search {
     #[arg(long)]
     pub minimum: bool,
 
-    /// What to choose from, or a scheme file: its positions, with carry, latitude, geometry, terms, conditions and gimbal limits of the file
+    /// What to choose from, or a scheme file: its positions; without SCHEME with carry, latitude, geometry, terms, conditions and gimbal limits of the file
     #[arg(long, value_name = "WHAT", default_value = CARDINAL, value_parser = WordOr(CANDIDATES))]
     pub candidates: String,
 
@@ -97,9 +98,9 @@ pub struct Search {
     #[arg(long, value_name = "N", value_parser = whole::<u64>(RESTARTS))]
     pub restarts: Option<u64>,
 
-    /// Under reset carry, where many sequences would have to be searched: a scheme found by exchange is enough when it is within so many percent
-    /// of what is possible at all. 0: all sequences are searched, however long that takes, under any carry (beyond
-    /// 5 million sets of candidates: exchange; default: 0.01)
+    /// Under reset carry, where more than two million sequences would have to be searched: all are searched unless the scheme that an exchange finds is
+    /// within so many percent of a bound on what is possible at all (default: they are not searched, and the answer says how far that scheme is from the
+    /// bound at most). 0: all sequences are searched, however long that takes, under any carry (beyond 5 million sets of candidates: exchange)
     #[arg(long, value_name = "PERCENT", value_parser = percent)]
     pub within: Option<f64>,
 
@@ -116,8 +117,8 @@ pub struct Search {
     pub front: Vec<usize>,
 
     /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
-    /// interrupted part goes on when the same command is given again. All options are given to the parts and to their merge alike, but for --format
-    /// and what goes with it; --refine, --divide, --front and --restarts act where the parts are merged
+    /// interrupted part goes on when the same command is given again. All parts are given the same options; --refine, --divide, --front and
+    /// --restarts act where the parts are merged, which know the options
     #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
     pub part: Option<[usize; 2]>,
 
@@ -245,6 +246,8 @@ fn percent(text: &str) -> Result<f64, String> {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SearchFiles {
+    /// The scheme whose conditions hold; its positions are not chosen from, and as many are searched where no number is asked for.
+    pub conditions_file: Option<Source>,
     /// The scheme whose positions are chosen from.
     pub candidates_file: Option<Source>,
     /// Parts that are put together.
@@ -320,9 +323,14 @@ impl Answer for Walked {
 /// # Errors
 /// Options that are wrong or do nothing; a search in which nothing was found.
 pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Designed, Problem> {
+    let asked = known(a, files)?;
+    let files = &SearchFiles { merge: files.merge.clone(), ..asked.files(files) };
+    let a = &asked.options;
     match (a.positions, a.minimum) {
         (None, false) => {
-            return Err(Problem::input("nothing to search; expected --positions K or --minimum"));
+            return Err(Problem::input(
+                "nothing to search; expected --positions K, --minimum, or a scheme file with as many positions",
+            ));
         }
         (Some(_), true) => {
             return Err(Problem::input("found --positions beside --minimum; expected one of them"));
@@ -341,6 +349,9 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
     a.restarts.map_or(Ok(()), |restarts| check_whole("--restarts", restarts, &RESTARTS))?;
     let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
+    if let Some(file) = &files.conditions_file {
+        base = file.scheme()?;
+    }
     a.assumptions.apply(&mut base);
     if let Some(terms) = a.terms.unknowns()? {
         base.unknowns = terms;
@@ -375,7 +386,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         refine: a.refine,
         divide: a.divide,
         front: a.front.clone(),
-        within: a.within.unwrap_or(0.01) / 100.0,
+        within: a.within.map(|percent| percent / 100.0),
         everywhere: true,
         free: (a.candidates == "free").then_some(step),
         seed: a.seed,
@@ -393,7 +404,8 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let progress = |now: Progress| (host.going)(now.into());
     if let Some(number) = a.part {
         let going_on = files.resume.as_ref().map(read_part).transpose()?;
-        let done = design_part(&base, &conditions, &options, number, going_on, &progress)?;
+        let mut done = design_part(&base, &conditions, &options, number, going_on, &progress)?;
+        done.asked = Some(Asked::of(a, files)?);
         return Ok(Designed::Part(Box::new(done)));
     }
     let found = if parts.is_empty() {
@@ -402,6 +414,74 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         design_merged(&base, &conditions, &options, &parts, &progress)
     }?;
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions })))
+}
+
+/// What a part was asked, as its file keeps it for the merge.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Asked {
+    options: Search,
+    conditions_file: Option<Source>,
+    candidates_file: Option<Source>,
+}
+
+impl Asked {
+    /// The same as JSON text: only what differs from what holds without options.
+    fn of(a: &Search, files: &SearchFiles) -> Result<String, Problem> {
+        let mut asked = serde_json::Map::new();
+        asked.insert("options".into(), Value::Object(stated(&Search { part: None, ..a.clone() })?));
+        let of_files =
+            [("conditions_file", &files.conditions_file), ("candidates_file", &files.candidates_file)];
+        for (name, file) in of_files {
+            if let Some(file) = file {
+                asked.insert(name.into(), serde_json::to_value(file).map_err(no_json)?);
+            }
+        }
+        Ok(Value::Object(asked).to_string())
+    }
+
+    /// The files that were given, or else those of the part.
+    fn files(&self, given: &SearchFiles) -> SearchFiles {
+        SearchFiles {
+            conditions_file: given.conditions_file.clone().or_else(|| self.conditions_file.clone()),
+            candidates_file: given.candidates_file.clone().or_else(|| self.candidates_file.clone()),
+            merge: Vec::new(),
+            resume: given.resume.clone(),
+        }
+    }
+}
+
+fn no_json(e: serde_json::Error) -> Problem {
+    Problem::internal(e.to_string())
+}
+
+/// The options that differ from what holds without any, as JSON.
+fn stated(a: &Search) -> Result<serde_json::Map<String, Value>, Problem> {
+    let object = |a: &Search| serde_json::to_value(a).map_err(no_json);
+    let (all, none) = (object(a)?, object(&Search::default())?);
+    let differs = |(name, value): &(&String, &Value)| none.get(name) != Some(value);
+    Ok(all.as_object().into_iter().flatten().filter(differs).map(|(n, v)| (n.clone(), v.clone())).collect())
+}
+
+/// What is asked: where parts are merged, what they were asked, with whatever options are given beside them over it; of a scheme file alone, as
+/// many positions as it has.
+fn known(a: &Search, files: &SearchFiles) -> Result<Asked, Problem> {
+    let mut asked = Asked { options: a.clone(), ..Asked::default() };
+    if let Some(first) = files.merge.first()
+        && let Some(of_part) = read_part(first)?.asked
+    {
+        let wrong = |e: serde_json::Error| Problem::input(format!("{}: its options: {e}", first.name));
+        asked = serde_json::from_str(&of_part).map_err(wrong)?;
+        let mut options = stated(&asked.options)?;
+        options.extend(stated(a)?);
+        asked.options = serde_json::from_value(Value::Object(options)).map_err(no_json)?;
+    }
+    if let (None, false, Some(file)) =
+        (asked.options.positions, asked.options.minimum, &files.conditions_file)
+    {
+        asked.options.positions = Some(file.scheme()?.positions.len());
+    }
+    Ok(asked)
 }
 
 /// Refuses options that would do nothing, each with what it needs.
@@ -568,7 +648,8 @@ fn scheme_file(
     let proven = match (proven, certificate) {
         (true, _) => "proven best".into(),
         (false, Some(c)) => {
-            format!("within {} of the best possible", obsdeg_report::percent(c.within_percent))
+            let excess = Excess::new(best.value, c.best_possible, c.within_percent);
+            format!("within {} of the best possible", excess.percent)
         }
         (false, None) => "best found".to_string(),
     };

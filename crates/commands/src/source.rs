@@ -83,6 +83,7 @@ impl Source {
     /// # Errors
     /// What is wrong with it, at its place.
     pub fn read(self) -> Result<Named, Problem> {
+        self.refuse_foreign()?;
         let name = self.name.clone();
         let input = match self.must_be {
             Expected::Any if self.is_model() => Input::Model(Box::new(self.model()?)),
@@ -117,6 +118,32 @@ impl Source {
             ))),
             Err(e) => Err(self.wrong(&e.to_string(), e.span)),
         }
+    }
+
+    /// Refuses a model of another tool, with the line of Python that judges it.
+    fn refuse_foreign(&self) -> Result<(), Problem> {
+        let ending = Path::new(&self.name).extension().map(|e| e.to_string_lossy().to_lowercase());
+        let by_ending = match ending.as_deref() {
+            Some("jl") => Some("@ODEmodel of StructuralIdentifiability.jl"),
+            Some("xml" | "sbml") => Some("SBML"),
+            Some("m") => Some("a script of STRIKE-GOLDD"),
+            Some("yaml" | "yml") => Some("a PEtab problem"),
+            _ => None,
+        };
+        let by_text = match &self.text {
+            text if text.contains("@ODEmodel") => Some("@ODEmodel of StructuralIdentifiability.jl"),
+            text if text.trim_start().starts_with('<') => Some("SBML"),
+            _ => None,
+        };
+        let own = || self.is_json() || scheme_file::is_scheme(&self.text) || model_file::is_model(&self.text);
+        let Some(kind) = by_text.or(by_ending).filter(|_| !own()) else { return Ok(()) };
+        let plain = |c: char| c.is_alphanumeric() || "/._- +~@:".contains(c);
+        let name = if self.name.chars().all(plain) && !self.name.is_empty() { &self.name } else { "FILE" };
+        Err(Problem::input(format!(
+            "{} seems to be {kind}; expected a scheme (TOML) or a model (TOML, JSON). The Python package imports it: python -c 'import obsdeg; \
+             print(obsdeg.analyze(obsdeg.load(\"{name}\")))'",
+            self.name
+        )))
     }
 
     /// Whether it is meant as a model, which may be JSON.

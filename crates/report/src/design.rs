@@ -6,6 +6,7 @@ use obsdeg_design::design::{Certificate, Design, Found, SearchReport, Weight};
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
 use crate::document::{Block, Document, left, number, right};
+use crate::excess::Excess;
 use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
 use crate::{Answer, gimbals, stated, words};
@@ -158,6 +159,9 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             s.examined
         ),
     };
+    let known = s.certificate.as_ref().map(|c| {
+        format!("at most {} above the best of these candidates, by a bound", first_above(d, c).0.percent)
+    });
     let mut out = vec![if s.proven {
         let unrefined = searched(d);
         format!(
@@ -173,14 +177,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             d.error_bound
         )
     } else if s.interrupted {
-        let known = s.certificate.as_ref().map_or_else(String::new, |c| {
-            format!(", at most {} above the best of these candidates, by a bound", percent(c.within_percent))
-        });
+        let known = known.map_or_else(String::new, |k| format!(", {k}"));
         format!("interrupted after {} sequences: the best so far{known}", s.examined)
     } else {
-        let known = s.certificate.as_ref().map_or_else(String::new, |c| {
-            format!("; at most {} above the best of these candidates, by a bound", percent(c.within_percent))
-        });
+        let known = known.map_or_else(String::new, |k| format!("; {k}"));
         let rounded =
             s.certificate.as_ref().and_then(|c| c.everywhere.as_ref()).is_some_and(|e| e.rounded.is_some());
         let by = match rounded {
@@ -189,7 +189,9 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             }
             false => "coordinate exchange from random starts",
         };
-        format!("not proven: {by}, {} sequences examined{known}", s.examined)
+        let all =
+            s.sequences.map_or_else(String::new, |n| format!("; --within 0 searches all {n} sequences"));
+        format!("not proven: {by}, {} sequences examined{known}{all}", s.examined)
     }];
     if d.found.iter().any(|f| f.image_of.is_some()) {
         out.push(
@@ -259,15 +261,16 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     out
 }
 
-/// In percent, rounded up to two digits: `0.0021 %`.
-pub(crate) fn percent(x: f64) -> String {
-    const LEAST: f64 = 1e-6;
-    if x <= LEAST {
-        return format!("{LEAST} %");
-    }
-    let digit = 10f64.powi(x.log10().floor() as i32 - 1);
-    let decimals = (1 - x.log10().floor() as i32).max(0) as usize;
-    format!("{:.decimals$} %", (x / digit - 1e-9).ceil() * digit)
+/// The criterion of the first scheme of those that were searched; not a number where there is none.
+fn first_value(d: &Design) -> f64 {
+    d.found.iter().find(|f| !f.refined && f.dwells_s.is_empty()).map_or(f64::NAN, |f| f.value)
+}
+
+/// The criterion of the first scheme that was searched, how far it is above the bound for the candidates, and above that for all attitudes.
+fn first_above(d: &Design, c: &Certificate) -> (Excess, Option<Excess>) {
+    let first = first_value(d);
+    let every = c.everywhere.as_ref().map(|e| Excess::new(first, e.best_possible, e.within_percent));
+    (Excess::new(first, c.best_possible, c.within_percent), every)
 }
 
 /// How good the best can be.
@@ -289,16 +292,16 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         return vec![why];
     };
     let first = searched(d);
+    let (Excess { value, bound, percent }, above_all) = first_above(d, c);
     let beyond = match s.proven {
-        true => format!("{} above that bound", percent(c.within_percent)),
-        false => format!("at most {} above the best of them", percent(c.within_percent)),
+        true => format!("{percent} above that bound"),
+        false => format!("at most {percent} above the best of them"),
     };
     let mut out = vec![
         format!(
-            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of whatever degrees, has a criterion below {}; \
-             {first} is {beyond} ({} {:.6} at least)",
+            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of whatever degrees, has a criterion below {bound}; \
+             {first}, of {value}, is {beyond} ({} {:.6} at least)",
             s.positions,
-            number(c.best_possible),
             if s.criterion == "D" { "D-efficiency" } else { "efficiency, the square of the ratio," },
             (c.efficiency * 1e6).floor() / 1e6
         ),
@@ -309,41 +312,49 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         ),
     ];
     out.push(format!("weights, as parts of their sum: {}", weights(&c.weights)));
-    let Some(every) = &c.everywhere else {
+    let Some((every, above)) = c.everywhere.as_ref().zip(above_all) else {
         out.push("of all attitudes: no bound was computed".into());
         return out;
     };
     out.push(format!(
-        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}; {first} is {} above that, \
+        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}; {first}, of {}, is {} above that, \
          and what lies between is left open: so few positions may not reach the bound (attitudes that add most are sought on a net; between \
          its points what they add is bounded as a trigonometric polynomial, and a part of 1e-8 is assumed for rounding)",
         s.positions,
-        number(every.best_possible),
+        above.bound,
         if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
-        percent(every.within_percent)
+        above.value,
+        above.percent
     ));
+    let lighter = match every.lighter {
+        0 => String::new(),
+        n => format!("; {n} lighter ones, {} together, are not listed", number(every.lighter_weight)),
+    };
     out.push(format!(
-        "weights on these {} attitudes, as parts of their sum, would reach {}: {}",
-        every.weights.len(),
+        "weights on {} attitudes, as parts of their sum, would reach {}: {}{lighter}",
+        every.weights.len() + every.lighter,
         number(every.attained),
         weights(&every.weights)
     ));
     let ratio = c.best_possible / every.attained;
     match &every.rounded {
         Some(rounded) => {
-            let value = d.found.iter().find(|f| !f.refined && f.dwells_s.is_empty()).map_or(f64::NAN, |f| f.value);
             out.push(format!(
                 "the candidates are the cardinal attitudes, and those of weights and of schemes near them with angles rounded to {} deg; every \
                  criterion listed is that of the angles as they are listed",
                 rounded.step_deg
             ));
             out.push(match &rounded.finer {
-                Some(finer) => format!(
-                    "rounding costs {}: with angles in hundredths of a degree a criterion of {} was found, at {}",
-                    percent(100.0 * (value / finer.value - 1.0)),
-                    number(finer.value),
-                    finer.angles.join(" ")
-                ),
+                Some(finer) => {
+                    let cost = Excess::new(first_value(d), finer.value, 0.0);
+                    format!(
+                        "rounding costs {}: with angles in hundredths of a degree a criterion of {} was found, and here {}, at {}",
+                        cost.percent,
+                        cost.bound,
+                        cost.value,
+                        finer.angles.join(" ")
+                    )
+                }
                 None => "rounding costs nothing that was found: no better scheme with angles in hundredths of a degree".into(),
             });
         }

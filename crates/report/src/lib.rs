@@ -20,6 +20,7 @@ mod crosscheck;
 mod csv_text;
 mod design;
 mod document;
+mod excess;
 mod figure;
 mod figures;
 mod gimbals;
@@ -46,6 +47,7 @@ mod words;
 
 pub use calibration::{calibration_figures, covariance_csv, residuals_csv};
 pub use document::Document;
+pub use excess::Excess;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use poses::position_figure;
@@ -157,7 +159,9 @@ pub enum ReportError {
     #[error(transparent)]
     Figure(#[from] FigureError),
     /// No typesetter in this build.
-    #[error("this program was built without the feature `pdf`; expected html, markdown or latex")]
+    #[error(
+        "this program was built without PDF; build it with `--features pdf`, or write HTML (-o review.html) and print it from a browser"
+    )]
     NoPdf,
     /// The typesetter refused.
     #[error("cannot typeset: {0}")]
@@ -274,11 +278,6 @@ pub fn csv(answer: &impl Answer, table: Option<&str>) -> Result<String, ReportEr
     }
     let table = table.ok_or_else(|| ReportError::NoTable { asked: asked.into(), known: known() })?;
     csv_text::write(std::iter::once(table.columns.clone()).chain(table.rows.iter().cloned()))
-}
-
-/// A part in percent, never below what it is: `0.0021 %`.
-pub fn percent(x: f64) -> String {
-    design::percent(x)
 }
 
 /// The front of a design as SVG and PNG.

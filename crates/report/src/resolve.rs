@@ -6,6 +6,7 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::remedies::{Change, Remedies, Remedy};
 use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis};
 use obsdeg_evidence::compare::{ComparedScheme, DropOne};
+use obsdeg_evidence::requirements::Worst;
 
 use crate::compare::worst;
 use crate::words::names;

@@ -18,8 +18,8 @@ use obsdeg_evidence::crosscheck::CrossCheck;
 use obsdeg_evidence::simulation::Outcome;
 
 use crate::analysis::null_vector;
-use crate::design::percent;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
+use crate::excess::Excess;
 use crate::{Answer, Origin, compare, gimbals, latex, simulation, stated, words};
 
 /// What a calibration changes of the review of its scheme.
@@ -418,15 +418,13 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
         &alternatives.certificate,
         alternatives.front.iter().find(|f| s.positions.first().is_some_and(|p| p.dwell_s == f.dwell_s)),
     ) {
+        let Excess { value, bound, percent } = Excess::new(best.value, c.best_possible, c.within_percent);
         lines.push(format!(
-            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {} (optimal weights); the best found has {}, \
-             within {} of that",
+            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} (optimal weights); the best found has {value}, \
+             at most {percent} above",
             alternatives.front_positions,
             number(best.dwell_s),
             alternatives.required.join(", "),
-            number(c.best_possible),
-            number(best.value),
-            percent(c.within_percent)
         ));
     }
     blocks.push(Block::list("", lines));

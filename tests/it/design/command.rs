@@ -240,6 +240,17 @@ fn parts_are_files() {
         assert_eq!(stdout(&with(&["--part", &format!("{i}/2"), "-o", path])), said);
     }
     assert_eq!(stdout(&with(&["--merge", &two, &one])), stdout(&with(&[])));
+    // the parts know what they were asked, a file of candidates too
+    assert_eq!(stdout(&run(&["design", "--merge", &one, &two, "--format", "json"])), stdout(&with(&[])));
+    let candidates = file("candidates.toml");
+    std::fs::copy("examples/six-positions/scheme.toml", &candidates).expect("copied");
+    let asked =
+        ["design", "--positions", "4", "--candidates", &candidates, "--carry", "reset", "--within", "0"];
+    let part = file("whole.json");
+    assert!(run(&[&asked[..], &["--part", "1/1", "-o", &part]].concat()).status.success());
+    let whole = stdout(&run(&asked));
+    std::fs::remove_file(&candidates).expect("removed");
+    assert_eq!(stdout(&run(&["design", "--merge", &part])), whole);
     for (arguments, expected) in [
         (vec!["--merge", &one], "missing of 2 parts: 2"),
         (vec!["--merge", &one, &two, &one], "is in"),

@@ -32,8 +32,14 @@ fn time_is_divided_as_well_as_can_be() {
         (Carry::Inertial, 7, CriterionName::Worst),
         (Carry::Reset, 7, CriterionName::A),
     ] {
-        let options =
-            DesignOptions { divide: true, criterion, keep: 1, restarts: 4, within: 0.5, ..options(Some(k)) };
+        let options = DesignOptions {
+            divide: true,
+            criterion,
+            keep: 1,
+            restarts: 4,
+            within: Some(0.5),
+            ..options(Some(k))
+        };
         let found = design(&base(carry), &step, &options, &on).expect("designed");
         let (divided, equal) = (&found.found[0], &found.found[1]);
         assert!(equal.dwells_s.is_empty() && divided.value < equal.value, "{carry}: {divided:?}");

@@ -2,7 +2,9 @@
 
 use obsdeg_core::model::c_n_f64;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_design::design::{Candidates, Criterion, CriterionName, Design, DesignOptions, Limits};
+use obsdeg_design::design::{
+    Candidates, Criterion, CriterionName, Design, DesignOptions, Evaluator, Everywhere, Limits,
+};
 use obsdeg_exact::SplitMix64;
 
 use super::certificate::Oracle;
@@ -25,6 +27,8 @@ struct Both {
     latitude: f64,
     cardinal: Design,
     free: Design,
+    /// The weights over all attitudes, all of them, from the same candidates.
+    every: Everywhere,
 }
 
 /// A task that is drawn, with `k` positions.
@@ -59,7 +63,7 @@ fn both(criterion: CriterionName, terms: &'static str, k: usize, step: i64, rng:
         design(&base, &conditions, &options, &on).expect("designed")
     };
     let grid = Candidates::grid(45_000_000_000).expect("a grid");
-    let (cardinal, free) = (of(Candidates::cardinals(), None), of(grid, Some(step)));
+    let (cardinal, free) = (of(Candidates::cardinals(), None), of(grid.clone(), Some(step)));
     let criterion = match criterion {
         CriterionName::Worst => Criterion::Worst,
         CriterionName::A => Criterion::A,
@@ -67,7 +71,10 @@ fn both(criterion: CriterionName, terms: &'static str, k: usize, step: i64, rng:
         CriterionName::E => Criterion::E,
         CriterionName::Margin => Criterion::Margin(Limits { coefficients: limits, psi: [0.1; 3] }),
     };
-    Both { terms, criterion, conditions, latitude, cardinal, free }
+    let all: Vec<usize> = (0..m).collect();
+    let evaluator = Evaluator::new(&base, &grid.attitudes, &all, &conditions).expect("an evaluator");
+    let every = evaluator.everywhere(&without_psi(&criterion), k, &|| true).expect("a bound");
+    Both { terms, criterion, conditions, latitude, cardinal, free, every }
 }
 
 impl Both {
@@ -117,11 +124,17 @@ impl Both {
         });
         // weights are parts of their sum; psi of positions is left out of what they reach
         let of_coefficients = Both { criterion: without_psi(&self.criterion), ..self.shallow() };
-        let angles: Vec<String> = every.weights.iter().map(|w| w.candidate.clone()).collect();
-        let sum: f64 = every.weights.iter().map(|w| w.weight).sum();
+        // ten are printed
+        assert!(every.weights.len() == 10 || every.lighter == 0 && every.weights.len() < 10, "{task}");
+        let all = &self.every.support;
+        let angles: Vec<String> =
+            all.iter().map(|(e, _)| e.each_ref().map(ToString::to_string).join(",")).collect();
+        let sum: f64 = all.iter().map(|(_, weight)| weight).sum();
         let times: Vec<f64> =
-            every.weights.iter().map(|w| w.weight / sum * first.angles.len() as f64).collect();
-        let weights = reaches(of_coefficients.value(&angles, &times), every.attained, 1e-3);
+            all.iter().map(|(_, weight)| weight / sum * first.angles.len() as f64).collect();
+        let weights = reaches(of_coefficients.value(&angles, &times), self.every.attained, 1e-3);
+        // the search begins with the same attitudes in another order: both are between the bounds of both
+        assert!(every.attained >= self.every.value && self.every.attained >= every.best_possible, "{task}");
         [found, finer, weights]
     }
 
@@ -131,6 +144,7 @@ impl Both {
             conditions: self.conditions.clone(),
             cardinal: self.cardinal.clone(),
             free: self.free.clone(),
+            every: self.every.clone(),
             ..*self
         }
     }

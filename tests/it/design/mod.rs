@@ -12,6 +12,8 @@ mod parts;
 mod prior;
 mod search;
 mod sigmas;
+mod speed;
+mod unmet;
 mod whole;
 
 use obsdeg_core::model::settings::Assignment;

@@ -161,7 +161,7 @@ fn requirements_on_psi_count() {
             };
             let found = design(&like, &conditions, &options, &on);
             if meet && factor < best {
-                assert!(matches!(found, Err(DesignError::Impossible { .. })), "{carry}: {found:?}");
+                assert!(matches!(found, Err(DesignError::NotMet { .. })), "{carry}: {found:?}");
                 continue;
             }
             let found = found.expect("designed");

@@ -101,6 +101,9 @@ pub struct SearchReport {
     /// Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
     /// required coefficient as far as double precision tells: they count as worse than all others.
     pub lost: u64,
+    /// Number of sequences, up to turns of the platform axes, that a search of all would go through where not all were searched (`within` 0); null where
+    /// all were, and where they are too many to be held or counted.
+    pub sequences: Option<u64>,
     /// Sequences, observable or not, that were not examined because a bound leaves no doubt: as far as double precision tells their criterion is
     /// larger than that of all listed.
     pub excluded: u64,
@@ -159,11 +162,16 @@ pub struct EverywhereReport {
     pub within_percent: f64,
     /// What rounding may hide of that criterion, as a part of it: as above, that of the attitudes of the scheme with it.
     pub rounding: Option<f64>,
-    /// The criterion that the weights would have as a scheme, exactly as they and their angles are listed.
+    /// The criterion that the weights would have as a scheme: all of them, with angles to hundredths of a degree and weights as they are rounded here.
     pub attained: f64,
-    /// The attitudes with weights, Euler angles in degrees: parts of their sum, rounded to two digits, or to as many as lose no more
-    /// than a thousandth of the variance; those below 1e-7 are left out.
+    /// The ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others above -180 and up
+    /// to 180. Weights are parts of the sum of all, rounded to two digits, or to as many as lose no more than a thousandth of the variance; those below
+    /// 1e-7 are left out.
     pub weights: Vec<Weight>,
+    /// Number of lighter attitudes, which are not listed.
+    pub lighter: usize,
+    /// Sum of the weights of the lighter attitudes.
+    pub lighter_weight: f64,
     /// Where attitudes were free: how their angles were rounded, and what that costs; null where candidates were given.
     pub rounded: Option<Rounded>,
 }

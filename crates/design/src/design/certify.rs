@@ -11,6 +11,9 @@ use super::rounding::Moved;
 use super::task::{DWELLS, Task};
 use super::ways::Stop;
 
+/// Number of attitudes of the weights over all attitudes that are listed.
+const LISTED: usize = 10;
+
 /// How far a criterion is above a bound at most, as a part of it.
 pub(super) fn excess(value: f64, bound: f64) -> f64 {
     (value / bound * (1.0 + 4.0 * f64::EPSILON) - 1.0).max(0.0)
@@ -41,12 +44,15 @@ pub(super) fn everywhere(
     rounded: Option<(i64, Option<&Moved>)>,
 ) -> EverywhereReport {
     let weight = |(euler, weight): &(Euler, f64)| Weight { candidate: angles_text(euler), weight: *weight };
+    let (listed, lighter) = found.support.split_at(found.support.len().min(LISTED));
     EverywhereReport {
         best_possible: found.value,
         within_percent: 100.0 * excess(value.at_most, found.value),
         rounding: value.rounding,
         attained: found.attained,
-        weights: found.support.iter().map(weight).collect(),
+        weights: listed.iter().map(weight).collect(),
+        lighter: lighter.len(),
+        lighter_weight: lighter.iter().map(|(_, weight)| weight).sum(),
         rounded: rounded.map(|(step, finer)| Rounded {
             step_deg: step as f64 / 1e9,
             finer: finer

@@ -6,7 +6,7 @@ use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::SimulationError;
 
 use super::candidates::MAX_CANDIDATES;
-use super::{PartError, information, ways};
+use super::{Nearest, PartError, information, ways};
 
 /// Why no scheme is found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -112,6 +112,14 @@ pub enum DesignError {
         wanted: String,
         /// How many were looked at.
         examined: u64,
+    },
+    /// No scheme meets every requirement.
+    #[error("{why}\n{nearest}")]
+    NotMet {
+        /// How that is known.
+        why: Box<DesignError>,
+        /// What would do.
+        nearest: Box<Nearest>,
     },
     /// Parts of no exhaustive search.
     #[error("parts are of a search for so many positions of given candidates; expected these")]

@@ -17,6 +17,7 @@ mod error;
 mod exchange;
 mod exhaust;
 pub(crate) mod information;
+mod nearest;
 pub(crate) mod observability;
 mod part;
 mod psi;
@@ -40,6 +41,7 @@ pub use criterion::{Criterion, Limits};
 pub use error::DesignError;
 pub(crate) use exhaust::Pruning;
 pub use information::{Evaluator, State};
+pub use nearest::Nearest;
 pub use observability::{Patience, Rows};
 pub use part::{Level, PART_SCHEMA, Part, PartError, design_merged, design_part, design_starts};
 pub use search::{Constraints, Progress, Search};
@@ -100,9 +102,10 @@ pub struct DesignOptions {
     pub divide: bool,
     /// Numbers of positions for the front of total time, besides that asked for.
     pub front: Vec<usize>,
-    /// Where many sequences would have to be searched and information adds (reset carry): a scheme found by exchange whose
-    /// criterion is within this part of what is possible at all is enough; 0: all are searched, however many they are, under any carry.
-    pub within: f64,
+    /// Where many sequences would have to be searched and information adds (reset carry): all are searched unless the criterion of a scheme found by
+    /// exchange is within this part of a bound on what is possible at all. `None`: they are not searched, and the answer says how far that scheme is from
+    /// the bound at most. 0: all are searched, however many they are, under any carry.
+    pub within: Option<f64>,
     /// Whether the bound over all attitudes is sought too (reset carry).
     pub everywhere: bool,
     /// The candidates are where the search for the best attitudes of all begins; these take their place, with angles
@@ -129,7 +132,7 @@ impl Default for DesignOptions {
             refine: false,
             divide: false,
             front: Vec::new(),
-            within: 1e-4,
+            within: None,
             everywhere: false,
             free: None,
             seed: 1,
@@ -267,16 +270,17 @@ impl<'a> Prepared<'a> {
     /// an exchange finds are good enough.
     fn searched(&self, search: &Search<'_>, k: usize, bound: Option<&Bound>) -> (Best, Option<(u64, u64)>) {
         let (task, options) = (&self.task, self.task.options);
-        let most = if options.within > 0.0 { EXHAUSTIVE } else { u64::MAX };
+        let all = options.within == Some(0.0);
+        let most = if all { u64::MAX } else { EXHAUSTIVE };
         let exhaustive = task.space(k, &self.evaluator).filter(|space| space.1 <= most);
         let exchanged = || search.exchange(k, &[], options.restarts, options.seed);
         if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, bound)
-            && options.within > 0.0
+            && !all
         {
             let exchanged = exchanged();
+            let near = |f: &Scored| excess(task.value(&self.evaluator, f).at_most, bound.value);
             let enough = |f: &Scored| {
-                f.worth.degree == search.floor
-                    && excess(task.value(&self.evaluator, f).at_most, bound.value) < options.within
+                options.within.is_none_or(|within| f.worth.degree == search.floor && near(f) < within)
             };
             if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
                 return (exchanged, None);
@@ -387,15 +391,20 @@ fn answered(
         task.mark_images(&mut out.found, evaluator.ordered());
         let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
             let (positions, wanted) = (k, task.wanted());
-            return Err(match (best.complete, exhaustive) {
-                (false, _) => DesignError::Interrupted,
+            let error = match (best.complete, exhaustive) {
+                (false, _) => return Err(DesignError::Interrupted),
                 (true, Some(_)) => DesignError::Impossible {
                     positions,
                     wanted,
                     why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
                 },
                 (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
-            });
+            };
+            if !options.meet {
+                return Err(error);
+            }
+            let nearest = Nearest::seek(base, conditions, options, k, progress)?;
+            return Err(DesignError::NotMet { why: Box::new(error), nearest: Box::new(nearest) });
         };
         out.front = task.all_found(evaluator, &best.front)?;
         // the bound is of samples without random drift: it says nothing of how far above it figures with it may be
@@ -446,6 +455,7 @@ fn answered(
             examined: best.examined,
             excluded: best.excluded,
             lost: best.lost,
+            sequences: task.space(k, evaluator).map(|s| s.1).filter(|_| !all && free.is_none()),
             proven: all && out.error_bound < PROOF && !task.is_noisy(),
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),

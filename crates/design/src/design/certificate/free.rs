@@ -33,6 +33,8 @@ const GAIN: f64 = 1e-5;
 const FULL: u64 = 360_000_000_000;
 /// Weights below are no support.
 const SUPPORT: f64 = 1e-7;
+/// Attitudes that are no further apart, in degrees, are equal to within the rounding of their angles.
+const SAME: f64 = 0.02;
 
 /// What weights on all attitudes reach, and what nothing is below.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +43,8 @@ pub struct Everywhere {
     pub value: f64,
     /// The criterion of the weights at these attitudes, as they are.
     pub attained: f64,
-    /// The attitudes, to hundredths of a degree, with weights: rounded, to be divided by their sum.
+    /// The attitudes, each once, with weights, heaviest first: angles to hundredths of a degree, beta up to a quarter of a turn, the others above
+    /// -180 and up to 180 degrees; weights rounded, to be divided by their sum.
     pub support: Vec<(Euler, f64)>,
 }
 
@@ -65,28 +68,25 @@ impl Evaluator {
             other => self.aim(other),
         };
         let mut here = self.clone();
-        let mut eulers: Vec<Option<Euler>> = vec![None; here.candidates.len()];
         let mut problem = here.additive(aim, k);
         let mut found: Weighed = weigh(&problem, going)?;
         let scale = k as f64 * self.dph * self.dph;
         for _ in 0..ROUNDS {
             let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
             let most = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
-            let new: Vec<Euler> = peaks(self.degree(), &energy)
-                .into_iter()
-                .filter(|e| energy(&c_n_f64(e)) > most * (1.0 + GAIN))
-                .collect();
+            let mut new: Vec<Euler> = peaks(self.degree(), &energy);
+            new.retain(|e| energy(&c_n_f64(e)) > most * (1.0 + GAIN));
+            // several beginnings lead to one peak
+            new.sort_by_key(|e| e.each_ref().map(Angle::nanodeg));
+            new.dedup();
             if new.is_empty() || !going() {
                 break;
             }
             // those without weight give way
-            let kept: Vec<usize> = (0..eulers.len()).filter(|&i| found.weights[i] > 1e-6).collect();
-            let mut attitudes: Vec<Matrix3<f64>> = kept.iter().map(|&i| here.candidates[i].c).collect();
-            let mut names: Vec<Option<Euler>> = kept.iter().map(|&i| eulers[i].clone()).collect();
+            let kept = here.candidates.iter().zip(&found.weights).filter(|(_, w)| **w > 1e-6);
+            let mut attitudes: Vec<Matrix3<f64>> = kept.map(|(c, _)| c.c).collect();
             attitudes.extend(new.iter().map(c_n_f64));
-            names.extend(new.into_iter().map(Some));
             here.stand_at(&attitudes);
-            eulers = names;
             problem = here.additive(problem.aim.clone(), k);
             found = weigh(&problem, going)?;
         }
@@ -102,9 +102,8 @@ impl Evaluator {
         let known = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
         let most = most.max(known);
         let value = problem.lower_bound_over(&found.dual, most).sqrt();
-        let support = eulers.iter().zip(&here.candidates).zip(&found.weights).filter(|(_, w)| **w > SUPPORT);
-        let (support, weights): (Vec<Euler>, Vec<f64>) =
-            support.map(|((e, c), w)| (e.clone().unwrap_or_else(|| angles(&c.c)), *w)).unzip();
+        let support = here.candidates.iter().zip(&found.weights).filter(|(_, w)| **w > SUPPORT);
+        let (support, weights) = merged(support.map(|(c, w)| (&c.c, *w)));
         // what is told of the weights is what these attitudes and numbers give
         here.stand_at(&support.iter().map(c_n_f64).collect::<Vec<_>>());
         let problem = here.additive(problem.aim, k);
@@ -269,7 +268,28 @@ fn euler(degrees: [f64; 3]) -> Euler {
     degrees.map(|x| Angle::from_nanodeg((x * 100.0).round() as i64 * 10_000_000))
 }
 
-/// The Euler angles of an attitude: `C = Mx(alpha) My(beta) Mz(gamma)`.
+/// Attitudes that are equal to within the rounding of their angles are one, with the sum of their weights; heaviest first.
+fn merged<'c>(weighed: impl Iterator<Item = (&'c Matrix3<f64>, f64)>) -> (Vec<Euler>, Vec<f64>) {
+    let mut sorted: Vec<(&Matrix3<f64>, f64)> = weighed.collect();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut out: Vec<(&Matrix3<f64>, f64)> = Vec::new();
+    for (c, weight) in sorted {
+        // a turn by a small angle moves the entries by its root of two, as a vector
+        let apart = |other: &Matrix3<f64>| {
+            let squares = c.as_flattened().iter().zip(other.as_flattened()).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / 2.0).sqrt().to_degrees()
+        };
+        match out.iter_mut().find(|(other, _)| apart(other) <= SAME) {
+            Some((_, sum)) => *sum += weight,
+            None => out.push((c, weight)),
+        }
+    }
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out.into_iter().map(|(c, weight)| (angles(c), weight)).unzip()
+}
+
+/// The Euler angles of an attitude, to hundredths of a degree: `C = Mx(alpha) My(beta) Mz(gamma)`, beta up to a quarter of a turn, the others
+/// above -180 and up to 180 degrees.
 fn angles(c: &Matrix3<f64>) -> Euler {
     let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
     let (alpha, gamma) = if beta.cos().abs() > 1e-9 {
@@ -278,7 +298,8 @@ fn angles(c: &Matrix3<f64>) -> Euler {
         // alpha and gamma turn about one axis
         ((-c[2][1]).atan2(c[1][1]), 0.0)
     };
-    euler([alpha, beta, gamma].map(f64::to_degrees))
+    let positive = |x: f64| if x <= -180.0 + 0.005 { 180.0 } else { x };
+    euler([alpha, beta, gamma].map(f64::to_degrees).map(positive))
 }
 
 /// Attitudes where the energy is largest near the points of the coarse net that have most of it, largest first.

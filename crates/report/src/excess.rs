@@ -1,0 +1,99 @@
+//! How far a criterion is above a bound: two figures, and the percentage that follows from them as they are printed.
+
+use crate::document::number;
+
+/// A criterion, a bound that it is not below, and how far it is above.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Excess {
+    /// The criterion, to six digits.
+    pub value: String,
+    /// The bound to six digits, rounded down.
+    pub bound: String,
+    /// What the first printed figure is above the second, in percent, rounded up to three digits; not below what is known at most.
+    pub percent: String,
+}
+
+impl Excess {
+    /// Of a criterion and a bound, both above 0; `at_most_percent` is what is known of the excess, with whatever rounding hides.
+    ///
+    /// ```
+    /// use obsdeg_report::Excess;
+    /// let excess = Excess::new(0.6204648, 0.6082472, 2.00865);
+    /// assert_eq!([&*excess.value, &*excess.bound, &*excess.percent], ["0.620465", "0.608247", "2.01 %"]);
+    /// ```
+    pub fn new(value: f64, bound: f64, at_most_percent: f64) -> Self {
+        let (value, bound) = (six(value, f64::round), six(bound, f64::floor));
+        let of = |figure: &str| figure.parse::<f64>().unwrap_or(f64::NAN);
+        let percent = 100.0 * (of(&value) / of(&bound) - 1.0);
+        Self { percent: upward(percent.max(at_most_percent)), value, bound }
+    }
+}
+
+/// A number above 0 to six digits.
+fn six(x: f64, rounded: impl Fn(f64) -> f64) -> String {
+    if !(x.is_finite() && x > 0.0) {
+        return number(x);
+    }
+    let digits = 5 - x.log10().floor() as i32;
+    let unit = 10f64.powi(digits.abs());
+    // what is a decimal number of six digits is not a step below itself
+    let scaled = if digits < 0 { x / unit } else { x * unit };
+    let near = (scaled - scaled.round()).abs() < 1e-9 * scaled;
+    let whole = if near { scaled.round() } else { rounded(scaled) };
+    let cut = if digits < 0 { whole * unit } else { whole / unit };
+    match (1e-3..1e6).contains(&x) {
+        true => format!("{cut:.*}", digits.max(0) as usize),
+        false => format!("{cut:.5e}"),
+    }
+}
+
+/// A percentage rounded up to three digits, and to a millionth at the finest: `0.0213 %`.
+fn upward(percent: f64) -> String {
+    const FINEST: f64 = 1e-6;
+    if percent <= FINEST {
+        return format!("{FINEST} %");
+    }
+    let decimals = (2 - percent.log10().floor() as i32).clamp(0, 6);
+    let unit = 10f64.powi(decimals);
+    format!("{:.*} %", decimals as usize, (percent * unit - 1e-6).ceil() / unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever the figures, the percentage is that of the figures as they are printed, by no more than a unit of its last digit above.
+    #[test]
+    fn percentages_follow_from_the_figures() {
+        let mut seed = 7u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for _ in 0..2000 {
+            let bound = 10f64.powf(9.0 * draw() - 6.0);
+            let value = bound * (1.0 + 10f64.powf(7.0 * draw() - 6.0));
+            let told = Excess::new(value, bound, 100.0 * (value / bound - 1.0));
+            let of = |figure: &str| figure.parse::<f64>().expect("a number");
+            let percent = told.percent.strip_suffix(" %").expect("a percentage");
+            let of_figures = 100.0 * (of(&told.value) / of(&told.bound) - 1.0);
+            let decimals = percent.split_once('.').map_or(0, |(_, d)| d.len() as i32);
+            let unit = 10f64.powi(-decimals);
+            assert!(
+                of(&told.bound) <= bound && (of(&told.value) / value - 1.0).abs() < 5.1e-6,
+                "{told:?} {value} {bound}"
+            );
+            assert!(of(percent) >= of_figures - 1e-6 * unit - 1e-9, "{told:?} {of_figures}");
+            // below a thousandth of a percent six digits are too few: the excess that is known counts
+            let most = of_figures.max(100.0 * (value / bound - 1.0)).max(1e-6);
+            assert!(of(percent) <= most + unit * 1.001, "{told:?} {of_figures}");
+        }
+        let of = |value: f64, bound: f64| {
+            let Excess { value, bound, percent } = Excess::new(value, bound, 100.0 * (value / bound - 1.0));
+            [value, bound, percent]
+        };
+        assert_eq!(of(0.5, 0.5), ["0.500000", "0.500000", "0.000001 %"]);
+        assert_eq!(of(6.343e-4 * 1.3, 6.343e-4), ["8.24590e-4", "6.34300e-4", "30.0 %"]);
+        assert_eq!(of(150.0, 100.0), ["150.000", "100.000", "50.0 %"]);
+    }
+}
