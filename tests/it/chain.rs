@@ -144,9 +144,9 @@ fn holds(seed: u64, with_report: bool) {
     // the page, whose engine takes the text
     let text = std::fs::read_to_string(&file).expect("the winner");
     let asked = object!({ "sources": [{ "name": "winner.toml", "text": text }] });
-    let (page, _) = call_json("compare", &asked.to_string(), &mut Host { worker: None, going: &|_| true })
+    let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, going: &|_| true })
         .expect("an answer");
-    let page: Value = serde_json::from_str(&page).expect("JSON");
+    let page: Value = serde_json::from_str(&page.text).expect("JSON");
     assert_eq!(&page["schemes"][0], compared, "{name}");
     // again from the file: the search of its own positions has its conditions
     let stated = first["requirements"]["stated"].as_u64() > Some(0);

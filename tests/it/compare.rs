@@ -131,7 +131,7 @@ fn requirements_are_those_of_all_unknowns() {
     assert_eq!((six.requirements.stated, missed(&six)), (1, psi(&["psi_y@4"])));
     assert_eq!(reset("psi").requirements.stated, 18);
     // one decision: what is met is what has a margin of at least one, by the numbers of the table
-    let paper = under(scheme(&["0,0,0", "180,0,0"], Carry::Platform), &[("D", 0.1)]);
+    let paper = under(scheme(&["0,0,0", "180,0,0"], Carry::Platform), &[("D", 0.1), ("psi", 0.01)]);
     for r in [&five, &six, &paper] {
         let asked = r.quantities.iter().filter(|q| q.requirement.is_some());
         let met: Vec<bool> =

@@ -11,7 +11,7 @@ use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
     Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions, Walks,
-    asked, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
+    asked as asked_conditions, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
@@ -364,7 +364,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
     a.measurement.concern(std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
-    conditions = asked(&base, &conditions, &a.wanted.observable)?;
+    conditions = asked_conditions(&base, &conditions, &a.wanted.observable)?;
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
     idle(a, !files.merge.is_empty(), &base, &conditions)?;
     let round = a.round.as_deref().unwrap_or("5");
