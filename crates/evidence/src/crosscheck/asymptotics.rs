@@ -90,7 +90,7 @@ pub(super) fn samples(scheme: &Scheme) -> Samples<'_> {
 pub(super) fn asymptotics(
     samples: &Samples<'_>,
     between: Between,
-    is_psi: &dyn Fn(usize) -> bool,
+    is_psi: &(dyn Fn(usize) -> bool + Sync),
     questions: &[Question],
 ) -> Option<Asymptotics> {
     (0..BITS.len()).find_map(|bits| {

@@ -27,6 +27,7 @@ use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Position, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::{Form, SquareRootInformation};
+use rayon::prelude::*;
 
 use crate::prediction::Prediction;
 use crate::simulation::batch::{batch, each_row};
@@ -347,8 +348,23 @@ fn controls(
         Some((FilterChange { latitude: elsewhere, ..FilterChange::default() }, far)),
         farthest.map(|(i, off)| (FilterChange { dropped: Some(i), ..FilterChange::default() }, off)),
     ];
+    let changes: Vec<(FilterChange, f64)> = changes.into_iter().flatten().collect();
+    let counted = changes.par_iter().map(|(change, _)| -> Result<(usize, usize), SimulationError> {
+        let filter_scheme = change.apply(scheme);
+        let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
+        // what a wrong filter's numbers do not resolve is no check of it
+        match structure(&truth, prediction, &filter_scheme, &filter_conditions) {
+            Ok(structure) => {
+                let counts = structure.counts();
+                Ok((counts.disagree, counts.agree + counts.disagree))
+            }
+            Err(e) if e.is_numeric() => Ok((0, 0)),
+            Err(e) => Err(e),
+        }
+    });
+    let counted: Vec<_> = counted.collect();
     let mut out = Vec::new();
-    for (change, off_deg) in changes.iter().flatten() {
+    for ((change, off_deg), counts) in changes.iter().zip(counted) {
         let filter_scheme = change.apply(scheme);
         let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
         let filter = Plan::new(&filter_scheme, &filter_conditions)?;
@@ -356,15 +372,7 @@ fn controls(
         if filter.stages == truth.stages {
             continue;
         }
-        // what a wrong filter's numbers do not resolve is no check of it
-        let (failed, checks) = match structure(&truth, prediction, &filter_scheme, &filter_conditions) {
-            Ok(structure) => {
-                let counts = structure.counts();
-                (counts.disagree, counts.agree + counts.disagree)
-            }
-            Err(e) if e.is_numeric() => (0, 0),
-            Err(e) => return Err(e),
-        };
+        let (failed, checks) = counts?;
         let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: None, seed };
         let prepared = Prepared::new(experiment)?;
         let by_data = |runs| prepared.statistics(&prepared.run(runs, &|_| true)).pop();

@@ -14,8 +14,9 @@ use crate::simulation::{Conditions, Plan};
 
 /// Bits of this evaluation: information of 1e30 of a prior, and what cancels in it.
 const BITS: usize = 512;
-/// By how much rounding may move a number of a model of doubles, whose largest are about one: 2^-50 is four units of the last place.
-pub(super) const ROUNDING: i32 = -50;
+/// By how much rounding may move a number of a model of doubles, whose largest are about one: 2^-46 is 64 units of the last place, for
+/// some hundreds of steps of the filter.
+pub(super) const ROUNDING: i32 = -46;
 /// Models that are rounded at random.
 const DRAWS: usize = 2;
 /// The factor between the two priors of evidence b.

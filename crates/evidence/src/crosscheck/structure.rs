@@ -182,10 +182,11 @@ impl Shown {
         let alone = scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift;
         let both = || -> Vec<Question> { questions(false).chain(questions(true)).collect() };
         let samples = samples(scheme);
-        Self {
-            derivatives: asymptotics(&samples, Between::Nothing, &is_psi, &start),
-            dwells: (!alone).then(|| asymptotics(&samples, Between::Dwell, &is_psi, &both())),
-        }
+        let (derivatives, dwells) = rayon::join(
+            || asymptotics(&samples, Between::Nothing, &is_psi, &start),
+            || (!alone).then(|| asymptotics(&samples, Between::Dwell, &is_psi, &both())),
+        );
+        Self { derivatives, dwells }
     }
 
     /// Of the functional of this number: the courses by derivatives, with dwells, and with dwells at the end.
