@@ -35,6 +35,7 @@ mod schemas;
 mod scheme_schema;
 mod schemes;
 mod second_path;
+mod sentences;
 mod simulation;
 mod solutions;
 mod structure;

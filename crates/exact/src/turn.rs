@@ -37,14 +37,19 @@ impl Turn {
 
     /// `(cos, sin)` as floating-point numbers, exact at multiples of 90 degrees.
     pub fn cos_sin_f64(self) -> (f64, f64) {
-        match self.0 / 90_000_000_000 {
-            q if self.is_multiple_of_deg(90) => {
-                [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][q as usize]
+        const QUARTER: i64 = 90_000_000_000;
+        // what is left of the nearest quarter turn is exact, so that a small cosine or sine has all its digits
+        let quarters = (self.nanodeg() + QUARTER / 2).div_euclid(QUARTER);
+        let rest = self.nanodeg() - quarters * QUARTER;
+        let (s, c) = (rest as f64 * 1e-9).to_radians().sin_cos();
+        match quarters.rem_euclid(4) {
+            _ if rest == 0 => {
+                [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarters.rem_euclid(4) as usize]
             }
-            _ => {
-                let (s, c) = self.degrees().to_radians().sin_cos();
-                (c, s)
-            }
+            0 => (c, s),
+            1 => (-s, c),
+            2 => (-c, -s),
+            _ => (s, -c),
         }
     }
 }

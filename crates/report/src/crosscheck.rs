@@ -227,6 +227,7 @@ impl Answer for CrossCheck {
         blocks.extend((!self.null_space.is_empty()).then(|| by_direction(self)));
         blocks.push(whole(self));
         blocks.extend(Block::list_if_any("What disagrees", self.disagreements.clone()));
+        blocks.extend(Block::list_if_any("Not resolvable, and why", self.unresolved.clone()));
         blocks.push(Block::list("How", self.method.clone()));
         blocks.push(Block::list("Not tested by evidence", self.not_tested.clone()));
         blocks.push(Block::list(
@@ -245,6 +246,9 @@ impl Answer for CrossCheck {
         assumed.push(format!("a prediction is wrong with probability below {:.0e}", self.error_bound));
         blocks.push(Block::list("Assumed", assumed));
         let verdict = match (self.passed, self.verdicts_agree) {
+            (true, _) if self.counts.not_resolvable > 0 => {
+                "filter and exact verdicts agree as far as resolvable"
+            }
             (true, _) => "filter and exact verdicts agree",
             (false, true) => {
                 "filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter"

@@ -117,7 +117,7 @@ pub(crate) fn validity(v: &Validity, c: &ConditionsReport) -> Vec<String> {
 }
 
 /// Which filter ran, and why.
-pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
+pub(crate) fn filter(f: &FilterReport, validity: &Validity) -> Vec<String> {
     let (what, passes) = match f.kind {
         FilterKind::Linear => ("linear: small angles, gains known beforehand".into(), String::new()),
         FilterKind::Extended => {
@@ -137,6 +137,14 @@ pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
     let mut out = vec![format!("{what}{passes}; {why}")];
     if f.kind != FilterKind::Linear {
         out.push("verdicts and degrees are those of small angles; what a filter learns beyond them comes of the attitudes that drift reached".into());
+    }
+    if f.kind == FilterKind::Extended && !validity.holds {
+        out.push(
+            "do not trust the sigmas of this filter where the small-angle model does not hold: it is linearised before the drifts are known; \
+             one run that is consistent does not show that they are right; the iterated filter (--filter iterated) is linearised along the \
+             whole run"
+                .into(),
+        );
     }
     out
 }
@@ -230,7 +238,7 @@ impl Answer for Simulation {
             blocks.push(table("Combinations (psi: of the end)", &self.combinations));
         }
         blocks.extend(Block::list_if_any("Known from the prior only: whose", priors(&self.quantities)));
-        blocks.push(Block::list("Filter", filter(&self.filter)));
+        blocks.push(Block::list("Filter", filter(&self.filter, &self.validity)));
         if self.filter.kind != FilterKind::Linear {
             let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
             let columns: Vec<_> = [left("unknown"), left("unit")].into_iter().chain(numbers).collect();

@@ -52,7 +52,7 @@ fn solutions(q: &SystemQuantity) -> String {
         Some(NumberOfSolutions::Counted(1)) => "one solution".into(),
         Some(NumberOfSolutions::Counted(k)) => format!("{k} solutions"),
         Some(NumberOfSolutions::Undecided(_)) => "locally unique; number of solutions not decided".into(),
-        None => "local: finitely many solutions".into(),
+        None => "locally unique; not counted".into(),
     };
     if q.solution.is_some() { format!("{number}; in terms of others: see below") } else { number }
 }
@@ -140,7 +140,7 @@ impl Answer for SystemAnalysis {
             lines.extend(silent.map(|q| format!("change {} alone", q.name)));
             lines.extend(self.other_directions.iter().map(|moved| {
             format!(
-                "move {} together in a way that is no polynomial of degree up to {POLYNOMIAL_DEGREE}, or a long one",
+                "move {} together in a way for which no polynomial of degree up to {POLYNOMIAL_DEGREE} was found",
                 moved.join(", ")
             )
         }));
@@ -151,6 +151,16 @@ impl Answer for SystemAnalysis {
         if !self.known.is_empty() {
             assumed.push(format!("known starts: {}", self.known.join(", ")));
         }
+        assumed.extend(self.time.as_ref().map(|time| {
+            let at = match time.as_str() {
+                "generic" => "a generic time (verdicts of almost every time)".into(),
+                time => format!("t = {time}, where the run begins"),
+            };
+            format!(
+                "the equations or known inputs hold the time: judged at {at}, in later segments at a generic time; `time` in the file sets \
+                 another, or \"generic\""
+            )
+        }));
         if !self.constraints.is_empty() {
             assumed.push(format!(
                 "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0",
@@ -273,7 +283,8 @@ impl Answer for SystemEvidence {
         let said = |outcome: Agreement| match outcome {
             Agreement::Disagrees => "DISAGREES",
             Agreement::NotResolvable => "not resolvable",
-            Agreement::Agrees | Agreement::NotTested => "agrees",
+            Agreement::Agrees => "agrees",
+            Agreement::NotTested => "not measured",
         };
         let row = |q: &SystemQuantityEvidence| {
             vec![
@@ -291,6 +302,7 @@ impl Answer for SystemEvidence {
                 ) {
                     (true, _, _) => "DISAGREES",
                     (false, Agreement::NotResolvable, _) => "not resolvable",
+                    (false, Agreement::NotTested, _) => "not measured",
                     (false, _, true) => "agrees, degree not measured",
                     (false, _, false) => "agrees",
                 }

@@ -168,7 +168,15 @@ pub(crate) fn carries(a: &Analysis) -> Vec<String> {
             if c.differs.is_empty() { "no verdict differs".into() } else { differences(&c.differs) };
         format!("{} (rank profile {} of {}): {differs}", c.carry, list(&c.rank_profile), c.unknowns)
     };
-    a.carries.iter().map(line).collect()
+    let mut out: Vec<String> = a.carries.iter().map(line).collect();
+    if a.carries.iter().flat_map(|c| &c.differs).any(|d| d.name.contains('@')) {
+        out.push(
+            "psi of one position (psi_x@2) is an unknown of reset carry alone: it is compared with psi at the first position, which the other \
+             carry hands on to all"
+                .into(),
+        );
+    }
+    out
 }
 
 /// `gyros X: I=+x O=-z S=+y, Y: ...`.

@@ -7,7 +7,7 @@ use obsdeg_exact::SplitMix64;
 
 /// A scheme drawn at random: carries, latitudes with poles and equator, terms, one to eight positions; `near` has two positions or a
 /// latitude that hardly differ from another.
-fn drawn(seed: u64, near: bool) -> Scheme {
+pub(super) fn drawn(seed: u64, near: bool) -> Scheme {
     let mut rng = SplitMix64::new(seed);
     let mut pick = |n: usize| rng.below(n as u64) as usize;
     let (count, carry, kind) = (1 + pick(8), Carry::ALL[pick(3)], pick(4));
@@ -103,7 +103,7 @@ fn whole_platforms_drawn_at_random_agree() {
 #[test]
 #[ignore = "minutes"]
 fn many_schemes_drawn_at_random_agree() {
-    sweep(0..500, 100, |seed| drawn(seed, false));
+    sweep(0..2000, 100, |seed| drawn(seed, false));
     sweep(1000..1100, 10, |seed| drawn(seed, true));
 }
 

@@ -1,5 +1,6 @@
 //! The exact verdicts against the filter: what must agree, and what must not.
 
+mod borderline;
 mod command;
 mod drawn;
 mod exact;
@@ -415,5 +416,10 @@ fn what_is_not_resolvable_is_no_disagreement() {
         "checks: {} agree, 0 disagree, {} not resolvable, {} not tested",
         c.counts.agree, c.counts.not_resolvable, c.counts.not_tested
     );
-    assert!(text.contains(&line) && text.contains("not resolvable where a direction that is seen"), "{text}");
+    assert!(
+        text.contains(&line)
+            && text.contains("not resolvable where many digits say")
+            && text.contains("Not resolvable, and why"),
+        "{text}"
+    );
 }

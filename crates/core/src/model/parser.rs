@@ -7,7 +7,7 @@ use winnow::combinator::{Infix, Prefix, expression};
 use winnow::error::{ErrMode, ParserError};
 use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 
-use super::expression::{Expression, ExpressionError, Function, MAX_DEPTH, Names, Node};
+use super::expression::{Expression, ExpressionError, Function, MAX_DEPTH, Names, Node, evaluate_f64};
 use super::vectors::{Made, Maker, Mismatch, Operation, Shape, Value, component, entry, list};
 
 /// The shapes of names that are no scalars.
@@ -426,6 +426,11 @@ pub fn parse_equation(text: &str, shapes: &Shapes) -> Result<Components, Express
         let Some(argument) = root.filter(|_| right.shape == Shape::SCALAR) else {
             return binary(input, '-', &left, &right);
         };
+        let own = component(&input.state.expression, right.entries[0]);
+        let size = evaluate_f64(&own, &|_| f64::NAN);
+        if size < 0.0 {
+            return wrong(input, "a root or norm equal to what is not negative");
+        }
         input.state.vectors = true;
         let square = binary(input, '*', &right, &right)?;
         binary(input, '-', &Value { entries: vec![argument], ..left }, &square)

@@ -1,7 +1,7 @@
 //! The rings in which one and the same model is written out.
 
-use obsdeg_exact::Field;
 use obsdeg_exact::series::SeriesRing;
+use obsdeg_exact::{Ball, Field};
 
 /// What a model needs of its numbers. The platform is written once over this trait: its images in a
 /// prime field give the verdicts, in `f64` the decimals, as text the exact formulas.
@@ -109,6 +109,58 @@ impl Ring for Float {
     }
     fn is_zero(&self, a: &f64) -> bool {
         *a == 0.0
+    }
+}
+
+/// A real number of 512 bits with a bound on its error.
+pub(crate) type Real = Ball<8>;
+
+/// Real numbers of many digits.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ManyDigits;
+
+impl ManyDigits {
+    /// Cosine and sine of an angle in 1e-9 degrees; exact at quarter turns.
+    pub(crate) fn cos_sin(nanodeg: i64) -> Option<(Real, Real)> {
+        const QUARTER: i64 = 90_000_000_000;
+        let (quarters, rest) = (nanodeg.div_euclid(QUARTER).rem_euclid(4), nanodeg.rem_euclid(QUARTER));
+        let half_turns = Real::from_i64(rest).div(&Real::from_i64(2 * QUARTER))?;
+        let (s, c) = if rest == 0 { Real::ZERO.sin_cos()? } else { half_turns.mul(&Real::pi()).sin_cos()? };
+        Some(match quarters {
+            0 => (c, s),
+            1 => (s.neg(), c),
+            2 => (c.neg(), s.neg()),
+            _ => (s, c.neg()),
+        })
+    }
+
+    /// The nearest double, zero where only zero is possible to 1e-60; `None` where the number is not known to all digits of a double.
+    pub(crate) fn to_f64(x: &Real) -> Option<f64> {
+        let known =
+            if x.is_zero() { x.radius_log2() < -200.0 } else { x.radius_log2() < x.size_log2() - 60.0 };
+        Some(x.to_f64()).filter(|x| known && x.is_finite())
+    }
+}
+
+impl Ring for ManyDigits {
+    type Element = Real;
+    fn zero(&self) -> Real {
+        Real::ZERO
+    }
+    fn one(&self) -> Real {
+        Real::from_i64(1)
+    }
+    fn add(&self, a: &Real, b: &Real) -> Real {
+        a.add(b)
+    }
+    fn mul(&self, a: &Real, b: &Real) -> Real {
+        a.mul(b)
+    }
+    fn neg(&self, a: &Real) -> Real {
+        a.neg()
+    }
+    fn is_zero(&self, a: &Real) -> bool {
+        a.is_exactly_zero()
     }
 }
 

@@ -1,9 +1,9 @@
 //! The symbols of exact formulas: sines and cosines of angles, square roots of 2 and 3.
 
 use crate::model::angle::{Angle, format_decimal};
-use crate::model::expression::{Environment, evaluate, evaluate_f64, parse};
+use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
 use crate::model::platform::{Platform, Point, RandomValues, Sample};
-use crate::model::ring::{Ring, Text};
+use crate::model::ring::{ManyDigits, Real, Ring, Text};
 use crate::model::scheme::Station;
 
 /// An angle whose sine and cosine stay symbols.
@@ -175,22 +175,20 @@ impl Symbols {
         })
     }
 
-    /// The value of a text in square roots and constant angles; `None` when it has another symbol.
+    /// The value of a text in square roots and constant angles, right in all its digits whatever cancels; `None` when it has another
+    /// symbol, or when 512 bits do not tell it.
     pub(crate) fn float(&self, text: &str) -> Option<f64> {
-        let at = |name: &str| -> f64 {
-            let value = || -> Option<f64> {
-                let (kind, suffix) = name.split_at_checked(2)?;
-                if kind == "r_" {
-                    return Some(suffix.parse::<f64>().ok()?.sqrt());
-                }
-                let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
-                let Base::Constant(nanodeg) = self.bases[i] else { return None };
-                let (c, s) = Angle::from_nanodeg(nanodeg).turn().cos_sin_f64();
-                Some(if kind == "c_" { c } else { s })
-            };
-            value().unwrap_or(f64::NAN)
+        let at = |name: &str| -> Option<Real> {
+            let (kind, suffix) = name.split_at_checked(2)?;
+            if kind == "r_" {
+                return Real::from_i64(suffix.parse().ok()?).sqrt();
+            }
+            let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
+            let Base::Constant(nanodeg) = self.bases[i] else { return None };
+            let (c, s) = ManyDigits::cos_sin(nanodeg)?;
+            Some(if kind == "c_" { c } else { s })
         };
-        Some(evaluate_f64(&parse(text).ok()?, &at)).filter(|x| x.is_finite())
+        ManyDigits::to_f64(&real(&parse(text).ok()?, &at)?)
     }
 
     /// The value of a text in the symbols at a sample; `None` for what has none.
@@ -198,6 +196,31 @@ impl Symbols {
         let env = SymbolValues { symbols: self, values, sample };
         evaluate(&parse(text).ok()?, &sample.roots.field, &env).ok()
     }
+}
+
+/// The value of a rational expression; `None` for a name that `at` does not know, for a function, and for what is divided by zero.
+fn real(e: &Expression, at: &dyn Fn(&str) -> Option<Real>) -> Option<Real> {
+    let power = |x: &Real, k: i32| {
+        let product = (0..k.unsigned_abs()).fold(Real::from_i64(1), |product, _| product.mul(x));
+        if k < 0 { product.inverse() } else { Some(product) }
+    };
+    let mut values: Vec<Real> = Vec::with_capacity(e.nodes.len());
+    for node in &e.nodes {
+        values.push(match node {
+            Node::Number { mantissa, decimals } => {
+                Real::from_i128(*mantissa).mul(&power(&Real::from_i64(10), -*decimals)?)
+            }
+            Node::Name(name) => at(name)?,
+            Node::Call { .. } => return None,
+            Node::Negate(a) => values[*a].neg(),
+            Node::Add(a, b) => values[*a].add(&values[*b]),
+            Node::Subtract(a, b) => values[*a].sub(&values[*b]),
+            Node::Multiply(a, b) => values[*a].mul(&values[*b]),
+            Node::Divide(a, b) => values[*a].div(&values[*b])?,
+            Node::Power(a, b) => power(&values[*a], e.integer_at(*b)?)?,
+        });
+    }
+    values.pop()
 }
 
 /// `(base, quadrant, mirrored)`: the constant part of an angle is quadrant * 90 + base, or
@@ -254,6 +277,26 @@ mod tests {
     use super::*;
     use crate::model::scheme::{Scheme, parse_attitude};
     use obsdeg_exact::SplitMix64;
+
+    /// What cancels costs no digits: `(1 - cos x) / sin x = tan(x / 2)`, whose series is summed here.
+    #[test]
+    fn texts_have_all_their_digits() {
+        for nanodeg in [1, 1000, 1_000_000, 100_000_000] {
+            let angle = format!("{},0,0", format_decimal(nanodeg));
+            let attitudes = ["0,0,0", &angle].map(|a| parse_attitude(a).expect("an attitude"));
+            let symbols = Symbols::of(&Platform::new(Scheme::of_angles(attitudes)).expect("valid"));
+            let h = (nanodeg as f64 * 1e-9).to_radians() / 2.0;
+            let tangent = h + h.powi(3) / 3.0 + 2.0 * h.powi(5) / 15.0;
+            for text in ["(1-c_0)/s_0", "-(c_0-1)*s_0^-1", "s_0/(1+c_0)"] {
+                let value = symbols.float(text).expect("a number");
+                assert!((value / tangent - 1.0).abs() < 1e-14, "{nanodeg} {text}: {value} {tangent}");
+            }
+        }
+        let symbols = Symbols::of(&Platform::new(Scheme::of_angles([])).expect("valid"));
+        assert_eq!(symbols.float("r_2*r_2-2"), Some(0.0));
+        assert_eq!(symbols.float("1/(2-2)"), None);
+        assert_eq!(symbols.float("wN"), None);
+    }
 
     /// The text of every cosine and sine has the value that the sample has.
     #[test]

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_exact::{Field, echelon::express};
 use obsdeg_symbolic::System;
 
-use crate::model::ring::{Float, Ring, Text};
+use crate::model::ring::{Float, ManyDigits, Real, Ring, Text};
 
 /// `M x = b` with entries out of the table of observable rows, and the outputs `P x`.
 ///
@@ -145,6 +145,38 @@ impl Problem {
         Some(self.outputs_of(f, table, x))
     }
 
+    /// The outputs in many digits, by elimination with the largest pivot; `None` when a pivot is not told from zero, or an output is not
+    /// known to all digits of a double. The system has a solution: that is known from the prime fields.
+    pub(crate) fn solve_in_many_digits(&self, table: &[Vec<Real>]) -> Option<Vec<f64>> {
+        let ring = ManyDigits;
+        let equation = |(places, right): &(Vec<(usize, Place)>, Right)| {
+            let mut row = vec![ring.zero(); self.unknowns + 1];
+            for &(i, (r, c)) in places {
+                row[i] = table[r][c];
+            }
+            row[self.unknowns] = right.value(&ring, table, &[]);
+            row
+        };
+        let mut rows: Vec<Vec<Real>> = self.equations.iter().map(equation).collect();
+        for k in 0..self.unknowns {
+            let certain = (k..rows.len()).filter(|&i| !rows[i][k].is_zero());
+            let best = certain.max_by(|&a, &b| rows[a][k].size_log2().total_cmp(&rows[b][k].size_log2()))?;
+            rows.swap(k, best);
+            let inverse = rows[k][k].inverse()?;
+            rows[k].iter_mut().for_each(|x| *x = x.mul(&inverse));
+            let pivot = rows[k].clone();
+            let others = rows.iter_mut().enumerate().filter(|(i, row)| *i != k && !row[k].is_exactly_zero());
+            for (_, row) in others {
+                let factor = row[k];
+                for (x, y) in row.iter_mut().zip(&pivot).skip(k) {
+                    *x = x.sub(&factor.mul(y));
+                }
+            }
+        }
+        let x = rows.iter().take(self.unknowns).map(|row| row[self.unknowns]).collect();
+        self.outputs_of(&ring, table, x).iter().map(ManyDigits::to_f64).collect()
+    }
+
     /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the right side, when the rounding of
     /// the table alone may move a value by more than [`CERTAIN`] of the largest, or anything is not finite.
     pub(crate) fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
@@ -206,14 +238,18 @@ mod tests {
         for (a, b) in x.iter().zip([1.0 / 3.0, -2.0 / 3.0, 2.0 / 3.0]) {
             assert!((a - b).abs() < 1e-12);
         }
+        let digits: Vec<Vec<Real>> =
+            table.iter().map(|r| r.iter().map(|&a| Real::from_i64(a)).collect()).collect();
         let y = p.solve_in_field(&f, &images, &[f.one(), 0, 0]).expect("solvable");
         assert_eq!(y, [f.from_ratio(1, 3), f.from_ratio(-2, 3), f.from_ratio(2, 3)]);
         // rows 0 and 1 vanish outside {0, 2} as (1, 0, -2)
         let p = Problem::combination(&[0, 1], 3, &[0, 2], 0);
         assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.one(), f.from_i64(-2)]));
+        assert_eq!(p.solve_in_many_digits(&digits), Some(vec![1.0, -2.0]));
         // (2, -1, 1) is annihilated by rows 0 and 1: lead 0 = 1 gives (-1/2, 1/2)
         let p = Problem::null_vector(&[0, 1], &[0, 1, 2], 0);
         assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.from_ratio(-1, 2), f.from_ratio(1, 2)]));
+        assert_eq!(p.solve_in_many_digits(&digits), Some(vec![-0.5, 0.5]));
         // no solution
         let p = Problem::solution(&[0], 3, &[]);
         assert_eq!(p.solve_in_field(&f, &images, &[f.one(), 0, 0]), None);

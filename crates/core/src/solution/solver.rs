@@ -1,6 +1,8 @@
 //! Coefficients and solutions: recovered from the fields, solved and verified by the symbolic worker,
 //! or as decimals.
 
+use std::cell::OnceCell;
+
 use obsdeg_exact::Radical;
 use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
@@ -12,8 +14,9 @@ use crate::degree::coefficient::{
     Coefficient, Image, Number, READABLE, Rates, power, rates_between, recover_radical,
 };
 use crate::degree::ensemble::Verdicts;
+use crate::model::angle::Angle;
 use crate::model::platform::{Platform, Point};
-use crate::model::ring::{Float, Text};
+use crate::model::ring::{Float, ManyDigits, Real, Text};
 use crate::model::rotation::Axis;
 use crate::model::symbols::Symbols;
 use crate::model::terms::Source;
@@ -60,6 +63,7 @@ pub struct Solver<'a> {
     pub(super) text: Vec<Vec<String>>,
     pub(super) text_point: Point<Text>,
     pub(super) floats: Option<(Point<Float>, Vec<Vec<f64>>)>,
+    many_digits: OnceCell<Option<Vec<Vec<Real>>>>,
     pub(super) worker: Option<&'a mut Worker>,
     pub(super) frame: Frame,
     /// Per station: its position, and the axis if it turns there.
@@ -97,7 +101,20 @@ impl<'a> Solver<'a> {
             });
         let stations = platform.scheme().stations();
         let stations = stations.iter().map(|s| (s.index, s.turned.as_ref().map(|t| t.axis))).collect();
-        Self { platform, verdicts, tables, symbols, text, text_point, floats, worker, frame, stations }
+        let many_digits = OnceCell::new();
+        Self {
+            platform,
+            verdicts,
+            tables,
+            symbols,
+            text,
+            text_point,
+            floats,
+            many_digits,
+            worker,
+            frame,
+            stations,
+        }
     }
 
     /// Whether formulas in sines and cosines are out of question: too many different angles.
@@ -260,8 +277,31 @@ impl<'a> Solver<'a> {
                 return Some(pairs.map(|(raw, (_, numbers))| self.simplest(raw, numbers)).collect());
             }
         }
+        if let Some(numbers) = self.many_digits().and_then(|rows| problem.solve_in_many_digits(rows)) {
+            return Some(numbers.into_iter().map(Number::Decimal).collect());
+        }
         let (_, rows) = self.floats.as_ref()?;
         Some(problem.solve_in_floats(rows, &[])?.into_iter().map(|x| Number::Decimal(tidy(x))).collect())
+    }
+
+    /// The observable rows at the rates of decimals in many digits; `None` for generic angles, and for torquer errors, whose turns have none.
+    fn many_digits(&self) -> Option<&Vec<Vec<Real>>> {
+        let rows = self.many_digits.get_or_init(|| {
+            let scheme = self.platform.scheme();
+            self.floats.as_ref().filter(|_| !scheme.unknowns.have(Source::Rate))?;
+            let known =
+                |a: &Angle| ManyDigits::cos_sin(a.turn().nanodeg()).unwrap_or((Real::ZERO, Real::ZERO));
+            let rate = |zero: bool| if zero { Real::ZERO } else { Real::from_i64(1) };
+            let point = Point {
+                ring: ManyDigits,
+                w_n: rate(self.tables.zeros.w_n),
+                w_u: rate(self.tables.zeros.w_u),
+                attitudes: scheme.stations().iter().map(|s| s.attitude(&ManyDigits, known)).collect(),
+                turns: Vec::new(),
+            };
+            Some(rows_at(self.platform, &point, &self.tables.observables))
+        });
+        rows.as_ref()
     }
 
     fn simplest(&self, raw: String, numbers: &[u64]) -> Number {

@@ -7,8 +7,9 @@ use serde::Serialize;
 use super::constraints::slots_of;
 use super::dag::Op;
 use super::fibre::{Count, values_taken};
+use super::functions::gcd;
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
-use super::model::{Compiled, ModelError, Role, StateStart, SystemModel};
+use super::model::{Compiled, ModelError, Role, StartTime, StateStart, SystemModel};
 use super::remedies::remedies;
 use super::rows::Unknown;
 use super::solutions::solutions;
@@ -46,6 +47,9 @@ pub struct SystemAnalysis {
     pub quantities: Vec<SystemQuantity>,
     /// States whose start is known.
     pub known: Vec<String>,
+    /// Time at which the first segment was judged, where the equations hold it: a number, or `generic` (almost every time, as in all later
+    /// segments); null where they do not.
+    pub time: Option<String>,
     /// Equations that hold at the start; their differentials count as rows of order 0.
     pub constraints: Vec<String>,
     /// Combinations that were asked for.
@@ -111,7 +115,7 @@ pub struct SystemQuantity {
     pub unit: String,
     /// What it is, as the file says.
     pub description: String,
-    /// The verdict: locally observable (finitely many solutions), inseparable from its partners, not excited, or not seen up to the
+    /// The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not seen up to the
     /// bound on the order.
     pub status: Status,
     /// The smallest order of derivatives that solves it.
@@ -133,7 +137,7 @@ pub enum NumberOfSolutions {
     OneByExpression,
     /// So many, complex ones counted: by elimination at a random point modulo each prime.
     Counted(usize),
-    /// Finitely many. Why their number is not decided.
+    /// Locally unique. Why the number of solutions is not decided.
     Undecided(String),
 }
 
@@ -149,7 +153,8 @@ pub struct SystemCombination {
 /// A symmetry in words.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SymmetryReport {
-    /// `multiply alpha by c, divide gamma by c`.
+    /// What changes no output, for every `c` (every positive one where something is multiplied or divided): `multiply alpha by c; divide
+    /// gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
     pub words: String,
     /// The unknowns that it moves.
     pub unknowns: Vec<String>,
@@ -220,6 +225,10 @@ pub fn analyze_system(
     let mut out = answer(model, &judged, &symmetries);
     out.branches = branches(&compiled);
     out.to_resolve = remedies(model, &compiled, &judged, seed, order);
+    out.time = compiled.uses_time().then(|| match model.time {
+        StartTime::Generic => "generic".into(),
+        time => time.number().to_string(),
+    });
     if !options.solutions {
         return Ok(out);
     }
@@ -331,6 +340,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         known: (model.states.iter().filter(|s| s.start != StateStart::Unknown))
             .map(|s| s.named.name.clone())
             .collect(),
+        time: None,
         constraints: model.constraint_texts(),
         combinations: asked
             .map(|(c, verdict)| SystemCombination { expression: c.text.clone(), degree: verdict.degree })
@@ -383,7 +393,11 @@ pub fn symmetry_reports(
     let name = &|c: usize| name_of(model, judged, c);
     let plain = symmetries.found.iter().map(|s| SymmetryReport {
         words: words(s, &c, name),
-        unknowns: s.scaling.iter().chain(&s.translation).map(|t| name(t.0)).collect(),
+        unknowns: {
+            let scaled = |t: &&(usize, _)| s.scaling.iter().any(|own| own.0 == t.0);
+            let moved = s.translation.iter().filter(|t| !scaled(t));
+            s.scaling.iter().chain(moved).map(|t| name(t.0)).collect()
+        },
     });
     let polynomial = symmetries.polynomial.iter().map(|d| SymmetryReport {
         words: along(d, name),
@@ -429,16 +443,19 @@ fn along(d: &PolynomialDirection, name: &dyn Fn(usize) -> String) -> String {
     format!("move {} along {}", names.join(", "), speeds.join(", "))
 }
 
-/// `multiply a, b by c, divide d by c^2`, `add c to x, subtract 2 c from y`.
+/// A symmetry as what it does to the unknowns, for every `c` where scalings are at work for every positive one: the flow of
+/// `x_i' = c_i x_i + d_i` after the time `log c`, or after `c` where nothing is scaled.
+/// `multiply a, b by c; divide d by c^2`, `add c to x; subtract 2 c from y`, `multiply a by c; replace x by c*x + 1 - c; add log(c) to y`.
 fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
     let fraction = |(p, q): (i64, i64)| if q == 1 { p.to_string() } else { format!("{p}/{q}") };
     let power = |(p, q): (i64, i64)| match (p, q) {
         (1, 1) => c.to_string(),
-        (p, 1) => format!("{c}^{p}"),
+        (p, 1) if p > 0 => format!("{c}^{p}"),
         k => format!("{c}^({})", fraction(k)),
     };
+    let step = if s.scaling.is_empty() { c.to_string() } else { format!("log({c})") };
     let amount = |(p, q): (i64, i64)| {
-        if (p, q) == (1, 1) { c.to_string() } else { format!("{} {c}", fraction((p, q))) }
+        if (p, q) == (1, 1) { step.clone() } else { format!("{} {step}", fraction((p, q))) }
     };
     // unknowns that are treated alike stand together
     let mut groups: Vec<(String, Vec<String>, String)> = Vec::new();
@@ -449,10 +466,29 @@ fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
             None => groups.push((verb.into(), vec![name], rest)),
         };
     for &(i, (p, q)) in &s.scaling {
-        let verb = if p > 0 { "multiply" } else { "divide" };
-        put(verb, name(i), format!("by {}", power((p.abs(), q))));
+        let Some(&(_, (d, e))) = s.translation.iter().find(|t| t.0 == i) else {
+            let verb = if p > 0 { "multiply" } else { "divide" };
+            put(verb, name(i), format!("by {}", power((p.abs(), q))));
+            continue;
+        };
+        // x' = k x + d moves x away from -d/k
+        let (above, below) = (d * q, e * p);
+        let divisor = gcd(above, below) * below.signum();
+        let (centre, factor) = ((above / divisor, below / divisor), power((p, q)));
+        let size = match (centre.0.abs(), centre.1) {
+            (1, 1) => String::new(),
+            size => format!("{}*", fraction(size)),
+        };
+        let moved = match (centre.0 > 0, size.is_empty()) {
+            (true, true) => format!("{factor} - 1"),
+            (false, true) => format!("1 - {factor}"),
+            (true, false) => format!("{size}({factor} - 1)"),
+            (false, false) => format!("{size}(1 - {factor})"),
+        };
+        put("replace", name(i), format!("by {factor}*{} + {moved}", name(i)));
     }
-    for &(i, (p, q)) in &s.translation {
+    let scaled = |i: usize| s.scaling.iter().any(|t| t.0 == i);
+    for &(i, (p, q)) in s.translation.iter().filter(|t| !scaled(t.0)) {
         let (verb, to) = if p > 0 { ("add", "to") } else { ("subtract", "from") };
         put(&format!("{verb} {} {to}", amount((p.abs(), q))), name(i), String::new());
     }

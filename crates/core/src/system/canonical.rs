@@ -2,7 +2,7 @@
 
 use obsdeg_exact::SplitMix64;
 
-use super::model::{Constant, KnownInput, PlacedExpression, StateStart, SystemModel};
+use super::model::{Constant, KnownInput, PlacedExpression, StartTime, StateStart, SystemModel};
 
 impl SystemModel {
     /// The stream of `seed` for one purpose and this model ([`SplitMix64::of`]). Everything takes part but what moves
@@ -69,6 +69,13 @@ impl SystemModel {
             formulas(&mut out, &mut own.constants.iter().map(|(name, f)| (name, f)));
             count(&mut out, own.known_inputs.len());
             out.extend(own.known_inputs.iter().flat_map(|(name, input)| [name.clone(), kind_of(input)]));
+        }
+        match self.time {
+            StartTime::Zero => {}
+            StartTime::At { mantissa, decimals } => {
+                out.extend(["time".into(), format!("{mantissa}e-{decimals}")])
+            }
+            StartTime::Generic => out.extend(["time".into(), "generic".into()]),
         }
         if !self.constraints.is_empty() {
             out.push("constraints".into());

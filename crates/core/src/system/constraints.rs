@@ -14,7 +14,7 @@ use super::dag::{Dag, Op};
 /// Draws of a block: half of all quadratic equations have a root in a field.
 const TRIES: usize = 60;
 /// Highest degree of a constraint on a line.
-const MAX_DEGREE: usize = 64;
+const MAX_DEGREE: usize = 400;
 
 /// The slots that a node depends on.
 pub(crate) fn slots_of(dag: &Dag, node: usize) -> BTreeSet<usize> {

@@ -7,6 +7,7 @@ use super::addition::written_apart;
 use super::dag::{Dag, Op};
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
+use super::real_points::has_real_point;
 use super::rows::{Layout, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
@@ -17,6 +18,9 @@ use crate::model::expression::Function;
 
 /// Pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
+
+/// Largest bound on the probability of a wrong verdict with which a verdict is given.
+const CERTAIN: f64 = 1e-9;
 
 /// From so many orders on, about, fields have roots of unity.
 const LONG: usize = 100;
@@ -261,11 +265,13 @@ pub fn judge_compiled(
         if let Some(count) = independent
             && let Ok(judged) = judge_in_fields(model, apart, &layout, seed)
         {
+            has_real_point(model, compiled, &layout, seed)?;
             return Ok(Judgement { independent_functions: Some(count), ..judged });
         }
         return judge_in_digits(model, compiled, seed, bound);
     }
     let judged = judge_in_fields(model, compiled, &layout, seed)?;
+    has_real_point(model, compiled, &layout, seed)?;
     Ok(Judgement { independent_functions: Some(0), ..judged })
 }
 
@@ -294,6 +300,12 @@ fn judge_in_fields(
         if first.agrees(&second) {
             let error_bound =
                 error_bound(&Claim { order, ..claim(compiled, layout, &first.degrees, runs) }, 2);
+            if error_bound > CERTAIN {
+                return Err(refuse(format!(
+                    "undecided, because the powers in it are too high for primes of 61 bits: two agree, but a verdict may be wrong with \
+                     probability {error_bound:.0e}, where {CERTAIN:.0e} is expected at most"
+                )));
+            }
             let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), error_bound };
             let span = first.span.clone();
             let judged = Judgement::of(layout.clone(), first, SystemCertainty::Primes(primes), seed);

@@ -19,6 +19,7 @@ pub(crate) mod model;
 pub mod model_file;
 mod nominal;
 mod reader;
+pub(crate) mod real_points;
 mod remedies;
 pub(crate) mod rows;
 mod solutions;
@@ -31,7 +32,7 @@ pub use dag::{Dag, DagError, Op};
 pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
 pub use model::{
     Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, ModelError, Named,
-    Nominal, Place, PlacedExpression, Role, Segment, State, StateStart, SystemModel,
+    Nominal, Place, PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
 };
 pub use rows::{Layout, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};

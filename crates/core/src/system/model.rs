@@ -100,6 +100,34 @@ pub struct Experiment {
     pub known_inputs: Vec<(String, KnownInput)>,
 }
 
+/// Time at which the first segment begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StartTime {
+    /// Zero.
+    #[default]
+    Zero,
+    /// `mantissa / 10^decimals`.
+    At {
+        /// The digits.
+        mantissa: i128,
+        /// Number of digits behind the point.
+        decimals: i32,
+    },
+    /// A time that is not given: verdicts are those of almost every time.
+    Generic,
+}
+
+impl StartTime {
+    /// The time; 1 stands for a generic one.
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Zero => 0.0,
+            Self::At { mantissa, decimals } => mantissa as f64 / 10f64.powi(decimals),
+            Self::Generic => 1.0,
+        }
+    }
+}
+
 /// Numbers for a simulation, as far as the file gives them; in the units of the model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nominal {
@@ -148,6 +176,8 @@ pub struct SystemModel {
     pub constraints: Vec<PlacedExpression>,
     /// Combinations to be judged.
     pub combinations: Vec<PlacedExpression>,
+    /// Time at which the first segment begins.
+    pub time: StartTime,
     /// Numbers for a simulation.
     pub simulation: Nominal,
     /// How its records are read.

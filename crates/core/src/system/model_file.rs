@@ -10,11 +10,11 @@ use toml::Value;
 
 use super::model::{
     Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, PlacedExpression,
-    Segment, State, StateStart, SystemModel,
+    Segment, StartTime, State, StateStart, SystemModel,
 };
 use super::nominal::nominal;
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
-use crate::model::expression::{Shape, Shapes, nearest};
+use crate::model::expression::{Node, Shape, Shapes, nearest, parse};
 use crate::model::file_error::explain;
 use crate::model::recording::ModelRecord;
 
@@ -70,7 +70,11 @@ pub struct ModelFile {
     /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
     #[serde(default, rename = "segment")]
     segments: Vec<SegmentEntry>,
-    /// Equations that hold at the start of every experiment, as `norm(q) = 1`: what is random otherwise lies on them, and their
+    /// Time t at which the run begins: a number (0 when left out), or "generic". Where equations or known inputs hold t, the first segment is
+    /// judged at this time: verdicts at t = 0 may differ from those at any later time. Later segments are judged at a generic time.
+    #[schemars(with = "Option<serde_json::Value>")]
+    time: Option<Spanned<Value>>,
+    /// Equations that hold at the start of every experiment (there must be a real point that meets them), as `norm(q) = 1`: what is random otherwise lies on them, and their
     /// differentials are known.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
@@ -197,6 +201,28 @@ impl Reader<'_> {
         let equations = self.fitted((name, &what), equation, span)?;
         let state = |((named, equation), start)| State { named, equation, start };
         Ok(named.into_iter().zip(equations).zip(starts).map(state).collect())
+    }
+
+    /// `0`, `2.5` or `"generic"`.
+    fn time(&self, entry: &Spanned<Value>) -> Result<StartTime, ModelError> {
+        let text = match entry.get_ref() {
+            Value::String(word) if word == "generic" => return Ok(StartTime::Generic),
+            Value::Integer(n) => n.to_string(),
+            Value::Float(x) => x.to_string(),
+            _ => String::new(),
+        };
+        let (negative, digits) = text.strip_prefix('-').map_or((1, text.as_str()), |rest| (-1, rest));
+        match parse(digits).map(|e| e.nodes) {
+            Ok(nodes) => match nodes[..] {
+                [Node::Number { mantissa: 0, .. }] => Ok(StartTime::Zero),
+                [Node::Number { mantissa, decimals }] => {
+                    Ok(StartTime::At { mantissa: negative * mantissa, decimals })
+                }
+                _ => Err(()),
+            },
+            Err(_) => Err(()),
+        }
+        .map_err(|()| self.at(entry.span(), "time".into(), "expected a number or \"generic\"".into()))
     }
 
     /// `{ polynomial = 2 }`.
@@ -467,6 +493,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     for (i, segment) in file.segments.iter().enumerate() {
         model.segments.push(r.segment(i, segment)?);
     }
+    model.time = file.time.as_ref().map_or(Ok(StartTime::Zero), |time| r.time(time))?;
     for c in &file.constraints {
         model.constraints.extend(r.constraint(c)?);
     }

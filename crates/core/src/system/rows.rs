@@ -4,7 +4,7 @@ use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
 use super::adjoint::Adjoint;
-use super::model::{Compiled, CompiledSegment, KnownInput, Role, StateStart, SystemModel};
+use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
 use crate::degree::rows::DerivativeRows;
@@ -531,8 +531,14 @@ impl<'a, S: Values> SystemRows<'a, S> {
         let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
         let (mut runs, mut gap) = (Vec::new(), Gap::OPEN);
+        let any_time = model.time == StartTime::Generic;
+        let time = match model.time {
+            StartTime::Zero => f.zero(),
+            StartTime::At { mantissa, decimals } => f.number(mantissa, decimals),
+            StartTime::Generic => f.random(rng, attempt),
+        };
         for experiment in 0..model.experiments.max(1) {
-            let mut point = maker.draw(experiment, (&parameters, &constants), f.zero(), rng, attempt);
+            let mut point = maker.draw(experiment, (&parameters, &constants), time, rng, attempt);
             maker.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
             maker.hold_constraints(&mut point, experiment == 0, rng)?;
             let value = |slot: usize| match &point.signals[slot] {
@@ -564,7 +570,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 let combinations = compiled.combinations.iter().map(gradient).collect();
                 let end = match () {
                     () if arbitrary => End::Open,
-                    () if generic && (number > 0 || !taylor.depends_on_time()) => End::Stagnation,
+                    () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => End::Stagnation,
                     () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
                     () => match maker.generic_rank(&point, &known, rng) {
                         None => End::Open,

@@ -32,6 +32,8 @@ pub struct CrossCheck {
     pub verdicts_agree: bool,
     /// What disagrees, in words.
     pub disagreements: Vec<String>,
+    /// Reasons why checks are not resolvable, one for each such check.
+    pub unresolved: Vec<String>,
     /// How many checks agree, disagree, are not resolvable, were not made.
     pub counts: Counts,
     /// How slopes are measured, and when something is not resolvable.

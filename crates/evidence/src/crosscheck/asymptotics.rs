@@ -3,7 +3,7 @@
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::slew::W_IE;
 
-use super::precise::{Between, Digits, Functional, Information, Seen};
+use super::precise::{self, Between, Digits, Functional, Seen};
 
 /// Digits that are tried in turn.
 const BITS: [usize; 2] = [1024, 2048];
@@ -78,38 +78,24 @@ pub(super) fn functional(
     terms.iter().map(|&(c, k)| (c, digits.double(scaled(c, k)))).collect()
 }
 
-/// How far the weakest direction that is seen at the dwells of the scheme is from a prior: sigma in that of the prior (standard
-/// deviations in rad and rad/s); `None` where it is not told from rounding. `noise` is that of Z per root of density, and of a
-/// measured azimuth.
-pub(super) fn weakest(
-    scheme: &Scheme,
-    dwell_s: f64,
-    is_psi: &dyn Fn(usize) -> bool,
-    prior: &[f64],
-    noise: [f64; 2],
-) -> Option<f64> {
-    BITS.iter().find_map(|&bits| {
-        let digits = Digits { bits };
-        let information =
-            Information::new(scheme, Between::Dwell, dwell_s * W_IE, digits, (noise[0] / noise[1]).powi(2))?;
-        let unit = |c: usize| if is_psi(c) { 1.0 } else { W_IE };
-        let scale: Vec<f64> = prior.iter().enumerate().map(|(c, p)| p / unit(c)).collect();
-        let smallest = information.scaled(&scale).seen()?.sizes.into_iter().reduce(f64::min);
-        Some(smallest.map_or(0.0, |s| (-s / 2.0).exp2() * noise[0] * W_IE.sqrt()))
-    })
+/// Samples of a scheme at the dwells.
+pub(super) type Samples<'a> = precise::Samples<'a, { BITS.len() }>;
+
+/// Samples of `scheme` at the dwells.
+pub(super) fn samples(scheme: &Scheme) -> Samples<'_> {
+    Samples::new(scheme, DWELLS.iter().map(|&k| 2f64.powi(k)).collect(), BITS)
 }
 
 /// The courses of `questions`; `None` where no digits tell what is seen from rounding.
 pub(super) fn asymptotics(
-    scheme: &Scheme,
+    samples: &Samples<'_>,
     between: Between,
-    is_psi: &dyn Fn(usize) -> bool,
+    is_psi: &(dyn Fn(usize) -> bool + Sync),
     questions: &[Question],
 ) -> Option<Asymptotics> {
-    BITS.iter().find_map(|&bits| {
-        let digits = Digits { bits };
-        let seen = |k: i32| Information::new(scheme, between, 2f64.powi(k), digits, 1.0)?.seen();
-        let seen: Vec<Seen> = DWELLS.iter().map(|&k| seen(k)).collect::<Option<_>>()?;
+    (0..BITS.len()).find_map(|bits| {
+        let seen: Vec<Seen> = samples.seen(bits, between)?;
+        let digits = Digits { bits: BITS[bits] };
         let course = |q: &Question| {
             let terms = functional(digits, is_psi, &q.terms, false);
             let sigmas = |rounded: Option<f64>| -> Vec<Option<f64>> {
@@ -171,7 +157,7 @@ mod tests {
         let ask = |c| Question { terms: vec![(c, 1.0)], exact: true, at_end: false };
         let n = if carry == Carry::Reset { 3 * attitudes.len() + 12 } else { 15 };
         let questions: Vec<Question> = (0..n).map(ask).collect();
-        let found = asymptotics(&scheme, between, &|c| c + 12 < n, &questions).expect("resolved");
+        let found = asymptotics(&samples(&scheme), between, &|c| c + 12 < n, &questions).expect("resolved");
         (found.courses, found.profile.expect("settled"))
     }
 

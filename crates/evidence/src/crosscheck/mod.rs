@@ -11,10 +11,12 @@ mod equations;
 pub(crate) mod monte_carlo;
 mod precise;
 mod ranking;
+mod resolution;
 pub(crate) mod rules;
 pub(crate) mod slopes;
 mod spaces;
 mod structure;
+mod summary;
 
 pub use answer::*;
 pub use monte_carlo::{Experiment, Prepared, Totals};
@@ -25,6 +27,7 @@ use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Position, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::{Form, SquareRootInformation};
+use rayon::prelude::*;
 
 use crate::prediction::Prediction;
 use crate::simulation::batch::{batch, each_row};
@@ -35,6 +38,7 @@ use crate::simulation::{
 };
 use asymptotics::method;
 use structure::{last_covariance, still, structure};
+use summary::{disagreements, misfits, outcomes, unresolved};
 
 /// Relative difference of covariances that is rounding; P itself holds half the digits of its root.
 const COVARIANCE_LIMITS: [(Form, &str, f64); 2] =
@@ -222,6 +226,7 @@ fn against(
         passed: false,
         verdicts_agree: false,
         disagreements: Vec::new(),
+        unresolved: Vec::new(),
         counts: Counts::default(),
         method: method().into_iter().chain([filter_method()]).collect(),
         not_tested: NOT_TESTED.map(String::from).to_vec(),
@@ -240,6 +245,7 @@ fn against(
         seed: options.seed,
         error_bound: prediction.error_bound,
     };
+    out.unresolved = unresolved(&out, structure.unresolved);
     out.disagreements = disagreements(&out);
     out.verdicts_agree = out.disagreements.is_empty();
     out.disagreements.extend(misfits(&out));
@@ -251,10 +257,11 @@ fn against(
 /// When evidence b, c and f of doubles is not resolvable, in words.
 fn filter_method() -> String {
     format!(
-        "b: taken in doubles; what fails is not resolvable where a direction that is seen has, by many digits, a sigma of more than {} of the \
-         prior's, or where a sigma is below what rounding an attitude makes of the widest psi or drift; c: where rounding may make a tenth of the limit; f: where the filter is off by less than {OFF_DEG} deg, \
+        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits say that the prior of the filter is \
+         too narrow to show it, or that moving the numbers of the model by 2^{} hides it; c: where rounding may make a tenth of the limit; f: where \
+         the filter is off by less than {OFF_DEG} deg, \
          or where what it cannot explain of the truths drawn need not show in {MANY_RUNS} runs",
-        structure::WEAK
+        resolution::ROUNDING
     )
 }
 
@@ -341,8 +348,23 @@ fn controls(
         Some((FilterChange { latitude: elsewhere, ..FilterChange::default() }, far)),
         farthest.map(|(i, off)| (FilterChange { dropped: Some(i), ..FilterChange::default() }, off)),
     ];
+    let changes: Vec<(FilterChange, f64)> = changes.into_iter().flatten().collect();
+    let counted = changes.par_iter().map(|(change, _)| -> Result<(usize, usize), SimulationError> {
+        let filter_scheme = change.apply(scheme);
+        let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
+        // what a wrong filter's numbers do not resolve is no check of it
+        match structure(&truth, prediction, &filter_scheme, &filter_conditions) {
+            Ok(structure) => {
+                let counts = structure.counts();
+                Ok((counts.disagree, counts.agree + counts.disagree))
+            }
+            Err(e) if e.is_numeric() => Ok((0, 0)),
+            Err(e) => Err(e),
+        }
+    });
+    let counted: Vec<_> = counted.collect();
     let mut out = Vec::new();
-    for (change, off_deg) in changes.iter().flatten() {
+    for ((change, off_deg), counts) in changes.iter().zip(counted) {
         let filter_scheme = change.apply(scheme);
         let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
         let filter = Plan::new(&filter_scheme, &filter_conditions)?;
@@ -350,15 +372,7 @@ fn controls(
         if filter.stages == truth.stages {
             continue;
         }
-        // what a wrong filter's numbers do not resolve is no check of it
-        let (failed, checks) = match structure(&truth, prediction, &filter_scheme, &filter_conditions) {
-            Ok(structure) => {
-                let counts = structure.counts();
-                (counts.disagree, counts.agree + counts.disagree)
-            }
-            Err(e) if e.is_numeric() => (0, 0),
-            Err(e) => return Err(e),
-        };
+        let (failed, checks) = counts?;
         let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: None, seed };
         let prepared = Prepared::new(experiment)?;
         let by_data = |runs| prepared.statistics(&prepared.run(runs, &|_| true)).pop();
@@ -442,91 +456,6 @@ fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<boo
 fn angle_deg(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     let trace: f64 = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| a[i][j] * b[i][j]).sum();
     ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
-}
-
-/// How every check came out.
-fn outcomes(c: &CrossCheck) -> impl Iterator<Item = Agreement> {
-    let covariance = c.covariance.iter().map(|d| d.outcome);
-    let statistics = c.monte_carlo.statistics.iter().map(|s| s.pass);
-    let controls = c.controls.iter().map(|k| k.outcome);
-    let others = statistics.chain([c.monte_carlo.white, c.ranking.pass]).map(Agreement::of);
-    let structure = structure::outcomes(&c.quantities, &c.spaces, &c.null_space, &c.defect);
-    structure.chain(covariance).chain(controls).chain(others)
-}
-
-/// What failed of d, in words.
-fn misfits(c: &CrossCheck) -> Vec<String> {
-    let mut out = Vec::new();
-    for s in c.monte_carlo.statistics.iter().filter(|s| !s.pass) {
-        let (low, high) = s.wide_band;
-        out.push(format!("{} is {:.4}, outside {low:.3}..{high:.3}", s.name, s.measured));
-    }
-    if c.monte_carlo.unsettled > 0 {
-        out.push(format!("{} of {} runs did not settle", c.monte_carlo.unsettled, c.monte_carlo.runs));
-    }
-    if !c.monte_carlo.white {
-        out.push("innovations are not white".into());
-    }
-    out
-}
-
-/// What failed of a, b, c, e and f, in words.
-fn disagreements(c: &CrossCheck) -> Vec<String> {
-    let mut out = Vec::new();
-    let failed = |c: &Check| c.measured.filter(|_| c.fails());
-    for q in &c.quantities {
-        if !q.modelled {
-            out.push(format!("{}: the filter has no such unknown", q.name));
-        }
-        if let (Some(found), Agreement::Disagrees) = (q.status_measured, q.status_outcome) {
-            out.push(format!("{}: {found} instead of {}", q.name, q.status));
-        }
-        for (check, of) in [
-            (&q.degree_slope, "slope without dwells"),
-            (&q.slope, "slope"),
-            (&q.slope_at_end, "slope at the end"),
-        ] {
-            if let Some(found) = failed(check) {
-                out.push(format!("{}: {of} {found:.3} instead of {:.1}", q.name, check.predicted));
-            }
-        }
-        if let Some(p) = q.partners.as_ref().filter(|p| p.outcome == Agreement::Disagrees) {
-            let list = |names: &[String]| if names.is_empty() { "none".into() } else { names.join(", ") };
-            let found = p.measured.as_deref().map_or_else(String::new, list);
-            out.push(format!("{}: partners {found} instead of {}", q.name, list(&p.predicted)));
-        }
-        if let Some(found) = failed(&q.inflation) {
-            let expected = q.inflation.predicted;
-            out.push(format!("{}: prior inflation {found:.3} instead of {expected:.0}", q.name));
-        }
-    }
-    for s in c.spaces.iter().filter(|s| s.outcome == Agreement::Disagrees) {
-        out.push(format!("{}: {} instead of {}", s.what, s.measured, s.predicted));
-    }
-    for v in &c.null_space {
-        if v.seen.fails() {
-            out.push(format!("{}: the filter sees this direction", v.direction));
-        }
-        if v.correlation.is_some_and(|k| k.fails()) {
-            out.push(format!("{}: correlation is not +-1", v.direction));
-        }
-    }
-    if c.defect.outcome == Agreement::Disagrees {
-        out.push(format!("{} directions unseen instead of {}", c.defect.measured, c.defect.predicted));
-    }
-    out.extend(
-        c.covariance
-            .iter()
-            .filter(|d| d.outcome == Agreement::Disagrees)
-            .map(|d| format!("{}: {:.1e}", d.name, d.difference)),
-    );
-    if !c.ranking.pass {
-        out.push("predicted and measured orders rank differently".into());
-    }
-    for control in c.controls.iter().filter(|k| k.outcome == Agreement::Disagrees) {
-        out.push(format!("{} was not found out", control.name));
-    }
-    out
 }
 
 /// The band of the mean of `count` chi-square variables of `dof` degrees of freedom, 95 %.

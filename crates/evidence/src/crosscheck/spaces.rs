@@ -58,18 +58,8 @@ fn null_space(
         out.outcome = Agreement::NotResolvable;
         return out;
     };
-    let (free, rows) = seen.reduced();
-    let unseen = |v: &Combination| {
-        // a change of drift in units of the earth rate
-        let v = functional(seen.digits(), &|c| is_psi(c), v, true);
-        let entry = |c: usize| v.iter().filter(move |(d, _)| *d == c).map(|(_, x)| x);
-        let alone = |c: usize| entry(c).map(|x| (None, x)).collect::<Vec<_>>();
-        seen.pivots.iter().zip(&rows).all(|(&pivot, row)| {
-            let moved = free.iter().zip(row).flat_map(|(&f, r)| entry(f).map(move |x| (Some(r), x)));
-            add_up(seen.digits(), alone(pivot).into_iter().chain(moved)) <= ROUNDED[0]
-        })
-    };
-    let hidden = vectors.iter().filter(|v| unseen(v)).count();
+    let free = seen.free();
+    let hidden = count_unseen(seen, vectors, is_psi);
     let on_free: Vec<Vec<f64>> = vectors.iter().map(|v| dense(v, &free, is_psi, true)).collect();
     let rank = rank(on_free);
     let unexcited = seen.excited.iter().filter(|e| !**e).count();
@@ -86,10 +76,27 @@ fn null_space(
     out
 }
 
-/// The directions that are not seen with dwells either: as many as `hidden`, independent; `partial` where others are known to be there.
-/// That each is not seen, the filter's information says.
+/// Number of vectors that nothing of what is seen moves.
+fn count_unseen(seen: &Seen, vectors: &[Combination], is_psi: &dyn Fn(usize) -> bool) -> usize {
+    let (free, rows) = seen.reduced();
+    let unseen = |v: &&Combination| {
+        // a change of drift in units of the earth rate
+        let v = functional(seen.digits(), &|c| is_psi(c), v, true);
+        let entry = |c: usize| v.iter().filter(move |(d, _)| *d == c).map(|(_, x)| x);
+        let alone = |c: usize| entry(c).map(|x| (None, x)).collect::<Vec<_>>();
+        seen.pivots.iter().zip(&rows).all(|(&pivot, row)| {
+            let moved = free.iter().zip(row).flat_map(|(&f, r)| entry(f).map(move |x| (Some(r), x)));
+            add_up(seen.digits(), alone(pivot).into_iter().chain(moved)) <= ROUNDED[0]
+        })
+    };
+    vectors.iter().filter(unseen).count()
+}
+
+/// The directions that are not seen with dwells either: as many as `hidden`, independent, each seen by nothing; `partial` where others are
+/// known to be there.
 pub(super) fn with_dwells(
     prediction: &Prediction,
+    shown: Option<&Asymptotics>,
     hidden: Option<usize>,
     partial: bool,
     is_psi: &dyn Fn(usize) -> bool,
@@ -98,11 +105,14 @@ pub(super) fn with_dwells(
     let columns: Vec<usize> = (0..prediction.unknowns.len()).collect();
     let vectors = prediction.null_space.iter();
     let rank = rank(vectors.map(|v| dense(v, &columns, is_psi, true)).collect());
-    let measured = |n: usize| match rank {
-        Some(r) => format!("{n} ({r} independent)"),
-        None => n.to_string(),
+    let unseen = shown.map_or(listed, |s| count_unseen(&s.seen, &prediction.null_space, is_psi));
+    let measured = |n: usize| match (rank, unseen == listed) {
+        (Some(r), true) => format!("{n} ({r} independent)"),
+        (_, false) => format!("{n} ({unseen} of those listed are not seen)"),
+        (None, true) => n.to_string(),
     };
     let outcome = match (hidden, rank) {
+        _ if unseen != listed => Agreement::Disagrees,
         (Some(n), _) if listed > n || (listed < n && !partial) => Agreement::Disagrees,
         (_, Some(r)) if r < listed => Agreement::Disagrees,
         (Some(_), Some(_)) => Agreement::Agrees,

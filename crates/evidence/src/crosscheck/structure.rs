@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
-use obsdeg_core::model::{Carry, Dwell, Latitude, Scheme, Unknowns};
+use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
@@ -10,8 +10,9 @@ use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 use super::answer::{
     Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SpaceCheck,
 };
-use super::asymptotics::{Asymptotics, Course, Question, asymptotics, weakest};
+use super::asymptotics::{Asymptotics, Course, Question, asymptotics, samples};
 use super::precise::Between;
+use super::resolution::{ROUNDING, Resolution};
 use super::slopes::{self, slopes};
 use super::{rules, spaces};
 use crate::prediction::{Combination, PredictedUnknown, Prediction};
@@ -20,11 +21,6 @@ use crate::simulation::conditions::{is_rate, shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
-/// Parts of a null vector that are smaller, beside its largest and by what Z shows of each alone, show no correlation
-/// where other directions are hardly seen.
-const SMALL_PART: f64 = 0.01;
-/// Sigma of the weakest direction that is seen, beside the prior of evidence b: above it, that prior is none, and doubles lose what is seen.
-pub(super) const WEAK: f64 = 1e-2;
 /// What of a column is rounding, relative to the longest of its kind.
 const NOTHING: f64 = 1e-14;
 /// What counts as not seen, relative to the best seen direction.
@@ -38,6 +34,8 @@ pub(super) struct Structure {
     pub(super) defect: Count,
     pub(super) slopes: Vec<SlopeCurve>,
     pub(super) correlation: Correlation,
+    /// Why evidence b is not resolvable, one reason for each check of it that is not.
+    pub(super) unresolved: Vec<String>,
 }
 
 /// The outcomes of evidence a and b.
@@ -78,20 +76,19 @@ pub(super) fn structure(
     let known: Vec<Combination> = functionals.iter().flatten().cloned().collect();
     let shown = Shown::of(&filter, truth, &functionals);
     let inflation = inflation(&filter, &known)?;
-    let weak = is_weak(&filter, conditions, &inflation.prior);
-    let (null_space, defect) = null_evidence(truth, &filter, prediction, &shown, &inflation.correlation)?;
+    let resolution = Resolution::new(&filter, conditions, &inflation.prior);
+    let (mut null_space, defect) = null_evidence(truth, &filter, prediction, &shown, &inflation.correlation)?;
     let is_psi = |c: usize| !is_rate(filter.platform.units()[c]);
     let same = truth.platform.names() == filter.platform.names();
     let mut quantities = quantities(truth, &names, prediction, &functionals, &shown, &inflation.ratios);
-    let mut null_space = null_space;
-    let lost = functionals
-        .iter()
-        .scan(inflation.lost.iter(), |lost, f| Some(f.is_some() && lost.next().is_some_and(|l| *l)));
-    let inflations = quantities.iter_mut().map(|q| &mut q.inflation).zip(lost);
-    let correlations = null_space.iter_mut().filter_map(|v| v.correlation.as_mut()).map(|c| (c, false));
-    for (check, _) in inflations.chain(correlations).filter(|(c, lost)| c.fails() && (weak || *lost)) {
-        check.outcome = Agreement::NotResolvable;
+    let mut unresolved = Vec::new();
+    let present = quantities.iter_mut().zip(&functionals).filter_map(|(q, f)| Some((q, f.as_ref()?)));
+    for (i, (q, terms)) in present.enumerate() {
+        unresolved.extend(decide_inflation(q, terms, shown.courses(i)[2], &resolution));
     }
+    unresolved.extend(null_space.iter_mut().filter_map(decide_seen));
+    unresolved.extend(null_space.iter_mut().filter_map(|v| decide_correlation(v, &resolution)));
+    let null_space = null_space.into_iter().map(|v| v.evidence).collect();
     // at a pole drift moves psi that nobody sees, and directions without numbers are not listed
     let pole = truth.platform.scheme().latitude.is_some_and(Latitude::is_pole);
     let partial = pole || prediction.unseen_by_derivatives.is_none();
@@ -99,7 +96,7 @@ pub(super) fn structure(
     let mut spaces = Vec::new();
     if same {
         spaces.extend(spaces::spaces(prediction, shown.derivatives.as_ref(), &is_psi));
-        spaces.push(spaces::with_dwells(prediction, hidden, partial, &is_psi));
+        spaces.push(spaces::with_dwells(prediction, shown.with_dwells(), hidden, partial, &is_psi));
     }
     Ok(Structure {
         quantities,
@@ -111,17 +108,56 @@ pub(super) fn structure(
             names: filter.platform.names().to_vec(),
             values: inflation.correlation.row_iter().map(|r| r.iter().copied().collect()).collect(),
         },
+        unresolved,
     })
 }
 
-/// Whether a direction that is seen has, by many digits, hardly a smaller sigma than the prior.
-fn is_weak(filter: &Plan, conditions: &Conditions, prior: &[f64]) -> bool {
-    let (scheme, units) = (filter.platform.scheme(), filter.platform.units());
-    let dwell_s = scheme.positions[0].dwell.map_or(conditions.dwell_s, Dwell::seconds);
-    let density = conditions.step_s.sqrt();
-    let noise =
-        [conditions.accelerometer_noise_g, conditions.azimuth_noise_deg.to_radians()].map(|s| s * density);
-    weakest(scheme, dwell_s, &|c| !is_rate(units[c]), prior, noise).is_none_or(|sigma| sigma > WEAK)
+/// The prior inflation of a quantity, by many digits first: whether the samples determine it is what its slope at the end shows. What the
+/// filter in doubles shows counts where many digits say that it must show it. The reason, where it is not resolvable.
+fn decide_inflation(
+    q: &mut QuantityEvidence,
+    terms: &Combination,
+    at_end: Option<Course>,
+    resolution: &Resolution<'_>,
+) -> Option<String> {
+    let determined = match at_end.filter(|_| q.slope_at_end.outcome.is_resolved()) {
+        Some(Course::Slope(_)) => Some(true),
+        Some(Course::Unseen) => Some(false),
+        Some(Course::Bends) | None => None,
+    };
+    let said = q.inflation.predicted == 1.0;
+    if determined.is_some_and(|determined| determined != said) {
+        q.inflation.outcome = Agreement::Disagrees;
+        return None;
+    }
+    let measured = q.inflation.measured.filter(|_| q.inflation.fails())?;
+    let why = match determined {
+        Some(determined) => resolution.inflation(terms, determined)?,
+        None => "many digits do not tell whether it is determined".into(),
+    };
+    q.inflation.outcome = Agreement::NotResolvable;
+    Some(format!("{}: prior inflation {measured:.3}: {why}", q.name))
+}
+
+/// That a filter in doubles sees a direction counts where rounding does not show as much of it; the reason, where it is not resolvable.
+fn decide_seen(v: &mut Direction) -> Option<String> {
+    let NullEvidence { direction, seen, .. } = &mut v.evidence;
+    let measured = seen.measured.filter(|x| seen.fails() && *x <= v.rounding)?;
+    seen.outcome = Agreement::NotResolvable;
+    Some(format!(
+        "{direction}: part of it seen {measured:.1e}: moving the numbers of the model by 2^{ROUNDING} may show {:.1e}",
+        v.rounding
+    ))
+}
+
+/// The correlation along a direction counts where many digits say that the filter must show it; the reason, where it is not resolvable.
+fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<String> {
+    let NullEvidence { direction, correlation, .. } = &mut v.evidence;
+    let check = correlation.as_mut().filter(|c| c.fails())?;
+    let (pair, sign) = v.weakest?;
+    let why = resolution.correlation(pair, sign)?;
+    check.outcome = Agreement::NotResolvable;
+    Some(format!("{direction}: correlation {:.6}: {why}", check.measured?))
 }
 
 /// What samples show as the dwell goes to zero.
@@ -145,10 +181,12 @@ impl Shown {
         let start: Vec<Question> = questions(false).collect();
         let alone = scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift;
         let both = || -> Vec<Question> { questions(false).chain(questions(true)).collect() };
-        Self {
-            derivatives: asymptotics(scheme, Between::Nothing, &is_psi, &start),
-            dwells: (!alone).then(|| asymptotics(scheme, Between::Dwell, &is_psi, &both())),
-        }
+        let samples = samples(scheme);
+        let (derivatives, dwells) = rayon::join(
+            || asymptotics(&samples, Between::Nothing, &is_psi, &start),
+            || (!alone).then(|| asymptotics(&samples, Between::Dwell, &is_psi, &both())),
+        );
+        Self { derivatives, dwells }
     }
 
     /// Of the functional of this number: the courses by derivatives, with dwells, and with dwells at the end.
@@ -164,10 +202,14 @@ impl Shown {
         }
     }
 
+    /// What is seen with dwells.
+    fn with_dwells(&self) -> Option<&Asymptotics> {
+        self.dwells.as_ref().unwrap_or(&self.derivatives).as_ref()
+    }
+
     /// The rank with dwells.
     fn rank(&self) -> Option<usize> {
-        let found = self.dwells.as_ref().unwrap_or(&self.derivatives);
-        Some(found.as_ref()?.seen.rank())
+        Some(self.with_dwells()?.seen.rank())
     }
 }
 
@@ -214,8 +256,6 @@ fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Opti
 struct Inflation {
     /// Of every functional: the factor on sigma.
     ratios: Vec<f64>,
-    /// Whether its sigma is lost in what rounding of attitudes makes of what is not seen.
-    lost: Vec<bool>,
     /// Correlation under the diffuse prior.
     correlation: DMatrix<f64>,
     /// Standard deviations of that.
@@ -233,19 +273,10 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let ratios = functionals.iter().map(ratio).collect::<Result<_, obsdeg_ekf::EkfError>>()?;
     let n = plan.unknowns();
     let sigma = small.sigmas();
-    let is_psi = |i: usize| !is_rate(plan.platform.units()[i]);
-    let largest = |psi: bool| (0..n).filter(|&i| is_psi(i) == psi).map(|i| sigma[i]).fold(0.0, f64::max);
-    let lost = |c: &Combination| {
-        let coefficient = c.iter().map(|(_, k)| k.abs()).fold(0.0, f64::max);
-        let rounding = f64::EPSILON * coefficient * c.first().map_or(0.0, |&(i, _)| largest(is_psi(i)));
-        Ok(small.variance(c)?.sqrt() < rounding)
-    };
-    let lost = functionals.iter().map(lost).collect::<Result<_, obsdeg_ekf::EkfError>>()?;
     let small = small.matrix();
     Ok(Inflation {
         prior,
         ratios,
-        lost,
         correlation: DMatrix::from_fn(n, n, |i, j| small[(i, j)] / (sigma[i] * sigma[j])),
     })
 }
@@ -339,6 +370,15 @@ fn quantities(
         .collect()
 }
 
+/// A direction that Z does not see, as the verdicts say.
+struct Direction {
+    evidence: NullEvidence,
+    /// The two of its unknowns that are correlated least, and the sign of their correlation.
+    weakest: Option<([usize; 2], f64)>,
+    /// The part of it that rounding of the model may show.
+    rounding: f64,
+}
+
 /// What Z does not see: the predicted null vectors against the information, and their number.
 fn null_evidence(
     truth: &Plan,
@@ -346,17 +386,17 @@ fn null_evidence(
     prediction: &Prediction,
     shown: &Shown,
     correlation: &DMatrix<f64>,
-) -> Result<(Vec<NullEvidence>, Count), SimulationError> {
+) -> Result<(Vec<Direction>, Count), SimulationError> {
     let n = filter.unknowns();
     let root = batch(filter, SquareRootInformation::none(n))?.information;
     // columns of unit length, so that units do not matter; what cosines of right angles leave of a column is nothing
     let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
     let units = filter.platform.units();
-    let largest = |unit: &str| {
+    let largest_of = |unit: &str| {
         let own = lengths.iter().zip(units).filter(|(_, u)| is_rate(u) == is_rate(unit));
         own.map(|(x, _)| *x).fold(0.0, f64::max)
     };
-    let norm = |(x, unit): (&f64, &&str)| match largest(unit) {
+    let norm = |(x, unit): (&f64, &&str)| match largest_of(unit) {
         0.0 => 1.0,
         most if *x <= NOTHING * most => most,
         _ => *x,
@@ -389,24 +429,24 @@ fn null_evidence(
         let alone = prediction
             .whole_null_space()
             .is_some_and(|all| all.iter().enumerate().all(|(i, other)| i == k || !shares(other)));
-        let correlation = (comparable && alone && vector.len() > 1).then(|| {
-            let pairs = vector.iter().enumerate().flat_map(|(i, a)| vector[..i].iter().map(move |b| (a, b)));
-            let signed = pairs.map(|(a, b)| correlation[(a.0, b.0)] * (a.1 * b.1).signum());
-            // NaN stays
-            let smallest = signed.fold(1.0, |a: f64, b| if b >= a { a } else { b });
-            let mut check = Check::new(1.0, Some(smallest), |x| x > 0.999);
-            // a part that is small beside the others is moved more by what else is hardly seen
-            let parts = vector.iter().map(|&(c, x)| (x * norms[c]).abs());
-            let (least, most) = parts.fold((f64::MAX, 0.0f64), |(l, m), x| (l.min(x), m.max(x)));
-            if check.fails() && least < SMALL_PART * most {
-                check.outcome = Agreement::NotResolvable;
-            }
-            check
-        });
-        evidence.push(NullEvidence {
-            direction: parts.join(", "),
-            seen: Check::new(0.0, seen, |s| s <= UNSEEN),
-            correlation,
+        let parts_of = if comparable && alone { vector.as_slice() } else { &[] };
+        let pairs = parts_of.iter().enumerate().flat_map(|(i, a)| parts_of[..i].iter().map(move |b| (a, b)));
+        let signed = pairs.map(|(a, b)| (([a.0, b.0], (a.1 * b.1).signum()), correlation[(a.0, b.0)]));
+        // NaN stays
+        let weakest = signed
+            .map(|((pair, sign), x)| ((pair, sign), x * sign))
+            .reduce(|a, b| if b.1 >= a.1 || a.1.is_nan() { a } else { b });
+        let moved = |&(c, x): &(usize, f64)| (x * largest_of(units[c])).abs();
+        let size = |v: &Combination| v.iter().map(|&(c, x)| (x * norms[c]).powi(2)).sum::<f64>().sqrt();
+        let part = |v: &Combination| v.iter().map(moved).sum::<f64>() / (size(v) * largest);
+        evidence.push(Direction {
+            weakest: weakest.map(|w| w.0),
+            rounding: if comparable { f64::from(ROUNDING).exp2() * part(vector) } else { 0.0 },
+            evidence: NullEvidence {
+                direction: parts.join(", "),
+                seen: Check::new(0.0, seen, |s| s <= UNSEEN),
+                correlation: weakest.map(|(_, x)| Check::new(1.0, Some(x), |x| x > 0.999)),
+            },
         });
     }
     Ok((evidence, defect))

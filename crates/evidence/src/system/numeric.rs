@@ -33,6 +33,8 @@ pub struct Numeric<'a> {
     constants: Vec<Vec<f64>>,
     /// Known inputs that are held at a value, whatever the time.
     held: Vec<Option<f64>>,
+    /// Time of the model at which a run begins.
+    origin: f64,
     /// The state of the filter that a slot is, of every experiment.
     columns: Vec<Vec<Option<usize>>>,
 }
@@ -98,7 +100,8 @@ impl<'a> Numeric<'a> {
             columns.push(compiled.roles.iter().map(column).collect());
         }
         let held = vec![None; model.known_inputs.len()];
-        Ok(Self { compiled, states, names, inputs, constants, held, columns })
+        let origin = model.time.number();
+        Ok(Self { compiled, states, names, inputs, constants, held, origin, columns })
     }
 
     /// Holds the known input `input` at a value from now on.
@@ -123,6 +126,7 @@ impl<'a> Numeric<'a> {
 
     /// The values of all nodes at a time of a part.
     fn values(&self, part: usize, t: f64, x: &[f64]) -> Vec<f64> {
+        let t = t + self.origin;
         let dag = &self.compiled.dag;
         let experiment = part / self.segments();
         let mut values: Vec<f64> = Vec::with_capacity(dag.ops.len());

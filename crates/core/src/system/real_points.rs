@@ -1,0 +1,68 @@
+//! Real points at which the constraints of a model hold: prime fields have points where there is no real one.
+
+use obsdeg_exact::Reals;
+
+use super::model::{Compiled, ModelError, Role, StateStart, SystemModel};
+use super::rows::{Layout, Maker};
+use super::values::Values;
+
+/// Starts of Newton's method: the values of the file first, then random points, the later the farther.
+const TRIES: usize = 200;
+/// Random attempts from one start to the next: sizes grow with them.
+const FARTHER: usize = 10;
+
+/// Looks for a real point at which all constraints hold.
+///
+/// # Errors
+/// [`ModelError`] where none was found.
+pub(super) fn has_real_point(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    seed: u64,
+) -> Result<(), ModelError> {
+    let Some(first) = model.constraints.first() else { return Ok(()) };
+    let field = Reals::<4>;
+    let maker = Maker { model, compiled, layout, field };
+    let mut rng = model.random(seed, "real points");
+    let free: Vec<bool> = (compiled.roles.iter())
+        .map(|role| match *role {
+            Role::State(i) => !matches!(model.states[i].start, StateStart::Value(_)),
+            Role::Parameter(_) => true,
+            Role::Constant(c) => compiled.constants(0)[c].is_none(),
+            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
+        })
+        .collect();
+    for attempt in 0..TRIES {
+        let Some(mut values) = maker.values(&mut rng, attempt * FARTHER) else { continue };
+        if attempt == 0 {
+            for (slot, value) in nominal(model, compiled).into_iter().enumerate() {
+                values[slot] =
+                    value.filter(|_| free[slot]).map_or(values[slot], obsdeg_exact::Ball::from_f64);
+            }
+        }
+        if field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut rng).is_ok() {
+            return Ok(());
+        }
+    }
+    let all = if model.constraints.len() > 1 { " together with the others" } else { "" };
+    let message = format!(
+        "no real point was found at which it holds{all}, in {TRIES} tries from random points; if there is one, give it under \
+         [simulation.values]"
+    );
+    Err(first.place.error(message, 0..first.text.len()))
+}
+
+/// The value that the file gives for a simulation, of every slot.
+fn nominal(model: &SystemModel, compiled: &Compiled) -> Vec<Option<f64>> {
+    let value = |role: &Role| {
+        let name = match *role {
+            Role::State(i) => &model.states[i].named.name,
+            Role::Parameter(i) => &model.parameters[i].name,
+            Role::Constant(i) => &model.constants[i].0.name,
+            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => return None,
+        };
+        model.simulation.values.get(name).copied()
+    };
+    compiled.roles.iter().map(value).collect()
+}

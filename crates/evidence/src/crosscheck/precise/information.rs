@@ -1,0 +1,105 @@
+//! The information of samples on the unknowns at the start.
+
+use std::sync::Arc;
+
+use super::digits::{Digits, Real, Vector};
+use super::model::{LOCAL, Model, Moments};
+
+/// What becomes of psi between the start of one position and that of the next, besides the carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum Between {
+    /// Nothing: Phi = 1. What samples determine then is what derivatives do.
+    Nothing,
+    /// It moves during the dwell.
+    Dwell,
+}
+
+/// A local unknown at the start of a position as a functional: nine rows, one entry per column.
+struct Local {
+    columns: Vec<usize>,
+    rows: [Vector; LOCAL],
+}
+
+/// The information of all samples on the unknowns at the start.
+pub(super) struct Information {
+    pub(super) digits: Digits,
+    /// Its matrix (n x n), symmetric.
+    pub(super) matrix: Vec<Vector>,
+    /// psi of the end in the carried axes as functionals of the unknowns at the start, where psi is handed on.
+    pub(super) psi_at_end: Option<[Vector; 3]>,
+}
+
+impl Information {
+    /// Of the samples `moments`, one for each position.
+    pub(super) fn new(model: &Model, moments: &[Arc<Moments>], between: Between) -> Self {
+        let (d, reset) = (model.digits, model.reset);
+        let n = model.unknowns;
+        let coefficients = model.drifts[0][0].len();
+        let first = n - coefficients;
+        let unit = |r: usize| (0..3 + coefficients).map(|k| d.int(i64::from(r == k))).collect::<Vector>();
+        // psi in the carried axes, as functionals of psi at the start and the coefficients
+        let mut psi: [Vector; 3] = std::array::from_fn(unit);
+        let mut matrix = vec![vec![d.int(0); n]; n];
+        for (i, (to_n, drift)) in model.carried.iter().zip(&model.drifts).enumerate() {
+            if reset {
+                psi = std::array::from_fn(unit);
+            }
+            let own = if reset { 3 * i } else { 0 };
+            let columns: Vec<usize> = (own..own + 3).chain(first..n).collect();
+            let behind =
+                |row: &Vector| (0..3).map(|_| d.int(0)).chain(row.iter().cloned()).collect::<Vector>();
+            // in turns at once torquers add to psi^n, not to the psi that is carried
+            let torqued: [Vector; 3] = std::array::from_fn(|r| behind(&model.torqued[i][r]));
+            let carried = |r: usize, k: usize| d.dot((0..3).map(|j| (&to_n[r][j], &psi[j][k])));
+            let carried: [Vector; 3] =
+                std::array::from_fn(|r| (0..columns.len()).map(|k| carried(r, k)).collect());
+            let rows: [Vector; LOCAL] = std::array::from_fn(|r| match r {
+                0..3 => carried[r].iter().zip(&torqued[r]).map(|(x, y)| d.add(x, y)).collect(),
+                3..6 => behind(&drift[r - 3]),
+                _ => behind(&model.errors[i][r - 6]),
+            });
+            let local = Local { columns, rows };
+            local.add(d, &moments[i].gram, &mut matrix);
+            if between == Between::Dwell && !reset {
+                let moved = &moments[i].end;
+                let after: [Vector; 3] = std::array::from_fn(|r| {
+                    // what the dwell makes of torqued psi^n, less that itself: no digits of it are left where nothing moves it
+                    let change = |j: usize| d.sub(&moved[r][j], &d.int(i64::from(r == j)));
+                    let change: [Real; 3] = std::array::from_fn(change);
+                    let after = |k: usize| {
+                        let own = carried.iter().chain(&local.rows[3..6]).map(|row| &row[k]);
+                        d.dot(
+                            moved[r].iter().zip(own).chain(change.iter().zip((0..3).map(|j| &torqued[j][k]))),
+                        )
+                    };
+                    (0..local.columns.len()).map(after).collect()
+                });
+                psi = std::array::from_fn(|j| {
+                    (0..local.columns.len())
+                        .map(|k| d.dot((0..3).map(|r| (&to_n[r][j], &after[r][k]))))
+                        .collect()
+                });
+            }
+        }
+        Self { digits: d, matrix, psi_at_end: (!reset).then_some(psi) }
+    }
+}
+
+impl Local {
+    /// Adds `L^T G L`.
+    fn add(&self, d: Digits, gram: &[Vector], matrix: &mut [Vector]) {
+        let c = self.columns.len();
+        let weighted: Vec<Vector> = gram
+            .iter()
+            .map(|g| (0..c).map(|k| d.dot(g.iter().zip(self.rows.iter().map(|r| &r[k])))).collect())
+            .collect();
+        for (i, &row) in self.columns.iter().enumerate() {
+            for (j, &column) in self.columns.iter().enumerate().skip(i) {
+                let entry = d.dot(self.rows.iter().map(|r| &r[i]).zip(weighted.iter().map(|w| &w[j])));
+                let sum = d.add(&matrix[row][column], &entry);
+                matrix[column][row] = sum.clone();
+                matrix[row][column] = sum;
+            }
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! What a filter's covariance is in many digits.
+
+use super::digits::{Digits, ROUNDING, Vector, double};
+use super::information::{Between, Information};
+use super::model::Model;
+use super::seen::{Functional, at_start};
+
+/// The covariance at the end, by its inverse: samples and prior.
+pub(in super::super) struct Posterior {
+    digits: Digits,
+    /// Standard deviations of the prior.
+    prior: Vector,
+    /// Lower triangular `L` (n x n), whose rows grow: `L L^T` is the information in units of the prior.
+    factor: Vec<Vector>,
+    psi_at_end: Option<[Vector; 3]>,
+}
+
+impl Posterior {
+    /// Of samples of `model` over a first dwell of `dwell / w_ie` and a prior (standard deviations in rad and in w_ie). `noise` is
+    /// that of Z per root of density and that of a measured azimuth. `None` when rounding leaves no information.
+    pub(in super::super) fn new(model: &Model, dwell: f64, prior: &[f64], noise: [f64; 2]) -> Option<Self> {
+        let d = model.digits;
+        let moments = model.moments(dwell, (noise[0] / noise[1]).powi(2));
+        let Information { matrix, psi_at_end, .. } = Information::new(model, &moments, Between::Dwell);
+        let prior: Vector = prior.iter().map(|p| d.double(*p)).collect();
+        let density = d.double(noise[0].powi(2));
+        let n = prior.len();
+        let mut factor: Vec<Vector> = Vec::with_capacity(n);
+        for i in 0..n {
+            let mut row: Vector = Vec::with_capacity(i + 1);
+            for j in 0..=i {
+                let scaled = d.div(&d.mul(&d.mul(&prior[i], &prior[j]), &matrix[i][j]), &density);
+                let own = if i == j { d.add(&scaled, &d.int(1)) } else { scaled };
+                let above = factor.get(j).unwrap_or(&row);
+                let rest = d.sub(&own, &d.dot(row.iter().zip(above).take(j)));
+                if i == j && !rest.is_positive() {
+                    return None;
+                }
+                row.push(if i == j { rest.sqrt(d.bits, ROUNDING) } else { d.div(&rest, &factor[j][j]) });
+            }
+            factor.push(row);
+        }
+        Some(Self { digits: d, prior, factor, psi_at_end })
+    }
+
+    /// `L^-1 c` of a functional of psi at the end and the coefficients, in units of the prior: its square is the variance.
+    fn solved(&self, functional: &Functional) -> Vector {
+        let d = self.digits;
+        let mut c = vec![d.int(0); self.prior.len()];
+        for (i, x) in at_start(d, self.psi_at_end.as_ref(), functional) {
+            c[i] = d.add(&c[i], &d.mul(&x, &self.prior[i]));
+        }
+        let mut out: Vector = Vec::with_capacity(c.len());
+        for (x, row) in c.iter().zip(&self.factor) {
+            let rest = d.sub(x, &d.dot(row.iter().zip(&out)));
+            out.push(d.div(&rest, &row[out.len()]));
+        }
+        out
+    }
+
+    /// Standard deviation of a functional.
+    pub(in super::super) fn sigma(&self, functional: &Functional) -> f64 {
+        let d = self.digits;
+        let y = self.solved(functional);
+        double(&d.dot(y.iter().zip(&y)).sqrt(d.bits, ROUNDING))
+    }
+
+    /// Correlation of two functionals.
+    pub(in super::super) fn correlation(&self, a: &Functional, b: &Functional) -> f64 {
+        let d = self.digits;
+        let (a, b) = (self.solved(a), self.solved(b));
+        let product = |a: &Vector, b: &Vector| d.dot(a.iter().zip(b));
+        let length = d.mul(&product(&a, &a), &product(&b, &b)).sqrt(d.bits, ROUNDING);
+        double(&d.div(&product(&a, &b), &length))
+    }
+}

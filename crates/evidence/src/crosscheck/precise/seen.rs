@@ -1,0 +1,191 @@
+//! What of the information is seen, and what is rounding.
+
+use super::digits::{Digits, ROUNDING, Real, Vector, log2};
+use super::information::Information;
+
+/// A pivot is seen above the first of these parts of the digits, relative to the diagonal; the errors that Cholesky's elimination
+/// then makes are within half of it, and what is below the second is rounding. Between them nothing is certain.
+const CLEAR: f64 = 10.0 / 16.0;
+const ROUNDING_BELOW: f64 = 11.0 / 16.0;
+/// What is left of a functional whose coefficients are doubles, beside its largest coefficient (drifts in units of the earth rate), in bits: what
+/// their rounding spreads to other unknowns, and far below the 1e-11 by which positions differ at least.
+const NEGLIGIBLE: f64 = -46.0;
+/// A sum of errors is at most so many bits more than the largest of them.
+const SUMMED: f64 = 8.0;
+
+/// What is seen: `N = sum l_k l_k^T`, best seen first.
+pub(in super::super) struct Seen {
+    digits: Digits,
+    /// The unknown of every pivot.
+    pub(in super::super) pivots: Vec<usize>,
+    /// `l_k` (n entries each).
+    columns: Vec<Vector>,
+    /// Binary logarithms of the pivots, descending.
+    pub(in super::super) sizes: Vec<f64>,
+    /// Of every unknown: whether its column is not zero.
+    pub(in super::super) excited: Vec<bool>,
+    /// Binary logarithms of the diagonal of N.
+    own: Vec<f64>,
+    psi_at_end: Option<[Vector; 3]>,
+}
+
+impl Information {
+    /// Cholesky factors, the largest pivot first; `None` where what is seen and rounding are not told apart.
+    pub(super) fn seen(mut self) -> Option<Seen> {
+        let d = self.digits;
+        let n = self.matrix.len();
+        let diagonal = |m: &[Vector], c: usize| log2(&m[c][c]);
+        let own: Vec<Option<f64>> = (0..n).map(|c| diagonal(&self.matrix, c)).collect();
+        let largest = own.iter().flatten().copied().fold(f64::MIN, f64::max);
+        let [rounding, clear] = [ROUNDING_BELOW, CLEAR].map(|part| -part * d.bits as f64);
+        // a column whose entries are rounding is below its square; what is seen is above
+        let excited: Vec<bool> =
+            own.iter().map(|x| x.is_some_and(|x| x - largest > 2.0 * rounding)).collect();
+        let doubtful = |x: f64| x - largest > 2.0 * rounding && x - largest < 2.0 * clear;
+        if own.iter().flatten().any(|x| doubtful(*x)) {
+            return None;
+        }
+        let mut left: Vec<usize> = (0..n).filter(|&c| excited[c]).collect();
+        let (mut pivots, mut columns, mut sizes): (Vec<usize>, Vec<Vector>, Vec<f64>) = Default::default();
+        loop {
+            // what is left of a column, in its own
+            let part = |c: usize| Some((c, diagonal(&self.matrix, c)?, own[c]?));
+            let parts = || left.iter().filter_map(|&c| part(c));
+            let positive = |c: usize| self.matrix[c][c].is_positive();
+            if parts().any(|(c, x, own)| x - own > rounding && (x - own < clear || !positive(c))) {
+                return None;
+            }
+            let best = parts().filter(|(_, x, own)| x - own > rounding).max_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((pivot, size, _)) = best else { break };
+            let root = self.matrix[pivot][pivot].sqrt(d.bits, ROUNDING);
+            let mut column = vec![d.int(0); n];
+            column[pivot] = root.clone();
+            left.retain(|c| *c != pivot);
+            for &c in &left {
+                column[c] = d.div(&self.matrix[c][pivot], &root);
+            }
+            for (i, &r) in left.iter().enumerate() {
+                for &c in &left[i..] {
+                    let x = d.sub(&self.matrix[r][c], &d.mul(&column[r], &column[c]));
+                    self.matrix[c][r] = x.clone();
+                    self.matrix[r][c] = x;
+                }
+            }
+            pivots.push(pivot);
+            columns.push(column);
+            sizes.push(size);
+        }
+        let own = own.into_iter().map(|x| x.unwrap_or(f64::MIN)).collect();
+        Some(Seen { digits: d, pivots, columns, sizes, excited, own, psi_at_end: self.psi_at_end })
+    }
+}
+
+/// A functional: `(unknown, coefficient)`, drifts in units of the earth rate.
+pub(in super::super) type Functional = Vec<(usize, Real)>;
+
+/// A functional of psi at the end and the coefficients as one of the unknowns at the start; `psi` is psi of the end, where it is handed
+/// on.
+pub(super) fn at_start(d: Digits, psi: Option<&[Vector; 3]>, functional: &Functional) -> Functional {
+    let Some(psi) = psi else { return functional.clone() };
+    let moved = functional.iter().filter(|(c, _)| *c < 3);
+    let moved = moved.flat_map(|(c, x)| psi[*c].iter().enumerate().map(move |(k, y)| (k, d.mul(x, y))));
+    moved.chain(functional.iter().filter(|(c, _)| *c >= 3).cloned()).filter(|(_, x)| !x.is_zero()).collect()
+}
+
+impl Seen {
+    pub(in super::super) fn digits(&self) -> Digits {
+        self.digits
+    }
+
+    /// The number of directions that are seen.
+    pub(in super::super) fn rank(&self) -> usize {
+        self.pivots.len()
+    }
+
+    /// Half the digits: what is smaller, in units of what rounding could make, is rounding.
+    fn rounding(&self) -> f64 {
+        -(self.digits.bits as f64) / 2.0
+    }
+
+    /// Binary logarithm of sigma of a functional, by what is seen alone; `None` when it is not in the span of that. `rounded` is the relative
+    /// error of its coefficients (none by default).
+    pub(in super::super) fn sigma(&self, functional: &Functional, rounded: Option<f64>) -> Option<f64> {
+        let d = self.digits;
+        let mut rest = vec![d.int(0); self.own.len()];
+        for (c, x) in functional {
+            rest[*c] = d.add(&rest[*c], x);
+        }
+        // the sums of magnitudes that the rest is the difference of
+        let mut sizes: Vec<Real> = rest.iter().map(Real::abs).collect();
+        let mut variance = d.int(0);
+        let largest = rest.iter().filter_map(log2).fold(f64::MIN, f64::max);
+        let vanishes = |rest: &Vector, sizes: &Vector, variance: &Real| {
+            let sigma = log2(variance).map(|v| v / 2.0);
+            rest.iter().zip(sizes).zip(&self.own).all(|((x, size), own)| {
+                let Some(x) = log2(x) else { return true };
+                let coefficients = rounded
+                    .zip(log2(size))
+                    .is_some_and(|(r, size)| x - size < r.log2() || x - largest < NEGLIGIBLE);
+                // an error of N, relative to its diagonal
+                coefficients || sigma.is_some_and(|sigma| x - (own / 2.0 + sigma) < self.rounding())
+            })
+        };
+        for (pivot, column) in self.pivots.iter().zip(&self.columns) {
+            if vanishes(&rest, &sizes, &variance) {
+                break;
+            }
+            let y = d.div(&rest[*pivot], &column[*pivot]);
+            variance = d.add(&variance, &d.mul(&y, &y));
+            for ((x, size), l) in rest.iter_mut().zip(&mut sizes).zip(column).filter(|(_, l)| !l.is_zero()) {
+                let part = d.mul(&y, l);
+                *x = d.sub(x, &part);
+                *size = d.add(size, &part.abs());
+            }
+            rest[*pivot] = d.int(0);
+        }
+        vanishes(&rest, &sizes, &variance).then(|| log2(&variance).map(|v| v / 2.0)).flatten()
+    }
+
+    /// A functional of psi at the end and the coefficients as one of the unknowns at the start.
+    pub(in super::super) fn at_start(&self, functional: &Functional) -> Functional {
+        at_start(self.digits, self.psi_at_end.as_ref(), functional)
+    }
+
+    /// Unknowns that are excited and no pivots.
+    pub(in super::super) fn free(&self) -> Vec<usize> {
+        (0..self.own.len()).filter(|c| self.excited[*c] && !self.pivots.contains(c)).collect()
+    }
+
+    /// What is not seen: `x_pivots = -R x_free` with `R = R_11^-1 R_12`. Its free unknowns (those that are not excited left out), and for every
+    /// pivot its row of R, with zeros for what is rounding.
+    pub(in super::super) fn reduced(&self) -> (Vec<usize>, Vec<Vector>) {
+        let d = self.digits;
+        let free = self.free();
+        // from the last pivot up; what rounding may make of an entry comes from its own pivot, or from entries below
+        let mut rows: Vec<Vector> = Vec::new();
+        let mut errors: Vec<Vec<f64>> = Vec::new();
+        for (k, column) in self.columns.iter().enumerate().rev() {
+            let below = &self.pivots[k + 1..];
+            let pivot = &column[self.pivots[k]];
+            let (mut row, mut error) = (Vec::new(), Vec::new());
+            for (j, &f) in free.iter().enumerate() {
+                let known = below.iter().map(|&p| &column[p]).zip(rows.iter().rev().map(|r: &Vector| &r[j]));
+                let x = d.div(&d.sub(&column[f], &d.dot(known)), pivot);
+                let own = (self.own[f] - self.sizes[k]) / 2.0 + self.rounding();
+                let inherited = below
+                    .iter()
+                    .zip(errors.iter().rev())
+                    .filter_map(|(&p, e)| Some(log2(&column[p])? + e[j]));
+                let inherited =
+                    log2(pivot).map_or(f64::MIN, |size| inherited.fold(f64::MIN, f64::max) - size);
+                let rounded = own.max(inherited + SUMMED);
+                row.push(if log2(&x).is_none_or(|x| x < rounded) { d.int(0) } else { x });
+                error.push(rounded);
+            }
+            rows.push(row);
+            errors.push(error);
+        }
+        rows.reverse();
+        (free, rows)
+    }
+}

@@ -1,0 +1,176 @@
+//! Schemes at the edge of degeneracy: right verdicts do not disagree, wrong ones do.
+
+use obsdeg_core::degree::Status;
+use obsdeg_core::model::{Angle, Carry, Scheme};
+use obsdeg_evidence::crosscheck::{
+    Agreement, CrossCheck, CrossCheckOptions, FilterChange, crosscheck, crosscheck_against,
+};
+use obsdeg_evidence::prediction::Prediction;
+use obsdeg_evidence::simulation::{Conditions, Plan};
+use obsdeg_exact::SplitMix64;
+
+/// A scheme whose positions nearly coincide, are nearly opposite, or are nearly cardinal, or whose latitude is nearly that of a pole or
+/// of the equator.
+fn borderline(seed: u64) -> Scheme {
+    const DEGREE: i64 = 1_000_000_000;
+    let mut rng = SplitMix64::new(seed ^ 0x626f_7264_6572);
+    let mut pick = |n: usize| rng.below(n as u64) as usize;
+    let (kind, axis, carry) = (pick(4), pick(3), Carry::ALL[pick(3)]);
+    let sign = 1 - 2 * pick(2) as i64;
+    let near_zero = [10_000_000, 3_000_000, 1_000_000, 300_000, 100_000];
+    let near_half = [1_000_000, 100_000, 10_000, 1000, 100, 10, 1];
+    let cardinal = |k: usize| (k as i64 - 1) * 90 * DEGREE;
+    let mut places = vec![[0; 3]; 2];
+    let mut latitude = ["28.2", "0", "90", "-45"][pick(4)];
+    match kind {
+        0 => places[1][axis] = sign * near_zero[pick(5)],
+        1 => places[1][axis] = sign * (180 * DEGREE - near_half[pick(7)] * (1 - 2 * pick(2) as i64)),
+        2 => {
+            places = (0..2 + pick(3)).map(|_| std::array::from_fn(|_| cardinal(pick(4)))).collect();
+            let off = if pick(2) == 0 { near_zero[pick(5)] } else { near_half[pick(7)] };
+            let place = pick(places.len());
+            places[place][axis] += sign * off;
+        }
+        _ => {
+            places = (0..2 + pick(3)).map(|_| std::array::from_fn(|_| cardinal(pick(4)))).collect();
+            latitude = ["89.9999", "89.999999999", "-89.999", "0.0001", "-0.000000001", "0.01"][pick(6)];
+        }
+    }
+    let terms = ["F,I,O,S", "F,I,O,S", "F,I", "F,S,IO", "I,II"][pick(5)];
+    Scheme {
+        carry,
+        latitude: latitude.parse().ok(),
+        unknowns: terms.parse().expect("terms"),
+        ..Scheme::of_angles(places.into_iter().map(|p| p.map(Angle::from_nanodeg)))
+    }
+}
+
+fn options(seed: u64) -> CrossCheckOptions {
+    CrossCheckOptions { runs: 2, seed, filter: FilterChange::default() }
+}
+
+fn checked(seed: u64, scheme: &Scheme) -> CrossCheck {
+    crosscheck(scheme, &Conditions::default(), &options(seed), &|_| true).expect("an answer")
+}
+
+/// What is not resolvable has a reason, check by check.
+fn explained(c: &CrossCheck) {
+    assert_eq!(c.unresolved.len(), c.counts.not_resolvable, "{:?}", c.unresolved);
+}
+
+/// Right verdicts on schemes at the edge: none disagrees, and most of the checks are resolved.
+#[expect(clippy::print_stdout, reason = "the figures of a long run")]
+fn right_verdicts(seeds: std::ops::Range<u64>) {
+    let (mut agree, mut open, mut wrong) = (0, 0, Vec::new());
+    for seed in seeds {
+        let s = borderline(seed);
+        let c = checked(seed, &s);
+        explained(&c);
+        if !c.verdicts_agree {
+            println!("{seed} {s:?}: {:?}", c.disagreements);
+            wrong.push(seed);
+        }
+        (agree, open) = (agree + c.counts.agree, open + c.counts.not_resolvable);
+    }
+    println!("{agree} agree, {open} not resolvable");
+    assert!(wrong.is_empty(), "{wrong:?} disagree");
+    assert!(open * 10 <= agree, "{agree} agree, {open} not resolvable");
+}
+
+/// What is changed of a verdict, and the outcomes of the checks that must show it.
+type Falsified = (Prediction, fn(&CrossCheck, usize) -> [Agreement; 2], usize);
+
+/// A degree that is off by one.
+fn another_degree(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> {
+    let of: Vec<usize> = (0..right.unknowns.len()).filter(|&i| right.unknowns[i].degree.is_some()).collect();
+    let i = *of.get(rng.below(of.len().max(1) as u64) as usize)?;
+    let mut wrong = right.clone();
+    let degree = &mut wrong.unknowns[i].degree;
+    *degree = degree.map(|d| if d > 0 && rng.below(2) == 0 { d - 1 } else { d + 1 });
+    Some((wrong, |c, i| [c.quantities[i].degree_slope.outcome; 2], i))
+}
+
+/// An unknown that is not observable, declared so.
+fn declared_observable(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> {
+    let of: Vec<usize> = (0..right.unknowns.len()).filter(|&i| right.unknowns[i].degree.is_none()).collect();
+    let i = *of.get(rng.below(of.len().max(1) as u64) as usize)?;
+    let mut wrong = right.clone();
+    (wrong.unknowns[i].status, wrong.unknowns[i].degree) = (Status::Observable, Some(rng.below(3) as usize));
+    Some((wrong, |c, i| [c.quantities[i].degree_slope.outcome, c.quantities[i].status_outcome], i))
+}
+
+/// An entry of a null vector, by derivatives or with dwells, off by a thousandth.
+fn another_entry(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> {
+    let mut wrong = right.clone();
+    let dwells = rng.below(2) == 0;
+    let vectors = if dwells { &mut wrong.null_space } else { wrong.unseen_by_derivatives.as_mut()? };
+    let of: Vec<usize> = (0..vectors.len()).filter(|&i| vectors[i].len() > 1).collect();
+    let vector = &mut vectors[*of.get(rng.below(of.len().max(1) as u64) as usize)?];
+    let k = rng.below(vector.len() as u64) as usize;
+    vector[k].1 *= 1.001;
+    Some((wrong, |c, i| [c.spaces[i].outcome; 2], if dwells { 3 } else { 1 }))
+}
+
+/// Wrong verdicts on schemes at the edge, `count` of each kind: each is caught where its check is resolved, and most are.
+#[expect(clippy::print_stdout, reason = "the figures of a long run")]
+fn wrong_verdicts(count: usize, scheme: impl Fn(u64) -> Scheme) {
+    let kinds = [another_degree, declared_observable, another_entry];
+    for (kind, falsify) in kinds.into_iter().enumerate() {
+        let (mut caught, mut open) = (0, 0);
+        for seed in 10_000.. {
+            if caught + open == count {
+                break;
+            }
+            let s = scheme(seed);
+            let plan = Plan::new(&s, &Conditions::default()).expect("a plan");
+            let rates = [plan.point.w_n, plan.point.w_u];
+            let right = Prediction::new(&plan.platform, rates, 1).expect("a prediction");
+            let Some((wrong, of, at)) = falsify(&right, &mut SplitMix64::new(seed)) else { continue };
+            let c = crosscheck_against(&wrong, &s, &Conditions::default(), &options(seed), &|_| true);
+            let c = c.expect("an answer");
+            explained(&c);
+            if c.passed || c.verdicts_agree {
+                // nothing that many digits decide is open
+                let outcomes = of(&c, at);
+                assert!(outcomes.contains(&Agreement::NotResolvable), "{kind} {seed} {s:?} is not caught");
+                open += 1;
+            } else {
+                caught += 1;
+            }
+        }
+        println!("kind {kind}: {caught} caught, {open} not resolvable");
+        assert!(caught * 20 >= count * 19, "kind {kind}: {caught} of {count}");
+    }
+}
+
+#[test]
+fn schemes_at_the_edge_agree() {
+    right_verdicts(0..16);
+    // an ordinary readout of gimbals, and separations to both sides of the prior's width
+    for (angle, open) in [("180.001", 1), ("0.001", 6), ("179.99999", 5)] {
+        let c = checked(1, &crate::schemes::scheme(&["0,0,0", &format!("{angle},0,0")], Carry::Platform));
+        explained(&c);
+        assert!(c.verdicts_agree && c.counts.not_resolvable == open, "{angle}: {:?}", c.unresolved);
+        assert!(c.unresolved.iter().all(|w| w.contains("too narrow to show")), "{:?}", c.unresolved);
+    }
+}
+
+#[test]
+fn wrong_verdicts_at_the_edge_are_caught() {
+    wrong_verdicts(8, borderline);
+}
+
+/// Minutes: `cargo test --test it -- --ignored many_schemes_at_the_edge --nocapture`.
+#[test]
+#[ignore = "minutes"]
+fn many_schemes_at_the_edge_agree() {
+    right_verdicts(0..500);
+}
+
+/// Minutes: `cargo test --test it -- --ignored many_wrong_verdicts --nocapture`.
+#[test]
+#[ignore = "minutes"]
+fn many_wrong_verdicts_are_caught() {
+    wrong_verdicts(200, borderline);
+    wrong_verdicts(200, |seed| super::drawn::drawn(seed, false));
+}
