@@ -534,7 +534,7 @@ class NumberOfSolutionsCounted(Record):
 
 
 class NumberOfSolutionsUndecided(Record):
-    """Finitely many. Why their number is not decided."""
+    """Locally unique. Why the number of solutions is not decided."""
 
     __slots__ = ()
 
@@ -560,8 +560,8 @@ class SystemQuantity(Record):
     description: str
     """What it is, as the file says."""
     status: Status
-    """The verdict: locally observable (finitely many solutions), inseparable from its partners, not excited, or not seen up to the bound
-    on the order.
+    """The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
+    seen up to the bound on the order.
     """
     degree: int | None
     """The smallest order of derivatives that solves it."""
@@ -592,7 +592,9 @@ class SymmetryReport(Record):
     __slots__ = ()
 
     words: str
-    """`multiply alpha by c, divide gamma by c`."""
+    """What changes no output, for every `c` (every positive one where something is multiplied or divided): `multiply alpha by c; divide
+    gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
+    """
     unknowns: list[str]
     """The unknowns that it moves."""
 
@@ -633,6 +635,10 @@ class SystemAnalysis(Shape):
     """The verdicts in model order."""
     known: list[str]
     """States whose start is known."""
+    time: str | None
+    """Time at which the first segment was judged, where the equations hold it: a number, or `generic` (almost every time, as in all
+    later segments); null where they do not.
+    """
     constraints: list[str]
     """Equations that hold at the start; their differentials count as rows of order 0."""
     combinations: list[SystemCombination]
@@ -2002,6 +2008,8 @@ class CrossCheck(Shape):
     """Whether all but d agrees: d holds the filter against drawn truths, which fails where the small-angle model does, too."""
     disagreements: list[str]
     """What disagrees, in words."""
+    unresolved: list[str]
+    """Reasons why checks are not resolvable, one for each such check."""
     counts: Counts
     """How many checks agree, disagree, are not resolvable, were not made."""
     method: list[str]

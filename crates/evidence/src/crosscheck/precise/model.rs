@@ -397,10 +397,8 @@ impl Model {
                 }
             }
         }
-        for i in 0..LOCAL {
-            for j in 0..i {
-                gram[i][j] = gram[j][i].clone();
-            }
+        for (i, j) in (0..LOCAL).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            gram[i][j] = gram[j][i].clone();
         }
         Moments { gram, end: moved }
     }
