@@ -293,6 +293,7 @@ mod tests {
             degree: Some(1),
             accuracy_order: Some(1),
             sigma,
+            by_prior: false,
             sigma_extended: None,
             requirement,
             margin: requirement.zip(sigma).map(|(r, s)| r / s),
