@@ -82,7 +82,7 @@ impl AllFiles {
 /// Whether a script is to hear of requirements that are missed.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct RequireMet {
-    /// Exit with 1 where a stated requirement is missed; with 2 where none is stated
+    /// Exit with 1 if a stated requirement is missed (2: none is stated)
     #[arg(long, help_heading = "Output")]
     require_met: bool,
 }
@@ -93,9 +93,11 @@ impl RequireMet {
     /// # Errors
     /// A failure of the input, before anything is written.
     pub(crate) fn check<'a>(self, all: impl IntoIterator<Item = &'a Requirements>) -> Result<(), Failure> {
-        match self.require_met && all.into_iter().all(|r| r.stated == 0) {
+        let mut all = all.into_iter().peekable();
+        let none = all.peek().is_none() || all.any(|r| r.stated == 0);
+        match self.require_met && none {
             true => Err(Failure::input(
-                "--require-met: no requirement is stated; expected --requirement NAME=SIGMA or [requirements] in the scheme file".into(),
+                "--require-met: no requirement is stated (of some scheme); expected --requirement NAME=SIGMA or [requirements] in the scheme file".into(),
             )),
             false => Ok(()),
         }

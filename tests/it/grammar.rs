@@ -190,7 +190,12 @@ fn done(folder: &Path, arguments: &[String]) -> (Option<i32>, String) {
 fn options(command: &str) -> BTreeMap<String, bool> {
     let help = stdout(&run(&[command, "--help"]));
     let line = |l: &str| {
+        // texts that go on are further in, or not at all
+        let indent = l.len() - l.trim_start().len();
         let l = l.trim_start();
+        if !(1..8).contains(&indent) {
+            return None;
+        }
         let l = if l.starts_with("--") { l } else { l.strip_prefix('-')?.get(3..)? };
         let mut words = l.strip_prefix("--")?.split_whitespace();
         Some((words.next()?.to_string(), words.next().is_some_and(|w| w.starts_with('<'))))

@@ -333,7 +333,7 @@ fn a_verdict_leads_with_what_limits_it() {
     // D_SZ is not excited at the start of the turn, nor at the second position
     let excited: Vec<[String; 2]> = (table(&page, "Every unknown").iter())
         .filter(|r| r[0].starts_with("D_"))
-        .map(|r| [r[0].clone(), r[9].clone()])
+        .map(|r| [r[0].clone(), r[r.len() - 1].clone()])
         .collect();
     assert!(excited.iter().all(|[_, at]| at != "-"), "{excited:?}");
     // at a pole the dwell gives what no derivative sees

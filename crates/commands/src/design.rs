@@ -351,6 +351,12 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
     if let Some(file) = &files.conditions_file {
         base = file.scheme()?;
+        // one dwell of all positions is that of the scheme
+        let mut dwells = base.positions.iter().map(|p| p.dwell.map(|d| d.seconds()));
+        let first = dwells.next().flatten();
+        if base.simulation.dwell_s.is_none() && dwells.all(|d| d == first) {
+            base.simulation.dwell_s = first;
+        }
     }
     a.assumptions.apply(&mut base);
     if let Some(terms) = a.terms.unknowns()? {
@@ -364,7 +370,6 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
     a.measurement.concern(std::iter::once(&with_any))?;
     let mut conditions = a.measurement.conditions(&base);
-    conditions = asked_conditions(&base, &conditions, &a.wanted.observable)?;
     conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
     idle(a, !files.merge.is_empty(), &base, &conditions)?;
     let round = a.round.as_deref().unwrap_or("5");
@@ -413,6 +418,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     } else {
         design_merged(&base, &conditions, &options, &parts, &progress)
     }?;
+    let conditions = asked_conditions(&base, &conditions, &options.required)?;
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions })))
 }
 

@@ -186,10 +186,12 @@ fn lead(c: &Comparison) -> Vec<String> {
     for r in &c.schemes {
         let sigma = r.worst.as_ref().map_or_else(
             || "not every coefficient is determined".into(),
-            |w| format!("worst sigma {} deg/h ({})", number(w.sigma_dph), w.name),
+            |w| format!("worst sigma {}", stated::worst_sigma(w)),
         );
         out.push(of(format!("{}; {sigma}.", stated::requirements(&r.requirements)), r));
     }
+    let beyond = c.schemes.iter().filter_map(|r| Some((r, gimbals::lead(r.gimbals.as_ref())?)));
+    out.extend(beyond.map(|(r, text)| format!("{}: {text}", r.name)));
     let mut said: Vec<String> = Vec::new();
     for r in &c.schemes {
         let lines =
@@ -310,11 +312,9 @@ impl Answer for Comparison {
         }
         blocks.push(Block::list("Assumed", lines));
         let n = self.schemes.len();
-        let beyond = self.schemes.iter().filter_map(|r| Some((r, gimbals::lead(r.gimbals.as_ref())?)));
-        let beyond = beyond.map(|(r, text)| format!("{}: {text}", r.name));
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
-            lead: lead(self).into_iter().chain(beyond).collect(),
+            lead: lead(self),
             blocks,
         }
     }

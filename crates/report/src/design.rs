@@ -68,13 +68,26 @@ fn lead(d: &Design) -> Vec<String> {
         };
         let sigma = first.worst_sigma_dph.zip(first.worst.as_ref());
         let sigma = sigma.map_or_else(String::new, |(sigma, name)| {
-            format!(": worst sigma {} deg/h ({name})", number(sigma))
+            format!(": worst sigma {}", stated::sigma_of(name, sigma))
         });
-        out.push(format!("{best}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
+        let by = format!("{best} by the criterion {}", s.criterion);
+        out.push(format!("{by}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
+        if first.requirements.any_missed() {
+            let margin =
+                if s.criterion == "margin" { "" } else { "--criterion margin seeks the largest margin; " };
+            out.push(format!("Next: {margin}--meet says what would meet every requirement"));
+        }
     }
     if d.search.is_none() {
         out.push(fewest(d));
     }
+    if !d.not_judged.is_empty() {
+        let names = words::names(d.not_judged.iter().map(String::as_str));
+        out.push(format!(
+            "not judged, since --observable does not ask for them: the requirements on {names}"
+        ));
+    }
+    out.extend(gimbals::lead(d.gimbals.as_ref()));
     out.push(stated::carry(d.carry).into());
     out.extend(stated::other_carries(&d.other_carries));
     out.extend(d.search.as_ref().and_then(|s| stated::by_default(&s.conditions)));
@@ -510,11 +523,7 @@ impl Answer for Design {
             || "fewest positions".into(),
             |s| format!("{} of {} positions", s.positions, self.candidates.len()),
         );
-        Document {
-            title: format!("Design: {what}, {} carry", self.carry),
-            lead: lead(self).into_iter().chain(gimbals::lead(self.gimbals.as_ref())).collect(),
-            blocks,
-        }
+        Document { title: format!("Design: {what}, {} carry", self.carry), lead: lead(self), blocks }
     }
 
     fn main_table(&self) -> &'static str {

@@ -12,11 +12,23 @@ pub(crate) const NAMES: [&str; 3] =
 
 /// `angles beyond the gimbal limits: p2`: for the first lines of an answer.
 pub(crate) fn lead(report: Option<&GimbalReport>) -> Option<String> {
-    let report = report.filter(|r| !r.beyond.is_empty())?;
+    let report = report?;
     let each: Vec<String> = (report.beyond.iter())
         .map(|b| format!("{} ({}): the same attitude within them is {}", b.position, b.angles, b.within))
         .collect();
-    Some(format!("angles beyond the gimbal limits ({}): {}", report.limits, each.join("; ")))
+    let angles = format!("angles beyond the gimbal limits ({}): {}", report.limits, each.join("; "));
+    let leave = |t: &&GimbalTurn| !t.stays;
+    let turns: Vec<&str> = report.turns.iter().filter(leave).map(|t| t.position.as_str()).collect();
+    let turns = format!(
+        "turns that do NOT stay within the gimbal limits: to {}",
+        words::names(turns.iter().copied())
+    );
+    match (each.is_empty(), report.turns.iter().any(|t| !t.stays)) {
+        (true, false) => None,
+        (false, false) => Some(angles),
+        (true, true) => Some(format!("{turns} (see Gimbals)")),
+        (false, true) => Some(format!("{angles}; {turns} (see Gimbals)")),
+    }
 }
 
 /// `alpha by -180, gamma by 90 deg`.
@@ -39,7 +51,10 @@ fn named(t: &GimbalTurn) -> String {
 fn turn(t: &GimbalTurn) -> Option<String> {
     let instead = t.gimbals_deg.as_ref().filter(|_| !t.by_gimbals);
     let instead = instead.map_or_else(String::new, |change| {
-        format!("; gimbal by gimbal it stays within them: {}", by_gimbals(change))
+        format!(
+            "; gimbal by gimbal, between angles within the limits, it stays within them: {}",
+            by_gimbals(change)
+        )
     });
     let what = match (&t.stop, t.ends_deg) {
         (Some(GimbalStop { gimbal: Some(gimbal), at_deg, after_deg }), _) => format!(
@@ -89,7 +104,12 @@ pub(crate) fn lines(report: Option<&GimbalReport>) -> Vec<String> {
     let instead = report.turns.iter().any(|t| turn(t).is_some() && !t.by_gimbals && t.gimbals_deg.is_some());
     lines.extend(listed);
     lines.extend(instead.then(|| {
-        "`path = \"gimbals\"` in the scheme file turns gimbal by gimbal, alpha, beta, gamma one after another, to positions without a slew axis of their own".into()
+        match report.beyond.is_empty() {
+            true => "Write `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, gamma one after another".into(),
+            false => "Write the angles within the limits (first lines) and `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, \
+                      gamma one after another"
+                .into(),
+        }
     }));
     lines
 }

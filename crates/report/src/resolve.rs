@@ -8,7 +8,7 @@ use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis};
 use obsdeg_evidence::compare::{ComparedScheme, DropOne};
 use obsdeg_evidence::requirements::Worst;
 
-use crate::compare::worst;
+use crate::stated::worst_sigma;
 use crate::words::names;
 
 /// A sigma that grows by no more than this factor is the same.
@@ -20,7 +20,10 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
         return None;
     }
     let met = r.requirements.stated > 0 && r.requirements.all_met();
-    let keeps = |d: &&DropOne| d.lost.is_empty() && (!met || d.requirements.all_met());
+    // psi of single positions is named anew without one of them
+    let missed_here = |name: &str| name.contains('@') || r.requirements.missed.iter().any(|m| m.name == name);
+    let keeps =
+        |d: &&DropOne| d.lost.is_empty() && d.requirements.missed.iter().all(|m| missed_here(&m.name));
     let sigma = |d: &DropOne| d.worst.as_ref().map_or(f64::INFINITY, |w| w.sigma_dph);
     let best = r.drop_one.iter().filter(keeps).min_by(|x, y| sigma(x).total_cmp(&sigma(y)));
     let Some(d) = best else {
@@ -32,17 +35,23 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
     };
     let kept = match met {
         true => "every unknown stays observable and every requirement met",
+        false if r.requirements.stated > 0 => "nothing observable is lost and no further requirement missed",
         false => "nothing observable is lost",
     };
     let grows = |now: &Worst, then: &Worst| {
-        let [now, then] = [now, then].map(|w| worst(Some(w)));
+        let [now, then] = [now, then].map(worst_sigma);
         format!("the largest predicted sigma of a coefficient grows from {now} to {then}")
     };
     Some(match (&r.worst, &d.worst) {
         (Some(now), Some(then)) if then.sigma_dph <= now.sigma_dph * SAME => {
-            format!("Drop {}: {kept}, and the largest predicted sigma of a coefficient stays", d.position)
+            format!(
+                "Drop {}: {kept}, and the largest predicted sigma of a coefficient does not grow",
+                d.position
+            )
         }
-        (Some(now), Some(then)) if met => format!("You can drop {}: {kept}; {}", d.position, grows(now, then)),
+        (Some(now), Some(then)) if met => {
+            format!("You can drop {}: {kept}; {}", d.position, grows(now, then))
+        }
         (Some(now), Some(then)) => {
             format!("Keep all positions: without {}, which costs least, {}", d.position, grows(now, then))
         }

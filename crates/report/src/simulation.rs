@@ -200,10 +200,16 @@ fn priors(quantities: &[Estimate]) -> Vec<String> {
 fn lead(s: &Simulation) -> Vec<String> {
     let [predicted, run] = [stated::requirements(&s.requirements), stated::run(&s.run, &s.conditions)]
         .map(|t| stated::capital(&t));
-    let mut out = vec![format!("{predicted}. {run}.")];
+    let mut out = vec![format!("{predicted}."), format!("{run}.")];
     if !s.consistency.consistent {
-        out.push("Do not use the filter's sigmas: its run is inconsistent with the truth.".into());
+        let whose = if stated::drifts_by_default(&s.conditions) && s.conditions.states_priors() {
+            ", which is the paper's, against the priors that are stated: state the drifts (--value) or leave this run out of account"
+        } else {
+            ""
+        };
+        out.push(format!("Do not use the filter's sigmas: its run is inconsistent with the truth{whose}."));
     }
+    out.extend(gimbals::lead(s.gimbals.as_ref()));
     out.push(stated::carry(s.carry).into());
     out.extend(stated::other_carries(&s.other_carries));
     out.extend(stated::by_default_in_run(&s.conditions));
@@ -276,7 +282,7 @@ impl Answer for Simulation {
                 self.carry,
                 number_short(end)
             ),
-            lead: lead(self).into_iter().chain(gimbals::lead(self.gimbals.as_ref())).collect(),
+            lead: lead(self),
             blocks,
         }
     }

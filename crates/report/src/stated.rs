@@ -122,9 +122,21 @@ pub(crate) fn carry(c: Carry) -> &'static str {
     }
 }
 
-/// `0.002237 deg/h (D_SX)`.
-fn worst_sigma(w: &Worst) -> String {
-    format!("{} deg/h ({})", number(w.sigma_dph), w.name)
+/// `0.002237 deg/h/g (D_SX)`.
+pub(crate) fn worst_sigma(w: &Worst) -> String {
+    sigma_of(&w.name, w.sigma_dph)
+}
+
+/// The sigma of a drift coefficient with its unit: zero-order coefficients and components of the drift are rates, those with one letter more are
+/// per g, with two per g^2.
+pub(crate) fn sigma_of(name: &str, sigma_dph: f64) -> String {
+    let terms = name.strip_prefix("D_").map_or("", |rest| &rest[..rest.len().saturating_sub(1)]);
+    let unit = match terms {
+        "" | "F" => "deg/h",
+        one if one.len() == 1 => "deg/h/g",
+        _ => "deg/h/g^2",
+    };
+    format!("{} {unit} ({name})", number(sigma_dph))
 }
 
 /// The same scheme under the other carries, in one line; empty where nothing was judged.
@@ -133,6 +145,7 @@ pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
         let Some(r) = &o.requirements else {
             return format!("{}: not judged ({})", o.carry, o.not_judged.as_deref().unwrap_or("unknown"));
         };
+        let at_once = if o.without_slews { " (repositioning at once)" } else { "" };
         let sigma = o.worst.as_ref().map_or_else(
             || "not every coefficient is determined".into(),
             |w| format!("worst sigma {}", worst_sigma(w)),
@@ -142,7 +155,7 @@ pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
             (n, true) => format!(", every requirement met ({n})"),
             (n, false) => format!(", requirements NOT met ({} of {n} missed)", r.missed.len()),
         };
-        format!("{}: {sigma}{met}", o.carry)
+        format!("{}{at_once}: {sigma}{met}", o.carry)
     };
     let listed: Vec<String> = carries.iter().map(of).collect();
     (!listed.is_empty()).then(|| format!("under the other carries, {}", listed.join("; ")))
@@ -204,9 +217,14 @@ pub(crate) fn by_default_in_run(c: &ConditionsReport) -> Option<String> {
     (!listed.is_empty()).then(|| format!("not stated, chosen by the program: {}", listed.join(", ")))
 }
 
+/// True if nobody states the drifts of a run, which has those of the paper then.
+pub(crate) fn drifts_by_default(c: &ConditionsReport) -> bool {
+    c.by_default.iter().any(|key| key == "values")
+}
+
 /// The drifts of a run: those that are stated, or the paper's.
 pub(crate) fn drifts(c: &ConditionsReport) -> &'static str {
-    match c.by_default.iter().any(|key| key == "values") {
+    match drifts_by_default(c) {
         true => "the drifts of the paper (11 to 13 deg/h; none are stated)",
         false => "these drifts",
     }

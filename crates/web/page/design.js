@@ -1,16 +1,13 @@
 // The best schemes of the cardinal attitudes, and the text of schemes and models.
 
-const CARDINAL = Object.keys(LETTERS).flatMap((a) => Object.keys(LETTERS).flatMap((b) => Object.keys(LETTERS).map((c) => a + b + c)))
-  .filter((letters) => matrixOfLetters(letters));
-
 async function search() {
   const k = Number($('design-k').value);
   if (!Number.isInteger(k) || k < 1) return void refuse(`K: expected a whole number from 1, found "${$('design-k').value}"`);
   say('');
-  // the 24 attitudes under the conditions of the scheme
-  const { position: _, combinations: __, name: ___, description: ____, ...rest } = copy(state.scheme);
-  const candidates = { name: 'cardinal.toml', text: toToml({ ...rest, position: CARDINAL.map((attitude) => ({ name: attitude, attitude })) }) };
-  const request = { positions: k, candidates_file: candidates, criterion: $('design-criterion').value };
+  // the 24 cardinal attitudes under the conditions of the scheme
+  const own = copy(state.scheme);
+  if (!own.position?.length) own.position = [{ attitude: 'NUE' }];
+  const request = { positions: k, conditions_file: { name: state.name, text: toToml(own) }, criterion: $('design-criterion').value };
   const wanted = $('design-observable').value.split(',').map((t) => t.trim()).filter(Boolean);
   if (wanted.length) request.observable = wanted;
   $('design-go').disabled = true;

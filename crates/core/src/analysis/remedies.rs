@@ -264,6 +264,10 @@ impl Search<'_> {
 
     /// Two changes for what no single one resolves: two attitudes, an attitude and a value, two values.
     fn two(&mut self, directions: &Directions<Field>, candidates: Vec<Candidate>) {
+        if candidates.iter().any(|c| c.tells.is_none()) && !self.left().is_empty() {
+            let text = "two changes with an attitude among them: the turn to it acts as well";
+            self.out.not_tried.push(text.into());
+        }
         let (names, attitudes): (Vec<String>, Vec<Told<Field>>) =
             candidates.into_iter().filter_map(|c| Some((c.attitude, c.tells?))).unzip();
         let values: Vec<Told<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();

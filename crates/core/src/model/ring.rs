@@ -1,5 +1,7 @@
 //! The rings in which one and the same model is written out.
 
+use std::sync::OnceLock;
+
 use obsdeg_exact::series::SeriesRing;
 use obsdeg_exact::{Ball, Field};
 
@@ -120,12 +122,18 @@ pub(crate) type Real = Ball<8>;
 pub(crate) struct ManyDigits;
 
 impl ManyDigits {
+    /// The angle of the half turn, computed once.
+    fn pi() -> &'static Real {
+        static PI: OnceLock<Real> = OnceLock::new();
+        PI.get_or_init(Real::pi)
+    }
+
     /// Cosine and sine of an angle in 1e-9 degrees; exact at quarter turns.
     pub(crate) fn cos_sin(nanodeg: i64) -> Option<(Real, Real)> {
         const QUARTER: i64 = 90_000_000_000;
         let (quarters, rest) = (nanodeg.div_euclid(QUARTER).rem_euclid(4), nanodeg.rem_euclid(QUARTER));
         let half_turns = Real::from_i64(rest).div(&Real::from_i64(2 * QUARTER))?;
-        let (s, c) = if rest == 0 { Real::ZERO.sin_cos()? } else { half_turns.mul(&Real::pi()).sin_cos()? };
+        let (s, c) = if rest == 0 { Real::ZERO.sin_cos()? } else { half_turns.mul(Self::pi()).sin_cos()? };
         Some(match quarters {
             0 => (c, s),
             1 => (s.neg(), c),

@@ -1,5 +1,7 @@
 //! The symbols of exact formulas: sines and cosines of angles, square roots of 2 and 3.
 
+use std::sync::OnceLock;
+
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
 use crate::model::platform::{Platform, Point, RandomValues, Sample};
@@ -22,6 +24,8 @@ pub struct Symbols {
     radicals: bool,
     /// Indices of the positions that rotate.
     turning: Vec<usize>,
+    /// Cosine and sine of every constant angle in many digits, computed when the first is asked for.
+    digits: OnceLock<Vec<Option<(Real, Real)>>>,
 }
 
 impl Symbols {
@@ -184,9 +188,13 @@ impl Symbols {
                 return Real::from_i64(suffix.parse().ok()?).sqrt();
             }
             let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
-            let Base::Constant(nanodeg) = self.bases[i] else { return None };
-            let (c, s) = ManyDigits::cos_sin(nanodeg)?;
-            Some(if kind == "c_" { c } else { s })
+            let digits = |base: &Base| match base {
+                Base::Constant(nanodeg) => ManyDigits::cos_sin(*nanodeg),
+                Base::Name(_) => None,
+            };
+            let all = self.digits.get_or_init(|| self.bases.iter().map(digits).collect());
+            let (c, s) = all[i].as_ref()?;
+            Some(if kind == "c_" { *c } else { *s })
         };
         ManyDigits::to_f64(&real(&parse(text).ok()?, &at)?)
     }
@@ -292,7 +300,8 @@ mod tests {
                 assert!((value / tangent - 1.0).abs() < 1e-14, "{nanodeg} {text}: {value} {tangent}");
             }
         }
-        let symbols = Symbols::of(&Platform::new(Scheme::of_angles([])).expect("valid"));
+        let none = parse_attitude("0,0,0").expect("an attitude");
+        let symbols = Symbols::of(&Platform::new(Scheme::of_angles([none])).expect("valid"));
         assert_eq!(symbols.float("r_2*r_2-2"), Some(0.0));
         assert_eq!(symbols.float("1/(2-2)"), None);
         assert_eq!(symbols.float("wN"), None);

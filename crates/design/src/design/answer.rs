@@ -43,6 +43,9 @@ pub struct Design {
     pub found: Vec<Found>,
     /// Schemes that none found beats in both total time and criterion, by total time.
     pub front: Vec<Found>,
+    /// Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for.
+    #[serde(default)]
+    pub not_judged: Vec<String>,
     /// The first scheme under the other carries; empty where none was searched.
     #[serde(default)]
     pub other_carries: Vec<OtherCarry>,

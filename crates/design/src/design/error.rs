@@ -58,9 +58,14 @@ pub enum DesignError {
         /// The coefficients.
         known: String,
     },
+    /// Turns that take time are about one axis here.
+    #[error(
+        "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave one of them out"
+    )]
+    GimbalPath,
     /// Requirements decide, and none is stated.
     #[error(
-        "{what} needs a requirement, and none is stated; expected --requirement NAME=SIGMA (as in --requirement D=0.05 for all drift \
+        "{what} needs a requirement, and none is stated on what must be observable; expected --requirement NAME=SIGMA (as in --requirement D=0.05 for all drift \
          coefficients, psi=0.01 for psi), or [requirements] in a scheme file"
     )]
     NoRequirement {

@@ -55,7 +55,8 @@ pub use walks::{WalkOptions, Walks, is_walk, scheme_of_walk, walks};
 pub use winner::scheme as scheme_found;
 
 use certify::excess;
-use obsdeg_core::model::{Euler, Path, Scheme, c_n_f64};
+use obsdeg_core::model::settings::{Assignment, concerns};
+use obsdeg_core::model::{Angle, Euler, Path, Scheme, c_n_f64};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, latitude_of, other_carries};
 use rounding::Free;
 use serde::{Deserialize, Serialize};
@@ -334,6 +335,7 @@ fn answered(
     progress: &(dyn Fn(Progress) -> bool + Sync),
     elsewhere: Option<Elsewhere<'_>>,
 ) -> Result<Design, DesignError> {
+    let stated = conditions;
     let conditions = &asked(base, conditions, &options.required)?;
     watched(progress, |progress, stopped| {
         let going = || progress(NOTHING_YET);
@@ -363,6 +365,7 @@ fn answered(
             found: Vec::new(),
             front: Vec::new(),
             other_carries: Vec::new(),
+            not_judged: not_judged(stated, conditions),
             gimbals: None,
             primes: task.rows.fields(),
             error_bound: task.rows.error_bound(sets),
@@ -447,7 +450,11 @@ fn answered(
         };
         out.search = Some(SearchReport {
             positions: k,
-            conditions: MeasurementReport::new(base, conditions),
+            // positions that are searched for have the dwell of the conditions
+            conditions: MeasurementReport::new(
+                &Scheme { positions: Scheme::of_angles([zero()]).positions, ..base.clone() },
+                conditions,
+            ),
             drift_noise: conditions.as_stated().drift_noise_in_words(),
             prior: conditions.stated_prior_in_words(),
             criterion: task.criterion.name().into(),
@@ -467,6 +474,17 @@ fn answered(
         winner::within_gimbals(&mut out, base, conditions)?;
         Ok(out)
     })
+}
+
+/// Names of the requirements that `conditions` leave out of those that are stated.
+fn not_judged(stated: &Conditions, conditions: &Conditions) -> Vec<String> {
+    let judged = |a: &Assignment| conditions.requirements.iter().any(|r| concerns(&a.name, &r.name));
+    stated.requirements.iter().filter(|a| !judged(a)).map(|a| a.name.clone()).collect()
+}
+
+/// The attitude with all angles zero.
+fn zero() -> Euler {
+    std::array::from_fn(|_| Angle::from_degrees(0))
 }
 
 /// Why an exhaustive search found nothing.

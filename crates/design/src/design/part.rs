@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::best::Best;
 use super::search::Progress;
-use super::{Design, DesignError, DesignOptions, NOTHING_YET, Prepared, answered, watched};
+use super::{Design, DesignError, DesignOptions, NOTHING_YET, Prepared, answered, asked, watched};
 
 /// Name and version of the JSON layout.
 pub const PART_SCHEMA: &str = "obsdeg.part/1";
@@ -272,6 +272,7 @@ pub fn design_starts(
     options: &DesignOptions,
 ) -> Result<usize, DesignError> {
     let going = || true;
+    let conditions = &asked(base, conditions, &options.required)?;
     let prepared = Prepared::new(base, conditions, options, &going)?;
     let k = options.positions.filter(|_| options.free.is_none()).ok_or(DesignError::Parts)?;
     Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
@@ -306,6 +307,7 @@ pub fn design_part(
             return Ok(resumed.clone());
         }
     }
+    let conditions = &asked(base, conditions, &options.required)?;
     watched(progress, |progress, _| {
         let going = || progress(NOTHING_YET);
         let prepared = Prepared::new(base, conditions, options, &going)?;

@@ -97,6 +97,9 @@ impl<'a> Task<'a> {
                 return Err(DesignError::Limit { what, found });
             }
         }
+        if base.path == Some(Path::Gimbals) && conditions.slew_rate_deg_s.is_some() {
+            return Err(DesignError::GimbalPath);
+        }
         let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
         if let Some((name, _)) = generic {
             return Err(DesignError::GenericAngle { name: name.into() });

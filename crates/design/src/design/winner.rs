@@ -81,7 +81,7 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
         combinations: Vec::new(),
         simulation: Settings {
             step_s: Some(conditions.step_s),
-            dwell_s: None,
+            dwell_s: found.dwells_s.is_empty().then_some(found.dwell_s),
             slew_rate_deg_s: conditions.slew_rate_deg_s,
             accelerometer_noise_g: Some(conditions.accelerometer_noise_g),
             priors,

@@ -129,6 +129,13 @@ pub struct ConditionsReport {
     pub by_default: Vec<String>,
 }
 
+impl ConditionsReport {
+    /// True if a prior is stated.
+    pub fn states_priors(&self) -> bool {
+        !self.by_default.iter().any(|key| key == "priors")
+    }
+}
+
 /// The bias instability of the accelerometers: a first-order Gauss-Markov process of each, which goes on in platform axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AccelerometerBias {

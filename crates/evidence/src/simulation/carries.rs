@@ -18,6 +18,9 @@ pub struct OtherCarry {
     pub carry: Carry,
     /// The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was judged.
     pub worst: Option<Worst>,
+    /// True if the slews of the scheme are left out there, since only inertial carry has slews.
+    #[serde(default)]
+    pub without_slews: bool,
     /// What becomes of the requirements; null where nothing was judged.
     pub requirements: Option<Requirements>,
     /// The reason why nothing was judged; left out where it was.
@@ -40,9 +43,15 @@ pub fn other_carries(
     conditions: &Conditions,
     seed: u64,
 ) -> Result<Vec<OtherCarry>, SimulationError> {
+    let without_slews = scheme.positions.iter().skip(1).any(|p| conditions.slew_rate(p).is_some());
     let judged = |carry: Carry| {
-        let nothing =
-            |why: String| OtherCarry { carry, worst: None, requirements: None, not_judged: Some(why) };
+        let nothing = |why: String| OtherCarry {
+            carry,
+            worst: None,
+            without_slews,
+            requirements: None,
+            not_judged: Some(why),
+        };
         let Some((scheme, conditions)) = under(scheme, conditions, carry) else {
             return Ok(nothing("torquer errors act in turns that the scheme does not state".into()));
         };
@@ -56,6 +65,7 @@ pub fn other_carries(
         Ok(OtherCarry {
             carry,
             worst: attained.worst_of(&|_| true),
+            without_slews,
             requirements: Some(attained.requirements(&conditions)?),
             not_judged: None,
         })

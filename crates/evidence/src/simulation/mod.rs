@@ -41,7 +41,7 @@ use obsdeg_core::model::{Carry, Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
 
 use crate::prediction::{PredictedCombination, Prediction, PredictionError};
-use crate::requirements::{Basis, Claim, Requirements, meets};
+use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
 use answer::chosen;
 use conditions::REQUIRED;
 use consistency::Outcomes;
@@ -248,7 +248,12 @@ fn run_requirements(
     let claims = quantities.iter().map(|q| Claim {
         name: &q.name,
         required: q.required_sigma,
-        sigma: q.outcome.miss().map_or(Ok(q.sigma), Err),
+        // what a stated prior bounds counts, as in the prediction
+        sigma: match q.outcome.miss() {
+            Some(Miss::NotObservable) if q.predicted_sigma.is_some() => Ok(q.sigma),
+            Some(why) => Err(why),
+            None => Ok(q.sigma),
+        },
     });
     let ratio = |q: &Estimate| {
         let ratio = q.sigma / q.predicted_sigma?;

@@ -39,9 +39,9 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
             stated::run(&s.simulation.run, &s.simulation.conditions)
         ));
     }
-    if !s.simulation.validity.holds {
+    if !s.simulation.validity.holds && !stated::drifts_by_default(&s.simulation.conditions) {
         out.push(
-            "known drifts compensated before the run, or a filter with full attitudes (`obsdeg simulate --truth exact` shows what that gives): \
+            "Compensate known drifts before the run, or use a filter with full attitudes (`obsdeg simulate --truth exact` shows its sigmas): \
              at these drifts the small-angle model does not hold"
                 .into(),
         );

@@ -71,7 +71,9 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
 
 /// What limits the verdict, the gravest first.
 fn limits(s: &SchemeReview) -> Vec<String> {
-    let mut out: Vec<String> = small_angles(s).into_iter().collect();
+    // drifts that nobody states limit no scheme
+    let states_drifts = !stated::drifts_by_default(&s.simulation.conditions);
+    let mut out: Vec<String> = small_angles(s).filter(|_| states_drifts).into_iter().collect();
     out.extend(gimbals::lead(s.analysis.gimbals.as_ref()));
     if !s.simulation.consistency.consistent {
         out.push(format!(
@@ -220,7 +222,10 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
             row("Requirements", required, requirements),
             row(
                 "Small-angle model",
-                grade(s.simulation.validity.holds),
+                match stated::drifts_by_default(&s.simulation.conditions) {
+                    true => Grade::Open,
+                    false => grade(s.simulation.validity.holds),
+                },
                 small_angles(s)
                     .unwrap_or_else(|| format!("holds for {}", stated::drifts(&s.simulation.conditions))),
             ),
