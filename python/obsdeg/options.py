@@ -88,7 +88,12 @@ class Measured(TypedDict, total=False):
     azimuth_noise: Real
     """Noise of a measured azimuth per sample in deg [default: 0.001]."""
     requirement: ByName
-    """Largest standard deviation allowed, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: psi 0.01, D 0.1]."""
+    """Largest standard deviation allowed at the end, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: none, so that nothing is judged]."""
+    drift_noise: str
+    """Random drift with its unit: ``"0.01 deg/h"`` is a bias held for one step, ``"0.001 deg/sqrt(h)"`` a random walk [default: none in
+    predictions, 0.01 deg/h in simulated runs]."""
+    prior: ByName
+    """Standard deviations beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug [default: none in predictions]."""
 
 
 class Filtered(Measured, GyroNoise, total=False):
@@ -100,14 +105,10 @@ class Filtered(Measured, GyroNoise, total=False):
     """The filter [default: linear where its model holds, else iterated]."""
     slew_rate: Real
     """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
-    drift_noise: str
-    """Random drift with its unit: ``"0.01 deg/h"`` is a bias held for one step, ``"0.001 deg/sqrt(h)"`` a random walk."""
     propagation: Literal["exponential", "rk4"]
     """Transition matrix of the filter: the matrix exponential, or Runge-Kutta of fourth order."""
     value: ByName
     """True values in deg, deg/h, deg/h/g, ppm, arcsec, ug."""
-    prior: ByName
-    """Initial standard deviations, likewise."""
     estimate: ByName
     """Initial estimates, likewise."""
     drift_scale: Real
@@ -203,7 +204,7 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     criterion: Literal["worst", "a", "d", "e", "margin"]
     """What makes one scheme better: the largest sigma, trace, determinant, largest eigenvalue, or the largest sigma over its requirement."""
     meet: bool
-    """Only schemes that meet every requirement."""
+    """Only schemes that meet every stated requirement."""
     max_time: Real
     """Largest total time with slews in s."""
     max_slew: Real
@@ -213,8 +214,6 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     gimbal: Names
     """How far gimbals turn in degrees: ``["alpha=-90:90", "beta=-80:80"]``; alpha is the outer gimbal, about North, beta the middle one,
     gamma the inner one, about Z_p. Schemes have angles within the limits."""
-    prior: ByName
-    """Initial standard deviations in deg, deg/h, deg/h/g, ppm, arcsec, ug."""
 
 
 class Report(Seeded, Assumed, Filtered, total=False):

@@ -694,9 +694,27 @@ class AccelerometerBias(Record):
     correlation_time_s: float
     """Its correlation time in s."""
 
+PerGyro = tuple[float, float, float]
+"""A noise of each gyro: X, Y, Z; zero for none."""
+
+
+class GyroNoise(Record):
+    """The datasheet of the gyros X, Y, Z."""
+
+    __slots__ = ()
+
+    angle_random_walk_deg_sqrt_h: PerGyro
+    """Angle random walk in deg/sqrt(h)."""
+    rate_random_walk_dph_sqrt_h: PerGyro
+    """Rate random walk in deg/h/sqrt(h)."""
+    bias_instability_dph: PerGyro
+    """Bias instability in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B."""
+    correlation_time_s: float
+    """Correlation time in s of the Gauss-Markov process that stands for it."""
+
 
 class MeasurementReport(Record):
-    """What a predicted sigma rests on: the information of all samples, without prior and without drift noise."""
+    """What a predicted sigma rests on: the information of all samples with the noise, the random drift and the priors that are stated."""
 
     __slots__ = ()
 
@@ -711,11 +729,21 @@ class MeasurementReport(Record):
     accelerometer_noise_g: float
     """Noise of the observation per sample and axis in g."""
     accelerometer_bias: AccelerometerBias | None
-    """Bias instability of the accelerometers: `design` counts it, a comparison leaves it out; left out where there is none."""
+    """Bias instability of the accelerometers; left out where there is none."""
     azimuth_noise_deg: float | None
     """Noise of the azimuth per sample in deg; null where it is not measured."""
     slew_rate_deg_s: float | None
     """Rate of slews in deg/s where a position does not say its own; null: instantaneous."""
+    drift_noise: str | None
+    """Random drift that is stated, with its unit; null: none counts."""
+    gyro_noise: GyroNoise | None
+    """Datasheet of the gyros; left out where they have no noise of their own."""
+    prior: str | None
+    """Priors that are stated, as 1 sigma in the units of the unknowns; null: none counts."""
+    by_default: list[str]
+    """Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
+    dwell_s, azimuth_noise_deg.
+    """
 
 
 class Slew(Record):
@@ -745,10 +773,14 @@ class ComparisonQuantity(Record):
     accuracy_order: int | None
     """The accuracy order."""
     sigma: float | None
-    """Standard deviation by the information of all samples, without prior and drift noise; null when these do not determine it."""
+    """Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when neither samples nor stated
+    priors bound it.
+    """
+    by_prior: bool
+    """True if the samples do not determine it, so that sigma rests on stated priors alone."""
     sigma_extended: float | None
-    """Of a coefficient, where the small-angle model does not hold for the scheme's own drifts: the standard deviation of a filter with
-    full attitudes at the end, with the prior.
+    """Of a coefficient, where the small-angle model does not hold for the drifts that are stated: the standard deviation of a filter
+    with full attitudes at the end, with the prior.
     """
     requirement: float | None
     """The largest sigma allowed."""
@@ -763,19 +795,21 @@ class ComparisonQuantity(Record):
 
 
 class Worst(Record):
-    """The largest sigma of a coefficient."""
+    """The largest sigma of a drift coefficient."""
 
     __slots__ = ()
 
     name: str
     """The coefficient."""
     sigma_dph: float
-    """Its sigma in deg/h (per g)."""
+    """Its sigma in deg/h (per g, per g^2)."""
 
-Basis = Literal["predicted", "predicted_with_prior", "run"]
-"""Under what sigmas are held against requirements. predicted: The information of all samples: no prior, no drift noise, psi at the start
-(under reset carry at the start of each position). predicted_with_prior: The same with the priors that are stated. run: The filter at
-the end of a run: with prior and drift noise, psi at the end.
+Basis = Literal["predicted", "predicted_with_prior", "run", "record"]
+"""Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the prediction alone; a run is one
+example of it, a record its confirmation. predicted: The information of all samples with the noise and the random drift that are
+stated, psi at the end of the scheme (under reset carry at the end of each position); nothing is known beforehand.
+predicted_with_prior: The same with the priors that are stated. run: The filter at the end of a simulated run, with its prior and its
+random drift, whether they are stated or chosen by the program. record: The estimates from a record.
 """
 
 
@@ -822,8 +856,29 @@ class Requirements(Record):
     """The smallest margin of those whose sigma counts."""
     missed: list[Missed]
     """Those that miss theirs, in model order."""
-    by_default: bool
-    """Nobody stated any: they are those that the program chooses."""
+    on_prior: list[str]
+    """Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated priors alone."""
+
+
+class OtherCarry(Record):
+    """A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has,
+    are left out.
+    """
+
+    __slots__ = ()
+
+    carry: Carry
+    """What is carried between positions there."""
+    worst: Worst | None
+    """The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was
+    judged.
+    """
+    without_slews: bool
+    """True if the slews of the scheme are left out there, since only inertial carry has slews."""
+    requirements: Requirements | None
+    """What becomes of the requirements; null where nothing was judged."""
+    not_judged: str | None
+    """The reason why nothing was judged; left out where it was."""
 
 
 class Validity(Record):
@@ -875,24 +930,6 @@ class Sensitivity(Record):
     """The worst sigma there."""
     worst_determined: Worst | None
     """The worst sigma there of the coefficients that the scheme itself makes observable; null when one is not."""
-
-PerGyro = tuple[float, float, float]
-"""A noise of each gyro: X, Y, Z; zero for none."""
-
-
-class GyroNoise(Record):
-    """The datasheet of the gyros X, Y, Z."""
-
-    __slots__ = ()
-
-    angle_random_walk_deg_sqrt_h: PerGyro
-    """Angle random walk in deg/sqrt(h)."""
-    rate_random_walk_dph_sqrt_h: PerGyro
-    """Rate random walk in deg/h/sqrt(h)."""
-    bias_instability_dph: PerGyro
-    """Bias instability in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B."""
-    correlation_time_s: float
-    """Correlation time in s of the Gauss-Markov process that stands for it."""
 
 Reached = Literal["at_the_shortest", "within", "still_falls"]
 """Where a sigma is within 5 % of the least. at_the_shortest: At the shortest dwell looked at already: shorter ones may do as well, or
@@ -960,13 +997,15 @@ class Review(Record):
     worst: Worst | None
     """The largest sigma of a coefficient; null when one is not observable."""
     meets_requirements: bool
-    """Whether every unknown with a requirement meets it."""
+    """True if requirements are stated and every one is met."""
     requirements: Requirements
-    """What became of the requirements: predicted sigma (psi: of the start, under reset carry of the start of each position)."""
+    """What becomes of the requirements by the predicted sigmas."""
+    other_carries: list[OtherCarry]
+    """The same scheme under the other carries."""
     has_accuracy_orders: bool
     """Whether accuracy orders are computed: none are for rotating segments."""
     validity: Validity | None
-    """Whether the small-angle model holds at the scheme's own drifts; null where they have no true values, or for very many steps."""
+    """Whether the small-angle model holds at the drifts that are stated; null where none are (`values`), or for very many steps."""
     drop_one: list[DropOne]
     """What happens without each of the positions."""
     sensitivity: list[Sensitivity]
@@ -983,7 +1022,7 @@ class Comparison(Shape):
     """Several schemes, judged alike."""
 
     schema: str
-    """`obsdeg.comparison/1`."""
+    """`obsdeg.comparison/2`."""
     version: str
     """Version of the program."""
     schemes: list[Review]
@@ -1136,11 +1175,11 @@ class SearchReport(Record):
     positions: int
     """The number of positions."""
     conditions: MeasurementReport
-    """What every sigma rests on: the information of all samples on psi and all coefficients, and the prior. Every position has the
-    dwell, slews are about the eigenaxis, Z is not used meanwhile.
+    """What every sigma rests on: the information of all samples on psi and all coefficients, with the random drift and the priors that
+    are stated. Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
     """
     drift_noise: str | None
-    """Random drift that sigmas allow for; null: none."""
+    """Random drift that is stated: the search leaves it out, and the figures of all schemes that are listed count it; null: none."""
     prior: str | None
     """Knowledge beforehand that sigmas and the bound count beside the samples: the priors that are stated; null: none. What is
     observable is by the samples alone.
@@ -1247,7 +1286,7 @@ class Design(Shape):
     """The result of a search."""
 
     schema: str
-    """`obsdeg.design/1`."""
+    """`obsdeg.design/2`."""
     version: str
     """Version of the program."""
     carry: Carry
@@ -1276,6 +1315,10 @@ class Design(Shape):
     """The best schemes, best first."""
     front: list[Found]
     """Schemes that none found beats in both total time and criterion, by total time."""
+    not_judged: list[str]
+    """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
+    other_carries: list[OtherCarry]
+    """The first scheme under the other carries; empty where none was searched."""
     gimbals: GimbalReport | None
     """Of the first scheme: turns beyond the gimbal limits; and positions of the file of candidates whose angles lie beyond. Left out
     where no limits are stated.
@@ -1487,6 +1530,10 @@ class ConditionsReport(Record):
     """Propagation of the filter."""
     drift_scale: float
     """Factor on true drifts and their priors."""
+    by_default: list[str]
+    """Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
+    dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    """
 
 
 class TimelineReport(Record):
@@ -1516,12 +1563,21 @@ class LinearEstimate(Record):
     sigma: float
     """What it believes of the error."""
 
-Outcome = Literal["reached", "converging", "rests_on_prior", "prior_only", "large_angles_only", "inconsistent", "no_number"]
-"""What a run says of one unknown. reached: Sigma is at or below what is required. converging: Sigma fell, but not to what is required,
-or nothing is. rests_on_prior: The samples determine it, but sigma is (nearly) that of the prior. prior_only: The samples do not
-determine it: whatever sigma says, it comes of the prior. large_angles_only: The verdict, which is about small angles, has it
-undetermined; a filter with full attitudes learns of it through large ones. inconsistent: The error is beyond four sigma: the filter
-is wrong about it. no_number: The error or sigma is no number.
+Outcome = Literal[
+    "reached",
+    "converging",
+    "determined",
+    "rests_on_prior",
+    "prior_only",
+    "large_angles_only",
+    "inconsistent",
+    "no_number",
+]
+"""What a run says of one unknown. reached: Sigma is at or below what is required. converging: Sigma fell, but not to what is required.
+determined: Sigma fell; nothing is required of it. rests_on_prior: The samples determine it, but sigma is (nearly) that of the prior.
+prior_only: The samples do not determine it: whatever sigma says, it comes of the prior. large_angles_only: The verdict, which is
+about small angles, has it undetermined; a filter with full attitudes learns of it through large ones. inconsistent: The error is
+beyond four sigma: the filter is wrong about it. no_number: The error or sigma is no number.
 """
 
 
@@ -1548,6 +1604,8 @@ class Estimate(Record):
     """Estimate minus truth."""
     sigma: float
     """What the filter believes of the error."""
+    predicted_sigma: float | None
+    """Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound it."""
     error_over_sigma: float
     """Error over sigma."""
     linear: LinearEstimate | None
@@ -1562,6 +1620,38 @@ class Estimate(Record):
     """What came out."""
     prior_of: list[str]
     """On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only."""
+
+
+class SigmaRatio(Record):
+    """The ratio of a run's sigma to the predicted one."""
+
+    __slots__ = ()
+
+    name: str
+    """The unknown."""
+    ratio: float
+    """Sigma of the run over the predicted sigma, dimensionless."""
+
+RunDiffers = Literal["random_drift", "prior", "full_attitudes"]
+"""What a run assumes besides the conditions that are stated. random_drift: The random drift of the program: none is stated. prior:
+Priors of the program: not every unknown has a stated one. full_attitudes: A filter with full attitudes: the prediction is that of
+small angles.
+"""
+
+
+class RunRequirements(Record):
+    """A run's sigmas against the requirements, beside the prediction."""
+
+    __slots__ = ()
+
+    requirements: Requirements
+    """What became of the requirements in the run."""
+    largest_ratio: SigmaRatio | None
+    """The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null where none has."""
+    smallest_ratio: SigmaRatio | None
+    """The smallest such ratio; null where no unknown has both."""
+    differs: list[RunDiffers]
+    """Reasons why the sigmas of the run may differ from the predicted ones."""
 
 Doubt = Literal["no_number", "nis", "nees", "error", "correlated"]
 """What speaks against a run. no_number: A statistic, an estimate or a sigma is no number. nis: The mean NIS is outside its band of 99.9
@@ -1631,7 +1721,7 @@ class Simulation(Shape):
     """One run of the filter against a simulated truth."""
 
     schema: str
-    """`obsdeg.simulation/1`."""
+    """`obsdeg.simulation/2`."""
     version: str
     """Version of the program."""
     carry: Carry
@@ -1645,7 +1735,13 @@ class Simulation(Shape):
     combinations: list[Estimate]
     """Observable combinations of unknowns that are not observable alone."""
     requirements: Requirements
-    """What became of the requirements: sigma of the filter at the end, with prior and drift noise."""
+    """What becomes of the requirements by prediction, as in every other command: the information of all samples with the noise, the
+    random drift and the priors that are stated.
+    """
+    run: RunRequirements
+    """What became of them in this run, by sigma of its filter at the end."""
+    other_carries: list[OtherCarry]
+    """The same scheme under the other carries."""
     consistency: Consistency
     """Whether errors and innovations are what the filter believes."""
     filter: FilterReport
@@ -2596,6 +2692,8 @@ class Assumed(Record):
     """What is different in the scheme of that."""
     held: list[tuple[str, float, str]]
     """What nothing determines, unknown by unknown: the standard deviation within which it is held, in its unit."""
+    by_default: list[str]
+    """Keys of the conditions that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, drift_noise."""
     seed: int
     """Seed of the exact verdicts."""
 
@@ -2619,7 +2717,7 @@ class Setup(Record):
     """Names and Euler angles in deg of the positions."""
 
 
-class CalibrationBasis(Record):
+class Basis2(Record):
     """A record that estimates rest on."""
 
     __slots__ = ()
@@ -2666,6 +2764,10 @@ class Calibration(Shape):
     """What speaks against that, the gravest first; empty when nothing does."""
     quantities: list[Estimated]
     """Every unknown, psi of the start of each record."""
+    requirements: Requirements | None
+    """What becomes of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null where
+    none is stated. Those on psi are not judged: a calibration estimates psi of the start of a record.
+    """
     combinations: list[Estimated]
     """Combinations of what is not told apart one by one, and those asked for."""
     covariance: CovarianceTable
@@ -2690,7 +2792,7 @@ class Calibration(Shape):
     """What was assumed."""
     setup: Setup
     """What it is of."""
-    rests_on: list[CalibrationBasis]
+    rests_on: list[Basis2]
     """The records that it rests on, those of the calibration before too."""
     series: list[ResidualSeries]
     """What is left over time, by record and component."""

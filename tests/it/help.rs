@@ -5,12 +5,12 @@ use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 /// The commands, with the most lines that `-h` may have.
 const COMMANDS: [(&str, usize); 11] = [
     ("analyze", 45),
-    ("simulate", 61),
+    ("simulate", 62),
     ("crosscheck", 67),
-    ("calibrate", 46),
-    ("compare", 43),
-    ("design", 66),
-    ("report", 58),
+    ("calibrate", 47),
+    ("compare", 46),
+    ("design", 68),
+    ("report", 59),
     ("paper", 18),
     ("completions", 12),
     ("man", 14),

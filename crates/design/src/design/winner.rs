@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use obsdeg_core::model::ranges::DWELL_S;
 use obsdeg_core::model::settings::{Assignment, Settings, concerns};
 use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, angles_text, parse_attitude};
 use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
@@ -81,7 +82,7 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
         combinations: Vec::new(),
         simulation: Settings {
             step_s: Some(conditions.step_s),
-            dwell_s: found.dwells_s.is_empty().then_some(found.dwell_s),
+            dwell_s: Some(found.dwell_s).filter(|s| found.dwells_s.is_empty() && DWELL_S.admits(*s)),
             slew_rate_deg_s: conditions.slew_rate_deg_s,
             accelerometer_noise_g: Some(conditions.accelerometer_noise_g),
             priors,
