@@ -236,7 +236,7 @@ fn by_normal_equations() -> Vec<f64> {
     (0..3).for_each(|i| information[(i, i)] += prior_psi);
     for i in 3..15 {
         let sigma = if i < 6 { 20.0 } else { 10.0 };
-        information[(i, i)] += (sigma * dph as f64).powi(-2);
+        information[(i, i)] += (sigma * dph).powi(-2);
     }
     (15..n).for_each(|i| information[(i, i)] += held);
     for (p, angles) in positions.iter().enumerate() {

@@ -207,7 +207,6 @@ fn random_schemes(count: usize) {
         tried += remedies.remedies.len();
         assert_eq!(of_scheme(&scheme), [] as [String; 0], "scheme {i}:\n{}", scheme_file::write(&scheme));
     }
-    println!("{tried} remedies of {count} schemes");
     assert!(tried > count, "{tried} remedies of {count} schemes");
 }
 
@@ -286,7 +285,6 @@ fn of_models(step: usize) -> usize {
         }
         assert_eq!(found, [] as [String; 0], "{name}");
     }
-    println!("{tried} remedies of every {step}th model");
     tried
 }
 

@@ -426,7 +426,7 @@ fn text_from_files_is_text_in_every_format() {
     let scheme = hostile(folder.path(), 3).display().to_string();
     let (file, text) = report(other.path(), "review.tex", &[&scheme]);
     assert_eq!(text.matches("\\end{document}").count(), 1);
-    assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & LIMITED & "));
+    assert!(text.contains("\\paragraph{Status: ") && text.contains("Small-angle model & "));
     assert!(text.contains("\\$a\\_b\\textasciicircum{}c\\$ \\#let \\textbackslash{}end\\{document\\}"));
     assert!(file.with_file_name("review_figures").join("s1_staircase.pdf").is_file());
 }

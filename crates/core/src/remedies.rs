@@ -156,11 +156,11 @@ impl<S: Scalars> Directions<S> {
         mut judge: impl FnMut(usize, usize) -> Option<Vec<usize>>,
     ) -> bool {
         let second = right.unwrap_or(left);
-        let [rows, columns] = [left, second].map(|list| list.len().min(MOST_PAIRED));
         let mut found: Vec<(usize, usize, Vec<usize>)> = Vec::new();
-        for i in 0..rows {
-            for j in if right.is_some() { 0 } else { i + 1 }..columns {
-                let resolved = self.resolved(&left[i].and(&second[j]), &open);
+        for (i, one) in left.iter().enumerate().take(MOST_PAIRED) {
+            let from = if right.is_some() { 0 } else { i + 1 };
+            for (j, other) in second.iter().enumerate().take(MOST_PAIRED).skip(from) {
+                let resolved = self.resolved(&one.and(other), &open);
                 if !resolved.is_empty() {
                     found.push((i, j, resolved));
                 }

@@ -546,7 +546,7 @@ impl Parts<'_> {
             ("accelerometer_noise_g", !stated.accelerometer_noise && !self.options.estimate_noise),
             ("drift_noise", !stated.drift_noise && self.conditions.drift_noise.amount() > 0.0),
         ];
-        all.into_iter().filter_map(|(key, by_default)| by_default.then(|| key.into())).collect()
+        all.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()).collect()
     }
 
     fn assumed(&self, unknowns: &[Asked]) -> Assumed {

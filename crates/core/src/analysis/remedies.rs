@@ -271,7 +271,8 @@ impl Search<'_> {
         let (names, attitudes): (Vec<String>, Vec<Told<Field>>) =
             candidates.into_iter().filter_map(|c| Some((c.attitude, c.tells?))).unzip();
         let values: Vec<Told<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();
-        let kinds: [(&[Told<Field>], Option<&[Told<Field>]>); 3] =
+        type List<'a> = &'a [Told<Field>];
+        let kinds: [(List<'_>, Option<List<'_>>); 3] =
             [(&attitudes, None), (&attitudes, Some(&values)), (&values, None)];
         let mut complete = true;
         for (kind, (left, right)) in kinds.into_iter().enumerate() {

@@ -221,7 +221,7 @@ pub(super) fn chosen(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
         ("dwell_s", !stated.dwell && needs_dwell),
         ("azimuth_noise_deg", !stated.azimuth_noise && scheme.measured_azimuth),
     ];
-    all.into_iter().filter_map(|(key, by_default)| by_default.then(|| key.into())).collect()
+    all.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()).collect()
 }
 
 /// A position or slew of the timeline.

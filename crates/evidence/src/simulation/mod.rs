@@ -313,7 +313,7 @@ fn chosen_for_run(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
         ("values", conditions.stated_values().is_empty()),
         ("priors", conditions.stated_priors().is_empty()),
     ];
-    out.extend(own.into_iter().filter_map(|(key, by_default)| by_default.then(|| key.into())));
+    out.extend(own.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()));
     out
 }
 

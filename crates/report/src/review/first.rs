@@ -143,7 +143,7 @@ fn choice(r: &DesignReview) -> (Grade, String) {
         let s = &schemes[best];
         let as_short = meeting.iter().filter(|&&i| schemes[i].total_s == s.total_s).count();
         let why = match (meeting.len(), as_short) {
-            (1, _) => format!("the only one that meets every requirement by prediction"),
+            (1, _) => "the only one that meets every requirement by prediction".to_string(),
             (n, 1) => format!(
                 "the shortest of {n} that meet every requirement by prediction, {} s",
                 seconds(s.total_s)
