@@ -321,7 +321,7 @@ fn it_is_for_everyone() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts .against').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
     b.value(&format!("{axe};1"));
     click(b, "#start-tour");

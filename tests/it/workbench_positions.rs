@@ -23,7 +23,7 @@ fn positions_are_edited() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts .against').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
     // a slider: psi_y becomes observable, the row says what it was
     click(b, "#positions li:nth-child(2) .name");
@@ -273,7 +273,7 @@ fn it_keeps_up() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts .against').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
     // in the quietest of a few drags: other tests run beside this one
     let mut quickest: Option<[f64; 2]> = None;

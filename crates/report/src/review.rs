@@ -482,7 +482,8 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
             && !is_list(b, "Assumed")
             && !is_list(b, "Validity of the small-angle model")
     };
-    blocks.extend(run.blocks.into_iter().filter(kept));
+    // predicted sigmas stand among the unknowns, and a sheet has room for so many columns
+    blocks.extend(run.blocks.into_iter().filter(kept).map(|b| b.without(&["predicted"])));
     let flat: Vec<&str> = (s.simulation.quantities.iter())
         .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)
         .map(|q| q.name.as_str())

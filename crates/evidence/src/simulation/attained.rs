@@ -164,7 +164,11 @@ fn stated_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<Option<f64>>
 /// Covariance at the end by the information of all samples: nothing is random but the noise of the samples.
 fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<Known, SimulationError> {
     let Batch { information, to_end } = batch(plan, SquareRootInformation::prior(&prior)?)?;
-    Ok(Known::Root(to_end * information.inverse_root()?))
+    let root = information.inverse_root()?;
+    let n = root.nrows();
+    // sums in the same order on every machine: no product that uses whatever the processor has
+    let entry = |i: usize, j: usize| (0..n).map(|k| to_end[(i, k)] * root[(k, j)]).sum::<f64>();
+    Ok(Known::Root(DMatrix::from_fn(n, n, entry)))
 }
 
 /// Covariance at the end of a filter, with random drift and biases.
