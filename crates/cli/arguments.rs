@@ -79,7 +79,7 @@ impl AllFiles {
     }
 }
 
-/// Whether a script is to hear of requirements that are missed.
+/// Exit code for requirements that are missed, for scripts.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct RequireMet {
     /// Exit with 1 if a stated requirement is missed (2: none is stated)
@@ -123,7 +123,7 @@ pub(crate) fn one_file(arg: Arg) -> Arg {
     }
 }
 
-/// What a command says of the latitude whose numbers need one.
+/// Help of `--latitude` for commands whose numbers need a latitude.
 pub(crate) fn with_latitude(arg: Arg) -> Arg {
     match arg.get_id() == "latitude" {
         true => arg.help("Latitude in degrees (default: that of the file, or 28.2)"),

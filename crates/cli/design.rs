@@ -43,16 +43,17 @@ Exit codes: 0 done (with --minimum also when no positions do), 1 the first schem
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
 pub(crate) struct Arguments {
-    /// Scheme file whose carry, latitude, geometry, terms, conditions, requirements and gimbal limits hold; - is stdin. Its positions are not chosen from
-    /// (--candidates), and as many are searched where no number is asked for
+    /// Scheme file whose carry, latitude, geometry, terms, conditions, requirements and gimbal limits hold; -
+    /// is stdin. Its positions are not chosen from (--candidates), and as many are searched where no number
+    /// is asked for
     #[arg(value_name = "SCHEME", id = "conditions", conflicts_with = "merge")]
     scheme: Option<PathBuf>,
 
     #[command(flatten)]
     asked: Search,
 
-    /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0). No other option is needed: the parts know
-    /// theirs
+    /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0).
+    /// No other option is needed: the parts know theirs
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = "Parts", conflicts_with_all = ["minimum", "part"])]
     merge: Vec<PathBuf>,
 

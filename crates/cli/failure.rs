@@ -33,7 +33,8 @@ fn say_as(message: &str, made: impl Fn(&str) -> String) {
     }
 }
 
-/// A line in the colours of clap's errors; `drawn`: one that may draw a place of a text, with a margin and marks below what is meant.
+/// A line in the colours of clap's errors; `drawn`: one that may draw a place of a text, with a margin and
+/// marks below what is meant.
 fn colored(line: &str, drawn: bool) -> String {
     let error = AnsiColor::Red.on_default().bold();
     let margin = AnsiColor::BrightBlue.on_default().bold();

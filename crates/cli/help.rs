@@ -19,8 +19,8 @@ const SOLUTIONS: Section = Some("Solutions");
 const CONTROLS: Section = Some("Controls");
 const OUTPUT: Section = Some("Output");
 
-/// Options by their names in the program, with the section where they stand and their line; what a command says of one of its own comes first,
-/// as `calibrate.step`.
+/// Options by their names in the program, with the section where they stand and their line; what a command
+/// says of one of its own comes first, as `calibrate.step`.
 const LINES: &[(&str, Section, &str)] = &[
     ("calibrate.files", None, "Scheme or model file, then records of its runs; - is stdin"),
     ("compare.files", None, "Scheme files (TOML); - is stdin"),
@@ -131,7 +131,8 @@ const LINES: &[(&str, Section, &str)] = &[
     ("kind", None, "What the schema describes, such as analysis, design or scheme"),
 ];
 
-/// A command with a line for every option, and with its examples and notes behind `--help`; `short`: of `-h`, where lines name the words themselves.
+/// A command with a line for every option, and with its examples and notes behind `--help`; `short`: of `-h`,
+/// where lines name the words themselves.
 pub(crate) fn in_lines(command: Command, short: bool) -> Command {
     let name = command.get_name().to_string();
     let notes = command.get_after_help().cloned();

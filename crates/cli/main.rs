@@ -105,8 +105,8 @@ fn command() -> clap::Command {
     })
 }
 
-/// Where an argument belongs that a command does not know: the commands that have such an option, or where a file goes that no command is named
-/// for.
+/// Where an argument belongs that a command does not know: the commands that have such an option, or where a
+/// file goes that no command is named for.
 fn hint(e: &clap::Error) -> Option<String> {
     let is_file =
         |text: &str| std::path::Path::new(text).extension().is_some_and(|x| x == "toml" || x == "json");

@@ -338,7 +338,7 @@ class Remedy(Record):
 
 
 class Remedies(Record):
-    """What resolves the unknowns that are not observable."""
+    """Remedies of the unknowns that are not observable."""
 
     __slots__ = ()
 
@@ -714,7 +714,7 @@ class GyroNoise(Record):
 
 
 class MeasurementReport(Record):
-    """What a predicted sigma rests on: the information of all samples with the noise, the random drift and the priors that are stated."""
+    """Conditions of predicted sigmas: the information of all samples with the noise, the random drift and the priors that are stated."""
 
     __slots__ = ()
 
@@ -779,8 +779,8 @@ class ComparisonQuantity(Record):
     by_prior: bool
     """True if the samples do not determine it, so that sigma rests on stated priors alone."""
     sigma_extended: float | None
-    """Of a coefficient, where the small-angle model does not hold for the drifts that are stated: the standard deviation of a filter
-    with full attitudes at the end, with the prior.
+    """Standard deviation of a coefficient, where the small-angle model does not hold for the drifts that are stated, by a filter with
+    full attitudes at the end, with the prior.
     """
     requirement: float | None
     """The largest sigma allowed."""
@@ -868,7 +868,7 @@ class OtherCarry(Record):
     __slots__ = ()
 
     carry: Carry
-    """What is carried between positions there."""
+    """Carry: what of psi goes on between positions."""
     worst: Worst | None
     """The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was
     judged.
@@ -876,7 +876,7 @@ class OtherCarry(Record):
     without_slews: bool
     """True if the slews of the scheme are left out there, since only inertial carry has slews."""
     requirements: Requirements | None
-    """What becomes of the requirements; null where nothing was judged."""
+    """Outcome of the requirements; null where nothing was judged."""
     not_judged: str | None
     """The reason why nothing was judged; left out where it was."""
 
@@ -912,7 +912,7 @@ class DropOne(Record):
     worst: Worst | None
     """The worst sigma without it."""
     requirements: Requirements
-    """What becomes of the requirements without it."""
+    """Outcome of the requirements without it."""
 
 
 class Sensitivity(Record):
@@ -999,13 +999,13 @@ class Review(Record):
     meets_requirements: bool
     """True if requirements are stated and every one is met."""
     requirements: Requirements
-    """What becomes of the requirements by the predicted sigmas."""
+    """Outcome of the requirements by the predicted sigmas."""
     other_carries: list[OtherCarry]
     """The same scheme under the other carries."""
     has_accuracy_orders: bool
     """Whether accuracy orders are computed: none are for rotating segments."""
     validity: Validity | None
-    """Whether the small-angle model holds at the drifts that are stated; null where none are (`values`), or for very many steps."""
+    """Validity of the small-angle model at the drifts that are stated; null where none are (`values`), or for very many steps."""
     drop_one: list[DropOne]
     """What happens without each of the positions."""
     sensitivity: list[Sensitivity]
@@ -1175,7 +1175,7 @@ class SearchReport(Record):
     positions: int
     """The number of positions."""
     conditions: MeasurementReport
-    """What every sigma rests on: the information of all samples on psi and all coefficients, with the random drift and the priors that
+    """Conditions of every sigma: the information of all samples on psi and all coefficients, with the random drift and the priors that
     are stated. Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
     """
     drift_noise: str | None
@@ -1320,7 +1320,7 @@ class Design(Shape):
     other_carries: list[OtherCarry]
     """The first scheme under the other carries; empty where none was searched."""
     gimbals: GimbalReport | None
-    """Of the first scheme: turns beyond the gimbal limits; and positions of the file of candidates whose angles lie beyond. Left out
+    """Turns of the first scheme beyond the gimbal limits, and positions of the file of candidates whose angles lie beyond. Left out
     where no limits are stated.
     """
     primes: int
@@ -1633,9 +1633,9 @@ class SigmaRatio(Record):
     """Sigma of the run over the predicted sigma, dimensionless."""
 
 RunDiffers = Literal["random_drift", "prior", "full_attitudes"]
-"""What a run assumes besides the conditions that are stated. random_drift: The random drift of the program: none is stated. prior:
-Priors of the program: not every unknown has a stated one. full_attitudes: A filter with full attitudes: the prediction is that of
-small angles.
+"""Reason why the sigmas of a run may differ from the predicted ones. random_drift: The random drift of the program: none is stated.
+prior: Priors of the program: not every unknown has a stated one. full_attitudes: A filter with full attitudes: the prediction is that
+of small angles.
 """
 
 
@@ -1645,7 +1645,7 @@ class RunRequirements(Record):
     __slots__ = ()
 
     requirements: Requirements
-    """What became of the requirements in the run."""
+    """Outcome of the requirements in the run."""
     largest_ratio: SigmaRatio | None
     """The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null where none has."""
     smallest_ratio: SigmaRatio | None
@@ -1735,11 +1735,11 @@ class Simulation(Shape):
     combinations: list[Estimate]
     """Observable combinations of unknowns that are not observable alone."""
     requirements: Requirements
-    """What becomes of the requirements by prediction, as in every other command: the information of all samples with the noise, the
-    random drift and the priors that are stated.
+    """Outcome of the requirements by prediction, as in every other command: the information of all samples with the noise, the random
+    drift and the priors that are stated.
     """
     run: RunRequirements
-    """What became of them in this run, by sigma of its filter at the end."""
+    """Outcome of the requirements in this run, by the sigmas of its filter at the end."""
     other_carries: list[OtherCarry]
     """The same scheme under the other carries."""
     consistency: Consistency
@@ -2765,8 +2765,8 @@ class Calibration(Shape):
     quantities: list[Estimated]
     """Every unknown, psi of the start of each record."""
     requirements: Requirements | None
-    """What becomes of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null where
-    none is stated. Those on psi are not judged: a calibration estimates psi of the start of a record.
+    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null where none is
+    stated. Those on psi are not judged: a calibration estimates psi of the start of a record.
     """
     combinations: list[Estimated]
     """Combinations of what is not told apart one by one, and those asked for."""

@@ -1,4 +1,5 @@
-//! From command to command: what `design` says of a scheme, `compare`, `simulate`, `report` and the engine of the page say of its file.
+//! From command to command: what `design` says of a scheme, `compare`, `simulate`, `report` and the engine of
+//! the page say of its file.
 
 use std::path::Path;
 
@@ -186,7 +187,8 @@ fn what_design_says_every_command_repeats_in_200_tasks() {
     (1..=200).for_each(|seed| holds(1000 + seed, seed % 10 == 0));
 }
 
-/// Sigmas at the end with random drift and a prior, by normal equations of all samples with one more unknown for every step's drift: no filter.
+/// Sigmas at the end with random drift and a prior, by normal equations of all samples with one more unknown
+/// for every step's drift: no filter.
 #[test]
 fn predicted_sigmas_are_those_of_least_squares() {
     let scheme = "carry = \"inertial\"\nlatitude_deg = 40\n[simulation]\ndwell_s = 60\nstep_s = 10\naccelerometer_noise_g = 2e-5\ndrift_noise = \"3 deg/h\"\n\
@@ -211,7 +213,8 @@ fn predicted_sigmas_are_those_of_least_squares() {
     assert_eq!(answer["schemes"][0]["meets_requirements"], met);
 }
 
-/// The same scheme by hand: psi' = -[w x] psi + C E D + n in n, Z1 = psi_z, Z3 = -psi_x, steps of 0.1 s, n constant over 10 s.
+/// The same scheme by hand: psi' = -[w x] psi + C E D + n in n, Z1 = psi_z, Z3 = -psi_x, steps of 0.1 s, n
+/// constant over 10 s.
 fn by_normal_equations() -> Vec<f64> {
     const STEPS: usize = 6;
     let (dph, deg) = (1f64.to_radians() / 3600.0, 1f64.to_radians());

@@ -17,7 +17,8 @@ const COMMANDS: [(&str, usize); 11] = [
     ("schema", 10),
 ];
 
-/// Every option has one line of `-h`, without its range, inputs before all others; `--help` names as many options, and has ranges and words.
+/// Every option has one line of `-h`, without its range, inputs before all others; `--help` names as many
+/// options, and has ranges and words.
 #[test]
 fn help_is_in_lines() {
     let text = |arguments: &[&str]| {
@@ -65,7 +66,8 @@ fn help_is_in_lines() {
     assert!(text(&["analyze", "-h"]).contains("left out: generic"));
 }
 
-/// A model of another tool: the Python package reads it, and the line to type is there; a file of that name with a model of obsdeg is read.
+/// A model of another tool: the Python package reads it, and the line to type is there; a file of that name
+/// with a model of obsdeg is read.
 #[test]
 fn models_of_other_tools_are_named() {
     let (folder, _) = scratch();

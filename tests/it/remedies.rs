@@ -1,4 +1,5 @@
-//! What is said to resolve an unknown does: every change is made in the text of the scheme or model, and judged from there.
+//! What is said to resolve an unknown does: every change is made in the text of the scheme or model, and
+//! judged from there.
 
 use std::collections::BTreeSet;
 
@@ -304,8 +305,9 @@ fn p1_p2() -> Scheme {
         .expect("a scheme")
 }
 
-/// Remedies of the paper's two positions by hand: D_FZ - wN psi_y has degree 1, so that one of them tells the other; inertial carry tells
-/// D_FZ and loses D_SZ; without another direction of g no drift along it is excited.
+/// Remedies of the paper's two positions by hand: D_FZ - wN psi_y has degree 1, so that one of them tells the
+/// other; inertial carry tells D_FZ and loses D_SZ; without another direction of g no drift along it is
+/// excited.
 #[test]
 fn remedies_of_two_positions() {
     let (remedies, _) = judged_scheme(&p1_p2());
@@ -321,7 +323,8 @@ fn remedies_of_two_positions() {
     assert_eq!(inertial.map(|r| r.loses.clone()), Some(vec!["D_SZ".to_string()]));
 }
 
-/// A remedy that is not true is found out: another degree, another unknown, an attitude that the scheme has already, another value.
+/// A remedy that is not true is found out: another degree, another unknown, an attitude that the scheme has
+/// already, another value.
 #[test]
 fn a_wrong_remedy_is_caught() {
     let scheme = p1_p2();

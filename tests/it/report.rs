@@ -237,7 +237,8 @@ fn a_verdict_leads_with_what_limits_it() {
     assert!(verdict.contains(missed) && row(&page, "Requirements")[1].contains(missed), "{verdict}");
     assert_eq!(row(&page, "Requirements")[0], "missed");
     assert_eq!(row(&page, "Observable"), ["good", "ok 12 of 12 gyro coefficients, 3 of 3 of psi"]);
-    // by prediction met; in the run, whose random drift nobody states, missed: the prediction decides, the run is said with its reason
+    // by prediction met; in the run, whose random drift nobody states, missed: the prediction decides, the
+    // run is said with its reason
     let twelve = ["examples/twelve-positions/scheme.toml", "--requirement", "D=0.02"];
     let (page, _) = page_of("quiet.html", &twelve);
     let [grade, text] = row(&page, "Requirements");

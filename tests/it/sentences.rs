@@ -165,7 +165,8 @@ fn applied(sentence: &str, by: f64, x: &Point) -> Point {
     out
 }
 
-/// Tries every symmetry of an answer from a point: outputs and constraints stay, unknowns do not. The number of those tried.
+/// Tries every symmetry of an answer from a point: outputs and constraints stay, unknowns do not. The number
+/// of those tried.
 fn symmetries_hold(model: &SystemModel, a: &SystemAnalysis, start: &Point) -> Option<usize> {
     let equations = Equations::read(model, &a.equations)?;
     let expected = equations.outputs(start.clone());
@@ -220,7 +221,8 @@ fn point(model: &SystemModel) -> Point {
 const SIR: &str = "name='sir'\nparameters=['beta', 'gamma', 'k']\nconstraints=['S + I + R = 1']\n[states]\nS='-beta*S*I'\n\
                    I='beta*S*I - gamma*I'\nR='gamma*I'\n[outputs]\ny='k*I'";
 
-/// Every printed symmetry, at several c: outputs and constraints stay as they are, and c = 1 (0 where nothing is scaled) changes nothing.
+/// Every printed symmetry, at several c: outputs and constraints stay as they are, and c = 1 (0 where nothing
+/// is scaled) changes nothing.
 #[test]
 fn symmetries_do_what_they_say() {
     let tried = |text: &str, start: &[(&str, f64)]| {
@@ -257,7 +259,8 @@ fn symmetries_do_what_they_say() {
     );
 }
 
-/// The same of the reference models, from one point each: those without known starts, segments and unknown inputs.
+/// The same of the reference models, from one point each: those without known starts, segments and unknown
+/// inputs.
 #[test]
 fn symmetries_of_the_reference_models() {
     let mut tried = 0;
@@ -298,7 +301,8 @@ fn what_is_not_counted_has_no_number() {
     }
 }
 
-/// Verdicts hold at the time that is named: degrees of x' = a + b t^2 by hand at 0, at 2 and at almost every time.
+/// Verdicts hold at the time that is named: degrees of x' = a + b t^2 by hand at 0, at 2 and at almost every
+/// time.
 #[test]
 fn verdicts_are_those_of_the_time_that_is_said() {
     let model = |time: &str| {
@@ -318,7 +322,8 @@ fn verdicts_are_those_of_the_time_that_is_said() {
         let of = |name: &str| a.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
         assert_eq!([of("a"), of("b")], degrees.map(Some), "{time}");
         assert!(table(&text).replace("\n      ", " ").contains(said), "{time}");
-        // y' = a + b t^2, y'' = 2 b t, y''' = 2 b: at the time that is said a and b follow with so many derivatives
+        // y' = a + b t^2, y'' = 2 b t, y''' = 2 b: at the time that is said a and b follow with so many
+        // derivatives
         let t: f64 = said
             .split("t = ")
             .nth(1)
@@ -404,8 +409,8 @@ fn other_carries_say_what_is_compared() {
     assert!(some[0] > 0 && some[1] > 0, "{some:?}");
 }
 
-/// An extended filter is not trusted where small angles do not hold, and its sigmas there are too small although single runs are called
-/// consistent; an iterated one has no such sentence.
+/// An extended filter is not trusted where small angles do not hold, and its sigmas there are too small
+/// although single runs are called consistent; an iterated one has no such sentence.
 #[test]
 fn the_extended_filter_is_not_trusted_at_large_drifts() {
     let run = |filter: &str, seed: u32, scale: &str| -> (bool, bool) {

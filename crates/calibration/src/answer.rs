@@ -24,8 +24,9 @@ pub struct Calibration {
     pub findings: Vec<Finding>,
     /// Every unknown, psi of the start of each record.
     pub quantities: Vec<Estimated>,
-    /// What becomes of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null where none is
-    /// stated. Those on psi are not judged: a calibration estimates psi of the start of a record.
+    /// Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are
+    /// too small; null where none is stated. Those on psi are not judged: a calibration estimates psi of the
+    /// start of a record.
     #[serde(default)]
     pub requirements: Option<Requirements>,
     /// Combinations of what is not told apart one by one, and those asked for.
@@ -461,7 +462,8 @@ pub struct Assumed {
     pub known_differs: Vec<String>,
     /// What nothing determines, unknown by unknown: the standard deviation within which it is held, in its unit.
     pub held: Vec<(String, f64, String)>,
-    /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, drift_noise.
+    /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
+    /// accelerometer_noise_g, drift_noise.
     #[serde(default)]
     pub by_default: Vec<String>,
     /// Seed of the exact verdicts.

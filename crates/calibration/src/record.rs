@@ -116,7 +116,7 @@ pub enum RecordError {
         place: Place,
         /// What there is.
         found: String,
-        /// What would do.
+        /// Changes that would meet every requirement.
         expected: &'static str,
     },
     /// A row of another length.

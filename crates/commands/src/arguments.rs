@@ -98,10 +98,11 @@ impl Given {
 #[command(next_help_heading = "What is judged")]
 #[serde(default)]
 pub struct InputOptions {
-    /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz): those of the outer gimbal, about North, of the middle one, and of the
-    /// inner one, about Z_p; once per position.
-    /// A name stands for any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE). A,B,G@X_p:360 turns from there, at a constant
-    /// rate for its dwell, about a platform axis (X_p, Y_p, Z_p) or a geographic one (N, U, E)
+    /// Euler angles alpha,beta,gamma of a position in degrees (C_c^n = Mx My Mz): those of the outer gimbal,
+    /// about North, of the middle one, and of the inner one, about Z_p; once per position. A name stands for
+    /// any angle (alpha,0,gamma); three letters give the directions of X_p, Y_p, Z_p (NUE). A,B,G@X_p:360
+    /// turns from there, at a constant rate for its dwell, about a platform axis (X_p, Y_p, Z_p) or a
+    /// geographic one (N, U, E)
     #[arg(long, value_name = "A,B,G", allow_hyphen_values = true)]
     #[serde(with = "text::list")]
     pub angles: Vec<Attitude>,

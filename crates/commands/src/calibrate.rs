@@ -169,7 +169,7 @@ impl Answer for Calibrated {
 }
 
 impl Calibrated {
-    /// What becomes of the requirements, where some are stated.
+    /// Outcome of the requirements; `None` where none is stated.
     pub fn requirements(&self) -> Option<&Requirements> {
         match self {
             Self::Platform(c) => c.requirements.as_ref(),

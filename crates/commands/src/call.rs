@@ -162,7 +162,7 @@ pub struct InJson {
     pub text: String,
     /// The answer in sentences ([`Answer::sentences`]).
     pub sentences: Vec<String>,
-    /// Whether the command line would exit with 0.
+    /// True if the command line would exit with 0.
     pub passed: bool,
 }
 
@@ -185,7 +185,8 @@ impl Wanted for JsonOnly {
     }
 }
 
-/// The text of an answer ([`Answered::text`]) and its sentences alone, and whether the command line would exit with 0.
+/// The text of an answer ([`Answered::text`]) and its sentences alone, and whether the command line would
+/// exit with 0.
 ///
 /// # Errors
 /// As [`call`].

@@ -66,19 +66,20 @@ pub struct MeasurementOptions {
     #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
     pub azimuth_noise: Option<f64>,
 
-    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
-    /// (default: none in predictions, 0.01 deg/h in simulated runs; 0, or 1e-12 to 1e6)
+    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random
+    /// walk (default: none in predictions, 0.01 deg/h in simulated runs; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "NOISE")]
     pub drift_noise: Option<DriftNoise>,
 
-    /// Standard deviation of an unknown or family beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_F=0.1, psi=0.05. It counts in sigmas, not in
-    /// what is observable (default: none in predictions; in simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
+    /// Standard deviation of an unknown or family beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug:
+    /// D_F=0.1, psi=0.05. It counts in sigmas, not in what is observable (default: none in predictions; in
+    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
     #[serde(with = "text::list")]
     pub prior: Vec<Assignment>,
 
-    /// Largest standard deviation allowed at the end for an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D=0.05, D_FX=0.01, K1=5
-    /// (default: none, so that nothing is judged; 1e-12 to 1e9)
+    /// Largest standard deviation allowed at the end for an unknown or family in deg, deg/h, deg/h/g, ppm,
+    /// arcsec, ug: D=0.05, D_FX=0.01, K1=5 (default: none, so that nothing is judged; 1e-12 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
     #[serde(with = "text::list")]
     pub requirement: Vec<Assignment>,
@@ -256,7 +257,7 @@ impl MeasurementOptions {
         all.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
-    /// What the scheme and the options say; for the rest the paper's conditions.
+    /// Conditions that the scheme and the options state; the others are the paper's.
     pub fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::of(scheme);
         out.apply(&Settings {

@@ -65,7 +65,8 @@ pub struct Search {
     #[arg(long)]
     pub minimum: bool,
 
-    /// What to choose from, or a scheme file: its positions; without SCHEME with carry, latitude, geometry, terms, conditions and gimbal limits of the file
+    /// What to choose from, or a scheme file: its positions; without SCHEME with carry, latitude, geometry,
+    /// terms, conditions and gimbal limits of the file
     #[arg(long, value_name = "WHAT", default_value = CARDINAL, value_parser = WordOr(CANDIDATES))]
     pub candidates: String,
 
@@ -98,9 +99,11 @@ pub struct Search {
     #[arg(long, value_name = "N", value_parser = whole::<u64>(RESTARTS))]
     pub restarts: Option<u64>,
 
-    /// Under reset carry, where more than two million sequences would have to be searched: all are searched unless the scheme that an exchange finds is
-    /// within so many percent of a bound on what is possible at all (default: they are not searched, and the answer says how far that scheme is from the
-    /// bound at most). 0: all sequences are searched, however long that takes, under any carry (beyond 5 million sets of candidates: exchange)
+    /// Under reset carry, where more than two million sequences would have to be searched: all are searched
+    /// unless the scheme that an exchange finds is within so many percent of a bound on what is possible at
+    /// all (default: they are not searched, and the answer says how far that scheme is from the bound at
+    /// most). 0: all sequences are searched, however long that takes, under any carry (beyond 5 million sets
+    /// of candidates: exchange)
     #[arg(long, value_name = "PERCENT", value_parser = percent)]
     pub within: Option<f64>,
 
@@ -116,8 +119,9 @@ pub struct Search {
     #[arg(long, value_name = "K", value_delimiter = ',', value_parser = whole::<usize>(POSITIONS))]
     pub front: Vec<usize>,
 
-    /// Search only part I of N of all sequences, however many these are, and write what it finds to the file of -o (a file here, no folder); an
-    /// interrupted part goes on when the same command is given again. All parts are given the same options; --refine, --divide, --front and
+    /// Search only part I of N of all sequences, however many these are, and write what it finds to the file
+    /// of -o (a file here, no folder); an interrupted part goes on when the same command is given again. All
+    /// parts are given the same options; --refine, --divide, --front and
     /// --restarts act where the parts are merged, which know the options
     #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
     pub part: Option<[usize; 2]>,
@@ -168,9 +172,10 @@ pub struct WantedOptions {
     #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 
-    /// How far a gimbal turns in degrees, as alpha=-90:90, beta=-80:80. alpha is the outer gimbal, about North, beta the middle one, gamma the
-    /// inner one, about Z_p. Attitudes beyond are left out; the others are printed, written and drawn with angles within the limits, those with the
-    /// shortest gimbal way from the position before
+    /// How far a gimbal turns in degrees, as alpha=-90:90, beta=-80:80. alpha is the outer gimbal, about
+    /// North, beta the middle one, gamma the inner one, about Z_p. Attitudes beyond are left out; the others
+    /// are printed, written and drawn with angles within the limits, those with the shortest gimbal way from
+    /// the position before
     #[arg(long, value_name = "ANGLE=LOW:HIGH", allow_hyphen_values = true)]
     pub gimbal: Vec<String>,
 }
@@ -246,7 +251,8 @@ fn percent(text: &str) -> Result<f64, String> {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SearchFiles {
-    /// The scheme whose conditions hold; its positions are not chosen from, and as many are searched where no number is asked for.
+    /// The scheme whose conditions hold; its positions are not chosen from, and as many are searched where no
+    /// number is asked for.
     pub conditions_file: Option<Source>,
     /// The scheme whose positions are chosen from.
     pub candidates_file: Option<Source>,
@@ -422,7 +428,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions })))
 }
 
-/// What a part was asked, as its file keeps it for the merge.
+/// Options and files of a part, as its file keeps them for the merge.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Asked {
@@ -469,8 +475,8 @@ fn stated(a: &Search) -> Result<serde_json::Map<String, Value>, Problem> {
     Ok(all.as_object().into_iter().flatten().filter(differs).map(|(n, v)| (n.clone(), v.clone())).collect())
 }
 
-/// What is asked: where parts are merged, what they were asked, with whatever options are given beside them over it; of a scheme file alone, as
-/// many positions as it has.
+/// Options and files of a search: where parts are merged those of the parts, with the options given beside
+/// them over them; of a scheme file alone, as many positions as it has.
 fn known(a: &Search, files: &SearchFiles) -> Result<Asked, Problem> {
     let mut asked = Asked { options: a.clone(), ..Asked::default() };
     if let Some(first) = files.merge.first()

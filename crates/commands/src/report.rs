@@ -129,7 +129,7 @@ pub fn report(
 }
 
 impl Reviewed {
-    /// What becomes of the requirements of every scheme, by prediction.
+    /// Outcome of the requirements of every scheme, by prediction.
     pub fn requirements(&self) -> impl Iterator<Item = &Requirements> {
         self.review.comparison.schemes.iter().map(|s| &s.requirements)
     }

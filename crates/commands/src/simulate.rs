@@ -50,7 +50,7 @@ pub enum Run {
 }
 
 impl Run {
-    /// What becomes of the requirements of a scheme, by prediction; a model has none.
+    /// Outcome of the requirements of a scheme, by prediction; `None` for a model, which has none.
     pub fn requirements(&self) -> Option<&Requirements> {
         match self {
             Self::Scheme(run) => Some(&run.requirements),

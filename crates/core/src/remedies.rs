@@ -1,5 +1,6 @@
-//! Remedies: changes of a scheme or model that make unobservable unknowns observable. Plain data, and the linear algebra that
-//! proposes candidates; the exact engine tries every candidate before it becomes a remedy.
+//! Remedies: changes of a scheme or model that make unobservable unknowns observable. Plain data, and the
+//! linear algebra that proposes candidates; the exact engine tries every candidate before it becomes a
+//! remedy.
 
 use std::cmp::Reverse;
 
@@ -12,14 +13,17 @@ use crate::model::Carry;
 /// Most candidates of which pairs are formed.
 const MOST_PAIRED: usize = 48;
 
-/// What resolves the unknowns that are not observable.
+/// Remedies of the unknowns that are not observable.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
 pub struct Remedies {
-    /// Remedies, each tried by the exact engine: single changes first, then pairs for unknowns that no single change resolves.
+    /// Remedies, each tried by the exact engine: single changes first, then pairs for unknowns that no single
+    /// change resolves.
     pub remedies: Vec<Remedy>,
-    /// Unobservable unknowns without a remedy: of the changes that were tried only the value of the unknown itself resolves them.
+    /// Unobservable unknowns without a remedy: of the changes that were tried only the value of the unknown
+    /// itself resolves them.
     pub unresolved: Vec<String>,
-    /// Candidates left out because of the limits on the work, one sentence for each kind; empty when all were tried.
+    /// Candidates left out because of the limits on the work, one sentence for each kind; empty when all were
+    /// tried.
     pub not_tried: Vec<String>,
     /// Number of changed schemes or models that the exact engine judged.
     pub verdicts: usize,
@@ -30,7 +34,8 @@ pub struct Remedies {
 pub struct Remedy {
     /// The changes.
     pub changes: Vec<Change>,
-    /// Unknowns that are observable with the changes and not without them, in model order; without those whose value is given.
+    /// Unknowns that are observable with the changes and not without them, in model order; without those
+    /// whose value is given.
     pub resolves: Vec<Resolved>,
     /// Unknowns that are observable without the changes and not with them: possible under another carry only.
     pub loses: Vec<String>,
@@ -49,8 +54,8 @@ pub struct Resolved {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Change {
-    /// The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of every experiment,
-    /// of an input at all times.
+    /// The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of
+    /// every experiment, of an input at all times.
     Known {
         /// Name of the unknown.
         name: String,
@@ -96,8 +101,9 @@ impl Remedies {
     }
 }
 
-/// The unobservable directions: for every unknown its entries in a basis of the null space. A row `c` of further information has the
-/// entries `c N`, and with such rows an unknown becomes observable if its own entries lie in their span.
+/// The unobservable directions: for every unknown its entries in a basis of the null space. A row `c` of
+/// further information has the entries `c N`, and with such rows an unknown becomes observable if its own
+/// entries lie in their span.
 pub(crate) struct Directions<S: Scalars> {
     field: S,
     /// Null vectors, one after the other.
@@ -115,7 +121,7 @@ impl<S: Scalars> Directions<S> {
         self.basis.iter().map(|v| v[column]).collect()
     }
 
-    /// What the values of some unknowns tell.
+    /// Information of known values of some unknowns on the unobservable directions.
     pub(crate) fn known(&self, columns: &[usize]) -> Told<S> {
         let mut space = <S::Space as RowSpace>::new(self.field.clone(), self.basis.len());
         for &c in columns {
@@ -124,7 +130,7 @@ impl<S: Scalars> Directions<S> {
         Told { space, given: columns.to_vec() }
     }
 
-    /// What rows of further information tell.
+    /// Information of further rows on the unobservable directions.
     pub(crate) fn rows<'a>(&self, rows: impl Iterator<Item = &'a [S::Element]>) -> Told<S>
     where
         S::Element: 'a,
@@ -139,15 +145,16 @@ impl<S: Scalars> Directions<S> {
         told
     }
 
-    /// Which of `open` become observable by that, and are not given.
+    /// Unknowns of `open` that become observable by that and are not given.
     pub(crate) fn resolved(&self, by: &Told<S>, open: &[usize]) -> Vec<usize> {
         let resolved = |c: &usize| !by.given.contains(c) && by.space.contains(&self.unit(*c));
         open.iter().copied().filter(resolved).collect()
     }
 
-    /// Pairs of one candidate of `left` and one of `right` (of one list where `right` is missing), the pair that resolves most of what is
-    /// open first: `judge` gets their indices and says what the engine finds resolved, or `None` at the end of its work. False if candidates
-    /// were left out: more than `MOST_PAIRED` in a list, or the end of the work.
+    /// Pairs of one candidate of `left` and one of `right` (of one list where `right` is missing), the pair
+    /// that resolves most of what is open first: `judge` gets their indices and says what the engine finds
+    /// resolved, or `None` at the end of its work. False if candidates were left out: more than `MOST_PAIRED`
+    /// in a list, or the end of the work.
     pub(crate) fn pairs(
         &self,
         left: &[Told<S>],
@@ -180,7 +187,7 @@ impl<S: Scalars> Directions<S> {
     }
 }
 
-/// What a candidate tells of the unobservable directions.
+/// Information of a candidate on the unobservable directions.
 pub(crate) struct Told<S: Scalars> {
     /// Span of its rows, in entries.
     space: S::Space,
@@ -189,7 +196,7 @@ pub(crate) struct Told<S: Scalars> {
 }
 
 impl<S: Scalars> Told<S> {
-    /// What two candidates tell together.
+    /// Information of two candidates together.
     fn and(&self, other: &Self) -> Self {
         let mut space = self.space.clone();
         (0..other.space.rank()).for_each(|k| {

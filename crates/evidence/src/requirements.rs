@@ -79,17 +79,18 @@ pub struct Worst {
     pub sigma_dph: f64,
 }
 
-/// Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the prediction alone; a run is one
-/// example of it, a record its confirmation.
+/// Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the
+/// prediction alone; a run is one example of it, a record its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
-    /// The information of all samples with the noise and the random drift that are stated, psi at the end of the scheme (under reset carry at
-    /// the end of each position); nothing is known beforehand.
+    /// The information of all samples with the noise and the random drift that are stated, psi at the end of
+    /// the scheme (under reset carry at the end of each position); nothing is known beforehand.
     Predicted,
     /// The same with the priors that are stated.
     PredictedWithPrior,
-    /// The filter at the end of a simulated run, with its prior and its random drift, whether they are stated or chosen by the program.
+    /// The filter at the end of a simulated run, with its prior and its random drift, whether they are stated
+    /// or chosen by the program.
     Run,
     /// The estimates from a record.
     Record,
@@ -108,7 +109,8 @@ pub struct Requirements {
     pub worst: Option<Margin>,
     /// Those that miss theirs, in model order.
     pub missed: Vec<Missed>,
-    /// Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated priors alone.
+    /// Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated
+    /// priors alone.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub on_prior: Vec<String>,
 }

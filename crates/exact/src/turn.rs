@@ -38,7 +38,8 @@ impl Turn {
     /// `(cos, sin)` as floating-point numbers, exact at multiples of 90 degrees.
     pub fn cos_sin_f64(self) -> (f64, f64) {
         const QUARTER: i64 = 90_000_000_000;
-        // what is left of the nearest quarter turn is exact, so that a small cosine or sine has all its digits
+        // what is left of the nearest quarter turn is exact, so that a small cosine or sine has all its
+        // digits
         let quarters = (self.nanodeg() + QUARTER / 2).div_euclid(QUARTER);
         let rest = self.nanodeg() - quarters * QUARTER;
         let (s, c) = (rest as f64 * 1e-9).to_radians().sin_cos();

@@ -57,7 +57,8 @@ fn margin(r: &Requirements) -> String {
     none.or_else(|| stated::worst_margin(r)).unwrap_or_else(|| "-".into())
 }
 
-/// The answer: the first scheme with what becomes of the requirements; then the carry, and what nobody states.
+/// The answer: the first scheme with what becomes of the requirements; then the carry, and what nobody
+/// states.
 fn lead(d: &Design) -> Vec<String> {
     let mut out = Vec::new();
     if let (Some(s), Some(first)) = (&d.search, d.found.first()) {
@@ -144,7 +145,7 @@ fn table(heading: &str, found: &[Found]) -> Block {
     )
 }
 
-/// What the operator sets at each position of a scheme.
+/// Gimbal angles that the operator sets at each position of a scheme.
 fn gimbal_angles(f: &Found) -> Block {
     let columns =
         [left(""), left("position")].into_iter().chain(gimbals::NAMES.map(right)).collect::<Vec<_>>();
@@ -279,7 +280,8 @@ fn first_value(d: &Design) -> f64 {
     d.found.iter().find(|f| !f.refined && f.dwells_s.is_empty()).map_or(f64::NAN, |f| f.value)
 }
 
-/// The criterion of the first scheme that was searched, how far it is above the bound for the candidates, and above that for all attitudes.
+/// The criterion of the first scheme that was searched, how far it is above the bound for the candidates, and
+/// above that for all attitudes.
 fn first_above(d: &Design, c: &Certificate) -> (Excess, Option<Excess>) {
     let first = first_value(d);
     let every = c.everywhere.as_ref().map(|e| Excess::new(first, e.best_possible, e.within_percent));

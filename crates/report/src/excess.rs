@@ -1,4 +1,5 @@
-//! How far a criterion is above a bound: two figures, and the percentage that follows from them as they are printed.
+//! How far a criterion is above a bound: two figures, and the percentage that follows from them as they are
+//! printed.
 
 use crate::document::number;
 
@@ -9,12 +10,13 @@ pub struct Excess {
     pub value: String,
     /// The bound to six digits, rounded down.
     pub bound: String,
-    /// What the first printed figure is above the second, in percent, rounded up to three digits; not below what is known at most.
+    /// Excess of the first printed figure over the second, in percent, rounded up to three digits.
     pub percent: String,
 }
 
 impl Excess {
-    /// Of a criterion and a bound, both above 0; `at_most_percent` is what is known of the excess, with whatever rounding hides.
+    /// Of a criterion and a bound, both above 0; `at_most_percent` is what is known of the excess, with
+    /// whatever rounding hides.
     ///
     /// ```
     /// use obsdeg_report::Excess;
@@ -62,7 +64,8 @@ fn upward(percent: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Whatever the figures, the percentage is that of the figures as they are printed, by no more than a unit of its last digit above.
+    /// Whatever the figures, the percentage is that of the figures as they are printed, by no more than a
+    /// unit of its last digit above.
     #[test]
     fn percentages_follow_from_the_figures() {
         let mut seed = 7u64;

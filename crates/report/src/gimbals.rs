@@ -47,7 +47,7 @@ fn named(t: &GimbalTurn) -> String {
     format!("{what} {}{}", t.position, turn.unwrap_or_default())
 }
 
-/// What a turn does, where it does not stay within the limits or ends at other angles.
+/// Sentence on a turn that leaves the limits or ends at other angles; `None` for any other.
 fn turn(t: &GimbalTurn) -> Option<String> {
     let instead = t.gimbals_deg.as_ref().filter(|_| !t.by_gimbals);
     let instead = instead.map_or_else(String::new, |change| {
@@ -80,7 +80,7 @@ fn turn(t: &GimbalTurn) -> Option<String> {
     Some(format!("{} {what}", named(t)))
 }
 
-/// What gimbal limits mean for the turns of a scheme, where it states some.
+/// Gimbal limits and turns of a scheme, where it states limits.
 pub(crate) fn block(report: Option<&GimbalReport>) -> Option<Block> {
     Block::list_if_any("Gimbals", lines(report))
 }

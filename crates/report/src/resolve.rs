@@ -1,5 +1,5 @@
-//! First lines: the answer of `analyze` in one sentence and what resolves the unknowns that are not observable, the position that
-//! `compare` would drop.
+//! First lines: the answer of `analyze` in one sentence and what resolves the unknowns that are not
+//! observable, the position that `compare` would drop.
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::degree::Status;
@@ -71,7 +71,7 @@ pub(crate) fn of_scheme(a: &Analysis) -> Vec<String> {
     std::iter::once(answer).chain(to_resolve_in_scheme(a)).collect()
 }
 
-/// What resolves the unknowns of a scheme that are not observable.
+/// Lines *To resolve* of a scheme.
 pub(crate) fn to_resolve_in_scheme(a: &Analysis) -> Vec<String> {
     let others = match a.terms == "drift" {
         true => "no other known value",
@@ -98,7 +98,7 @@ pub(crate) fn of_model(a: &SystemAnalysis) -> Vec<String> {
     std::iter::once(answer).chain(to_resolve_in_model(a)).collect()
 }
 
-/// What resolves the unknowns of a model that are not observable.
+/// Lines *To resolve* of a model.
 pub(crate) fn to_resolve_in_model(a: &SystemAnalysis) -> Vec<String> {
     let others = "no other known value and no state as an output";
     lines(&a.to_resolve, others, "two values or two outputs", a.quantities.iter().map(|q| q.name.as_str()))
@@ -148,7 +148,7 @@ fn single(r: &Remedy) -> Option<&Change> {
     }
 }
 
-/// Whether a remedy resolves an unknown.
+/// True if a remedy resolves an unknown.
 fn resolves(r: &Remedy, name: &str) -> bool {
     r.resolves.iter().any(|x| x.name == name)
 }
@@ -239,7 +239,7 @@ impl<'a> Group<'a> {
         same
     }
 
-    /// Whether one change besides another carry is enough.
+    /// True if one change besides another carry is enough.
     fn settled(&self) -> bool {
         !self.known.is_empty() || !self.outputs.is_empty() || self.attitude.is_some() || self.themselves
     }
@@ -323,7 +323,8 @@ fn changes(list: &[Change]) -> String {
     list.iter().map(&mut one).collect::<Vec<_>>().join(" and ")
 }
 
-/// A line for each group of unknowns that the same changes resolve, in the order of the unknowns; `others` and `two` say what was tried.
+/// A line for each group of unknowns that the same changes resolve, in the order of the unknowns; `others`
+/// and `two` say what was tried.
 fn lines<'a>(
     remedies: &'a Remedies,
     others: &str,

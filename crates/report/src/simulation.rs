@@ -196,7 +196,8 @@ fn priors(quantities: &[Estimate]) -> Vec<String> {
     groups.into_iter().map(line).collect()
 }
 
-/// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody states.
+/// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody
+/// states.
 fn lead(s: &Simulation) -> Vec<String> {
     let [predicted, run] = [stated::requirements(&s.requirements), stated::run(&s.run, &s.conditions)]
         .map(|t| stated::capital(&t));

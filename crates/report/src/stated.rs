@@ -72,7 +72,7 @@ pub(crate) fn requirements(r: &Requirements) -> String {
     )
 }
 
-/// What becomes of the requirements in a run, beside the prediction, and why its sigmas differ from the predicted ones.
+/// Outcome of the requirements in a run, and the reasons why its sigmas differ from the predicted ones.
 pub(crate) fn run(r: &RunRequirements, c: &ConditionsReport) -> String {
     let verdict = match r.requirements.stated {
         0 => "in this run".into(),
@@ -127,8 +127,8 @@ pub(crate) fn worst_sigma(w: &Worst) -> String {
     sigma_of(&w.name, w.sigma_dph)
 }
 
-/// The sigma of a drift coefficient with its unit: zero-order coefficients and components of the drift are rates, those with one letter more are
-/// per g, with two per g^2.
+/// The sigma of a drift coefficient with its unit: zero-order coefficients and components of the drift are
+/// rates, those with one letter more are per g, with two per g^2.
 pub(crate) fn sigma_of(name: &str, sigma_dph: f64) -> String {
     let terms = name.strip_prefix("D_").map_or("", |rest| &rest[..rest.len().saturating_sub(1)]);
     let unit = match terms {
@@ -161,7 +161,7 @@ pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
     (!listed.is_empty()).then(|| format!("under the other carries, {}", listed.join("; ")))
 }
 
-/// What a predicted sigma is, in the heading of a table.
+/// Conditions of predicted sigmas, for the heading of a table.
 pub(crate) fn predicted(m: &MeasurementReport) -> String {
     let drift = match (&m.drift_noise, &m.gyro_noise) {
         (None, None) => "no random drift",
@@ -181,7 +181,8 @@ pub(crate) fn predicted_of<'a>(all: impl IntoIterator<Item = &'a MeasurementRepo
     }
 }
 
-/// Values of the conditions that nobody states, by their keys: `latitude 28.2 deg, noise of Z 1e-5 g`; `None` where all are stated.
+/// Values of the conditions that nobody states, by their keys: `latitude 28.2 deg, noise of Z 1e-5 g`; `None`
+/// where all are stated.
 fn chosen(m: &MeasurementReport) -> Option<String> {
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", m.latitude_deg),

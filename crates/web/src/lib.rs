@@ -11,8 +11,9 @@ extern "C" {
     fn going(now: &str) -> bool;
 }
 
-/// A command by its name, with options and files as JSON. The answer is `{"text", "sentences", "passed"}`: the text is the command
-/// line's with `--format json`, the sentences are its first lines; or `{"problem": {"kind", "message", "place"}}`.
+/// A command by its name, with options and files as JSON. The answer is `{"text", "sentences", "passed"}`:
+/// the text is the command line's with `--format json`, the sentences are its first lines; or `{"problem":
+/// {"kind", "message", "place"}}`.
 #[wasm_bindgen]
 pub fn call(command: &str, request: &str) -> String {
     let hears = |now: Now| going(&serde_json::to_string(&now).unwrap_or_default());

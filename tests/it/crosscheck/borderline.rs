@@ -9,8 +9,8 @@ use obsdeg_evidence::prediction::Prediction;
 use obsdeg_evidence::simulation::{Conditions, Plan};
 use obsdeg_exact::SplitMix64;
 
-/// A scheme whose positions nearly coincide, are nearly opposite, or are nearly cardinal, or whose latitude is nearly that of a pole or
-/// of the equator.
+/// A scheme whose positions nearly coincide, are nearly opposite, or are nearly cardinal, or whose latitude
+/// is nearly that of a pole or of the equator.
 fn borderline(seed: u64) -> Scheme {
     const DEGREE: i64 = 1_000_000_000;
     let mut rng = SplitMix64::new(seed ^ 0x626f_7264_6572);
@@ -111,7 +111,8 @@ fn another_entry(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> 
     Some((wrong, |c, i| [c.spaces[i].outcome; 2], if dwells { 3 } else { 1 }))
 }
 
-/// Wrong verdicts on schemes at the edge, `count` of each kind: each is caught where its check is resolved, and most are.
+/// Wrong verdicts on schemes at the edge, `count` of each kind: each is caught where its check is resolved,
+/// and most are.
 #[expect(clippy::print_stdout, reason = "the figures of a long run")]
 fn wrong_verdicts(count: usize, scheme: impl Fn(u64) -> Scheme) {
     let kinds = [another_degree, declared_observable, another_entry];

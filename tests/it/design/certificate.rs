@@ -21,8 +21,8 @@ pub(super) fn attitude(degrees: [f64; 3]) -> Matrix3<f64> {
     x * y * z
 }
 
-/// Information of a position on psi at its start (in n, rad) and the drift (in n, rad/s), and both at its end by both at its start, by Taylor series
-/// of the motion.
+/// Information of a position on psi at its start (in n, rad) and the drift (in n, rad/s), and both at its end
+/// by both at its start, by Taylor series of the motion.
 fn of_a_dwell(latitude: f64, dwell: f64, step: f64, noise: f64) -> [SMatrix<f64, 6, 6>; 2] {
     let (north, up) = (EARTH * latitude.to_radians().cos(), EARTH * latitude.to_radians().sin());
     let mut f = SMatrix::<f64, 6, 6>::zeros();

@@ -25,8 +25,9 @@ fn correlated(instability_ug: f64, correlation_s: f64) -> Conditions {
     }
 }
 
-/// Sigmas of psi at the end (deg, platform axes; under reset carry of every position) and the coefficients (deg/h) by generalised least squares: every sample
-/// is a row of (psi, D), and the noise of any two has the covariance of the biases of three accelerometers between them.
+/// Sigmas of psi at the end (deg, platform axes; under reset carry of every position) and the coefficients
+/// (deg/h) by generalised least squares: every sample is a row of (psi, D), and the noise of any two has the
+/// covariance of the biases of three accelerometers between them.
 fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64, c: &Conditions) -> Vec<f64> {
     let (north, up) = (EARTH * latitude.to_radians().cos(), EARTH * latitude.to_radians().sin());
     let mut f = SMatrix::<f64, 6, 6>::zeros();
@@ -50,7 +51,8 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     let mut before = Matrix3::identity();
     // psi^n as a functional of the unknowns
     let mut psi = Matrix3xX::<f64>::zeros(n);
-    // psi in platform axes at the end: of the scheme, in axes of the first position where it goes on in n; of every position under reset carry
+    // psi in platform axes at the end: of the scheme, in axes of the first position where it goes on in n; of
+    // every position under reset carry
     let mut ends: Vec<Matrix3xX<f64>> = Vec::new();
     for (i, d) in degrees.iter().enumerate() {
         let turn = attitude(*d);

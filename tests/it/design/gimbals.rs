@@ -1,4 +1,5 @@
-//! Gimbal limits: what a design prints, writes and draws lies within them, and a file's own angles beyond are pointed out.
+//! Gimbal limits: what a design prints, writes and draws lies within them, and a file's own angles beyond are
+//! pointed out.
 
 use std::path::Path;
 
@@ -46,7 +47,8 @@ fn angles_in(text: &str) -> impl Iterator<Item = Euler> {
     })
 }
 
-/// The sum of what the gimbals turn to the nearest of all angles of an attitude (not at beta = +-90) within limits, tried one by one, in degrees.
+/// The sum of what the gimbals turn to the nearest of all angles of an attitude (not at beta = +-90) within
+/// limits, tried one by one, in degrees.
 fn shortest(limits: &Gimbals, to: [f64; 3], from: [f64; 3]) -> f64 {
     let mut best = f64::INFINITY;
     for twin in [to, [to[0] + 180.0, 180.0 - to[1], to[2] + 180.0]] {
@@ -62,8 +64,9 @@ fn shortest(limits: &Gimbals, to: [f64; 3], from: [f64; 3]) -> f64 {
     best
 }
 
-/// Of random tasks: every angle in tables, JSON, Markdown, the winner's file and the picture of its positions is within its gimbal, the attitudes
-/// are those that the letters name, and between positions no gimbal way is shorter. Returns the number of schemes.
+/// Of random tasks: every angle in tables, JSON, Markdown, the winner's file and the picture of its positions
+/// is within its gimbal, the attitudes are those that the letters name, and between positions no gimbal way
+/// is shorter. Returns the number of schemes.
 fn within(tasks: usize, seed: u64) -> usize {
     let mut rng = SplitMix64::new(seed);
     let mut schemes = 0;
@@ -165,7 +168,8 @@ fn no_angle_of_200_designs_is_outside_its_gimbal() {
     assert!(within(200, 33) > 400);
 }
 
-/// Angles of a file beyond its limits are pointed out, with the twin, in the first lines of every answer, and stay as they are written.
+/// Angles of a file beyond its limits are pointed out, with the twin, in the first lines of every answer, and
+/// stay as they are written.
 #[test]
 fn angles_of_a_file_beyond_its_limits_are_pointed_out() {
     let place = tempfile::tempdir().expect("a folder");

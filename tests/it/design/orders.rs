@@ -253,7 +253,8 @@ fn close(a: f64, b: f64) -> bool {
 }
 
 impl Judged {
-    /// The candidates that positions are: gimbal limits may ask for other angles of the same attitude, which name it then.
+    /// The candidates that positions are: gimbal limits may ask for other angles of the same attitude, which
+    /// name it then.
     fn named(&self, positions: &[String]) -> Vec<String> {
         let matrix = |e: &Euler| c_n_f64(e).map(|row| row.map(|x| (x * 1e9).round() as i64));
         let name = |position: &String| {

@@ -35,7 +35,8 @@ fn scheme(like: &Scheme, candidates: &Candidates, sequence: &[usize], slew: Opti
     out
 }
 
-/// Sigmas of all unknowns at the end as they are shown: by all samples and the prior of the run, its every prior stated.
+/// Sigmas of all unknowns at the end as they are shown: by all samples and the prior of the run, its every
+/// prior stated.
 fn by_samples(scheme: &Scheme, conditions: &Conditions) -> Vec<(String, f64)> {
     let plan = Plan::new(scheme, conditions).expect("a plan");
     let prior = RunStart::new(&plan, conditions).expect("a start").sigma;

@@ -1,4 +1,5 @@
-//! Searches that take long: all cores give one answer, what is not searched is certified, and weights are told so that they can be read.
+//! Searches that take long: all cores give one answer, what is not searched is certified, and weights are
+//! told so that they can be read.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -25,7 +26,8 @@ fn twelve() -> Candidates {
     out
 }
 
-/// Branch and bound on one, two, three and seven threads: schemes, front, ties and all that is counted are the same.
+/// Branch and bound on one, two, three and seven threads: schemes, front, ties and all that is counted are
+/// the same.
 #[test]
 fn a_pruned_search_has_one_answer_on_any_number_of_threads() {
     for carry in [Carry::Inertial, Carry::Platform] {
@@ -52,7 +54,8 @@ fn a_pruned_search_has_one_answer_on_any_number_of_threads() {
     }
 }
 
-/// Two cores take at most 0.6 of the time of one for the best six of 24 under inertial carry; the answers are equal.
+/// Two cores take at most 0.6 of the time of one for the best six of 24 under inertial carry; the answers are
+/// equal.
 #[test]
 #[ignore = "half a minute on two idle cores: in the release part of the gate"]
 fn two_cores_take_at_most_three_fifths_of_the_time() {
@@ -74,8 +77,8 @@ fn two_cores_take_at_most_three_fifths_of_the_time() {
     assert!(least[1] < least[0].mul_f64(0.6), "{least:?}");
 }
 
-/// Seventeen positions of twelve candidates: without being asked, the scheme of an exchange with what it is above a bound at most; when asked
-/// for less than that, all are searched.
+/// Seventeen positions of twelve candidates: without being asked, the scheme of an exchange with what it is
+/// above a bound at most; when asked for less than that, all are searched.
 #[test]
 fn what_would_be_searched_for_minutes_is_certified() {
     let certified = DesignOptions {
@@ -92,7 +95,8 @@ fn what_would_be_searched_for_minutes_is_certified() {
     assert!(certificate.within_percent < 5.0, "{certificate:?}");
     // multisets of 17 of 12: 28 over 11
     assert_eq!((search.sequences, found.symmetry), (Some(21_474_180), 1));
-    // the same scheme is enough for whoever asks for no less; whoever asks for all gets all, where they are few
+    // the same scheme is enough for whoever asks for no less; whoever asks for all gets all, where they are
+    // few
     let within = Some(certificate.within_percent / 100.0 * 1.01);
     let enough = designed(Carry::Reset, &DesignOptions { within, ..certified.clone() });
     assert_eq!(enough.found, found.found);
@@ -110,7 +114,8 @@ fn what_would_be_searched_for_minutes_is_certified() {
     assert!(stopped.expect("the best so far").search.is_some_and(|s| s.interrupted));
 }
 
-/// Weights over all attitudes: every attitude once, with angles that an operator reads, and they reach what is said, by the equations.
+/// Weights over all attitudes: every attitude once, with angles that an operator reads, and they reach what
+/// is said, by the equations.
 #[test]
 fn weights_over_all_attitudes_are_told_once() {
     let candidates = twelve();

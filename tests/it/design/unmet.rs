@@ -27,7 +27,8 @@ fn between<'t>(text: &'t str, before: &str, behind: &str) -> &'t str {
     &text[at..at + end]
 }
 
-/// Every remedy is searched for again with the options that are told: a scheme is found, and a comparison says that every requirement is met.
+/// Every remedy is searched for again with the options that are told: a scheme is found, and a comparison
+/// says that every requirement is met.
 #[test]
 fn what_would_do_does() {
     let output = run(&asked(&["--positions", "5"]));

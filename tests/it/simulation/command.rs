@@ -37,7 +37,8 @@ fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {
         arguments.extend(more);
         stdout(&run(&arguments)).replace("\n      ", " ")
     };
-    // the prior of psi_x and psi_y is all that they have in the run: no margin there, though they miss by more
+    // the prior of psi_x and psi_y is all that they have in the run: no margin there, though they miss by
+    // more
     let text = of(&["--requirement", "psi=0.01", "--prior", "psi=0.02"]);
     let said = "(resting on the prior); smallest margin of the others 0.0";
     assert!(text.contains("In this run requirements are NOT met, ") && text.contains(said), "{text}");

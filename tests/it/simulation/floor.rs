@@ -240,7 +240,8 @@ fn simulate_and_compare_show_the_floor() {
     for quiet in [json(&P1P2), json(&["compare", &file])["schemes"][0].clone()] {
         assert!(quiet.get("noise_floor").is_none() && quiet["conditions"].get("gyro_noise").is_none());
     }
-    // predicted sigmas count the noise of the gyros that is stated; at the scheme's dwells they are those of the floor
+    // predicted sigmas count the noise of the gyros that is stated; at the scheme's dwells they are those of
+    // the floor
     let quiet = json(&["compare", &file]);
     let sigma = |answer: &serde_json::Value, name: &str| {
         let all = answer["schemes"][0]["quantities"].as_array().expect("a list");

@@ -87,7 +87,8 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
             assert_eq!(
                 (run.stated, run.met),
                 (15 + 3 * usize::from(carry == Carry::Reset), {
-                    // a prior that is stated bounds what samples do not determine, in the run as in the prediction
+                    // a prior that is stated bounds what samples do not determine, in the run as in the
+                    // prediction
                     let by_prior = |q: &Estimate| {
                         q.outcome == Outcome::PriorOnly
                             && q.predicted_sigma.is_some()

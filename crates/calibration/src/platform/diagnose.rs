@@ -337,7 +337,7 @@ impl Parts<'_> {
         Ok(out)
     }
 
-    /// What becomes of the requirements on coefficients; none where none is stated.
+    /// Outcome of the requirements on coefficients; `None` where none is stated.
     fn requirements(&self, quantities: &[Estimated]) -> Option<Requirements> {
         let stated = |name: &str| {
             let of = |a: &&Assignment| concerns(&a.name, name) && !name.starts_with("psi");

@@ -225,7 +225,7 @@ pub enum SystemCalibrationError {
         column: String,
         /// What there is.
         found: String,
-        /// What would do.
+        /// Changes that would meet every requirement.
         expected: String,
     },
     /// Less data than unknowns.

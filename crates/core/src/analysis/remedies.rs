@@ -21,7 +21,7 @@ const MOST_PAIRS: usize = 12;
 /// Bases of `V_0, V_1, ...` in the two fields of a verdict.
 type Stairs = [Vec<Echelon>; 2];
 
-/// What is searched for one scheme.
+/// Search for remedies of one scheme.
 struct Search<'a> {
     platform: &'a Platform,
     verdicts: &'a Verdicts,
@@ -36,11 +36,13 @@ struct Search<'a> {
 struct Candidate {
     attitude: String,
     degrees: Vec<Option<usize>>,
-    /// What its rows tell beside those of the scheme; `None` where the two have no random values in common.
+    /// Rows of the attitude in the unobservable directions; `None` where the two schemes have no random
+    /// values in common.
     tells: Option<Told<Field>>,
 }
 
-/// The remedies of a scheme that was judged. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs of each kind are tried.
+/// The remedies of a scheme that was judged. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs
+/// of each kind are tried.
 pub(super) fn remedies(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -94,8 +96,8 @@ fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Option<usize>
     (first == second).then_some(first)
 }
 
-/// The entries of rows of a longer scheme in the unobservable directions; `places` are the columns of this scheme's unknowns. Unknowns
-/// of the new position alone are eliminated.
+/// The entries of rows of a longer scheme in the unobservable directions; `places` are the columns of this
+/// scheme's unknowns. Unknowns of the new position alone are eliminated.
 fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Told<Field> {
     let own: Vec<usize> = (0..space.columns()).filter(|k| !places.contains(k)).collect();
     let field = space.field();
@@ -159,7 +161,8 @@ impl Search<'_> {
         }
     }
 
-    /// The scheme with more cardinal attitudes at its end; `None` where they cannot be added, beyond a gimbal for instance.
+    /// The scheme with more cardinal attitudes at its end; `None` where they cannot be added, beyond a gimbal
+    /// for instance.
     fn with(&self, attitudes: &[&str]) -> Option<Platform> {
         let mut scheme = self.platform.scheme().clone();
         for attitude in attitudes {
@@ -218,11 +221,12 @@ impl Search<'_> {
         self.enter(self.attitude(attitudes), platform.names(), &degree)
     }
 
-    /// What one more attitude does, in the first field.
+    /// Degrees with one more attitude, in the first field.
     fn candidate(&self, attitude: &str, directions: &Directions<Field>) -> Option<Candidate> {
         let platform = self.with(&[attitude])?;
         let scheme = platform.scheme();
-        // where turns between positions or rates of rotations take part, random values are drawn for each scheme
+        // where turns between positions or rates of rotations take part, random values are drawn for each
+        // scheme
         let own = scheme.torquers_act() || scheme.by_course();
         let drawn;
         let values = match own {

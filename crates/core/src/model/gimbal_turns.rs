@@ -1,8 +1,9 @@
-//! Turns of the platform as its gimbals make them: whether gimbal angles stay within their limits on the way, not only at its ends.
+//! Turns of the platform as its gimbals make them: whether gimbal angles stay within their limits on the way,
+//! not only at its ends.
 //!
-//! From gimbal angles `(a, b, g)` a turn about one axis takes the gimbals along one course. It is followed in steps of at most a degree, and of a
-//! quarter of the distance to `beta = +-90`: there alpha and gamma turn about one line, and a turn about the line across both has to wait until they
-//! have swung round.
+//! From gimbal angles `(a, b, g)` a turn about one axis takes the gimbals along one course. It is followed in
+//! steps of at most a degree, and of a quarter of the distance to `beta = +-90`: there alpha and gamma turn
+//! about one line, and a turn about the line across both has to wait until they have swung round.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,9 +28,11 @@ const FASTEST: f64 = 100.0;
 pub struct GimbalReport {
     /// The limits in words, in degrees.
     pub limits: String,
-    /// Positions whose angles, as they are written, lie beyond a limit, with angles of the same attitude that do not.
+    /// Positions whose angles, as they are written, lie beyond a limit, with angles of the same attitude that
+    /// do not.
     pub beyond: Vec<BeyondLimits>,
-    /// The turn to every position but the first, and the rotation of every segment that turns; none for generic angles.
+    /// The turn to every position but the first, and the rotation of every segment that turns; none for
+    /// generic angles.
     pub turns: Vec<GimbalTurn>,
 }
 
@@ -55,19 +58,22 @@ pub struct GimbalTurn {
     pub by_gimbals: bool,
     /// The turn about one axis; null where the attitude stays, and gimbal by gimbal.
     pub turn: Option<Turn>,
-    /// True if all gimbal angles stay within their limits on the way; gimbal by gimbal, of the angles as they are written.
+    /// True if all gimbal angles stay within their limits on the way; gimbal by gimbal, of the angles as they
+    /// are written.
     pub stays: bool,
-    /// Where the turn about one axis cannot go on; null where it stays within the limits, and gimbal by gimbal.
+    /// Where the turn about one axis cannot go on; null where it stays within the limits, and gimbal by
+    /// gimbal.
     pub stop: Option<GimbalStop>,
-    /// Gimbal angles at the end of the turn in degrees (alpha, beta, gamma), where they are others of the same attitude than those listed.
+    /// Gimbal angles at the end of the turn in degrees (alpha, beta, gamma), where they are others of the
+    /// same attitude than those listed.
     pub ends_deg: Option<[f64; 3]>,
-    /// Change of alpha, beta and gamma in degrees of the way gimbal by gimbal (`path = "gimbals"`) between angles within the limits, which stays within them; null for a
-    /// rotation.
+    /// Change of alpha, beta and gamma in degrees of the way gimbal by gimbal (`path = "gimbals"`) between
+    /// angles within the limits, which stays within them; null for a rotation.
     pub gimbals_deg: Option<[f64; 3]>,
 }
 
-/// Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to turn more
-/// than a hundred times as fast as the platform.
+/// Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha
+/// and gamma would have to turn more than a hundred times as fast as the platform.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GimbalStop {
     /// The gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees.
@@ -79,7 +85,7 @@ pub struct GimbalStop {
 }
 
 impl Scheme {
-    /// What the gimbal limits mean for the scheme; `None` where it states none.
+    /// Angles and turns beyond the gimbal limits; `None` where the scheme states no limits.
     pub fn gimbal_report(&self) -> Option<GimbalReport> {
         let gimbals = &self.gimbals;
         if gimbals.are_free() {
@@ -120,8 +126,8 @@ impl Scheme {
         Some(GimbalReport { limits: gimbals.to_string(), beyond: beyond.collect(), turns })
     }
 
-    /// The gimbal angles of the positions: as they are written where they lie within the limits, and elsewhere those of the same attitude with
-    /// the shortest gimbal way from the position before.
+    /// The gimbal angles of the positions: as they are written where they lie within the limits, and
+    /// elsewhere those of the same attitude with the shortest gimbal way from the position before.
     fn gimbal_angles(&self) -> Vec<Euler> {
         let mut out: Vec<Euler> = Vec::with_capacity(self.positions.len());
         for p in &self.positions {
@@ -133,8 +139,8 @@ impl Scheme {
         out
     }
 
-    /// The turn from one position, which ends at gimbal angles `start`, to the next, at gimbal angles `listed` (degrees); `None` where the turn that
-    /// is stated does not lead there.
+    /// The turn from one position, which ends at gimbal angles `start`, to the next, at gimbal angles
+    /// `listed` (degrees); `None` where the turn that is stated does not lead there.
     fn turn_to(
         &self,
         from: &Position,
@@ -207,7 +213,8 @@ impl Gimbals {
         if angle < low - rounding { Some(low) } else { (angle > high + rounding).then_some(high) }
     }
 
-    /// The gimbal that reaches its limit first between two sets of angles in degrees, the limit, and the part of the step up to it.
+    /// The gimbal that reaches its limit first between two sets of angles in degrees, the limit, and the part
+    /// of the step up to it.
     fn first_passed(&self, at: &[f64; 3], next: &[f64; 3]) -> Option<(usize, f64, f64)> {
         let passed = (0..3).filter_map(|k| {
             let limit = self.passed(k, next[k])?;
@@ -216,7 +223,8 @@ impl Gimbals {
         passed.min_by(|a, b| a.2.total_cmp(&b.2))
     }
 
-    /// Follows a turn from gimbal angles in degrees: where it cannot go on, if anywhere, and the gimbal angles reached.
+    /// Follows a turn from gimbal angles in degrees: where it cannot go on, if anywhere, and the gimbal
+    /// angles reached.
     fn follow(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3]) {
         let whole = slew.turn().angle_deg;
         let (mut at, mut done) = (start, 0.0);
@@ -240,7 +248,8 @@ impl Gimbals {
         (None, at)
     }
 
-    /// The gimbal angles in degrees of an attitude that are nearest to `near`. At `beta = +-90` alpha is kept, unless gamma alone cannot follow.
+    /// The gimbal angles in degrees of an attitude that are nearest to `near`. At `beta = +-90` alpha is
+    /// kept, unless gamma alone cannot follow.
     fn beside(&self, c: &Matrix3<f64>, near: [f64; 3]) -> [f64; 3] {
         let [a, b, g] = euler_angles(c).map(f64::to_degrees);
         let placed = |angles: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| beside(angles[k], near[k])) };
@@ -280,7 +289,8 @@ mod tests {
         (stop.gimbal.as_deref(), whole[0].0, whole[1].0)
     }
 
-    /// Rates of alpha, beta, gamma for a rate `w` of the platform in n: the gimbals turn left-handed about North, the middle axis and Z_p.
+    /// Rates of alpha, beta, gamma for a rate `w` of the platform in n: the gimbals turn left-handed about
+    /// North, the middle axis and Z_p.
     fn rates([a, b, _]: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let [(sa, ca), (sb, cb)] = [a, b].map(|x| x.to_radians().sin_cos());
         // w = -a' (1, 0, 0) - b' (0, ca, -sa) - g' (-sb, sa cb, ca cb)
@@ -291,7 +301,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
 
-        /// A turn is followed to where integrating the rates of the gimbals leads (Runge and Kutta), and stops at the limit that these pass first.
+        /// A turn is followed to where integrating the rates of the gimbals leads (Runge and Kutta), and
+        /// stops at the limit that these pass first.
         #[test]
         fn courses_are_integrals_of_gimbal_rates(
             start in prop::array::uniform3(-80.0f64..80.0),
@@ -363,7 +374,8 @@ mod tests {
         assert_eq!((found.turns[0].stays, found.turns[0].gimbals_deg), (true, Some([0.0, 180.0, 180.0])));
     }
 
-    /// By hand: through beta = 90 straight on beta goes beyond; across, alpha and gamma have to swing by 90 degrees first.
+    /// By hand: through beta = 90 straight on beta goes beyond; across, alpha and gamma have to swing by 90
+    /// degrees first.
     #[test]
     fn through_the_lock_and_across() {
         let wide = "gimbals = { beta_deg = [-170, 170] }";

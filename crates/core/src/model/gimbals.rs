@@ -1,10 +1,11 @@
 //! The gimbals: which turns about which axis, how far each turns, and the gimbal angles of an attitude.
 //!
 //! `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19) takes platform components to geographic ones. Its first factor acts on geographic
-//! components: a change of alpha turns everything inside about North, an axis fixed to the base, so alpha is the *outer* gimbal. Its last
-//! factor acts on platform components: a change of gamma turns the platform alone, about Z_p, so gamma is the *inner* gimbal. Beta turns
-//! the *middle* gimbal about the axis `Mx(alpha) e_y`, which the outer gimbal carries along and the inner one does not move: Up where
-//! alpha = 0. The matrices are passive: a positive angle turns the platform left-handed about these axes.
+//! components: a change of alpha turns everything inside about North, an axis fixed to the base, so alpha is
+//! the *outer* gimbal. Its last factor acts on platform components: a change of gamma turns the platform
+//! alone, about Z_p, so gamma is the *inner* gimbal. Beta turns the *middle* gimbal about the axis `Mx(alpha)
+//! e_y`, which the outer gimbal carries along and the inner one does not move: Up where alpha = 0. The
+//! matrices are passive: a positive angle turns the platform left-handed about these axes.
 
 use std::fmt;
 
@@ -22,8 +23,8 @@ pub(super) const ROUNDING: i64 = 100_000;
 
 /// Limits on alpha, beta, gamma as `[low, high]` in 1e-9 degrees; `None`: the gimbal turns freely.
 ///
-/// An attitude has two sets of Euler angles, `(a, b, g)` and its twin `(a+180, 180-b, g+180)`, each up to whole turns, and at
-/// `b = +-90` infinitely many: it is reached when one of them lies within the limits.
+/// An attitude has two sets of Euler angles, `(a, b, g)` and its twin `(a+180, 180-b, g+180)`, each up to
+/// whole turns, and at `b = +-90` infinitely many: it is reached when one of them lies within the limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gimbals {
     /// Of alpha, beta and gamma.
@@ -59,7 +60,8 @@ impl Gimbals {
         Ok(())
     }
 
-    /// True if the angles lie within the limits as they are written, whole turns counted; generic angles count as within.
+    /// True if the angles lie within the limits as they are written, whole turns counted; generic angles
+    /// count as within.
     pub fn hold(&self, angles: &Euler) -> bool {
         let within = |(a, limit): (&Angle, Option<[i64; 2]>)| {
             a.generic().is_some() || limit.is_none_or(|[low, high]| (low..=high).contains(&a.nanodeg()))
@@ -67,12 +69,14 @@ impl Gimbals {
         angles.iter().zip(self.limits).all(within)
     }
 
-    /// The gimbal angles of the attitude of `angles`, within the limits, with the shortest gimbal way from `before`: exact, of the same
-    /// attitude. `None` where the gimbals do not reach the attitude; generic angles stay as they are.
+    /// The gimbal angles of the attitude of `angles`, within the limits, with the shortest gimbal way from
+    /// `before`: exact, of the same attitude. `None` where the gimbals do not reach the attitude; generic
+    /// angles stay as they are.
     ///
-    /// The gimbal way is the sum of what the three gimbals turn. Of equal ways, the one whose largest turn is smaller, then the one with
-    /// beta in -90..90 is taken. A gimbal without a limit turns the shorter way round, and its angle lies in (-180, 180]. At `beta = +-90`
-    /// alpha and gamma turn about one line: alpha is kept, and where gamma cannot follow, changed as little as possible.
+    /// The gimbal way is the sum of what the three gimbals turn. Of equal ways, the one whose largest turn is
+    /// smaller, then the one with beta in -90..90 is taken. A gimbal without a limit turns the shorter way
+    /// round, and its angle lies in (-180, 180]. At `beta = +-90` alpha and gamma turn about one line: alpha
+    /// is kept, and where gamma cannot follow, changed as little as possible.
     pub fn nearest(&self, angles: &Euler, before: &Euler) -> Option<Euler> {
         if angles.iter().any(|a| a.generic().is_some()) {
             return Some(angles.clone());
@@ -96,8 +100,9 @@ impl Gimbals {
         Some(std::array::from_fn(|k| Angle::from_nanodeg(shown(k))))
     }
 
-    /// The gimbal angles of successive attitudes, each with the shortest gimbal way from the one before, the first from (0, 0, 0).
-    /// Attitudes that the gimbals do not reach stay as they are. Without limits angles are brought into (-180, 180].
+    /// The gimbal angles of successive attitudes, each with the shortest gimbal way from the one before, the
+    /// first from (0, 0, 0). Attitudes that the gimbals do not reach stay as they are. Without limits angles
+    /// are brought into (-180, 180].
     pub fn along(&self, attitudes: &[Euler]) -> Vec<Euler> {
         let mut out: Vec<Euler> = Vec::with_capacity(attitudes.len());
         let zero: Euler = std::array::from_fn(|_| Angle::from_degrees(0));
@@ -133,7 +138,8 @@ impl Gimbals {
         (low..=high).contains(&inside).then_some(inside)
     }
 
-    /// The angles at `beta = +-90` within the limits: of every place of gamma the alpha nearest to that of `from`.
+    /// The angles at `beta = +-90` within the limits: of every place of gamma the alpha nearest to that of
+    /// `from`.
     fn locked(&self, [a, b, g]: [i64; 3], from: [i64; 3]) -> Vec<[i64; 3]> {
         let Some(beta) = self.place(1, b, from[1]) else { return Vec::new() };
         // at b = 90 only a - g counts, at b = -90 only a + g
@@ -310,8 +316,9 @@ mod tests {
         }
     }
 
-    /// Columns of `C_c^n` by turning a platform whose axes lie along North, Up, East and the gimbals around it, from the inside out: the inner one
-    /// turns the platform about its own Z, the middle one all of that about its own Y, the outer one all about North.
+    /// Columns of `C_c^n` by turning a platform whose axes lie along North, Up, East and the gimbals around
+    /// it, from the inside out: the inner one turns the platform about its own Z, the middle one all of that
+    /// about its own Y, the outer one all about North.
     fn nested([a, b, g]: [f64; 3]) -> Matrix3<f64> {
         // Rodrigues: v cos + (k x v) sin + k (k v) (1 - cos), left-handed
         let turned = |v: [f64; 3], k: [f64; 3], degrees: f64| -> [f64; 3] {
@@ -328,7 +335,8 @@ mod tests {
     }
 
     proptest! {
-        /// Alpha is the outer gimbal, about North; beta the middle, about an axis that alpha alone moves; gamma the inner, about Z_p.
+        /// Alpha is the outer gimbal, about North; beta the middle, about an axis that alpha alone moves;
+        /// gamma the inner, about Z_p.
         #[test]
         fn gimbals_from_the_inside_out(at in prop::array::uniform3(-180.0f64..180.0), by in -90.0f64..90.0) {
             let c = of_degrees(at);
@@ -342,7 +350,8 @@ mod tests {
             prop_assert!((0..3).all(|j| (middle(&changed(1), j) - middle(&c, j)).abs() < 1e-12));
         }
 
-        /// Of all gimbal angles within the limits that give the attitude, those with the shortest way; at beta = +-90 first those that keep alpha.
+        /// Of all gimbal angles within the limits that give the attitude, those with the shortest way; at
+        /// beta = +-90 first those that keep alpha.
         #[test]
         fn the_nearest_angles_are_what_a_search_over_gimbal_angles_finds(
             angles in prop::array::uniform3(-24i64..=24),
@@ -386,7 +395,8 @@ mod tests {
             prop_assert!((0..3).all(|k| width[k].is_some() || (-11..=12).contains(&found[k])));
         }
 
-        /// The attitude is the same, exactly: the matrices are equal in a prime field that holds the sines of all angles.
+        /// The attitude is the same, exactly: the matrices are equal in a prime field that holds the sines of
+        /// all angles.
         #[test]
         fn the_nearest_angles_give_the_same_attitude(
             angles in prop::array::uniform3(-400_000_000_000i64..400_000_000_000),
@@ -415,7 +425,8 @@ mod tests {
         }
     }
 
-    /// By hand: 135 of a gimbal that stops at 90 is its twin -45, whose way from the position before decides where both are within.
+    /// By hand: 135 of a gimbal that stops at 90 is its twin -45, whose way from the position before decides
+    /// where both are within.
     #[test]
     fn twins_by_hand() {
         let gimbals = limited([Some([-90, 90]), None, None]);

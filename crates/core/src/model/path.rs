@@ -24,7 +24,8 @@ use super::slew::Slew;
 pub enum Path {
     /// By one turn, the shortest (half turns about the axis in n whose first component that is not zero is positive).
     OneAxis,
-    /// Gimbal by gimbal: alpha (outer, about N), beta (middle), gamma (inner, about Z_p), each by the difference of its Euler angles.
+    /// Gimbal by gimbal: alpha (outer, about N), beta (middle), gamma (inner, about Z_p), each by the
+    /// difference of its Euler angles.
     Gimbals,
 }
 

@@ -142,7 +142,8 @@ impl ManyDigits {
         })
     }
 
-    /// The nearest double, zero where only zero is possible to 1e-60; `None` where the number is not known to all digits of a double.
+    /// The nearest double, zero where only zero is possible to 1e-60; `None` where the number is not known to
+    /// all digits of a double.
     pub(crate) fn to_f64(x: &Real) -> Option<f64> {
         let known =
             if x.is_zero() { x.radius_log2() < -200.0 } else { x.radius_log2() < x.size_log2() - 60.0 };

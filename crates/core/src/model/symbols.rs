@@ -179,8 +179,8 @@ impl Symbols {
         })
     }
 
-    /// The value of a text in square roots and constant angles, right in all its digits whatever cancels; `None` when it has another
-    /// symbol, or when 512 bits do not tell it.
+    /// The value of a text in square roots and constant angles, right in all its digits whatever cancels;
+    /// `None` when it has another symbol, or when 512 bits do not tell it.
     pub(crate) fn float(&self, text: &str) -> Option<f64> {
         let at = |name: &str| -> Option<Real> {
             let (kind, suffix) = name.split_at_checked(2)?;
@@ -206,7 +206,8 @@ impl Symbols {
     }
 }
 
-/// The value of a rational expression; `None` for a name that `at` does not know, for a function, and for what is divided by zero.
+/// The value of a rational expression; `None` for a name that `at` does not know, for a function, and for
+/// what is divided by zero.
 fn real(e: &Expression, at: &dyn Fn(&str) -> Option<Real>) -> Option<Real> {
     let power = |x: &Real, k: i32| {
         let product = (0..k.unsigned_abs()).fold(Real::from_i64(1), |product, _| product.mul(x));

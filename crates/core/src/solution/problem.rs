@@ -145,8 +145,9 @@ impl Problem {
         Some(self.outputs_of(f, table, x))
     }
 
-    /// The outputs in many digits, by elimination with the largest pivot; `None` when a pivot is not told from zero, or an output is not
-    /// known to all digits of a double. The system has a solution: that is known from the prime fields.
+    /// The outputs in many digits, by elimination with the largest pivot; `None` when a pivot is not told
+    /// from zero, or an output is not known to all digits of a double. The system has a solution: that is
+    /// known from the prime fields.
     pub(crate) fn solve_in_many_digits(&self, table: &[Vec<Real>]) -> Option<Vec<f64>> {
         let ring = ManyDigits;
         let equation = |(places, right): &(Vec<(usize, Place)>, Right)| {

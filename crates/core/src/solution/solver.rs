@@ -284,7 +284,8 @@ impl<'a> Solver<'a> {
         Some(problem.solve_in_floats(rows, &[])?.into_iter().map(|x| Number::Decimal(tidy(x))).collect())
     }
 
-    /// The observable rows at the rates of decimals in many digits; `None` for generic angles, and for torquer errors, whose turns have none.
+    /// The observable rows at the rates of decimals in many digits; `None` for generic angles, and for
+    /// torquer errors, whose turns have none.
     fn many_digits(&self) -> Option<&Vec<Vec<Real>>> {
         let rows = self.many_digits.get_or_init(|| {
             let scheme = self.platform.scheme();

@@ -47,8 +47,8 @@ pub struct SystemAnalysis {
     pub quantities: Vec<SystemQuantity>,
     /// States whose start is known.
     pub known: Vec<String>,
-    /// Time at which the first segment was judged, where the equations hold it: a number, or `generic` (almost every time, as in all later
-    /// segments); null where they do not.
+    /// Time at which the first segment was judged, where the equations hold it: a number, or `generic`
+    /// (almost every time, as in all later segments); null where they do not.
     pub time: Option<String>,
     /// Equations that hold at the start; their differentials count as rows of order 0.
     pub constraints: Vec<String>,
@@ -115,8 +115,8 @@ pub struct SystemQuantity {
     pub unit: String,
     /// What it is, as the file says.
     pub description: String,
-    /// The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not seen up to the
-    /// bound on the order.
+    /// The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its
+    /// partners, not excited, or not seen up to the bound on the order.
     pub status: Status,
     /// The smallest order of derivatives that solves it.
     pub degree: Option<usize>,
@@ -153,8 +153,9 @@ pub struct SystemCombination {
 /// A symmetry in words.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SymmetryReport {
-    /// What changes no output, for every `c` (every positive one where something is multiplied or divided): `multiply alpha by c; divide
-    /// gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
+    /// What changes no output, for every `c` (every positive one where something is multiplied or divided):
+    /// `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is multiplied or divided at c =
+    /// 0, nothing changes.
     pub words: String,
     /// The unknowns that it moves.
     pub unknowns: Vec<String>,
@@ -443,9 +444,10 @@ fn along(d: &PolynomialDirection, name: &dyn Fn(usize) -> String) -> String {
     format!("move {} along {}", names.join(", "), speeds.join(", "))
 }
 
-/// A symmetry as what it does to the unknowns, for every `c` where scalings are at work for every positive one: the flow of
-/// `x_i' = c_i x_i + d_i` after the time `log c`, or after `c` where nothing is scaled.
-/// `multiply a, b by c; divide d by c^2`, `add c to x; subtract 2 c from y`, `multiply a by c; replace x by c*x + 1 - c; add log(c) to y`.
+/// A symmetry as what it does to the unknowns, for every `c` where scalings are at work for every positive
+/// one: the flow of `x_i' = c_i x_i + d_i` after the time `log c`, or after `c` where nothing is scaled.
+/// `multiply a, b by c; divide d by c^2`, `add c to x; subtract 2 c from y`, `multiply a by c; replace x by
+/// c*x + 1 - c; add log(c) to y`.
 fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
     let fraction = |(p, q): (i64, i64)| if q == 1 { p.to_string() } else { format!("{p}/{q}") };
     let power = |(p, q): (i64, i64)| match (p, q) {

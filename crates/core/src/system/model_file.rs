@@ -70,12 +70,13 @@ pub struct ModelFile {
     /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
     #[serde(default, rename = "segment")]
     segments: Vec<SegmentEntry>,
-    /// Time t at which the run begins: a number (0 when left out), or "generic". Where equations or known inputs hold t, the first segment is
-    /// judged at this time: verdicts at t = 0 may differ from those at any later time. Later segments are judged at a generic time.
+    /// Time t at which the run begins: a number (0 when left out), or "generic". Where equations or known
+    /// inputs hold t, the first segment is judged at this time: verdicts at t = 0 may differ from those at
+    /// any later time. Later segments are judged at a generic time.
     #[schemars(with = "Option<serde_json::Value>")]
     time: Option<Spanned<Value>>,
-    /// Equations that hold at the start of every experiment (there must be a real point that meets them), as `norm(q) = 1`: what is random otherwise lies on them, and their
-    /// differentials are known.
+    /// Equations that hold at the start of every experiment (there must be a real point that meets them), as
+    /// `norm(q) = 1`: what is random otherwise lies on them, and their differentials are known.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     constraints: Vec<Spanned<String>>,

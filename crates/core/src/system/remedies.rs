@@ -12,8 +12,9 @@ use super::values::Values;
 use crate::model::expression::{Expression, Node};
 use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
 
-/// Most verdicts on single changes, and half as many on pairs, of a model of up to `UNKNOWNS`; beyond, the number falls as the square of
-/// the unknowns, as the work of a verdict grows at least: 10 of a model of 90 unknowns, none from 300 on.
+/// Most verdicts on single changes, and half as many on pairs, of a model of up to `UNKNOWNS`; beyond, the
+/// number falls as the square of the unknowns, as the work of a verdict grows at least: 10 of a model of 90
+/// unknowns, none from 300 on.
 const MOST_VERDICTS: usize = 24;
 /// Unknowns up to which that many verdicts are computed.
 const UNKNOWNS: usize = 60;
@@ -22,7 +23,7 @@ const MOST_IN_DIGITS: usize = 12;
 /// Most values that are tried of unknowns that determine each other.
 const MOST_ALIKE: usize = 6;
 
-/// What is searched for one model.
+/// Search for remedies of one model.
 struct Search<'a> {
     model: &'a SystemModel,
     judged: &'a Judgement,
@@ -30,7 +31,7 @@ struct Search<'a> {
     order: Option<usize>,
     /// Columns of unknowns that are not observable and are spoken of.
     open: Vec<usize>,
-    /// What these are, each once, with all columns of it.
+    /// Names of the columns, each once, with all columns that it has.
     roles: Vec<(Role, Vec<usize>)>,
     /// Verdicts that may still be computed.
     budget: usize,
@@ -99,8 +100,9 @@ impl Search<'_> {
         self.two(directions, &states.collect::<Vec<_>>());
     }
 
-    /// Single changes in the order in which they are tried: a value of every set of unknowns that determine each other, parameters first;
-    /// then outputs, those first whose value alone resolves most; then other values of the sets.
+    /// Single changes in the order in which they are tried: a value of every set of unknowns that determine
+    /// each other, parameters first; then outputs, those first whose value alone resolves most; then other
+    /// values of the sets.
     fn singles<S: Values>(&self, directions: &Directions<S>) -> Vec<Change> {
         let resolves = |columns: &[usize]| directions.resolved(&directions.known(columns), &self.open);
         let mut sets: Vec<(Vec<usize>, Vec<Role>)> = Vec::new();
@@ -139,7 +141,8 @@ impl Search<'_> {
             let changes = [i, j].map(|k| self.known(self.roles[k].0));
             Some(self.judge(changes.into()))
         });
-        // rows of an output more are those of another random point: only the engine can say what two of them tell
+        // rows of an output more are those of another random point: only the engine can say what two of them
+        // tell
         for (i, j) in (0..outputs.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
             if self.left().is_empty() {
                 break;

@@ -43,14 +43,15 @@ pub struct Design {
     pub found: Vec<Found>,
     /// Schemes that none found beats in both total time and criterion, by total time.
     pub front: Vec<Found>,
-    /// Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for.
+    /// Unknowns and families with a stated requirement that is not judged, since only some coefficients are
+    /// asked for.
     #[serde(default)]
     pub not_judged: Vec<String>,
     /// The first scheme under the other carries; empty where none was searched.
     #[serde(default)]
     pub other_carries: Vec<OtherCarry>,
-    /// Of the first scheme: turns beyond the gimbal limits; and positions of the file of candidates whose angles lie beyond. Left out where no
-    /// limits are stated.
+    /// Turns of the first scheme beyond the gimbal limits, and positions of the file of candidates whose
+    /// angles lie beyond. Left out where no limits are stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gimbals: Option<GimbalReport>,
     /// How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so.
@@ -87,10 +88,12 @@ pub struct Minimum {
 pub struct SearchReport {
     /// The number of positions.
     pub positions: usize,
-    /// What every sigma rests on: the information of all samples on psi and all coefficients, with the random drift and the priors that are
-    /// stated. Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
+    /// Conditions of every sigma: the information of all samples on psi and all coefficients, with the random
+    /// drift and the priors that are stated. Every position has the dwell, slews are about the eigenaxis, Z
+    /// is not used meanwhile.
     pub conditions: MeasurementReport,
-    /// Random drift that is stated: the search leaves it out, and the figures of all schemes that are listed count it; null: none.
+    /// Random drift that is stated: the search leaves it out, and the figures of all schemes that are listed
+    /// count it; null: none.
     pub drift_noise: Option<String>,
     /// Knowledge beforehand that sigmas and the bound count beside the samples: the priors that are stated; null: none. What is observable is
     /// by the samples alone.
@@ -104,8 +107,9 @@ pub struct SearchReport {
     /// Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
     /// required coefficient as far as double precision tells: they count as worse than all others.
     pub lost: u64,
-    /// Number of sequences, up to turns of the platform axes, that a search of all would go through where not all were searched (`within` 0); null where
-    /// all were, and where they are too many to be held or counted.
+    /// Number of sequences, up to turns of the platform axes, that a search of all would go through where not
+    /// all were searched (`within` 0); null where all were, and where they are too many to be held or
+    /// counted.
     pub sequences: Option<u64>,
     /// Sequences, observable or not, that were not examined because a bound leaves no doubt: as far as double precision tells their criterion is
     /// larger than that of all listed.
@@ -165,11 +169,13 @@ pub struct EverywhereReport {
     pub within_percent: f64,
     /// What rounding may hide of that criterion, as a part of it: as above, that of the attitudes of the scheme with it.
     pub rounding: Option<f64>,
-    /// The criterion that the weights would have as a scheme: all of them, with angles to hundredths of a degree and weights as they are rounded here.
+    /// The criterion that the weights would have as a scheme: all of them, with angles to hundredths of a
+    /// degree and weights as they are rounded here.
     pub attained: f64,
-    /// The ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others above -180 and up
-    /// to 180. Weights are parts of the sum of all, rounded to two digits, or to as many as lose no more than a thousandth of the variance; those below
-    /// 1e-7 are left out.
+    /// The ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees,
+    /// beta up to 90, the others above -180 and up to 180. Weights are parts of the sum of all, rounded to
+    /// two digits, or to as many as lose no more than a thousandth of the variance; those below 1e-7 are left
+    /// out.
     pub weights: Vec<Weight>,
     /// Number of lighter attitudes, which are not listed.
     pub lighter: usize,
@@ -182,8 +188,9 @@ pub struct EverywhereReport {
 /// Free attitudes with rounded angles: every scheme is evaluated at the angles as they are rounded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rounded {
-    /// Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too, and for what gimbal limits ask for: the
-    /// twin (alpha+180, 180-beta, gamma+180) of such angles, and at beta = +-90 another alpha.
+    /// Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too, and
+    /// for what gimbal limits ask for: the twin (alpha+180, 180-beta, gamma+180) of such angles, and at beta
+    /// = +-90 another alpha.
     pub step_deg: f64,
     /// A better scheme, by the same search with angles in hundredths of a degree; null where none was found.
     pub finer: Option<Finer>,
@@ -224,8 +231,8 @@ pub struct Found {
     /// Which of those listed before it, counted from 1, a turn of the platform axes turns into it (coefficients renamed): the same scheme in
     /// other axes; null: none.
     pub image_of: Option<usize>,
-    /// Their gimbal angles alpha,beta,gamma in degrees: within the gimbal limits, each with the shortest gimbal way from the position before
-    /// (without limits as the candidates have them, in (-180, 180]).
+    /// Their gimbal angles alpha,beta,gamma in degrees: within the gimbal limits, each with the shortest
+    /// gimbal way from the position before (without limits as the candidates have them, in (-180, 180]).
     pub angles: Vec<String>,
     /// The half turns between them, each with its direction: the other one is another scheme.
     pub half_turns: Vec<HalfTurn>,

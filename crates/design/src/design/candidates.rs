@@ -76,8 +76,9 @@ impl Candidates {
         self.attitudes.push(attitude);
     }
 
-    /// Those that the gimbals reach, with angles within the limits, and the names of the others. An attitude whose own angles lie beyond them has
-    /// those with the shortest gimbal way from (0, 0, 0), and their name where it was named by its angles.
+    /// Those that the gimbals reach, with angles within the limits, and the names of the others. An attitude
+    /// whose own angles lie beyond them has those with the shortest gimbal way from (0, 0, 0), and their name
+    /// where it was named by its angles.
     pub fn within(self, gimbals: &Gimbals) -> (Self, Vec<String>) {
         let (mut reached, mut beyond) = (Self::default(), Vec::new());
         let zero: Euler = std::array::from_fn(|_| Angle::from_degrees(0));

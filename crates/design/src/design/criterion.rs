@@ -30,7 +30,8 @@ pub enum Criterion {
 pub struct Limits {
     /// Of the coefficients that count, in deg/h (per g) (shape d).
     pub coefficients: Vec<f64>,
-    /// Of psi_x, psi_y, psi_z at the end, under reset carry at the end of every position, in deg.
+    /// Largest sigmas of psi_x, psi_y, psi_z at the end, under reset carry at the end of every position, in
+    /// deg.
     pub psi: [f64; 3],
 }
 
@@ -48,7 +49,8 @@ impl Criterion {
 }
 
 impl Criterion {
-    /// The criterion of a scheme by its covariance at the end, random drift included; `counts` names the coefficients that count.
+    /// The criterion of a scheme by its covariance at the end, random drift included; `counts` names the
+    /// coefficients that count.
     pub(super) fn of_attained(
         &self,
         attained: &Attained,

@@ -121,9 +121,9 @@ pub enum DesignError {
     /// No scheme meets every requirement.
     #[error("{why}\n{nearest}")]
     NotMet {
-        /// How that is known.
+        /// Evidence that no scheme meets every requirement.
         why: Box<DesignError>,
-        /// What would do.
+        /// Changes that would meet every requirement.
         nearest: Box<Nearest>,
     },
     /// Parts of no exhaustive search.

@@ -103,9 +103,10 @@ pub struct DesignOptions {
     pub divide: bool,
     /// Numbers of positions for the front of total time, besides that asked for.
     pub front: Vec<usize>,
-    /// Where many sequences would have to be searched and information adds (reset carry): all are searched unless the criterion of a scheme found by
-    /// exchange is within this part of a bound on what is possible at all. `None`: they are not searched, and the answer says how far that scheme is from
-    /// the bound at most. 0: all are searched, however many they are, under any carry.
+    /// Where many sequences would have to be searched and information adds (reset carry): all are searched
+    /// unless the criterion of a scheme found by exchange is within this part of a bound on what is possible
+    /// at all. `None`: they are not searched, and the answer says how far that scheme is from the bound at
+    /// most. 0: all are searched, however many they are, under any carry.
     pub within: Option<f64>,
     /// Whether the bound over all attitudes is sought too (reset carry).
     pub everywhere: bool,
@@ -410,7 +411,8 @@ fn answered(
             return Err(DesignError::NotMet { why: Box::new(error), nearest: Box::new(nearest) });
         };
         out.front = task.all_found(evaluator, &best.front)?;
-        // the bound is of samples without random drift: it says nothing of how far above it figures with it may be
+        // the bound is of samples without random drift: it says nothing of how far above it figures with it
+        // may be
         let certified = bound.filter(|_| !task.is_noisy());
         let mut certificate = certified.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {

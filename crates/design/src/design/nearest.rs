@@ -1,5 +1,6 @@
-//! What would do where no scheme meets every requirement: the nearest scheme, what limits it, and the dwell, the number of positions or
-//! the candidates that would. Everything told is a scheme that was evaluated; the work is counted, not timed.
+//! Changes that would meet every requirement, where no scheme does: the nearest scheme, what limits it, and
+//! the dwell, the number of positions or the candidates that would. Everything told is a scheme that was
+//! evaluated; the work is counted, not timed.
 
 use std::fmt;
 
@@ -16,7 +17,8 @@ use super::{CriterionName, DesignError, DesignOptions, NOTHING_YET, Prepared};
 
 /// Sequences that may be evaluated: no further step begins behind them.
 const WORK: u64 = 400_000;
-/// Restarts of the exchange for the nearest scheme and for other candidates, and for every other number of positions.
+/// Restarts of the exchange for the nearest scheme and for other candidates, and for every other number of
+/// positions.
 const RESTARTS: u64 = 24;
 const FEW_RESTARTS: u64 = 4;
 /// Most positions that are tried beyond those asked for.
@@ -26,10 +28,11 @@ const LONGEST: f64 = 1024.0;
 /// Steps of the grids that are tried, in 1e-9 degrees.
 const GRIDS: [i64; 2] = [45_000_000_000, 30_000_000_000];
 
-/// What would do where no scheme meets every requirement.
+/// Changes that would meet every requirement, where no scheme does.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nearest {
-    /// The scheme with the largest worst margin of those evaluated; `None` where none determines what is required.
+    /// The scheme with the largest worst margin of those evaluated; `None` where none determines what is
+    /// required.
     pub scheme: Option<Found>,
     /// That scheme with the shortest dwell that meets every requirement, to three digits.
     pub dwell: Option<Found>,
@@ -39,7 +42,8 @@ pub struct Nearest {
     pub positions: Option<Found>,
     /// The largest number of positions that was tried.
     pub most: usize,
-    /// Other candidates that were tried, as `--candidates` names them, with the best scheme of as many positions.
+    /// Other candidates that were tried, as `--candidates` names them, with the best scheme of as many
+    /// positions.
     pub candidates: Vec<(String, Option<Found>)>,
     /// Number of sequences that were evaluated.
     pub examined: u64,
@@ -60,7 +64,7 @@ struct Seeking<'a> {
 type Best = (Scored, Found);
 
 impl Nearest {
-    /// What would do for `options`, for which no scheme of `k` positions meets every requirement.
+    /// Changes for `options`, for which no scheme of `k` positions meets every requirement.
     pub(super) fn seek(
         base: &Scheme,
         conditions: &Conditions,
@@ -99,7 +103,7 @@ impl Seeking<'_> {
         self.more_positions(k, nearest.map(|(scored, _)| scored.sequence))
     }
 
-    /// Whether another step may begin.
+    /// True if another step may begin.
     fn goes_on(&mut self) -> bool {
         let on = self.out.examined < WORK && (self.progress)(NOTHING_YET);
         self.out.unfinished |= !on;
@@ -131,7 +135,8 @@ impl Seeking<'_> {
         Ok(best.found.into_iter().zip(found).next())
     }
 
-    /// The nearest scheme with the shortest dwell that does: by factors of two, then by halves of what is between.
+    /// The nearest scheme with the shortest dwell that does: by factors of two, then by halves of what is
+    /// between.
     fn longer(&mut self, nearest: &Scored, k: usize) -> Result<(), DesignError> {
         let options = DesignOptions { positions: Some(k), ..self.options.clone() };
         let going = || (self.progress)(NOTHING_YET);
@@ -181,7 +186,8 @@ impl Seeking<'_> {
             if grid.names.iter().all(|name| chosen.contains(name)) || !self.goes_on() {
                 continue;
             }
-            // torquer errors act between cardinal attitudes only, and turns between too many attitudes are not held
+            // torquer errors act between cardinal attitudes only, and turns between too many attitudes are
+            // not held
             let best = match self.exchanged(k, Some(grid), RESTARTS / 2, Vec::new()) {
                 Err(
                     DesignError::Walks { .. } | DesignError::Pairs { .. } | DesignError::Candidates { .. },

@@ -30,7 +30,8 @@ pub struct Part {
     pub digest: String,
     /// The inputs by name, as the library writes them: which differ, where digests do.
     pub inputs: BTreeMap<String, String>,
-    /// Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null where no command did.
+    /// Options and files of the command that wrote it, as the JSON text that the command reads: its merge
+    /// needs no others; null where no command did.
     pub asked: Option<String>,
     /// Which part, counted from 1, of how many.
     pub part: [usize; 2],

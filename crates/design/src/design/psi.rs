@@ -1,4 +1,5 @@
-//! The accuracy of psi at the end of a scheme, with which the platform is used: what requirements on it are held against.
+//! The accuracy of psi at the end of a scheme, with which the platform is used: what requirements on it are
+//! held against.
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
@@ -16,8 +17,9 @@ pub(super) struct OwnPsi {
 }
 
 impl Evaluator {
-    /// Sigma in deg of psi in platform axes at the end of a whole sequence (inertial carry: in those of its first position), under reset carry
-    /// at the end of its every position; infinite where it is not determined, none when a coefficient that counts is not.
+    /// Sigma in deg of psi in platform axes at the end of a whole sequence (inertial carry: in those of its
+    /// first position), under reset carry at the end of its every position; infinite where it is not
+    /// determined, none when a coefficient that counts is not.
     pub fn psi_sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<[f64; 3]> {
         let (state, mut root) = (self.state_of(sequence), Vec::new());
         if self.root(&state, &mut root) { self.psi_of(&state, &root) } else { Vec::new() }
@@ -62,7 +64,8 @@ impl Evaluator {
         std::array::from_fn(row)
     }
 
-    /// psi in platform axes at the end of a position by its own psi in these axes at its start and the coefficients (3 x n).
+    /// psi in platform axes at the end of a position by its own psi in these axes at its start and the
+    /// coefficients (3 x n).
     fn own_psi_at_end(&self, candidate: usize) -> [Vec<f64>; 3] {
         let Candidate { c, effects, .. } = &self.candidates[candidate];
         let phi = &self.dwelling_of(candidate).phi;
@@ -74,8 +77,9 @@ impl Evaluator {
         self.in_platform_axes(candidate, &rows.each_ref().map(Vec::as_slice))
     }
 
-    /// Information of a position, with the prior of its psi, on psi^n at its end: with itself and with the other local unknowns (3 x L).
-    /// `psi(end) = A psi(start) + B eps` with a rotation A, so psi(start) is `A^T (psi(end) - B eps)`.
+    /// Information of a position, with the prior of its psi, on psi^n at its end: with itself and with the
+    /// other local unknowns (3 x L). `psi(end) = A psi(start) + B eps` with a rotation A, so psi(start) is
+    /// `A^T (psi(end) - B eps)`.
     fn information_at_end(&self, candidate: usize) -> [[f64; LOCAL]; 3] {
         let (c, dwelling) = self.stands(candidate);
         let phi = &dwelling.phi;
@@ -97,8 +101,8 @@ impl Evaluator {
         std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| phi[i][k] * with[k][j]).sum()))
     }
 
-    /// Sigma in deg of psi at the end of a position with a psi of its own, when the rest of the scheme knows the coefficients as
-    /// `root` says.
+    /// Sigma in deg of psi at the end of a position with a psi of its own, when the rest of the scheme knows
+    /// the coefficients as `root` says.
     fn psi_of_position(&self, candidate: usize, root: &[f64]) -> [f64; 3] {
         let OwnPsi { variances, moved } = self.own_psi(candidate);
         let n = self.n;

@@ -31,8 +31,8 @@ pub(super) const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Restarts of the exchange at each of them, besides those from the schemes found.
 const FRONT_RESTARTS: u64 = 8;
 
-/// Conditions of a search: where only some coefficients are asked for, requirements on psi and on the others are left out, also of the file that
-/// is written, so that every command judges the same.
+/// Conditions of a search: where only some coefficients are asked for, requirements on psi and on the others
+/// are left out, also of the file that is written, so that every command judges the same.
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a base that is no platform.
@@ -397,8 +397,8 @@ impl<'a> Task<'a> {
         }))
     }
 
-    /// What was found with the figures that every other command gives of its file; `None` where requirements are a constraint and one is
-    /// missed.
+    /// Scheme that was found, with the figures that every other command gives of its file; `None` where
+    /// requirements are a constraint and one is missed.
     ///
     /// # Errors
     /// [`DesignError`] for a scheme that cannot be run.

@@ -13,8 +13,8 @@ use super::answer::{Design, Found};
 /// Half a turn in degrees.
 const HALF: i32 = 180;
 
-/// Gives every scheme of an answer the gimbal angles of its attitudes within the limits of `base`, each with the shortest gimbal way from the
-/// position before; what was named by its angles has the name of these.
+/// Gives every scheme of an answer the gimbal angles of its attitudes within the limits of `base`, each with
+/// the shortest gimbal way from the position before; what was named by its angles has the name of these.
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a dwell that no scheme has.
@@ -103,7 +103,8 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
     })
 }
 
-/// Assignments as a file states them: there what is of one unknown counts before what is of its family, whichever comes first.
+/// Assignments as a file states them: there what is of one unknown counts before what is of its family,
+/// whichever comes first.
 fn by_name(given: &[Assignment]) -> BTreeMap<String, f64> {
     let mut out = BTreeMap::new();
     for a in given {

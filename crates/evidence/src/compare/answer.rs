@@ -52,13 +52,14 @@ pub struct ComparedScheme {
     pub worst: Option<Worst>,
     /// True if requirements are stated and every one is met.
     pub meets_requirements: bool,
-    /// What becomes of the requirements by the predicted sigmas.
+    /// Outcome of the requirements by the predicted sigmas.
     pub requirements: Requirements,
     /// The same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
     /// Whether accuracy orders are computed: none are for rotating segments.
     pub has_accuracy_orders: bool,
-    /// Whether the small-angle model holds at the drifts that are stated; null where none are (`values`), or for very many steps.
+    /// Validity of the small-angle model at the drifts that are stated; null where none are (`values`), or
+    /// for very many steps.
     pub validity: Option<Validity>,
     /// What happens without each of the positions.
     pub drop_one: Vec<DropOne>,
@@ -94,13 +95,13 @@ pub struct Quantity {
     pub degree: Option<usize>,
     /// The accuracy order.
     pub accuracy_order: Option<usize>,
-    /// Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when neither samples nor stated
-    /// priors bound it.
+    /// Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when
+    /// neither samples nor stated priors bound it.
     pub sigma: Option<f64>,
     /// True if the samples do not determine it, so that sigma rests on stated priors alone.
     pub by_prior: bool,
-    /// Of a coefficient, where the small-angle model does not hold for the drifts that are stated: the standard deviation of a
-    /// filter with full attitudes at the end, with the prior.
+    /// Standard deviation of a coefficient, where the small-angle model does not hold for the drifts that are
+    /// stated, by a filter with full attitudes at the end, with the prior.
     pub sigma_extended: Option<f64>,
     /// The largest sigma allowed.
     pub requirement: Option<f64>,
@@ -122,7 +123,7 @@ pub struct DropOne {
     pub lost: Vec<String>,
     /// The worst sigma without it.
     pub worst: Option<Worst>,
-    /// What becomes of the requirements without it.
+    /// Outcome of the requirements without it.
     pub requirements: Requirements,
 }
 

@@ -86,8 +86,8 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
 }
 
-/// Every unknown with its predicted standard deviation in deg, deg/h, deg/h/g at the end, by the conditions that are stated; `None` where
-/// neither samples nor stated priors bound it.
+/// Every unknown with its predicted standard deviation in deg, deg/h, deg/h/g at the end, by the conditions
+/// that are stated; `None` where neither samples nor stated priors bound it.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -100,7 +100,8 @@ pub fn predicted(
     Ok(judged.plan.platform.names().iter().cloned().zip(judged.sigmas.iter().copied()).collect())
 }
 
-/// The accuracy of a scheme under conditions of which those count that concern its unknowns: other carries and fewer positions have others.
+/// The accuracy of a scheme under conditions of which those count that concern its unknowns: other carries
+/// and fewer positions have others.
 fn judged(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Attained, SimulationError> {
     Attained::new(scheme, &conditions.within(&Platform::new(scheme.clone())?), seed)
 }

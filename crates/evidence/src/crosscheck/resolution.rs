@@ -1,5 +1,5 @@
-//! What evidence b must show in a filter of doubles, by many digits: whether the filter's prior is wide enough for it, and the
-//! rounding of doubles small enough.
+//! What evidence b must show in a filter of doubles, by many digits: whether the filter's prior is wide
+//! enough for it, and the rounding of doubles small enough.
 
 use std::cell::OnceCell;
 
@@ -14,15 +14,15 @@ use crate::simulation::{Conditions, Plan};
 
 /// Bits of this evaluation: information of 1e30 of a prior, and what cancels in it.
 const BITS: usize = 512;
-/// By how much rounding may move a number of a model of doubles, whose largest are about one: 2^-46 is 64 units of the last place, for
-/// some hundreds of steps of the filter.
+/// By how much rounding may move a number of a model of doubles, whose largest are about one: 2^-46 is 64
+/// units of the last place, for some hundreds of steps of the filter.
 pub(super) const ROUNDING: i32 = -46;
 /// Models that are rounded at random.
 const DRAWS: usize = 2;
 /// The factor between the two priors of evidence b.
 const WIDER: f64 = 10.0;
-/// How far the value by many digits may be from what a prior without bounds shows, a fifth of the tolerance of what is measured in
-/// doubles: of an inflation, relative, and of a correlation.
+/// How far the value by many digits may be from what a prior without bounds shows, a fifth of the tolerance
+/// of what is measured in doubles: of an inflation, relative, and of a correlation.
 const CLOSE: [f64; 2] = [2e-3, 2e-4];
 
 /// A model with both priors of evidence b.
@@ -78,8 +78,8 @@ impl<'a> Resolution<'a> {
         std::iter::once(&own).chain(&rounded).map(filtered).collect()
     }
 
-    /// Why doubles may show something else than `limit`, to which a prior without bounds leads by many digits; `None` where they must
-    /// show it. `of` is what is shown.
+    /// Why doubles may show something else than `limit`, to which a prior without bounds leads by many
+    /// digits; `None` where they must show it. `of` is what is shown.
     fn why(&self, limit: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
         let Some(filtered) = self.filtered.get_or_init(|| self.compute()) else {
             return Some("many digits do not tell what the filter must show".into());
@@ -98,7 +98,8 @@ impl<'a> Resolution<'a> {
         ))
     }
 
-    /// Why the prior inflation of a combination of the filter's unknowns may be another than that of what is determined, or is not.
+    /// Why the prior inflation of a combination of the filter's unknowns may be another than that of what is
+    /// determined, or is not.
     pub(super) fn inflation(&self, terms: &Combination, determined: bool) -> Option<String> {
         let f = functional(Digits { bits: BITS }, &|c| self.is_psi(c), terms, false);
         self.why(if determined { 1.0 } else { WIDER }, CLOSE[0], &|filtered| filtered.inflation(&f))

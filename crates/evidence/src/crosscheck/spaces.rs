@@ -92,8 +92,8 @@ fn count_unseen(seen: &Seen, vectors: &[Combination], is_psi: &dyn Fn(usize) -> 
     vectors.iter().filter(unseen).count()
 }
 
-/// The directions that are not seen with dwells either: as many as `hidden`, independent, each seen by nothing; `partial` where others are
-/// known to be there.
+/// The directions that are not seen with dwells either: as many as `hidden`, independent, each seen by
+/// nothing; `partial` where others are known to be there.
 pub(super) fn with_dwells(
     prediction: &Prediction,
     shown: Option<&Asymptotics>,

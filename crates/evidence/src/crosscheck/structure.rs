@@ -112,8 +112,9 @@ pub(super) fn structure(
     })
 }
 
-/// The prior inflation of a quantity, by many digits first: whether the samples determine it is what its slope at the end shows. What the
-/// filter in doubles shows counts where many digits say that it must show it. The reason, where it is not resolvable.
+/// The prior inflation of a quantity, by many digits first: whether the samples determine it is what its
+/// slope at the end shows. What the filter in doubles shows counts where many digits say that it must show
+/// it. The reason, where it is not resolvable.
 fn decide_inflation(
     q: &mut QuantityEvidence,
     terms: &Combination,
@@ -139,7 +140,8 @@ fn decide_inflation(
     Some(format!("{}: prior inflation {measured:.3}: {why}", q.name))
 }
 
-/// That a filter in doubles sees a direction counts where rounding does not show as much of it; the reason, where it is not resolvable.
+/// That a filter in doubles sees a direction counts where rounding does not show as much of it; the reason,
+/// where it is not resolvable.
 fn decide_seen(v: &mut Direction) -> Option<String> {
     let NullEvidence { direction, seen, .. } = &mut v.evidence;
     let measured = seen.measured.filter(|x| seen.fails() && *x <= v.rounding)?;
@@ -150,7 +152,8 @@ fn decide_seen(v: &mut Direction) -> Option<String> {
     ))
 }
 
-/// The correlation along a direction counts where many digits say that the filter must show it; the reason, where it is not resolvable.
+/// The correlation along a direction counts where many digits say that the filter must show it; the reason,
+/// where it is not resolvable.
 fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<String> {
     let NullEvidence { direction, correlation, .. } = &mut v.evidence;
     let check = correlation.as_mut().filter(|c| c.fails())?;

@@ -3,7 +3,7 @@
 use super::answer::{Agreement, Check, CrossCheck};
 use super::{rules, structure};
 
-/// How every check came out.
+/// Outcome of every check.
 pub(super) fn outcomes(c: &CrossCheck) -> impl Iterator<Item = Agreement> {
     let covariance = c.covariance.iter().map(|d| d.outcome);
     let statistics = c.monte_carlo.statistics.iter().map(|s| s.pass);
@@ -13,7 +13,7 @@ pub(super) fn outcomes(c: &CrossCheck) -> impl Iterator<Item = Agreement> {
     structure.chain(covariance).chain(controls).chain(others)
 }
 
-/// What failed of d, in words.
+/// Failed checks of d, in words.
 pub(super) fn misfits(c: &CrossCheck) -> Vec<String> {
     let mut out = Vec::new();
     for s in c.monte_carlo.statistics.iter().filter(|s| !s.pass) {
@@ -29,7 +29,7 @@ pub(super) fn misfits(c: &CrossCheck) -> Vec<String> {
     out
 }
 
-/// What failed of a, b, c, e and f, in words.
+/// Failed checks of a, b, c, e and f, in words.
 pub(super) fn disagreements(c: &CrossCheck) -> Vec<String> {
     let mut out = Vec::new();
     let failed = |c: &Check| c.measured.filter(|_| c.fails());

@@ -34,10 +34,10 @@ pub struct Simulation {
     pub quantities: Vec<Estimate>,
     /// Observable combinations of unknowns that are not observable alone.
     pub combinations: Vec<Estimate>,
-    /// What becomes of the requirements by prediction, as in every other command: the information of all samples with the noise, the random
-    /// drift and the priors that are stated.
+    /// Outcome of the requirements by prediction, as in every other command: the information of all samples
+    /// with the noise, the random drift and the priors that are stated.
     pub requirements: Requirements,
-    /// What became of them in this run, by sigma of its filter at the end.
+    /// Outcome of the requirements in this run, by the sigmas of its filter at the end.
     pub run: RunRequirements,
     /// The same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
@@ -60,9 +60,10 @@ pub struct Simulation {
 /// A run's sigmas against the requirements, beside the prediction.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunRequirements {
-    /// What became of the requirements in the run.
+    /// Outcome of the requirements in the run.
     pub requirements: Requirements,
-    /// The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null where none has.
+    /// The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null
+    /// where none has.
     pub largest_ratio: Option<SigmaRatio>,
     /// The smallest such ratio; null where no unknown has both.
     pub smallest_ratio: Option<SigmaRatio>,
@@ -79,7 +80,7 @@ pub struct SigmaRatio {
     pub ratio: f64,
 }
 
-/// What a run assumes besides the conditions that are stated.
+/// Reason why the sigmas of a run may differ from the predicted ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RunDiffers {
@@ -124,8 +125,8 @@ pub struct ConditionsReport {
     pub propagation: Propagation,
     /// Factor on true drifts and their priors.
     pub drift_scale: f64,
-    /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
-    /// dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg,
+    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors.
     pub by_default: Vec<String>,
 }
 
@@ -155,7 +156,8 @@ impl AccelerometerBias {
     }
 }
 
-/// What a predicted sigma rests on: the information of all samples with the noise, the random drift and the priors that are stated.
+/// Conditions of predicted sigmas: the information of all samples with the noise, the random drift and the
+/// priors that are stated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasurementReport {
     /// Latitude in degrees.
@@ -184,8 +186,8 @@ pub struct MeasurementReport {
     /// Priors that are stated, as 1 sigma in the units of the unknowns; null: none counts.
     #[serde(default)]
     pub prior: Option<String>,
-    /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
-    /// dwell_s, azimuth_noise_deg.
+    /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg,
+    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg.
     #[serde(default)]
     pub by_default: Vec<String>,
 }
@@ -260,7 +262,8 @@ pub struct Estimate {
     pub error: f64,
     /// What the filter believes of the error.
     pub sigma: f64,
-    /// Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound it.
+    /// Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound
+    /// it.
     pub predicted_sigma: Option<f64>,
     /// Error over sigma.
     pub error_over_sigma: f64,

@@ -1,8 +1,10 @@
-//! The accuracy that a scheme attains at its end by what is stated: the one figure that requirements are held against.
+//! The accuracy that a scheme attains at its end by what is stated: the one figure that requirements are held
+//! against.
 //!
-//! All samples count with the noise, the random drift and the biases that are stated, and nothing is known beforehand but the priors that
-//! are stated. Coefficients are constants; psi is that of the end of the scheme, with which the platform is used (under reset carry that of
-//! the end of each position, since each has a psi of its own).
+//! All samples count with the noise, the random drift and the biases that are stated, and nothing is known
+//! beforehand but the priors that are stated. Coefficients are constants; psi is that of the end of the
+//! scheme, with which the platform is used (under reset carry that of the end of each position, since each
+//! has a psi of its own).
 
 use nalgebra::{DMatrix, RowDVector};
 use obsdeg_core::model::Scheme;
@@ -19,7 +21,8 @@ use super::seen::{no_prior, predict};
 use crate::prediction::Prediction;
 use crate::requirements::{Claim, Miss, Requirements, Worst};
 
-/// How many times narrower a second prior that says nothing is: what it narrows is bounded by nothing else.
+/// Factor by which a second diffuse prior is narrower: an unknown whose sigma it narrows is bounded by
+/// nothing else.
 const NARROWER: f64 = 100.0;
 /// Largest ratio of the sigmas by both for an unknown that samples and stated priors bound.
 const BOUNDED: f64 = 1.05;
@@ -31,15 +34,16 @@ pub struct Attained {
     pub plan: Plan,
     /// The exact verdicts.
     pub prediction: Prediction,
-    /// Sigma of every unknown in its shown unit (deg, deg/h, ...); `None` where neither samples nor stated priors bound it.
+    /// Sigma of every unknown in its shown unit (deg, deg/h, ...); `None` where neither samples nor stated
+    /// priors bound it.
     pub sigmas: Vec<Option<f64>>,
     /// True for an unknown that the samples do not determine and stated priors bound.
     pub by_prior: Vec<bool>,
     known: Known,
 }
 
-/// Covariance of the unknowns at the end in SI units, as a root: what is not bounded has huge variances, which cancel in a determined
-/// combination of such unknowns only before they are squared.
+/// Covariance of the unknowns at the end in SI units, as a root: what is not bounded has huge variances,
+/// which cancel in a determined combination of such unknowns only before they are squared.
 #[derive(Debug, Clone)]
 enum Known {
     /// A root of the covariance (n x n).
@@ -120,7 +124,8 @@ impl Attained {
         Ok(out)
     }
 
-    /// What becomes of the requirements that `conditions` state; those on unknowns that the scheme does not have are left out.
+    /// Outcome of the requirements that `conditions` state; those on unknowns that the scheme does not have
+    /// are left out.
     ///
     /// # Errors
     /// [`SimulationError::UnknownName`] for a requirement on what no scheme has.
@@ -139,7 +144,8 @@ impl Attained {
         Ok(out)
     }
 
-    /// The largest sigma of a drift coefficient that counts, if all of these have one: other coefficients have other units.
+    /// The largest sigma of a drift coefficient that counts, if all of these have one: other coefficients
+    /// have other units.
     pub fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
         let (units, names) = (self.plan.platform.units(), self.plan.platform.names());
         let mut worst: Option<Worst> = None;

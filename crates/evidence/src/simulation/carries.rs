@@ -10,25 +10,27 @@ use super::conditions::Conditions;
 use super::plan::MAX_UNKNOWNS;
 use crate::requirements::{Requirements, Worst};
 
-/// A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has, are
-/// left out.
+/// A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which
+/// only inertial carry has, are left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OtherCarry {
-    /// What is carried between positions there.
+    /// Carry: what of psi goes on between positions.
     pub carry: Carry,
-    /// The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was judged.
+    /// The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable,
+    /// or where nothing was judged.
     pub worst: Option<Worst>,
     /// True if the slews of the scheme are left out there, since only inertial carry has slews.
     #[serde(default)]
     pub without_slews: bool,
-    /// What becomes of the requirements; null where nothing was judged.
+    /// Outcome of the requirements; null where nothing was judged.
     pub requirements: Option<Requirements>,
     /// The reason why nothing was judged; left out where it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
 }
 
-/// A scheme and its conditions under another carry; `None` where torquer errors act on turns that the scheme does not state.
+/// A scheme and its conditions under another carry; `None` where torquer errors act on turns that the scheme
+/// does not state.
 pub(crate) fn under(scheme: &Scheme, conditions: &Conditions, carry: Carry) -> Option<(Scheme, Conditions)> {
     let other = Scheme { carry, ..scheme.clone() };
     other.paths().is_ok().then(|| (other, Conditions { slews: false, ..conditions.clone() }))

@@ -59,8 +59,8 @@ pub struct Conditions {
     pub stated: Stated,
 }
 
-/// Conditions that a file or an option states. What it leaves out is chosen by the program, is named by every answer, and (random drift,
-/// priors, true values) counts in runs only.
+/// Conditions that a file or an option states. What it leaves out is chosen by the program, is named by every
+/// answer, and (random drift, priors, true values) counts in runs only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stated {
     /// Largest step between samples.
@@ -210,7 +210,7 @@ impl Conditions {
         self.values.strip_prefix(&Self::default().values[..]).unwrap_or(&self.values)
     }
 
-    /// What a prediction under these conditions rests on.
+    /// Basis of a prediction under these conditions.
     pub fn basis(&self) -> Basis {
         if self.stated_priors().is_empty() { Basis::Predicted } else { Basis::PredictedWithPrior }
     }
@@ -245,8 +245,8 @@ impl Conditions {
         }
     }
 
-    /// The conditions that requirements are judged by: random drift that nobody states is none. (Priors that nobody states do not count
-    /// either: see [`Self::stated_priors`].)
+    /// The conditions that requirements are judged by: random drift that nobody states is none. (Priors that
+    /// nobody states do not count either: see [`Self::stated_priors`].)
     pub fn as_stated(&self) -> Self {
         let drift_noise = if self.states().drift_noise { self.drift_noise } else { DriftNoise::OneStep(0.0) };
         Self { drift_noise, ..self.clone() }

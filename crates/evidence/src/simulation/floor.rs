@@ -181,8 +181,8 @@ pub fn sigmas_without_prior(
     Ok(last)
 }
 
-/// Standard deviations that say nothing beside the samples of `plan` under random drift (shape n): what the samples say is worth no more
-/// than the random drift of the run lets it be.
+/// Standard deviations that say nothing beside the samples of `plan` under random drift (shape n): what the
+/// samples say is worth no more than the random drift of the run lets it be.
 ///
 /// # Errors
 /// [`SimulationError::Filter`] when a number is not finite.

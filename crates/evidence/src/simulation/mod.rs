@@ -238,7 +238,7 @@ fn summary(
     })
 }
 
-/// What became of the requirements in the run, and why its sigmas may differ from the predicted ones.
+/// Outcome of the requirements in the run, and the reasons why its sigmas may differ from the predicted ones.
 fn run_requirements(
     plan: &Plan,
     conditions: &Conditions,
@@ -342,8 +342,8 @@ pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     out
 }
 
-/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it, the last are the required and the
-/// predicted sigma.
+/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it, the
+/// last are the required and the predicted sigma.
 fn estimate(
     name: &str,
     unit: &str,

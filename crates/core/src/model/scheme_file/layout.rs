@@ -42,8 +42,9 @@ pub struct SchemeFile {
     /// accelerometers (default; GM, M3), gyros (GM3, M6) or body (GM, M6).
     #[schemars(with = "Option<DefinedBy>")]
     pub(super) frame: Option<Spanned<String>>,
-    /// How the platform is turned from one position to the next, where a position does not say: one-axis (the shortest way) or
-    /// gimbals (alpha, beta, gamma one after another, within gimbal limits wherever both ends are). Torquer errors (GS, GM, GM3) act on the way.
+    /// How the platform is turned from one position to the next, where a position does not say: one-axis (the
+    /// shortest way) or gimbals (alpha, beta, gamma one after another, within gimbal limits wherever both
+    /// ends are). Torquer errors (GS, GM, GM3) act on the way.
     #[schemars(with = "Option<Path>")]
     pub(super) path: Option<Spanned<String>>,
     /// Whether psi_y^n is measured too.
@@ -63,7 +64,8 @@ pub struct SchemeFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::REQUIREMENT)))]
     pub(super) requirements: Numbers,
-    /// How far the gimbals turn; freely when left out. Positions whose angles lie beyond are pointed out with angles of the same attitude within.
+    /// Gimbal limits; the gimbals turn freely when left out. Positions whose angles lie beyond are pointed
+    /// out with angles of the same attitude within.
     #[serde(default)]
     pub(super) gimbals: GimbalEntry,
     /// How the records of `obsdeg calibrate` are read.
@@ -225,13 +227,13 @@ enum AboutEntry {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GimbalEntry {
-    /// Of alpha, the outer gimbal, about North.
+    /// Limits of alpha, the outer gimbal, about North, in degrees.
     #[schemars(with = "Option<Vec<f64>>", extend("minItems" = 2, "maxItems" = 2))]
     pub(super) alpha_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
-    /// Of beta, the middle gimbal.
+    /// Limits of beta, the middle gimbal, in degrees.
     #[schemars(with = "Option<Vec<f64>>", extend("minItems" = 2, "maxItems" = 2))]
     pub(super) beta_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
-    /// Of gamma, the inner gimbal, about Z_p.
+    /// Limits of gamma, the inner gimbal, about Z_p, in degrees.
     #[schemars(with = "Option<Vec<f64>>", extend("minItems" = 2, "maxItems" = 2))]
     pub(super) gamma_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
 }

@@ -43,7 +43,8 @@ pub struct Everywhere {
     pub value: f64,
     /// The criterion of the weights at these attitudes, as they are.
     pub attained: f64,
-    /// The attitudes, each once, with weights, heaviest first: angles to hundredths of a degree, beta up to a quarter of a turn, the others above
+    /// The attitudes, each once, with weights, heaviest first: angles to hundredths of a degree, beta up to a
+    /// quarter of a turn, the others above
     /// -180 and up to 180 degrees; weights rounded, to be divided by their sum.
     pub support: Vec<(Euler, f64)>,
 }
@@ -268,7 +269,8 @@ fn euler(degrees: [f64; 3]) -> Euler {
     degrees.map(|x| Angle::from_nanodeg((x * 100.0).round() as i64 * 10_000_000))
 }
 
-/// Attitudes that are equal to within the rounding of their angles are one, with the sum of their weights; heaviest first.
+/// Attitudes that are equal to within the rounding of their angles are one, with the sum of their weights;
+/// heaviest first.
 fn merged<'c>(weighed: impl Iterator<Item = (&'c Matrix3<f64>, f64)>) -> (Vec<Euler>, Vec<f64>) {
     let mut sorted: Vec<(&Matrix3<f64>, f64)> = weighed.collect();
     sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -288,8 +290,8 @@ fn merged<'c>(weighed: impl Iterator<Item = (&'c Matrix3<f64>, f64)>) -> (Vec<Eu
     out.into_iter().map(|(c, weight)| (angles(c), weight)).unzip()
 }
 
-/// The Euler angles of an attitude, to hundredths of a degree: `C = Mx(alpha) My(beta) Mz(gamma)`, beta up to a quarter of a turn, the others
-/// above -180 and up to 180 degrees.
+/// The Euler angles of an attitude, to hundredths of a degree: `C = Mx(alpha) My(beta) Mz(gamma)`, beta up to
+/// a quarter of a turn, the others above -180 and up to 180 degrees.
 fn angles(c: &Matrix3<f64>) -> Euler {
     let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
     let (alpha, gamma) = if beta.cos().abs() > 1e-9 {

@@ -25,7 +25,8 @@ pub(super) struct Information {
     pub(super) digits: Digits,
     /// Its matrix (n x n), symmetric.
     pub(super) matrix: Vec<Vector>,
-    /// psi of the end in the carried axes as functionals of the unknowns at the start, where psi is handed on.
+    /// psi of the end in the carried axes as functionals of the unknowns at the start, where psi is handed
+    /// on.
     pub(super) psi_at_end: Option<[Vector; 3]>,
 }
 
@@ -63,7 +64,8 @@ impl Information {
             if between == Between::Dwell && !reset {
                 let moved = &moments[i].end;
                 let after: [Vector; 3] = std::array::from_fn(|r| {
-                    // what the dwell makes of torqued psi^n, less that itself: no digits of it are left where nothing moves it
+                    // what the dwell makes of torqued psi^n, less that itself: no digits of it are left where
+                    // nothing moves it
                     let change = |j: usize| d.sub(&moved[r][j], &d.int(i64::from(r == j)));
                     let change: [Real; 3] = std::array::from_fn(change);
                     let after = |k: usize| {

@@ -1,9 +1,9 @@
-//! The information of samples over dwells as short as one likes, in as many digits as that takes: what slopes, ranks
-//! and null vectors of doubles cannot show where positions hardly differ.
+//! The information of samples over dwells as short as one likes, in as many digits as that takes: what
+//! slopes, ranks and null vectors of doubles cannot show where positions hardly differ.
 //!
-//! Written from the equations of the paper, (2), (3), (6) to (9) and (19): of the exact engine it takes nothing, and of
-//! the model only what a scheme says (angles, latitude, mounting, terms). The unit of time is 1/w_ie, so that drifts are
-//! in units of the earth rate.
+//! Written from the equations of the paper, (2), (3), (6) to (9) and (19): of the exact engine it takes
+//! nothing, and of the model only what a scheme says (angles, latitude, mounting, terms). The unit of time is
+//! 1/w_ie, so that drifts are in units of the earth rate.
 
 mod digits;
 mod information;
@@ -46,7 +46,8 @@ impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
         Self { scheme, dwells, bits, taken: [const { OnceLock::new() }; DIGITS] }
     }
 
-    /// What is seen at every dwell, in the digits of this number; `None` where that is not told from rounding.
+    /// What is seen at every dwell, in the digits of this number; `None` where that is not told from
+    /// rounding.
     pub(super) fn seen(&self, digits: usize, between: Between) -> Option<Vec<Seen>> {
         let sampled = self.taken[digits].get_or_init(|| {
             let model = Model::new(self.scheme, Digits { bits: self.bits[digits] })?;

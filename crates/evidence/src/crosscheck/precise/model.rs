@@ -37,7 +37,8 @@ pub(in super::super) struct Model {
     pub(super) drifts: Vec<[Vector; 3]>,
     /// `a^n` as a functional of the coefficients, for each position.
     pub(super) errors: Vec<[Vector; 3]>,
-    /// Sum of what torquer errors add to `psi^n` in all turns up to a position, as a functional of the coefficients.
+    /// Sum of what torquer errors add to `psi^n` in all turns up to a position, as a functional of the
+    /// coefficients.
     pub(super) torqued: Vec<[Vector; 3]>,
     /// Dwell of each position, in dwells of the first.
     ratios: Vec<Real>,
@@ -82,8 +83,9 @@ fn along(d: Digits, v: &[Real], axis: [i32; 3]) -> Real {
     v.iter().zip(axis).fold(d.int(0), |sum, (x, k)| d.add(&sum, &d.mul(x, &d.int(k.into()))))
 }
 
-/// What the coefficients of `terms` are multiplied with and along which axis of c they act, by their definitions (IEEE Std 517, 529, 1293): those
-/// of `source`, others with zero. `x` is `g^c`, the torqued rate, or the specific force, in c.
+/// What the coefficients of `terms` are multiplied with and along which axis of c they act, by their
+/// definitions (IEEE Std 517, 529, 1293): those of `source`, others with zero. `x` is `g^c`, the torqued
+/// rate, or the specific force, in c.
 fn acting(
     d: Digits,
     geometry: &Geometry,
@@ -204,8 +206,8 @@ fn axis_of(
     }
 }
 
-/// Sums of what torquer errors add to `psi^n` in all turns up to each position, as functionals of the coefficients; `none` adds
-/// nothing.
+/// Sums of what torquer errors add to `psi^n` in all turns up to each position, as functionals of the
+/// coefficients; `none` adds nothing.
 fn torqued(
     d: Digits,
     scheme: &Scheme,
@@ -317,7 +319,8 @@ impl Model {
         Some(Self { digits, unknowns, reset, carried, drifts, errors, torqued, ratios, turning, outputs })
     }
 
-    /// The same with every number moved at random by up to `2^log2`: what rounding may make of a model of doubles.
+    /// The same with every number moved at random by up to `2^log2`: what rounding may make of a model of
+    /// doubles.
     pub(in super::super) fn rounded(&self, log2: i32, rng: &mut SplitMix64) -> Self {
         let d = self.digits;
         let mut out = self.clone();
@@ -358,8 +361,8 @@ impl Model {
         sum
     }
 
-    /// Samples over the dwell of each position, the first of `dwell / w_ie`, at a density of noise of one; `azimuth` is the weight of
-    /// a measured azimuth beside Z. Equal dwells share them.
+    /// Samples over the dwell of each position, the first of `dwell / w_ie`, at a density of noise of one;
+    /// `azimuth` is the weight of a measured azimuth beside Z. Equal dwells share them.
     pub(super) fn moments(&self, dwell: f64, azimuth: f64) -> Vec<Arc<Moments>> {
         let d = self.digits;
         let mut out: Vec<Arc<Moments>> = Vec::new();

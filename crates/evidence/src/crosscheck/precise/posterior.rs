@@ -16,8 +16,9 @@ pub(in super::super) struct Posterior {
 }
 
 impl Posterior {
-    /// Of samples of `model` over a first dwell of `dwell / w_ie` and a prior (standard deviations in rad and in w_ie). `noise` is
-    /// that of Z per root of density and that of a measured azimuth. `None` when rounding leaves no information.
+    /// Of samples of `model` over a first dwell of `dwell / w_ie` and a prior (standard deviations in rad and
+    /// in w_ie). `noise` is that of Z per root of density and that of a measured azimuth. `None` when
+    /// rounding leaves no information.
     pub(in super::super) fn new(model: &Model, dwell: f64, prior: &[f64], noise: [f64; 2]) -> Option<Self> {
         let d = model.digits;
         let moments = model.moments(dwell, (noise[0] / noise[1]).powi(2));

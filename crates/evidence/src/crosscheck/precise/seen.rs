@@ -3,12 +3,14 @@
 use super::digits::{Digits, ROUNDING, Real, Vector, log2};
 use super::information::Information;
 
-/// A pivot is seen above the first of these parts of the digits, relative to the diagonal; the errors that Cholesky's elimination
-/// then makes are within half of it, and what is below the second is rounding. Between them nothing is certain.
+/// A pivot is seen above the first of these parts of the digits, relative to the diagonal; the errors that
+/// Cholesky's elimination then makes are within half of it, and what is below the second is rounding. Between
+/// them nothing is certain.
 const CLEAR: f64 = 10.0 / 16.0;
 const ROUNDING_BELOW: f64 = 11.0 / 16.0;
-/// What is left of a functional whose coefficients are doubles, beside its largest coefficient (drifts in units of the earth rate), in bits: what
-/// their rounding spreads to other unknowns, and far below the 1e-11 by which positions differ at least.
+/// What is left of a functional whose coefficients are doubles, beside its largest coefficient (drifts in
+/// units of the earth rate), in bits: what their rounding spreads to other unknowns, and far below the 1e-11
+/// by which positions differ at least.
 const NEGLIGIBLE: f64 = -46.0;
 /// A sum of errors is at most so many bits more than the largest of them.
 const SUMMED: f64 = 8.0;
@@ -83,8 +85,8 @@ impl Information {
 /// A functional: `(unknown, coefficient)`, drifts in units of the earth rate.
 pub(in super::super) type Functional = Vec<(usize, Real)>;
 
-/// A functional of psi at the end and the coefficients as one of the unknowns at the start; `psi` is psi of the end, where it is handed
-/// on.
+/// A functional of psi at the end and the coefficients as one of the unknowns at the start; `psi` is psi of
+/// the end, where it is handed on.
 pub(super) fn at_start(d: Digits, psi: Option<&[Vector; 3]>, functional: &Functional) -> Functional {
     let Some(psi) = psi else { return functional.clone() };
     let moved = functional.iter().filter(|(c, _)| *c < 3);
@@ -107,8 +109,8 @@ impl Seen {
         -(self.digits.bits as f64) / 2.0
     }
 
-    /// Binary logarithm of sigma of a functional, by what is seen alone; `None` when it is not in the span of that. `rounded` is the relative
-    /// error of its coefficients (none by default).
+    /// Binary logarithm of sigma of a functional, by what is seen alone; `None` when it is not in the span of
+    /// that. `rounded` is the relative error of its coefficients (none by default).
     pub(in super::super) fn sigma(&self, functional: &Functional, rounded: Option<f64>) -> Option<f64> {
         let d = self.digits;
         let mut rest = vec![d.int(0); self.own.len()];
@@ -156,12 +158,13 @@ impl Seen {
         (0..self.own.len()).filter(|c| self.excited[*c] && !self.pivots.contains(c)).collect()
     }
 
-    /// What is not seen: `x_pivots = -R x_free` with `R = R_11^-1 R_12`. Its free unknowns (those that are not excited left out), and for every
-    /// pivot its row of R, with zeros for what is rounding.
+    /// What is not seen: `x_pivots = -R x_free` with `R = R_11^-1 R_12`. Its free unknowns (those that are
+    /// not excited left out), and for every pivot its row of R, with zeros for what is rounding.
     pub(in super::super) fn reduced(&self) -> (Vec<usize>, Vec<Vector>) {
         let d = self.digits;
         let free = self.free();
-        // from the last pivot up; what rounding may make of an entry comes from its own pivot, or from entries below
+        // from the last pivot up; what rounding may make of an entry comes from its own pivot, or from
+        // entries below
         let mut rows: Vec<Vector> = Vec::new();
         let mut errors: Vec<Vec<f64>> = Vec::new();
         for (k, column) in self.columns.iter().enumerate().rev() {
