@@ -259,8 +259,8 @@ pub struct CovarianceTable {
     pub estimates: Vec<f64>,
     /// Covariance of the errors by the assumed noise, in products of the units of row and column.
     pub covariance: Vec<Vec<f64>>,
-    /// Covariance, in products of the units, with errors of the data times the root of chi-square per degree
-    /// of freedom, where that is above one; prior knowledge stays as it is.
+    /// Covariance, in products of the units of row and column, with errors of the data times the root of
+    /// chi-square per degree of freedom, where that is above one; prior knowledge stays as it is.
     pub rescaled: Vec<Vec<f64>>,
 }
 
@@ -397,7 +397,7 @@ pub struct Repeatability {
 /// Record that was read, with its clock and columns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordReport {
-    /// Name of the record, as on the command line.
+    /// Name of the record, as it was given.
     pub name: String,
     /// Number of samples in the record.
     pub samples: usize,
@@ -479,7 +479,7 @@ pub struct Assumed {
     pub known: Vec<String>,
     /// Differences of the scheme of that calibration.
     pub known_differs: Vec<String>,
-    /// Undetermined unknowns: the name, the standard deviation of the prior that constrains it, and its unit.
+    /// Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit.
     pub held: Vec<(String, f64, String)>,
     /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, drift_noise.

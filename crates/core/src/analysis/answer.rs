@@ -135,9 +135,11 @@ pub struct Quantity {
 /// unobservable or the condition is the given one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Elsewhere {
-    /// Observable degree at other latitudes, if the given one is special (equator, pole); otherwise null.
+    /// Observable degree at other latitudes; null unless the given one is special (equator, pole), or if
+    /// unobservable there too.
     pub other_latitudes: Option<usize>,
-    /// Observable degree with the same number of positions at generic angles; null if unobservable there too.
+    /// Observable degree with the same number of positions at generic angles; null if unobservable there too,
+    /// or if they were not judged.
     pub other_angles: Option<usize>,
 }
 

@@ -20,7 +20,7 @@ pub struct Comparison {
     pub schema: String,
     /// Version of the program that wrote it.
     pub version: String,
-    /// Schemes in the order given on the command line.
+    /// Schemes of the comparison, in the order given.
     pub schemes: Vec<ComparedScheme>,
     /// Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns,
     /// requirements, noise, step.

@@ -60,8 +60,8 @@ pub struct SchemeFile {
     /// Conditions of `obsdeg simulate` and `obsdeg crosscheck`.
     #[serde(default)]
     pub(super) simulation: SimulationEntry,
-    /// Largest sigma allowed, by unknown or family, as in D_F = 0.02: deg for psi, deg/h for D_F, deg/h/g for
-    /// the rest.
+    /// Largest sigma allowed, by unknown or family, as in D_F = 0.02: in deg for psi, in deg/h for D_F, in
+    /// deg/h/g for the rest.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::REQUIREMENT)))]
     pub(super) requirements: Numbers,
