@@ -172,9 +172,9 @@ class Elsewhere(Record):
     __slots__ = ()
 
     other_latitudes: int | None
-    """Observable degree at other latitudes, if the given one is special (equator, pole); otherwise null."""
+    """Observable degree at other latitudes; null unless the given one is special (equator, pole), or if unobservable there too."""
     other_angles: int | None
-    """Observable degree with the same number of positions at generic angles; null if unobservable there too."""
+    """Observable degree with the same number of positions at generic angles; null if unobservable there too, or if they were not judged."""
 
 
 class Quantity(Record):
@@ -1027,7 +1027,7 @@ class Comparison(Shape):
     version: str
     """Version of the program that wrote it."""
     schemes: list[Review]
-    """Schemes in the order given on the command line."""
+    """Schemes of the comparison, in the order given."""
     differ: list[str]
     """Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step."""
     seed: int
@@ -1406,7 +1406,9 @@ class Stop(Record):
     candidate: int
     """Index of the candidate, from 0."""
     reversed: bool
-    """True if a half turn to the position goes the other way round than `Slew::to` gives."""
+    """True if a half turn to the position goes the other way round than by default: about the axis whose first non-zero component is
+    negative.
+    """
 
 
 class Scored(Record):
@@ -2497,8 +2499,8 @@ class CovarianceTable(Record):
     covariance: list[list[float]]
     """Covariance of the errors by the assumed noise, in products of the units of row and column."""
     rescaled: list[list[float]]
-    """Covariance, in products of the units, with errors of the data times the root of chi-square per degree of freedom, where that is
-    above one; prior knowledge stays as it is.
+    """Covariance, in products of the units of row and column, with errors of the data times the root of chi-square per degree of
+    freedom, where that is above one; prior knowledge stays as it is.
     """
 
 
@@ -2666,7 +2668,7 @@ class RecordReport(Record):
     __slots__ = ()
 
     name: str
-    """Name of the record, as on the command line."""
+    """Name of the record, as it was given."""
     samples: int
     """Number of samples in the record."""
     unused: int
@@ -2713,7 +2715,7 @@ class Assumed(Record):
     known_differs: list[str]
     """Differences of the scheme of that calibration."""
     held: list[tuple[str, float, str]]
-    """Undetermined unknowns: the name, the standard deviation of the prior that constrains it, and its unit."""
+    """Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, drift_noise."""
     seed: int

@@ -223,7 +223,7 @@ mod descriptions {
             None => {}
         }
         for (name, of) in table("properties") {
-            // the tag of a variant, and the one key of a variant that is a table, are what the variant describes
+            // the variant's description covers its tag, and the only key of a variant that is a table
             let tag = of.get("const").is_some();
             let only = schema.get("additionalProperties") == Some(&Value::Bool(false))
                 && table("properties").len() == 1

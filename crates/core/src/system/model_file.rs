@@ -62,14 +62,15 @@ pub struct ModelFile {
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     outputs: BTreeMap<String, Spanned<Value>>,
     /// Number of experiments: runs with their own initial states and shared parameters; when left out, the
-    /// number of [[experiment]] tables, or 1.
+    /// number of `[[experiment]]` tables, or 1.
     #[serde(default)]
     #[schemars(with = "Option<usize>")]
     experiments: Option<Spanned<usize>>,
     /// Experiments one by one, with the constants and inputs that differ.
     #[serde(default, rename = "experiment")]
     own: Vec<ExperimentEntry>,
-    /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
+    /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states
+    /// that jump).
     #[serde(default, rename = "segment")]
     segments: Vec<SegmentEntry>,
     /// Time t at which the run begins: a number (0 when left out), or "generic". Where equations or known
@@ -77,8 +78,8 @@ pub struct ModelFile {
     /// any later time. Later segments are judged at a generic time.
     #[schemars(with = "Option<serde_json::Value>")]
     time: Option<Spanned<Value>>,
-    /// Equations that hold at the start of every experiment (there must be a real point that meets them), as
-    /// `norm(q) = 1`: what is random otherwise lies on them, and their differentials are known.
+    /// Equations that hold at the start of every experiment, as `norm(q) = 1`. There must be a real point
+    /// that meets them. Random starts lie on them, and their differentials are known.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     constraints: Vec<Spanned<String>>,

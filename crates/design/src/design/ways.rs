@@ -33,7 +33,8 @@ pub(super) struct Way {
 pub struct Stop {
     /// Index of the candidate, from 0.
     pub candidate: usize,
-    /// True if a half turn to the position goes the other way round than `Slew::to` gives.
+    /// True if a half turn to the position goes the other way round than by default: about the axis whose
+    /// first non-zero component is negative.
     pub reversed: bool,
 }
 
