@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use super::ties::{TIE, Ties};
 use super::ways::Stop;
 
-/// What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion.
+/// Score of a sequence, better first: constraints kept, then a small worst degree, then a small criterion.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
 pub struct Worth {
-    /// How far time limits, requirements and degree caps are missed; 0 when kept.
+    /// Violation of time limits, requirements and degree caps, dimensionless; 0 when kept.
     pub violation: f64,
-    /// The largest degree of a required coefficient.
+    /// Largest observable degree of a required coefficient.
     pub degree: usize,
-    /// The criterion.
+    /// Criterion of the sequence, in the unit of the criterion asked for.
     pub value: f64,
 }
 
@@ -38,34 +38,34 @@ impl Worth {
     }
 }
 
-/// A sequence with its worth.
+/// Sequence of candidates with its score.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scored {
-    /// What it is worth.
+    /// Score: constraints, worst degree and criterion.
     pub worth: Worth,
-    /// Dwells and turns, in s.
+    /// Total time of dwells and turns, in s.
     pub seconds: f64,
-    /// The candidates in order, with the ways there.
+    /// Candidates of the sequence, in order, with the slew paths to them.
     pub sequence: Vec<Stop>,
 }
 
-/// The best sequences, best first, and the front of time against the criterion.
+/// Best sequences, best first, and the front of time against the criterion.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Best {
-    /// At most as many as are kept.
+    /// Best sequences that were found, best first, up to the number to keep.
     pub found: Vec<Scored>,
     /// Sequences of the smallest worst degree that none of these beats in both time and criterion, by time.
     pub front: Vec<Scored>,
-    /// Those that are as good as the best.
+    /// Number of sequences as good as the best, by criterion.
     pub ties: Ties,
-    /// Whether everything was searched.
+    /// True if the search was complete.
     pub complete: bool,
-    /// Sequences whose sigma was computed.
+    /// Number of sequences whose sigma was computed.
     pub examined: u64,
-    /// Sequences, observable or not, that a bound left out: they are worse than those kept.
+    /// Number of sequences, observable or not, that a bound excluded: they are worse than those kept.
     pub excluded: u64,
-    /// Of those examined, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what
-    /// is required, as far as double precision tells.
+    /// Number of examined sequences that are observable (by the exact verdict, of repositioning at once) but
+    /// whose samples do not determine the required coefficients in double precision.
     pub lost: u64,
 }
 
