@@ -1798,6 +1798,10 @@ class SystemRun(Shape):
     """Estimates at the end."""
     consistency: Consistency
     """Whether errors and innovations are what the filter believes."""
+    time: float | None
+    """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
+    known inputs hold the time.
+    """
     duration: float
     """How long every experiment ran, in the unit of the model."""
     step: float
@@ -2197,6 +2201,10 @@ class SystemEvidence(Shape):
     """
     passed: bool
     """Whether none failed."""
+    time: float | None
+    """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
+    known inputs hold the time.
+    """
     duration: float
     """The longest horizon, of every experiment, in the unit of the model."""
     error_bound: float | None

@@ -66,6 +66,9 @@ pub struct SystemEvidence {
     pub not_resolvable: usize,
     /// Whether none failed.
     pub passed: bool,
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
+    /// equations nor the known inputs hold the time.
+    pub time: Option<f64>,
     /// The longest horizon, of every experiment, in the unit of the model.
     pub duration: f64,
     /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
@@ -297,6 +300,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         checks: counts.agree + counts.disagree,
         not_resolvable: counts.not_resolvable,
         passed: counts.disagree == 0,
+        time: compiled.uses_time().then(|| model.time.number()),
         duration: setup.duration,
         error_bound: judged.error_bound(),
         digits: judged.digits(),
