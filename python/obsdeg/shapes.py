@@ -7,333 +7,330 @@ from typing import Literal, Union
 from ._records import Record, Shape
 
 Carry = Literal["platform", "inertial", "reset"]
-"""Carry: quantity that continues from one position to the next (the paper does not state it). platform: Platform carry: `psi^c`
-continues, as in the paper's simulation. inertial: Inertial carry: `psi^n` continues, as in real torqued slews. reset: Reset carry:
-`psi` is a new unknown at each position.
+"""What is carried from one position to the next (the paper does not say). platform: `psi^c` is carried: what the paper's simulation did.
+inertial: `psi^n` is carried: right for real torqued slews. reset: `psi` is a new unknown at each position.
 """
 
 SignedAxis = str
-"""Signed platform axis such as `+x` or `-z`."""
+"""A signed platform axis such as `+x` or `-z`."""
 
 
 class GyroAxes(Record):
-    """Axes of one gyro: input I, output O, spin S, as signed platform axes."""
+    """The axes of one gyro: input I, output O, spin S, as signed platform axes."""
 
     __slots__ = ()
 
     I: SignedAxis
-    """Input axis of the gyro, a signed platform axis."""
+    """Input axis."""
     O: SignedAxis
-    """Output axis of the gyro, a signed platform axis."""
+    """Output axis."""
     S: SignedAxis
-    """Spin axis of the gyro, a signed platform axis."""
+    """Spin axis."""
 
 
 class Accelerometers(Record):
-    """Input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default."""
+    """The input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default."""
 
     __slots__ = ()
 
     X: SignedAxis
-    """Input axis of accelerometer X, whose coefficients end in X or have it first."""
+    """Of the accelerometer whose coefficients end in X, or have it first."""
     Y: SignedAxis
-    """Input axis of accelerometer Y, a signed platform axis."""
+    """Of Y."""
     Z: SignedAxis
-    """Input axis of accelerometer Z, a signed platform axis."""
+    """Of Z."""
 
 
 class Geometry(Record):
-    """Mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23), (27) and (28)."""
+    """The mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23), (27) and (28)."""
 
     __slots__ = ()
 
     X: GyroAxes
-    """Axes of the gyro whose coefficients end in X."""
+    """The gyro whose coefficients end in X."""
     Y: GyroAxes
-    """Axes of the gyro whose coefficients end in Y."""
+    """The gyro whose coefficients end in Y."""
     Z: GyroAxes
-    """Axes of the gyro whose coefficients end in Z."""
+    """The gyro whose coefficients end in Z."""
     accelerometers: Accelerometers | None
-    """Input axes of the accelerometers; X_p, Y_p, Z_p when left out."""
+    """The input axes of the accelerometers."""
 
 AngleReport = Union[float, str]
-"""Angle in degrees, or name of a generic angle."""
+"""An angle."""
 
 
 class Turn(Record):
-    """Turn of the platform about a fixed axis."""
+    """A turn about a fixed axis."""
 
     __slots__ = ()
 
     about: tuple[float, float, float]
-    """Axis of the turn: a unit vector (North, Up, East), dimensionless."""
+    """The axis: a unit vector (North, Up, East)."""
     angle_deg: float
-    """Angle of the turn in degrees, right-handed about the axis, above 0."""
+    """The angle in degrees, right-handed about the axis, above 0."""
 
 
 class PositionReport(Record):
-    """Position of the scheme, with gravity in platform axes."""
+    """One position."""
 
     __slots__ = ()
 
     name: str
-    """Name of the position in the scheme."""
+    """Its name."""
     angles_deg: tuple[AngleReport, AngleReport, AngleReport]
-    """Euler angles alpha, beta, gamma in degrees, or names of generic angles."""
+    """Euler angles alpha, beta, gamma in degrees, or names."""
     attitude: str | None
-    """Directions of X_p, Y_p, Z_p for a cardinal attitude, as in 'NUE'; null for others."""
+    """Where X_p, Y_p, Z_p point, for a cardinal attitude."""
     rotation: str | None
-    """Rotation that starts at the position, such as `X_p:360`; null for none."""
+    """The rotation that starts there, such as `X_p:360`."""
     turns: list[Turn]
-    """Turns from the position before to this one, where torquer errors act on them."""
+    """The turns that lead there from the position before, where torquer errors act on them."""
     g_c: tuple[float, float, float] | None
     """Gravity in platform axes (at the start of a rotation), in g; null for generic angles."""
 
 
 class StationLabel(Record):
-    """Label, in formulas, of a station: a point at which derivatives of Z are taken."""
+    """Where derivatives of Z are taken, as formulas name it."""
 
     __slots__ = ()
 
     label: str
-    """Label in formulas: `p1`, `'about X'`, `p1[45 deg]`."""
+    """As in formulas: `p1`, `'about X'`, `p1[45 deg]`."""
     position: str
-    """Name of the position or rotation."""
+    """The name of the position or rotation."""
     turned_deg: float | None
-    """Angle of the rotation at this station, in degrees, right-handed; null for a position at rest. Derivatives of Z at such a station
-    are those of a turning platform, not of one that stopped there.
+    """How far the rotation has come, in degrees, right-handed; null for a position that stands. Derivatives of Z at such a station are
+    those of a platform that is turning, not of one that stopped there.
     """
     about: str | None
-    """Axis of the rotation: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`; null for a position at rest."""
+    """What it turns about: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`."""
     rate: str | None
-    """Rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s; null for a position at rest."""
+    """The rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s."""
 
 Status = Literal["observable", "inseparable", "not_excited", "not_seen"]
-"""Verdict on an unknown or a combination. observable: Observable: the unknown is in the span of the derivative rows. inseparable:
-Inseparable: it affects Z, but only together with its partners. not_excited: Not excited: it does not affect Z at all. not_seen: Not
-resolved up to the bound on the order; a higher order may resolve it. For systems with special starts, jumps or arbitrary inputs.
+"""Whether an unknown can be solved. observable: It is in the span of the derivative rows. inseparable: It moves Z, but only together
+with its partners. not_excited: It does not move Z at all. not_seen: No order up to the last that was looked at solves it, and a
+higher one may: of systems with special starts, jumps or arbitrary inputs.
 """
 
 
 class SolutionTerm(Record):
-    """Term of a solution, machine-readable."""
+    """One term of a solution, for programs."""
 
     __slots__ = ()
 
     coefficient: str
-    """Coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits."""
+    """The coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits."""
     observation: str
-    """Derivative of the observation, such as `Z1'`."""
+    """The derivative of the observation, such as `Z1'`."""
     station: str
-    """Label of the station at which the derivative is taken."""
+    """Where it is taken: a label of the stations."""
 
 Form = Literal["exact", "symbolic", "decimal"]
-"""Form of a printed coefficient. exact: Rational numbers and square roots, exact. symbolic: Sines and cosines of angles. decimal:
-Decimals, rounded to six places (small ones to six digits).
+"""How exact a printed coefficient is. exact: Rationals and square roots. symbolic: Sines and cosines of angles. decimal: Decimals,
+rounded to six places (small ones to six digits).
 """
 
 FoundBy = Literal["prime_fields", "symbolic_engine", "floating_point"]
-"""Source of the coefficients of a solution. prime_fields: Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images in
-two prime fields. symbolic_engine: Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are
-the same. floating_point: Decimals from floating-point arithmetic.
+"""Where the coefficients of a solution come from. prime_fields: Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images
+in two prime fields. symbolic_engine: Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields
+are the same. floating_point: Decimals.
 """
 
 Verification = Literal["symbolic", "modular", "numeric"]
-"""Check that a solution passed before it was printed. symbolic: Exact substitution of the derivatives of Z, and substitution in two
-prime fields. modular: Substitution in two prime fields. numeric: Substitution in floating point: residual below 1e-9 of the sum of
-magnitudes.
+"""How a solution was checked before it was printed. symbolic: By exact substitution of the derivatives of Z, and by substitution in two
+prime fields. modular: By substitution in two prime fields. numeric: By substitution in floating point: residual below 1e-9 of the sum
+of magnitudes.
 """
 
 
 class Solution(Record):
-    """Solving expression of an unknown or a combination."""
+    """A solving expression."""
 
     __slots__ = ()
 
     text: str
-    """Solving expression in one line."""
+    """The expression in one line."""
     terms: list[SolutionTerm]
-    """Terms of the solving expression, one by one."""
+    """Its terms one by one."""
     turning: bool
-    """True if derivatives in it are taken while the platform turns: at stations with a rate."""
+    """Whether derivatives in it are taken while the platform turns: at stations with a rate."""
     form: Form
-    """Form of its coefficients: exact, symbolic or decimal."""
+    """How exact its coefficients are."""
     found_by: FoundBy
-    """Source of its coefficients: prime fields, symbolic engine or floating point."""
+    """Where its coefficients come from."""
     verification: Verification
-    """Check that the expression passed before it was printed."""
+    """How it was checked."""
 
 
 class Elsewhere(Record):
-    """Observable degrees of an unobservable unknown under other conditions; each is null if the unknown stays unobservable or the
-    condition is the given one.
-    """
+    """Degrees of an unobservable unknown under other conditions; null where it stays unobservable or the condition is the given one."""
 
     __slots__ = ()
 
     other_latitudes: int | None
-    """Observable degree at other latitudes; null unless the given one is special (equator, pole), or if unobservable there too."""
+    """At other latitudes (the given one is special)."""
     other_angles: int | None
-    """Observable degree with the same number of positions at generic angles; null if unobservable there too, or if they were not judged."""
+    """With the same number of positions at generic angles."""
 
 
 class Quantity(Record):
-    """Verdict on one unknown of a scheme."""
+    """The verdict on one unknown."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, as in the model."""
+    """Its name."""
     unit: str
-    """Unit of the unknown: deg, deg/h, deg/h/g, ..."""
+    """Its unit."""
     status: Status
-    """Verdict: observable, inseparable or not excited."""
+    """Whether it can be solved."""
     degree: int | None
-    """Observable degree: the smallest order of derivatives that determines the unknown; null if it is not observable."""
+    """The observable degree; null when it is not observable."""
     accuracy_order: int | None
-    """Accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null if no dwell makes it observable."""
+    """The accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null when no dwell makes it observable."""
     partners: list[str]
-    """Unknowns indistinguishable from it: those in a common unobservable direction of minimal support."""
+    """Unknowns that it cannot be told from: those that share with it a direction that Z does not see and that holds no shorter one."""
     solution: Solution | None
-    """Solving expression of the unknown; null if there is none."""
+    """How it is solved."""
     elsewhere: Elsewhere | None
-    """Degrees under conditions where the unknown is observable; null if it is observable, or under none of them."""
+    """Where it would be observable."""
 
 
 class CombinationReport(Record):
-    """Observable combination of unknowns, or one that was asked for."""
+    """An observable combination, or one that was asked for."""
 
     __slots__ = ()
 
     expression: str
-    """Combination of unknowns, as an expression."""
+    """The combination."""
     requested: bool
-    """True if the combination was asked for."""
+    """Whether it was asked for."""
     status: Status
-    """Verdict: observable, inseparable or not excited."""
+    """Whether it can be solved."""
     degree: int | None
-    """Observable degree of the combination; null if it is not observable."""
+    """Its observable degree."""
     accuracy_order: int | None
-    """Accuracy order of the combination, as of an unknown; null if no dwell makes it observable."""
+    """Its accuracy order."""
     solution: Solution | None
-    """Solving expression of the combination; null if there is none."""
+    """How it is solved."""
 
 
 class Component(Record):
-    """Component of a null vector."""
+    """One component of a null vector."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, as in the model."""
+    """The unknown."""
     coefficient: str | None
-    """Coefficient of the unknown in the null vector; null if it was not computed."""
+    """Its coefficient; null when it was not computed."""
 
 
 class Verdict(Record):
-    """Verdict on one unknown: status and degree."""
+    """Status and degree."""
 
     __slots__ = ()
 
     status: Status
-    """Status: observable, inseparable, not excited or not seen."""
+    """Whether it can be solved."""
     degree: int | None
-    """Observable degree of the unknown; null if it is not observable."""
+    """The observable degree."""
 
 
 class Difference(Record):
-    """Verdict that depends on the carry."""
+    """A verdict that depends on the carry."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown whose verdict differs."""
+    """The unknown."""
     here: Verdict
-    """Verdict under the carry of the scheme, or at generic angles."""
+    """Under the carry of the scheme."""
     there: Verdict
-    """Verdict under the other carry, or at the special angles."""
+    """Under the other one."""
 
 
 class CarryReport(Record):
-    """Verdicts of the scheme under another carry."""
+    """What changes under another carry."""
 
     __slots__ = ()
 
     carry: Carry
-    """Carry for which these verdicts hold."""
+    """The carry."""
     rank_profile: list[int]
-    """Rank profile under this carry: dim V_0, dim V_1, ..."""
+    """Its rank profile."""
     unknowns: int
-    """Number of unknowns under this carry."""
+    """Its number of unknowns."""
     differs: list[Difference]
-    """Unknowns of both carries whose verdict differs."""
+    """The unknowns of both carries whose verdict differs."""
 
 
 class ChangeKnown(Record):
-    """Known value of an unknown: of a parameter, of psi or a coefficient, of a state at the start of every experiment, of an input at
-    all times.
+    """The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of every experiment, of an
+    input at all times.
     """
 
     __slots__ = ()
 
     kind: Literal["known"]
     name: str
-    """Name of the unknown whose value is given."""
+    """Name of the unknown."""
 
 
 class ChangeOutput(Record):
-    """State that becomes one more output of the model."""
+    """A state is one more output of the model."""
 
     __slots__ = ()
 
     kind: Literal["output"]
     state: str
-    """Name of the state that becomes an output."""
+    """Name of the state."""
 
 
 class ChangeAttitude(Record):
-    """Position that is added at the end of the scheme."""
+    """One more position at the end of the scheme."""
 
     __slots__ = ()
 
     kind: Literal["attitude"]
     position: str
-    """Name of the position that is added."""
+    """Name of the new position."""
     attitude: str
-    """Cardinal attitude: directions of X_p, Y_p and Z_p."""
+    """Cardinal attitude: where X_p, Y_p and Z_p point."""
 
 
 class ChangeCarry(Record):
-    """Carry between positions that replaces the scheme's own."""
+    """Another carry between positions."""
 
     __slots__ = ()
 
     kind: Literal["carry"]
     carry: Carry
-    """Carry of the changed scheme."""
+    """The carry."""
 
 Change = Union[ChangeKnown, ChangeOutput, ChangeAttitude, ChangeCarry]
-"""Change of a scheme or model."""
+"""A change of a scheme or model."""
 
 
 class Resolved(Record):
-    """Unknown that a remedy makes observable."""
+    """An unknown that a remedy makes observable."""
 
     __slots__ = ()
 
     name: str
-    """Name of the resolved unknown."""
+    """Name of the unknown."""
     degree: int
     """Observable degree of the unknown after the change."""
 
 
 class Remedy(Record):
-    """Change of the scheme or model, or two changes that are needed together."""
+    """One change, or two changes that are needed together."""
 
     __slots__ = ()
 
     changes: list[Change]
-    """Changes that resolve the unknowns, one or two."""
+    """The changes."""
     resolves: list[Resolved]
     """Unknowns that are observable with the changes and not without them, in model order; without those whose value is given."""
     loses: list[str]
@@ -356,178 +353,180 @@ class Remedies(Record):
 
 
 class Locus(Record):
-    """Condition on generic angles, and its effect on the verdicts."""
+    """A condition and what it does."""
 
     __slots__ = ()
 
     condition: str
-    """Condition: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that vanishes; one that is too long
-    to print is described.
+    """Where: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that vanishes; one that is too long to be
+    read is described.
     """
     points_deg: list[dict[str, float]]
-    """Points on the locus, in degrees by angle: all of them when `complete`, examples otherwise."""
+    """Points of it, in degrees by angle: all of them when `complete`, examples otherwise."""
     complete: bool
-    """True if the condition is on a single angle and `points_deg` certainly holds all its values."""
+    """Whether the condition is on a single angle, and these are certainly all its values."""
     rank_profile: list[int]
-    """Rank profile at a general point of the locus."""
+    """The rank profile at a general point of the locus."""
     changes: list[Difference]
-    """Unknowns whose verdict changes on the locus."""
+    """The unknowns whose verdict changes there."""
 
 
 class Formula(Record):
-    """Formula of Z or of one of its derivatives."""
+    """One formula."""
 
     __slots__ = ()
 
     position: str | None
-    """Label of the station; null for formulas that hold at every station."""
+    """The label of the station; null for formulas that hold at every one."""
     left: str
-    """Left side of the formula, such as `Z1'`."""
+    """Left side, such as `Z1'`."""
     right: str
-    """Right side of the formula."""
+    """Right side."""
 
 Frame = Literal["n", "platform"]
-"""Axes in which Z is printed in solutions. n: Local geographic axes, as in the paper: `Z1` and `Z3` (`Z2` is zero). platform: Platform
-axes: `Zx`, `Zy`, `Zz`.
+"""The axes in which Z is printed. n: Local geographic axes, as in the paper: `Z1` and `Z3` (`Z2` is zero). platform: Platform axes:
+`Zx`, `Zy`, `Zz`.
 """
 
 
 class BeyondLimits(Record):
-    """Position written with angles beyond a gimbal limit."""
+    """A position written with angles beyond a gimbal limit."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position in the scheme."""
+    """Name of the position."""
     angles: str
-    """Euler angles as written, in degrees."""
+    """Its Euler angles as written, in degrees."""
     within: str
     """Euler angles of the same attitude within the limits, in degrees."""
 
 
 class GimbalStop(Record):
-    """Obstacle of a turn about one axis: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to turn
-    more than a hundred times as fast as the platform.
+    """Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to
+    turn more than a hundred times as fast as the platform.
     """
 
     __slots__ = ()
 
     gimbal: str | None
-    """Gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees."""
+    """The gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees."""
     at_deg: float
-    """Limit that is reached, in degrees; without a gimbal, beta in degrees."""
+    """The limit in degrees; without a gimbal beta in degrees."""
     after_deg: float
-    """Angle that the platform has turned by when it stops, in degrees."""
+    """Angle that the platform has turned by, in degrees."""
 
 
 class GimbalTurn(Record):
-    """Turn of the platform, followed from gimbal angles within the limits."""
+    """A turn of the platform, followed from gimbal angles within the limits."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position that the turn leads to, or whose rotation it is."""
+    """Name of the position that it leads to, or whose rotation it is."""
     rotation: bool
     """True for the rotation of a segment."""
     by_gimbals: bool
     """True if the scheme states that the platform turns gimbal by gimbal."""
     turn: Turn | None
-    """Turn about one axis; null if the attitude stays the same, or gimbal by gimbal."""
+    """The turn about one axis; null where the attitude stays, and gimbal by gimbal."""
     stays: bool
-    """True if all gimbal angles stay within their limits during the turn; gimbal by gimbal, judged by the angles as written."""
+    """True if all gimbal angles stay within their limits on the way; gimbal by gimbal, of the angles as they are written."""
     stop: GimbalStop | None
-    """Obstacle of the turn about one axis; null if it stays within the limits, and gimbal by gimbal."""
+    """Where the turn about one axis cannot go on; null where it stays within the limits, and gimbal by gimbal."""
     ends_deg: tuple[float, float, float] | None
-    """Gimbal angles at the end of the turn in degrees (alpha, beta, gamma); null if it stops, or ends at the angles listed."""
+    """Gimbal angles at the end of the turn in degrees (alpha, beta, gamma), where they are others of the same attitude than those
+    listed.
+    """
     gimbals_deg: tuple[float, float, float] | None
-    """Changes of alpha, beta and gamma, in degrees, of the slew path gimbal by gimbal (`path = 'gimbals'`) between angles within the
-    limits, which stays within them; null for a rotation.
+    """Change of alpha, beta and gamma in degrees of the way gimbal by gimbal (`path = 'gimbals'`) between angles within the limits,
+    which stays within them; null for a rotation.
     """
 
 
 class GimbalReport(Record):
-    """Gimbal limits of a scheme, with the angles and turns that exceed them."""
+    """Gimbal limits and a scheme: which angles and which turns lie beyond."""
 
     __slots__ = ()
 
     limits: str
-    """Gimbal limits in words, in degrees."""
+    """The limits in words, in degrees."""
     beyond: list[BeyondLimits]
-    """Positions written with angles beyond a limit, each with angles of the same attitude within the limits."""
+    """Positions whose angles, as they are written, lie beyond a limit, with angles of the same attitude that do not."""
     turns: list[GimbalTurn]
-    """Turns to every position but the first, and rotations of segments; empty for generic angles."""
+    """The turn to every position but the first, and the rotation of every segment that turns; none for generic angles."""
 
 
 class Certainty(Record):
-    """Certainty of the verdicts: method, error bound, primes and seed."""
+    """How certain the verdicts are."""
 
     __slots__ = ()
 
     method: str
-    """Method of the verdicts, in words."""
+    """The method, in words."""
     error_bound: float
     """Bound on the probability that any verdict is wrong."""
     primes: tuple[str, str]
-    """Random primes of the two prime fields, as text (61 bits)."""
+    """The two primes, as text (61 bits)."""
     seed: int
-    """Seed of all random choices."""
+    """The seed of all random choices."""
 
 
 class Analysis(Shape):
-    """Analysis of one scheme: verdicts, solutions and remedies."""
+    """The answer for one scheme."""
 
     schema: str
-    """Layout of this answer: `obsdeg.analysis/1`."""
+    """`obsdeg.analysis/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """What is carried between positions."""
     latitude_deg: float | None
     """Latitude in degrees; null when generic."""
     geometry: Geometry
-    """Mounting of the gyros and accelerometers."""
+    """How the gyros are mounted."""
     terms: str
     """Unknown terms of the gyro model, or `drift`."""
     measured_azimuth: bool
-    """True if psi_y^n is measured."""
+    """Whether psi_y^n is measured."""
     positions: list[PositionReport]
-    """Positions of the scheme, in order of time."""
+    """The positions."""
     stations: list[StationLabel]
-    """Stations: points at which the derivatives in solutions are taken, that is the positions and attitudes during rotations."""
+    """Where the terms of solutions are taken: the positions, and attitudes of rotations."""
     rank_profile: list[int]
-    """Rank profile: dim V_0, dim V_1, ..., the rank of the derivatives of Z up to each order."""
+    """`dim V_0, dim V_1, ...`."""
     rank: int
-    """Rank of all derivatives of Z up to the last order."""
+    """The final rank."""
     unknowns: list[str]
-    """Names of the unknowns, in model order."""
+    """The unknowns in model order."""
     has_accuracy_orders: bool
-    """True if accuracy orders were computed. They are not for rotating segments; notes give other reasons."""
+    """Whether accuracy orders were computed: none are for rotating segments, and notes say why else."""
     quantities: list[Quantity]
-    """Verdicts on the unknowns, best first."""
+    """The verdicts, best first."""
     combinations: list[CombinationReport]
     """Observable combinations beyond single unknowns, by degree, and those asked for."""
     null_space: list[list[Component]]
-    """Basis of the directions that Z does not observe, without unknowns that are not excited."""
+    """Basis of the directions that Z does not see (unknowns that are not excited left out)."""
     carries: list[CarryReport]
-    """Verdicts under the other carries, where they differ."""
+    """The verdicts under the other carries, where they differ."""
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     degenerate_loci: list[Locus] | None
-    """Conditions on generic angles under which a verdict changes; null if they were not computed."""
+    """Conditions on generic angles under which the verdict changes."""
     formulas: list[Formula] | None
-    """Formulas of Z and its derivatives, position by position; null if not asked for."""
+    """Formulas of Z and its derivatives, position by position."""
     frame: Frame
-    """Axes in which Z is printed in solutions."""
+    """Axes of Z in solutions."""
     gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
+    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
     certainty: Certainty
-    """Certainty of the verdicts: method, error bound, primes and seed."""
+    """How certain all this is."""
     notes: list[str]
-    """Limitations of this answer, each with its reason."""
+    """What could not be said, and why."""
 
 
 class NumberOfSolutionsCounted(Record):
-    """Number of solutions, complex ones included, by elimination at a random point modulo each prime."""
+    """So many, complex ones counted: by elimination at a random point modulo each prime."""
 
     __slots__ = ()
 
@@ -535,186 +534,183 @@ class NumberOfSolutionsCounted(Record):
 
 
 class NumberOfSolutionsUndecided(Record):
-    """Locally unique. The text is the reason why the number of solutions is not decided."""
+    """Locally unique. Why the number of solutions is not decided."""
 
     __slots__ = ()
 
     undecided: str
 
 NumberOfSolutions = Union[Literal["one_by_expression"], NumberOfSolutionsCounted, NumberOfSolutionsUndecided]
-"""Number of values of an unknown among all points with the same outputs. one_by_expression: Single value: the solving expression depends
-on outputs, inputs, constants and unknowns that have one solution.
+"""How many values an unknown takes among all points with the same outputs. one_by_expression: One: its solving expression rests on
+outputs, inputs, constants and unknowns that have one solution.
 """
 
 
 class SystemQuantity(Record):
-    """Verdict on one unknown of a system."""
+    """One unknown."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, as in the model."""
+    """Its name."""
     kind: str
-    """Kind of the unknown: state, parameter or input."""
+    """state, parameter or input."""
     unit: str
-    """Unit of the unknown, as in the model file."""
+    """Its unit, as the file says."""
     description: str
-    """Description of the unknown, as in the model file."""
+    """What it is, as the file says."""
     status: Status
-    """Verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
-    resolved up to the bound on the order.
+    """The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
+    seen up to the bound on the order.
     """
     degree: int | None
-    """Observable degree: the smallest order of derivatives that determines the unknown; null if it is not observable."""
+    """The smallest order of derivatives that solves it."""
     partners: list[str]
-    """Unknowns indistinguishable from it: those in a common unobservable direction of minimal support."""
+    """Unknowns that it cannot be told from: those that share with it a direction that changes no output and that holds no shorter one."""
     solution: str | None
-    """Expression of the unknown in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher
-    degree, in which it is linear; verified in both fields. Null if none was found.
+    """What it is in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher degree, where it
+    enters linearly; verified in both fields.
     """
     number_of_solutions: NumberOfSolutions | None
-    """Number of solutions for the unknown; null if it is not observable, or if solutions were not sought."""
+    """How many solutions it has; null where it is not observable, or where they were not sought."""
 
 
 class SystemCombination(Record):
-    """Combination of unknowns, with its verdict."""
+    """A combination."""
 
     __slots__ = ()
 
     expression: str
-    """Combination as written in the model, or `b*x1`."""
+    """As written, or `b*x1`."""
     degree: int | None
-    """Observable degree of the combination; null if it is not observable."""
+    """Its degree; null when it is not observable."""
 
 
 class SymmetryReport(Record):
-    """Symmetry of the system, in words."""
+    """A symmetry in words."""
 
     __slots__ = ()
 
     words: str
-    """Change that leaves every output as it is, for every `c` (every positive one where something is multiplied or divided): `multiply
-    alpha by c; divide gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
+    """What changes no output, for every `c` (every positive one where something is multiplied or divided): `multiply alpha by c; divide
+    gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
     """
     unknowns: list[str]
-    """Unknowns that the symmetry changes."""
+    """The unknowns that it moves."""
 
 
 class DigitsReport(Record):
-    """Margin of rank decisions in real numbers of many digits, at two random points."""
+    """How clear ranks were that real numbers of many digits decided, at two random points."""
 
     __slots__ = ()
 
     digits: tuple[int, int]
-    """Number of decimal digits at the first and at the second point."""
+    """Decimal digits at the first point and at the second."""
     nonzero_log10: float
-    """Decimal logarithm (dimensionless) of the smallest number, relative to its row, that is proven to differ from zero."""
+    """Decimal logarithm of the smallest number, relative to its row, that counts as different from zero; it is proven to be."""
     zero_log10: float | None
-    """Decimal logarithm (dimensionless) of the widest error bound, relative to its row, of a number that counts as zero; null if all
-    were exact.
-    """
+    """Decimal logarithm of the widest error bound, relative to its row, of a number that counts as zero; null where all were exact."""
 
 
 class SystemAnalysis(Shape):
-    """Analysis of one system: verdicts, combinations, symmetries and remedies."""
+    """The answer for one system."""
 
     schema: str
-    """Layout of this answer: `obsdeg.system/1`."""
+    """`obsdeg.system/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     name: str
-    """Name of the system, as in its file."""
+    """The system."""
     description: str
-    """Description of the system, as in its file."""
+    """What it is, as its file says."""
     equations: list[str]
-    """Equations, `x' = ...` and `y = ...`, as written."""
+    """The equations, `x' = ...` and `y = ...`, as written."""
     rank_profile: list[int]
-    """Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order."""
+    """`dim V_0, dim V_1, ...`."""
     rank: int
-    """Rank of all output derivatives up to the last order."""
+    """The final rank."""
     unknowns: int
-    """Number of unknowns that are judged."""
+    """The number of unknowns."""
     quantities: list[SystemQuantity]
-    """Verdicts on the unknowns, in model order."""
+    """The verdicts in model order."""
     known: list[str]
-    """States with a known initial value."""
+    """States whose start is known."""
     time: str | None
-    """Time at which the first segment was judged: a number, or `generic` (almost every time, as in all later segments); null if the
-    equations do not depend on time.
+    """Time at which the first segment was judged, where the equations hold it: a number, or `generic` (almost every time, as in all
+    later segments); null where they do not.
     """
     constraints: list[str]
     """Equations that hold at the start; their differentials count as rows of order 0."""
     combinations: list[SystemCombination]
-    """Combinations of unknowns that the model asks for."""
+    """Combinations that were asked for."""
     unobservable_directions: int
-    """Number of independent directions that change no output."""
+    """The number of independent directions that no output sees."""
     symmetries: list[SymmetryReport]
-    """Scalings, translations and polynomials among the unobservable directions, exactly."""
+    """Scalings, translations and polynomials among them, exactly."""
     other_directions: list[list[str]]
-    """Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was found describes it."""
+    """What is moved by each direction that is none of these: at a generic point, no polynomial that was found describes it."""
     invariants: list[SystemCombination]
-    """Observable combinations of unobservable unknowns."""
+    """Combinations of unobservable unknowns that are observable."""
     last_order: int
-    """Highest order of derivatives that was examined."""
+    """The highest order that was looked at."""
     bound: int
-    """Order of derivatives at which the search ends at the latest."""
+    """Orders end at this bound."""
     closed: bool
-    """True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts hold up to the bound on the
-    order only.
-    """
+    """The end is proven: an order that adds nothing is the last. Otherwise what is not observable rests on the bound."""
     rests_on_bound: bool
-    """True if a verdict holds up to the bound on the order only."""
+    """Whether a verdict rests on the bound."""
     branches: list[str]
-    """Functions of unknowns that have branches (abs, sign, roots, asin, acos). The verdicts hold on the branch of points near one, or
-    where the model is undefined there, on the first branch that was found.
+    """Functions of unknowns that have branches (abs, sign, roots, asin, acos): the verdicts are those of the branch that points near one
+    lie in, or where the model is not defined there, of the first that was found.
     """
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     note: str | None
-    """Reason why there are no solving expressions; null if there are."""
+    """Why there are no solving expressions, if there are none."""
     counting_order: int | None
-    """Order of the derivatives with which solutions were counted by elimination; null if none were."""
+    """The order of the derivatives with which solutions were counted by elimination; null when none were."""
     independent_functions: int | None
-    """Number of functions whose values are proven to be independent of each other at a generic point (Ax 1971, doi:10.2307/1970774), so
-    that random values in prime fields replace them; 0 for a rational model, null if functions were evaluated in real numbers.
+    """Functions that take part whose values are proven to be independent of each other at a generic point (Ax 1971,
+    doi:10.2307/1970774), so that random values in prime fields stand for them; 0 for a rational model, null where functions were
+    evaluated truly, in real numbers.
     """
     primes: tuple[str, str] | None
-    """Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers."""
+    """Of a model judged in prime fields: the two random primes, as text (61 bits)."""
     error_bound: float | None
-    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
+    """Of a model judged in prime fields: bound on the probability that a verdict is wrong."""
     digits: DigitsReport | None
-    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
+    """Of a model judged in real numbers: how clear its ranks were."""
     seed: int
     """Seed of all random choices."""
 
 
 class AccelerometerBias(Record):
-    """Bias instability of the accelerometers: a first-order Gauss-Markov process of each, which continues in platform axes."""
+    """The bias instability of the accelerometers: a first-order Gauss-Markov process of each, which goes on in platform axes."""
 
     __slots__ = ()
 
     instability_ug: float
-    """Coefficient B of the bias instability, in ug; sigma of the process is 1.076 B."""
+    """The coefficient B in ug; sigma of the process is 1.076 B."""
     correlation_time_s: float
-    """Correlation time of the process, in s."""
+    """Its correlation time in s."""
 
 PerGyro = tuple[float, float, float]
-"""Noise of the X, Y and Z gyro, in the unit of the key; zero for none."""
+"""A noise of each gyro: X, Y, Z; zero for none."""
 
 
 class GyroNoise(Record):
-    """Noise of the gyros X, Y, Z by their datasheet."""
+    """The datasheet of the gyros X, Y, Z."""
 
     __slots__ = ()
 
     angle_random_walk_deg_sqrt_h: PerGyro
-    """Angle random walk of each gyro, in deg/sqrt(h)."""
+    """Angle random walk in deg/sqrt(h)."""
     rate_random_walk_dph_sqrt_h: PerGyro
-    """Rate random walk of each gyro, in deg/h/sqrt(h)."""
+    """Rate random walk in deg/h/sqrt(h)."""
     bias_instability_dph: PerGyro
-    """Bias instability of each gyro, in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B."""
+    """Bias instability in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B."""
     correlation_time_s: float
-    """Correlation time, in s, of the Gauss-Markov process that represents the bias instability."""
+    """Correlation time in s of the Gauss-Markov process that stands for it."""
 
 
 class MeasurementReport(Record):
@@ -723,27 +719,27 @@ class MeasurementReport(Record):
     __slots__ = ()
 
     latitude_deg: float
-    """Latitude of the scheme, in degrees."""
+    """Latitude in degrees."""
     latitude_by_default: bool
-    """True if the program chose the latitude."""
+    """Whether the latitude was chosen by the program."""
     dwell_s: float
-    """Dwell, in s, of positions that do not state their own."""
+    """Dwell of positions that do not say theirs, in s."""
     step_s: float
     """Largest step between samples in s; a position is divided into equal steps."""
     accelerometer_noise_g: float
-    """Noise of the observation per sample and axis, in g."""
+    """Noise of the observation per sample and axis in g."""
     accelerometer_bias: AccelerometerBias | None
     """Bias instability of the accelerometers; left out where there is none."""
     azimuth_noise_deg: float | None
-    """Noise of the azimuth per sample, in deg; null if it is not measured."""
+    """Noise of the azimuth per sample in deg; null where it is not measured."""
     slew_rate_deg_s: float | None
-    """Rate of slews in deg/s unless a position states its own; null for instantaneous slews."""
+    """Rate of slews in deg/s where a position does not say its own; null: instantaneous."""
     drift_noise: str | None
-    """Random drift that is stated, with its unit; null if none is."""
+    """Random drift that is stated, with its unit; null: none counts."""
     gyro_noise: GyroNoise | None
-    """Noise of the gyros by their datasheet; left out where they have no noise of their own."""
+    """Datasheet of the gyros; left out where they have no noise of their own."""
     prior: str | None
-    """Priors that are stated, as 1 sigma in the units of the unknowns; null if none are."""
+    """Priors that are stated, as 1 sigma in the units of the unknowns; null: none counts."""
     by_default: list[str]
     """Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg.
@@ -751,587 +747,586 @@ class MeasurementReport(Record):
 
 
 class Slew(Record):
-    """Slew of finite duration to a position."""
+    """A turn to a position."""
 
     __slots__ = ()
 
     to: str
-    """Name of the position that the slew leads to."""
+    """The position."""
     turn: Turn
-    """Turn of the slew: its axis and angle."""
+    """How it turns."""
 
 
 class ComparisonQuantity(Record):
-    """Verdict, sigma and requirement of one unknown of a scheme."""
+    """One unknown of a scheme."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, as in the scheme's model."""
+    """Its name."""
     unit: str
-    """Unit of sigma, of the requirement and of `sigma_extended`."""
+    """Unit of sigma."""
     status: Status
-    """Verdict: observable, inseparable or not excited."""
+    """The exact verdict."""
     degree: int | None
-    """Observable degree; null if the unknown is not observable."""
+    """The observable degree."""
     accuracy_order: int | None
-    """Accuracy order; null if no dwell makes the unknown observable, or if none were computed."""
+    """The accuracy order."""
     sigma: float | None
-    """Predicted standard deviation at the end of the scheme under the stated conditions, in the unit of `unit`; null if neither samples
-    nor stated priors bound it.
+    """Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when neither samples nor stated
+    priors bound it.
     """
     by_prior: bool
-    """True if the samples do not determine the unknown, so that sigma depends on stated priors alone."""
+    """True if the samples do not determine it, so that sigma rests on stated priors alone."""
     sigma_extended: float | None
-    """Standard deviation of a coefficient at the end by a filter with full attitudes, with the prior, in the unit of `unit`; null if the
-    small-angle model holds for the stated drifts, or none are stated.
+    """Standard deviation of a coefficient, where the small-angle model does not hold for the drifts that are stated, by a filter with
+    full attitudes at the end, with the prior.
     """
     requirement: float | None
-    """Largest sigma allowed, in the unit of `unit`; null if none is required."""
+    """The largest sigma allowed."""
     margin: float | None
-    """Requirement over sigma, dimensionless: met from 1; null if there is no requirement or no sigma."""
+    """Requirement over sigma: above 1 is met."""
     excitation: list[float]
-    """Factors by which the unknown enters the drift, position by position, dimensionless: products of components of g (1 for D_F), root
-    mean square over the arc of a rotating segment. Empty for psi.
+    """Per position: how it moves the drift there, as a product of components of g (1 for D_F); its root mean square over the arc of a
+    rotating segment; empty for psi.
     """
     carried_by: list[str]
-    """Positions without which the unknown is not observable."""
+    """Positions without which it is not observable."""
 
 
 class Worst(Record):
-    """Largest sigma of a drift coefficient."""
+    """The largest sigma of a drift coefficient."""
 
     __slots__ = ()
 
     name: str
-    """Name of the coefficient with this sigma."""
+    """The coefficient."""
     sigma_dph: float
-    """Standard deviation of the coefficient, in deg/h (per g, per g^2)."""
+    """Its sigma in deg/h (per g, per g^2)."""
 
 Basis = Literal["predicted", "predicted_with_prior", "run", "record"]
-"""Source of the sigmas that are compared with requirements. The prediction alone decides whether a scheme meets its requirements; a run
-is an example, a record its confirmation. predicted: Information of all samples with the stated noise and random drift, psi at the end
-of the scheme (under reset carry at the end of each position); no prior knowledge. predicted_with_prior: Information of all samples as
-in `predicted`, with the stated priors. run: Filter at the end of a simulated run, with its prior and its random drift, whether they
-are stated or chosen by the program. record: Estimates of a calibration from a record.
+"""Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the prediction alone; a run is one
+example of it, a record its confirmation. predicted: The information of all samples with the noise and the random drift that are
+stated, psi at the end of the scheme (under reset carry at the end of each position); nothing is known beforehand.
+predicted_with_prior: The same with the priors that are stated. run: The filter at the end of a simulated run, with its prior and its
+random drift, whether they are stated or chosen by the program. record: The estimates from a record.
 """
 
 
 class Margin(Record):
-    """Margin of a requirement, with its unknown."""
+    """A margin and whose it is."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown with this margin."""
+    """The unknown."""
     margin: float
-    """Required over found sigma, dimensionless: met from 1."""
+    """Required over found sigma: at least 1 is met."""
 
 Miss = Literal["too_large", "not_observable", "rests_on_prior", "inconsistent", "no_number"]
-"""Reason why a requirement is missed. too_large: Sigma above the requirement. not_observable: Unknown that the outputs do not determine.
-rests_on_prior: Sigma hardly below the prior's: it repeats the prior. inconsistent: Error beyond four sigma: the filter is wrong.
-no_number: Sigma or estimate that is not a finite number.
+"""Why a requirement is missed. too_large: Sigma is above it. not_observable: The unknown is not determined by the outputs.
+rests_on_prior: Sigma is hardly below the prior's: it says what the prior says. inconsistent: The filter is wrong about it: its error
+is beyond four sigma. no_number: Sigma or the estimate is no number.
 """
 
 
 class Missed(Record):
-    """Unknown that misses its requirement."""
+    """An unknown that misses its requirement."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown that misses."""
+    """The unknown."""
     why: Miss
-    """Reason why the requirement is missed."""
+    """Why."""
 
 
 class Requirements(Record):
-    """Outcome of all requirements: those met, those missed and the smallest margin."""
+    """What became of all requirements."""
 
     __slots__ = ()
 
     basis: Basis
-    """Source of the sigmas that decide."""
+    """Under what this is decided."""
     stated: int
-    """Number of unknowns with a requirement."""
+    """Unknowns with a requirement."""
     met: int
-    """Number of unknowns that meet their requirement."""
+    """How many of them meet it."""
     worst: Margin | None
-    """Smallest margin among the sigmas that count; null if there is none."""
+    """The smallest margin of those whose sigma counts."""
     missed: list[Missed]
-    """Unknowns that miss their requirement, in model order."""
+    """Those that miss theirs, in model order."""
     on_prior: list[str]
-    """Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated priors alone."""
+    """Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated priors alone."""
 
 
 class OtherCarry(Record):
-    """Scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has, are
-    left out.
+    """A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has,
+    are left out.
     """
 
     __slots__ = ()
 
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """Carry: what of psi goes on between positions."""
     worst: Worst | None
-    """Largest sigma of a drift coefficient in deg/h (per g); null if a coefficient is not observable, or if nothing was judged."""
+    """The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was
+    judged.
+    """
     without_slews: bool
     """True if the slews of the scheme are left out there, since only inertial carry has slews."""
     requirements: Requirements | None
-    """Outcome of the requirements; null if nothing was judged."""
+    """Outcome of the requirements; null where nothing was judged."""
     not_judged: str | None
-    """Reason why nothing was judged; left out where something was."""
+    """The reason why nothing was judged; left out where it was."""
 
 
 class Validity(Record):
-    """Validity of the small-angle model at the drifts of a run."""
+    """Whether the small-angle model holds for the drifts of a run."""
 
     __slots__ = ()
 
     largest_psi_deg: float
-    """Largest platform error `|psi|`, in deg."""
+    """Largest `|psi|`, in deg."""
     neglected_g: float
-    """Largest `|psi|^2/2`, in g: the term that the observation model (6) neglects."""
+    """Largest `|psi|^2/2`, in g: what the observation model (6) leaves out."""
     accelerometer_noise_g: float
-    """Noise of the observation per sample, in g."""
+    """Noise of the observation, in g."""
     neglected_dph: float
-    """Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: the term that the drift model (3) neglects."""
+    """Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: what the drift model (3) leaves out."""
     smallest_requirement_dph: float | None
-    """Smallest sigma required of a drift coefficient, in deg/h (per g); null if none is required."""
+    """The smallest sigma required of a drift coefficient, in deg/h (per g)."""
     holds: bool
-    """True if `neglected_g` is at most the noise and `neglected_dph` at most the smallest requirement."""
+    """Whether both are small."""
 
 
 class DropOne(Record):
-    """Scheme without one of its positions."""
+    """A scheme without one of its positions."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position that is left out."""
+    """The position left out."""
     lost: list[str]
-    """Unknowns that are not observable without the position."""
+    """Unknowns that are not observable without it."""
     worst: Worst | None
-    """Worst sigma without the position; null if a coefficient is not observable."""
+    """The worst sigma without it."""
     requirements: Requirements
-    """Outcome of the requirements without the position."""
+    """Outcome of the requirements without it."""
 
 
 class Sensitivity(Record):
-    """Worst sigma of the scheme under another condition."""
+    """The worst sigma under another condition."""
 
     __slots__ = ()
 
     condition: str
-    """Condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` for a scheme with slews, which only inertial
-    carry has.
+    """The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` where the scheme has slews, which only
+    inertial carry knows.
     """
     rank: tuple[int, int]
-    """Rank with dwell, then the number of unknowns, under the condition."""
+    """The rank with dwell and the number of unknowns there."""
     worst: Worst | None
-    """Worst sigma under the condition; null if a coefficient is not observable."""
+    """The worst sigma there."""
     worst_determined: Worst | None
-    """Worst sigma, under the condition, of the coefficients that are observable in the scheme itself; null if one is not."""
+    """The worst sigma there of the coefficients that the scheme itself makes observable; null when one is not."""
 
 Reached = Literal["at_the_shortest", "within", "still_falls"]
-"""Range of dwells in which a sigma comes within 5 % of the least. at_the_shortest: Shortest dwell examined: shorter ones may give the
-same or a smaller sigma. within: Dwell between the shortest and a quarter of the longest examined. still_falls: Dwell beyond a quarter
-of the longest examined: sigma still falls.
+"""Where a sigma is within 5 % of the least. at_the_shortest: At the shortest dwell looked at already: shorter ones may do as well, or
+better. within: Within the dwells looked at. still_falls: Beyond a quarter of the longest dwell: sigma still falls.
 """
 
 
 class CoefficientFloor(Record):
-    """Noise floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of the run."""
+    """The floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of the run."""
 
     __slots__ = ()
 
     name: str
-    """Name of the coefficient, as in the model."""
+    """Its name."""
     unit: str
-    """Unit of the sigmas of the coefficient."""
+    """The unit of its sigmas."""
     sigma: float | None
-    """Sigma with the dwells of the scheme, without prior, in the unit of `unit`; null if samples do not determine it."""
+    """Sigma with the dwells of the scheme, without prior; null when samples do not determine it."""
     least_sigma: float | None
-    """Least sigma over all dwells examined, in the unit of `unit`; null if samples do not determine it."""
+    """The least sigma over all dwells looked at; null when samples do not determine it."""
     reached: Reached | None
-    """Range of dwells in which the least sigma is reached; null if samples do not determine it."""
+    """Where it is reached; null when samples do not determine it."""
     dwell_s: float | None
-    """Shortest dwell, in s (mean of the positions), at which sigma is within 5 % of the least; null unless it lies within the dwells
-    examined.
+    """The shortest dwell (mean of the positions) in s at which sigma is within 5 % of the least, where this lies within the dwells
+    looked at.
     """
 
 
 class NoiseFloor(Record):
-    """Noise floor: the least sigmas of coefficients under random drift, however long the dwells."""
+    """How well coefficients can be known under random drift, however long the dwells."""
 
     __slots__ = ()
 
     drift_noise_deg_sqrt_h: float
-    """Density of the random drift besides the noise of the gyros, in deg/sqrt(h)."""
+    """Density of the random drift besides what the gyros have, in deg/sqrt(h)."""
     gyro_noise: GyroNoise
-    """Noise of the gyros by their datasheet."""
+    """The gyros."""
     dwells_s: tuple[float, float]
-    """Shortest and longest dwell that were examined, in s: the mean of the positions, all in proportion."""
+    """The shortest and the longest dwell looked at, in s: the mean of the positions, all in proportion."""
     coefficients: list[CoefficientFloor]
-    """Noise floor of each coefficient, in model order."""
+    """Per coefficient."""
 
 
 class Review(Record):
-    """Scheme of a comparison, with its predicted sigmas."""
+    """One scheme."""
 
     __slots__ = ()
 
     name: str
-    """Name of the scheme: that of its file."""
+    """Its name: the file's."""
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """What is carried between positions."""
     conditions: MeasurementReport
-    """Conditions of the predicted sigmas."""
+    """What its sigmas rest on."""
     positions: list[str]
-    """Names of the positions, in order of time."""
+    """Its positions."""
     slews: list[Slew]
-    """Slews of finite duration, each with the position that it leads to."""
+    """The turns between them that take time, with the position that each leads to."""
     total_s: float
-    """Total time of the scheme with slews, in s."""
+    """Total time with slews, in s."""
     rank: tuple[int, int]
-    """Rank with dwell (by derivatives if accuracy orders are not computed), then the number of unknowns."""
+    """The rank with dwell (by derivatives where accuracy orders are not computed), and the number of unknowns."""
     quantities: list[ComparisonQuantity]
-    """Verdict, sigma and requirement of each unknown."""
+    """Per unknown."""
     worst: Worst | None
-    """Largest sigma of a coefficient; null if one is not observable."""
+    """The largest sigma of a coefficient; null when one is not observable."""
     meets_requirements: bool
     """True if requirements are stated and every one is met."""
     requirements: Requirements
     """Outcome of the requirements by the predicted sigmas."""
     other_carries: list[OtherCarry]
-    """Outcome of the same scheme under the other carries."""
+    """The same scheme under the other carries."""
     has_accuracy_orders: bool
-    """True if accuracy orders are computed. They are not for rotating segments."""
+    """Whether accuracy orders are computed: none are for rotating segments."""
     validity: Validity | None
     """Validity of the small-angle model at the drifts that are stated; null where none are (`values`), or for very many steps."""
     drop_one: list[DropOne]
-    """Schemes with one position left out, for each position."""
+    """What happens without each of the positions."""
     sensitivity: list[Sensitivity]
-    """Worst sigmas under other conditions."""
+    """The worst sigma under other conditions."""
     noise_floor: NoiseFloor | None
-    """Noise floor: the least sigmas under random drift, however long the dwells; left out where the gyros have no noise of their own."""
+    """How well coefficients can be known under random drift, however long the dwells; left out where the gyros have no noise of their
+    own.
+    """
     gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
+    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
 
 
 class Comparison(Shape):
-    """Comparison of several schemes under the same method."""
+    """Several schemes, judged alike."""
 
     schema: str
-    """Layout of this answer: `obsdeg.comparison/2`."""
+    """`obsdeg.comparison/2`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     schemes: list[Review]
-    """Schemes of the comparison, in the order given."""
+    """The schemes in the order given."""
     differ: list[str]
-    """Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step."""
+    """What differs between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step."""
     seed: int
     """Seed of all random choices."""
 
 
 class Minimum(Record):
-    """Smallest number of positions that makes every required coefficient observable."""
+    """The fewest positions that make every required coefficient observable."""
 
     __slots__ = ()
 
     positions: int | None
-    """Number of positions; null if all candidates together are not enough, or if the sets are too many to be examined."""
+    """Their number; null when all candidates together do not do, or when the sets are too many to be examined."""
     witness: list[str]
-    """Smallest candidate set that makes all required coefficients observable; empty if none was found."""
+    """A set that does."""
     counting_bound: int
-    """Number of positions below which no set is enough: the required coefficients over the rows of a position, rounded up (0 where
-    torquer errors act in every turn).
-    """
+    """No fewer can do: the required coefficients over the rows of a position, rounded up (0 where torquer errors act in every turn)."""
     rows_per_position: int
-    """Largest number of independent rows on the unknowns that a candidate adds, under reset carry without those that its psi takes."""
+    """The most independent rows on the unknowns that a candidate adds, under reset carry without those that its psi takes."""
     none_of: list[tuple[int, int]]
-    """Sets excluded by exhaustion: `[size, number of sets]`, none of which is enough."""
+    """`[size, number of sets]`: none of these does, by exhaustion."""
     never: list[str]
     """Coefficients that all candidates together leave unobservable."""
     proven: bool
-    """True if `positions` is proven minimal, or the coefficients in `never` proven unobservable: no smaller set was left out, and the
+    """Whether `positions` is the fewest, or `never` is never, by more than rounding and chance: nothing smaller was left out, and the
     bound on the probability of an error is below 1e-12.
     """
 
 
 class TiesReport(Record):
-    """Number of sequences that are as good as the best."""
+    """Sequences that are as good as the best."""
 
     __slots__ = ()
 
     sequences: int
-    """Number of sequences as good as the best, with the best and all images under turns of the platform axes."""
+    """How many, the best and all their images under turns of the platform axes among them."""
     within: float
-    """Largest relative difference of two criteria, in double precision and dimensionless, that counts as equal; their worst degrees must
-    be equal too.
-    """
+    """Two tie when their worst degrees are equal and their criteria, as double precision gives them, differ by less than this part."""
 
 
 class Weight(Record):
-    """Candidate attitude with its weight."""
+    """A candidate and its weight."""
 
     __slots__ = ()
 
     candidate: str
-    """Candidate attitude: its name, or its Euler angles in degrees."""
+    """The candidate."""
     weight: float
-    """Weight of the candidate: its fraction of all positions, dimensionless, as it is before the division by the sum of all."""
+    """Its part of all positions, before it is divided by the sum of all."""
 
 
 class Finer(Record):
-    """Better scheme that rounding of the angles excludes."""
+    """A scheme that rounding leaves out."""
 
     __slots__ = ()
 
     value: float
-    """Criterion of the scheme, in the unit of `unit`."""
+    """Its criterion."""
     angles: list[str]
-    """Euler angles of its positions, in degrees."""
+    """Euler angles of its positions in degrees."""
 
 
 class Rounded(Record):
-    """Rounding of the angles of free attitudes: every scheme is evaluated at the rounded angles."""
+    """Free attitudes with rounded angles: every scheme is evaluated at the angles as they are rounded."""
 
     __slots__ = ()
 
     step_deg: float
-    """Step of the angles, in degrees. Exceptions: the cardinal attitudes, which may be chosen too, and angles that gimbal limits
-    require: the twin (alpha+180, 180-beta, gamma+180) of rounded angles, and at beta = +-90 another alpha.
+    """Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too, and for what gimbal limits ask
+    for: the twin (alpha+180, 180-beta, gamma+180) of such angles, and at beta = +-90 another alpha.
     """
     finer: Finer | None
-    """Better scheme, by the same search with angles in hundredths of a degree; null if none was found."""
+    """A better scheme, by the same search with angles in hundredths of a degree; null where none was found."""
 
 
 class EverywhereReport(Record):
-    """Bound on the criterion of the best scheme of any attitudes, whatever the candidates and the gimbals are, without requirements on
-    psi. Attitudes are added where they contribute most. Between the points of a net of 3 degrees their contribution is bounded as a
-    trigonometric polynomial, and rounding with it, so that the bound holds for all.
+    """How good the best scheme of any attitudes can be, whatever the candidates and the gimbals are; requirements on psi left out.
+    Attitudes are taken up where they add most; between the points of a net of 3 degrees what they add is bounded as a trigonometric
+    polynomial, and rounding with it, so that the bound holds for all.
     """
 
     __slots__ = ()
 
     best_possible: float
-    """Lower bound on the criterion of schemes of the same number of any attitudes, equal dwells, in the unit of `unit`."""
+    """No scheme of so many attitudes, equal dwells, has a smaller criterion."""
     within_percent: float
-    """Largest excess of the first unrefined scheme's criterion over the bound, in percent of the bound."""
+    """The criterion of the first scheme that is not refined is at most so much above, in percent of the bound."""
     rounding: float | None
-    """Relative rounding tolerance of that criterion, dimensionless, with that of the attitudes of the scheme; null if it is unknown."""
+    """What rounding may hide of that criterion, as a part of it: as above, that of the attitudes of the scheme with it."""
     attained: float
-    """Criterion that the weights would have as a scheme, in the unit of `unit`: all of them, with angles to hundredths of a degree and
-    weights as they are rounded here.
+    """The criterion that the weights would have as a scheme: all of them, with angles to hundredths of a degree and weights as they are
+    rounded here.
     """
     weights: list[Weight]
-    """Ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others above
-    -180 and up to 180. Weights are fractions of the sum of all, rounded to two digits, or to as many as lose no more than a
+    """The ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others
+    above -180 and up to 180. Weights are parts of the sum of all, rounded to two digits, or to as many as lose no more than a
     thousandth of the variance; those below 1e-7 are left out.
     """
     lighter: int
     """Number of lighter attitudes, which are not listed."""
     lighter_weight: float
-    """Sum of the weights of the lighter attitudes, dimensionless, 0 to 1."""
+    """Sum of the weights of the lighter attitudes."""
     rounded: Rounded | None
-    """Rounding of the angles of free attitudes, and its cost; null if candidates were given."""
+    """Where attitudes were free: how their angles were rounded, and what that costs; null where candidates were given."""
 
 
 class Certificate(Record):
-    """Bound on the criterion of the best scheme of the same number of these candidates, from the optimal weights of the candidates
-    (approximate design theory). It holds for schemes of any worst degree, within the constraints or not, and allows for the rounding
-    in its evaluation; the information of each position is in double precision, the same as in the search.
+    """How good the best scheme of so many of these candidates can be: a bound from the optimal weights of the candidates (approximate
+    design theory). It holds for schemes of any worst degree, within the constraints or not, and allows for the rounding in its
+    evaluation; the information of each position is as double precision gives it, the same as in the search.
     """
 
     __slots__ = ()
 
     best_possible: float
-    """Lower bound on the criterion of schemes of the same number of these candidates, equal dwells, in the unit of `unit`."""
+    """No scheme of so many of these candidates, equal dwells, has a smaller criterion."""
     within_percent: float
-    """Largest excess of the first unrefined scheme's criterion over the bound, in percent of the bound."""
+    """The criterion of the first scheme that is not refined is at most so much above, in percent of the bound."""
     efficiency: float
-    """Efficiency, dimensionless, 0 to 1: square of the bound over that criterion, the least fraction of the best possible information
-    (for D the D-efficiency).
+    """The square of the bound over that criterion: how much of the information that the best could have it has at least (for D the
+    D-efficiency).
     """
     rounding: float | None
-    """Relative rounding tolerance of that criterion, dimensionless, by the residual of the inverse; it is added before the criterion is
-    compared with the bound. Null if the remaining unknowns are not determined: then it is unknown and nothing is added.
+    """What rounding may hide of that criterion, as a part of it: it is added before the criterion is held against the bound. By the
+    residual of the inverse; null where what does not count is not determined, so that nothing is known of it and nothing added.
     """
     attained: float
-    """Criterion that the weights would have as a scheme, exactly as they are listed, in the unit of `unit`; the bound cannot be larger."""
+    """The criterion that the weights would have as a scheme, exactly as they are listed; the bound cannot be larger."""
     weights: list[Weight]
-    """Weights that divide the time among the candidates: fractions of their sum, rounded to two digits, or to as many as lose no more
+    """How the weights divide the time among the candidates: parts of their sum, rounded to two digits, or to as many as lose no more
     than a thousandth of the variance; those below 1e-7 are left out.
     """
     everywhere: EverywhereReport | None
-    """Bound for any attitudes instead of the candidates; null if it was not asked for."""
+    """The same for all attitudes; null where it was not asked for."""
     front: list[tuple[float, float]]
-    """Lower bound over time: `[total time in s, criterion in the unit of unit]`. No scheme of these candidates, in equal dwells and one
-    of the numbers of positions asked for, is below at this time.
+    """`[total time in s, criterion]`: no scheme of these candidates, in equal dwells and one of the numbers of positions asked for, is
+    below at this time.
     """
 
 
 class SearchReport(Record):
-    """Search for the best schemes, with its conditions and coverage."""
+    """What was searched, and how."""
 
     __slots__ = ()
 
     positions: int
-    """Number of positions of every scheme."""
+    """The number of positions."""
     conditions: MeasurementReport
-    """Conditions of every sigma: the information of all samples on psi and all coefficients, with the stated random drift and priors.
-    Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
+    """Conditions of every sigma: the information of all samples on psi and all coefficients, with the random drift and the priors that
+    are stated. Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
     """
     drift_noise: str | None
-    """Random drift that is stated: the search leaves it out, and the figures of all listed schemes include it; null for none."""
+    """Random drift that is stated: the search leaves it out, and the figures of all schemes that are listed count it; null: none."""
     prior: str | None
-    """Priors that are stated, which sigmas and the bound include beside the samples; null for none. The samples alone decide
-    observability.
+    """Knowledge beforehand that sigmas and the bound count beside the samples: the priors that are stated; null: none. What is
+    observable is by the samples alone.
     """
     criterion: str
-    """Criterion that orders schemes: worst, A, D, E or margin."""
+    """What makes a scheme better: worst, A, D, E or margin."""
     unit: str | None
-    """Unit of the criterion: deg/h (per g), ug (per g), ppm or arcsec; null for margin, and for D of coefficients in several units, each
-    in its own.
-    """
+    """Its unit: deg/h (per g), ug (per g), ppm or arcsec; null for margin, and for D of coefficients in several units, each in its own."""
     examined: int
-    """Number of sequences whose sigma was computed."""
+    """Sequences whose sigma was computed."""
     lost: int
-    """Number of examined sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not
-    determine every required coefficient in double precision. They rank below all others.
+    """Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
+    required coefficient as far as double precision tells: they count as worse than all others.
     """
     sequences: int | None
-    """Number of sequences, up to turns of the platform axes, in an exhaustive search if the search was not exhaustive (`within` 0); null
-    if it was, and if they are too many to be held or counted.
+    """Number of sequences, up to turns of the platform axes, that a search of all would go through where not all were searched (`within`
+    0); null where all were, and where they are too many to be held or counted.
     """
     excluded: int
-    """Number of sequences, observable or not, that a bound excluded from examination: in double precision their criterion is larger than
-    that of all listed.
+    """Sequences, observable or not, that were not examined because a bound leaves no doubt: as far as double precision tells their
+    criterion is larger than that of all listed.
     """
     proven: bool
-    """True if no sequence of candidates within the constraints is better than the first, by exhaustion or by a bound: none has a smaller
-    worst degree, or the same and a smaller criterion.
+    """Whether no sequence of candidates within the constraints is better than the first, by exhaustion, or because a bound excludes the
+    rest: none has a smaller worst degree, or the same and a smaller criterion.
     """
     ties: TiesReport | None
-    """Number of sequences as good as the first; null if the search was not exhaustive."""
+    """How many sequences are as good as the first; null where not all were searched."""
     order_matters: bool
-    """True if orders of the same positions count as different schemes."""
+    """Whether orders of the same positions count as different schemes."""
     interrupted: bool
-    """True if the search was interrupted; if the first is proven nevertheless, before the front was complete."""
+    """Whether the search was interrupted; if the first is proven nevertheless, before the front was complete."""
     degree_floor: int | None
-    """Smallest worst degree that all candidates together allow; null if torquer errors act during slews, so that sets have no degree."""
+    """The smallest worst degree that all candidates together allow; null where torquer errors act on the way, so that sets have no
+    degree.
+    """
     constraints: list[str]
-    """Constraints of the search, in words."""
+    """The constraints in words."""
     certificate: Certificate | None
-    """Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial carry, and where the noise
-    of Z is correlated, information is no sum over positions.
+    """How good the best can be; null where no such bound is known: under platform and inertial carry, and where the noise of Z is
+    correlated, information is no sum over positions.
     """
 
 
 class HalfTurn(Record):
-    """Half turn to a position, with its direction."""
+    """Half a turn to a position."""
 
     __slots__ = ()
 
     to: int
-    """Index, from 1, of the position that the half turn leads to."""
+    """Which position it leads to, counted from 1."""
     about: tuple[float, float, float]
-    """Axis of the half turn, right-handed: a unit vector (North, Up, East), dimensionless."""
+    """The axis, about which it is right-handed: a unit vector (North, Up, East)."""
 
 
 class Found(Record):
-    """Scheme that the search found, with its figures."""
+    """A scheme that was found."""
 
     __slots__ = ()
 
     positions: list[str]
-    """Candidates of the scheme, in order of time."""
+    """Its positions in order."""
     image_of: int | None
-    """Index, from 1, of the scheme listed before that a turn of the platform axes turns into this one (coefficients renamed): the same
-    scheme in other axes; null for none.
+    """Which of those listed before it, counted from 1, a turn of the platform axes turns into it (coefficients renamed): the same scheme
+    in other axes; null: none.
     """
     angles: list[str]
-    """Gimbal angles alpha,beta,gamma of the positions, in degrees: within the gimbal limits, each with the shortest gimbal path from the
-    position before (without limits as the candidates have them, in (-180, 180]).
+    """Their gimbal angles alpha,beta,gamma in degrees: within the gimbal limits, each with the shortest gimbal way from the position
+    before (without limits as the candidates have them, in (-180, 180]).
     """
     half_turns: list[HalfTurn]
-    """Half turns between the positions, each with its direction; the other direction makes another scheme."""
+    """The half turns between them, each with its direction: the other one is another scheme."""
     refined: bool
-    """True if its angles were refined continuously."""
+    """Its angles were refined continuously."""
     dwell_s: float
-    """Dwell of each position, in s; the mean if the dwells differ."""
+    """Dwell of each position, in s; the mean where they have dwells of their own."""
     dwells_s: list[float]
-    """Dwell of each position, in s, if the total time was divided among the positions; empty if the dwells are equal. Moving 1/256 of an
-    equal dwell (at least the time between samples) from one position to another makes none of them better.
+    """Where the total time was divided among the positions: the dwell of each, in s; empty where they are equal. Moving a two hundred
+    and fifty-sixth of an equal dwell (at least the time between samples) from one position to another makes none of them better.
     """
     total_s: float
     """Total time with turns, in s."""
     value: float
-    """Criterion of the scheme, in the unit of `unit`; for margin the largest sigma over its requirement, psi included where it counts."""
+    """The criterion: a sigma in its unit, or for margin the largest sigma over its requirement, psi's too where it counts."""
     worst_sigma_dph: float | None
-    """Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if one is stated, no drift
-    noise; null if none is required.
+    """The largest sigma of a required drift coefficient in deg/h (per g): information of all samples, prior if one is stated, no drift
+    noise; null when none is required.
     """
     worst: str | None
-    """Coefficient with the largest sigma; null if none is required."""
+    """The coefficient that has it."""
     requirements: Requirements
-    """Outcome of the requirements on the required coefficients, and on psi (of the start, under reset carry of every position) if every
-    coefficient is required.
+    """What became of the requirements on what must be observable, and on psi (of the start, under reset carry of every position) when
+    that is every coefficient.
     """
     worst_degree: int
-    """Largest observable degree of a required coefficient."""
+    """Its largest degree of a required coefficient."""
     worst_accuracy_order: int | None
-    """Largest accuracy order of a required coefficient; null if it was not computed."""
+    """Its largest accuracy order of a required coefficient."""
     rank: tuple[int, int]
-    """Rank by derivatives, exact, then the number of unknowns."""
+    """Its exact rank by derivatives, and the number of unknowns."""
 
 
 class Design(Shape):
-    """Search for the best schemes of candidate attitudes."""
+    """The result of a search."""
 
     schema: str
-    """Layout of this answer: `obsdeg.design/2`."""
+    """`obsdeg.design/2`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """What is carried between positions."""
     latitude_deg: float
-    """Latitude of the scheme, in degrees."""
+    """Latitude in degrees."""
     latitude_by_default: bool
-    """True if the program chose the latitude."""
+    """Whether the latitude was chosen by the program."""
     geometry: Geometry
-    """Mounting of the gyros and accelerometers."""
+    """Axes of the gyros."""
     terms: str
-    """Terms of the error model that are unknown besides psi; all of them are estimated."""
+    """Unknown besides psi; all of them are estimated."""
     candidates: list[str]
-    """Candidate attitudes of the search."""
+    """The attitudes to choose from."""
     beyond_gimbals: list[str]
     """Attitudes that the gimbals do not reach."""
     symmetry: int
-    """Number of rotations of the platform axes that turn schemes into equally good ones (1: the identity)."""
+    """Rotations of the platform axes that turn schemes into equally good ones (1: the identity)."""
     required: list[str]
-    """Coefficients that must be observable; the criterion is computed from their sigmas."""
+    """Coefficients that must be observable, and that the criterion is about."""
     minimum: Minimum
-    """Smallest number of positions that makes every required coefficient observable."""
+    """The fewest positions."""
     search: SearchReport | None
-    """Search that was done, with its conditions; null when only the minimum was asked for."""
+    """What was searched; null when only the minimum was asked for."""
     found: list[Found]
-    """Best schemes that were found, best first."""
+    """The best schemes, best first."""
     front: list[Found]
-    """Schemes that no scheme found beats in both total time and criterion, by total time."""
+    """Schemes that none found beats in both total time and criterion, by total time."""
     not_judged: list[str]
     """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
     other_carries: list[OtherCarry]
-    """Outcome of the first scheme under the other carries; empty if no scheme was searched."""
+    """The first scheme under the other carries; empty where none was searched."""
     gimbals: GimbalReport | None
     """Turns of the first scheme beyond the gimbal limits, and positions of the file of candidates whose angles lie beyond. Left out
     where no limits are stated.
     """
     primes: int
-    """Number of independent random 61-bit primes by which every set is judged: it counts as observable when one of them says so."""
+    """How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so."""
     error_bound: float
-    """Bound on the probability that an observable set was overlooked, or a degree taken too large. Nothing is called proven unless it is
+    """Bound on the probability that an observable set was overlooked, or a degree taken too large; nothing is called proven unless it is
     below 1e-12.
     """
     seed: int
@@ -1339,204 +1334,202 @@ class Design(Shape):
 
 
 class Walks(Shape):
-    """Shortest slew sequence that makes every required coefficient observable."""
+    """The fewest positions of a walk."""
 
     schema: str
-    """Layout of this answer: `obsdeg.walks/1`."""
+    """`obsdeg.walks/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     terms: str
-    """Terms of the error model that are unknown besides psi."""
+    """Unknown besides psi."""
     candidates: list[str]
-    """Candidate attitudes of the search."""
+    """The attitudes to choose from."""
     most_turn_deg: float
-    """Largest turn from one position to the next, in degrees, about one axis by the shortest path."""
+    """The largest turn from one position to the next, in degrees: by one axis, the shortest way."""
     turns: int
-    """Number of turns between candidates up to this size."""
+    """Turns between candidates that are not larger."""
     required: list[str]
     """Coefficients that must be observable."""
     positions: int | None
-    """Number of positions of the shortest slew sequence that was found; null if none was."""
+    """The fewest positions that were found; null when no walk does."""
     walk: list[str]
-    """Slew sequence that makes all required coefficients observable: its candidates, in order; empty if none was found."""
+    """A walk that does."""
     angles: list[str]
-    """Euler angles of its positions, in degrees."""
+    """Its Euler angles in degrees."""
     rank: tuple[int, int]
-    """Rank of the slew sequence, then the number of unknowns."""
+    """Its rank, and the number of unknowns."""
     latitude_deg: float | None
-    """Latitude of the scheme in degrees; null when generic."""
+    """The latitude in degrees; null when generic."""
     never: list[str]
-    """Coefficients that even the tour of all turns leaves unobservable; then no slew sequence is searched."""
+    """Coefficients that even the tour of all turns leaves unobservable; no walk is sought then."""
     counting_bound: int
-    """Number of positions below which no slew sequence is enough: the required coefficients over the rows of a position, rounded up."""
+    """No fewer can do: the required coefficients over the rows of a position, rounded up."""
     rows_per_position: int
-    """Largest number of independent rows that a position adds."""
+    """The most independent rows that a position adds."""
     none_of: list[tuple[int, int]]
-    """Slew sequences excluded by exhaustion: `[positions, number of sequences]`, none of which is enough."""
+    """`[positions, walks]`: none of these does, by exhaustion."""
     proven: bool
-    """True if `positions` is proven minimal for these candidates and turns: no shorter sequence was left out, and the bound on the
-    probability of an error is below 1e-12.
+    """Whether `positions` is the fewest of these candidates and turns: nothing smaller was left out, and the bound on the probability of
+    an error is below 1e-12.
     """
     interrupted: bool
-    """True if the search was interrupted."""
+    """Whether the search was interrupted."""
     error_bound: float
-    """Bound on the probability that a sufficient slew sequence was overlooked."""
+    """Bound on the probability that a walk that does was overlooked."""
     seed: int
     """Seed of all random choices."""
 
 
 class Worth(Record):
-    """Score of a sequence, better first: constraints kept, then a small worst degree, then a small criterion."""
+    """What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion."""
 
     __slots__ = ()
 
     violation: float
-    """Violation of time limits, requirements and degree caps, dimensionless; 0 when kept."""
+    """How far time limits, requirements and degree caps are missed; 0 when kept."""
     degree: int
-    """Largest observable degree of a required coefficient."""
+    """The largest degree of a required coefficient."""
     value: float
-    """Criterion of the sequence, in the unit of the criterion asked for."""
+    """The criterion."""
 
 
 class Stop(Record):
-    """Position of a sequence: the candidate, and the slew path to it."""
+    """A position of a sequence: which candidate, and which way there."""
 
     __slots__ = ()
 
     candidate: int
-    """Index of the candidate, from 0."""
+    """The candidate."""
     reversed: bool
-    """True if a half turn to the position goes the other way round than by default: about the axis whose first non-zero component is
-    negative.
-    """
+    """A half turn to it goes the other way round than `Slew::to` says."""
 
 
 class Scored(Record):
-    """Sequence of candidates with its score."""
+    """A sequence with its worth."""
 
     __slots__ = ()
 
     worth: Worth
-    """Score: constraints, worst degree and criterion."""
+    """What it is worth."""
     seconds: float
-    """Total time of dwells and turns, in s."""
+    """Dwells and turns, in s."""
     sequence: list[Stop]
-    """Candidates of the sequence, in order, with the slew paths to them."""
+    """The candidates in order, with the ways there."""
 
 
 class Ties(Record):
-    """Sequences near the best so far, counted by criterion."""
+    """The sequences near the best so far: how many there are of each criterion."""
 
     __slots__ = ()
 
     degree: int
-    """Smallest worst degree of the sequences."""
+    """The smallest worst degree."""
     counts: list[tuple[float, int, int]]
-    """Criterion (in the unit of the criterion asked for), number of searched images of a sequence, number of sequences."""
+    """Criterion, searched images of a sequence, how many there are."""
 
 
 class Best(Record):
-    """Best sequences, best first, and the front of time against the criterion."""
+    """The best sequences, best first, and the front of time against the criterion."""
 
     __slots__ = ()
 
     found: list[Scored]
-    """Best sequences that were found, best first, up to the number to keep."""
+    """At most as many as are kept."""
     front: list[Scored]
     """Sequences of the smallest worst degree that none of these beats in both time and criterion, by time."""
     ties: Ties
-    """Number of sequences as good as the best, by criterion."""
+    """Those that are as good as the best."""
     complete: bool
-    """True if the search was complete."""
+    """Whether everything was searched."""
     examined: int
-    """Number of sequences whose sigma was computed."""
+    """Sequences whose sigma was computed."""
     excluded: int
-    """Number of sequences, observable or not, that a bound excluded: they are worse than those kept."""
+    """Sequences, observable or not, that a bound left out: they are worse than those kept."""
     lost: int
-    """Number of examined sequences that are observable (by the exact verdict, of repositioning at once) but whose samples do not
-    determine the required coefficients in double precision.
+    """Of those examined, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what is
+    required, as far as double precision tells.
     """
 
 
 class Level(Record):
-    """Sequences found with one worst degree."""
+    """What was found among the sequences of one worst degree."""
 
     __slots__ = ()
 
     next: int
-    """Index of the first start that is not yet searched."""
+    """The first start that is not yet searched."""
     best: Best
-    """Best sequences, the front and the counts at this worst degree."""
+    """What was examined, found, and the front."""
 
 
 class Part(Shape):
-    """Part of an exhaustive search, done or interrupted."""
+    """One part of an exhaustive search, done or interrupted."""
 
     schema: str
-    """Layout of this answer: `obsdeg.part/1`."""
+    """`obsdeg.part/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     digest: str
     """SHA-256 of all inputs: the parts of one search have the same."""
     inputs: dict[str, str]
-    """Inputs of the search by name, as the library writes them; they show the difference if digests differ."""
+    """The inputs by name, as the library writes them: which differ, where digests do."""
     asked: str | None
-    """Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null if no
+    """Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null where no
     command did.
     """
     part: tuple[int, int]
-    """Index of the part, from 1, then the number of parts."""
+    """Which part, counted from 1, of how many."""
     starts: tuple[int, int, int]
-    """Starts of the part: index of the first, index behind the last (both from 0), and the number of all starts."""
+    """The starts that are its own, counted from 0: the first, the one behind the last, and how many there are in all."""
     levels: list[Level]
-    """Sequences found, by worst degree, smallest first (under reset carry all degrees together)."""
+    """What was found, by worst degree, smallest first (under reset carry all degrees together)."""
     complete: bool
-    """True if all of its starts were searched, at as many worst degrees as the whole may need."""
+    """Whether all of its starts were searched, at as many worst degrees as the whole may need."""
 
 Truth = Literal["linear", "exact"]
-"""Model that generates the truth of a simulated run. linear: Linear model of the filter: (2), (6). exact: Direction cosines: the drift
-turns the true attitude, the specific force is taken in the true platform frame.
+"""How the truth is generated. linear: By the linear model of the filter: (2), (6). exact: By direction cosines: the drift turns the true
+attitude, the specific force is taken in the true platform frame.
 """
 
 Propagation = Literal["exponential", "rk4"]
-"""Computation of the filter's transition matrix. exponential: Matrix exponential of the linear model. rk4: Runge-Kutta integration of
-order four, as in the paper.
+"""How the filter gets its transition matrix. exponential: The matrix exponential of the linear model. rk4: Runge-Kutta of order four, as
+the paper.
 """
 
 
 class ConditionsReport(Record):
-    """Conditions of a run with their units."""
+    """The conditions of a run with their units."""
 
     __slots__ = ()
 
     truth: Truth
-    """Model that generates the truth: linear or exact."""
+    """How the truth is generated."""
     latitude_deg: float
-    """Latitude of the run, in degrees."""
+    """Latitude in degrees."""
     latitude_by_default: bool
-    """True if the program chose the latitude."""
+    """Whether the latitude was chosen by the program."""
     step_s: float
-    """Largest step between samples, in s."""
+    """Largest step in s."""
     slew_rate_deg_s: float | None
-    """Rate of slews in deg/s unless a position states its own; null for instantaneous slews."""
+    """Rate of slews in deg/s where a position does not say its own; null: instantaneous."""
     accelerometer_noise_g: float
-    """Noise of the observation per sample, in g."""
+    """Noise of the observation per sample in g."""
     accelerometer_bias: AccelerometerBias | None
     """Bias instability of the accelerometers, states of the filter and of the truth; left out where there is none."""
     drift_noise: str
     """Random drift with its unit."""
     drift_noise_density_deg_sqrt_h: tuple[float, float]
-    """Density of the random drift, in deg/sqrt(h), in the shortest and in the longest step of the timeline."""
+    """Its density in deg/sqrt(h) in the shortest and in the longest step of the timeline."""
     drift_noise_step_s: float | None
-    """Step, in s, for which a bias of one step was given; null for a density."""
+    """The step in s for which a bias of one step was given; null for a density."""
     drift_noise_differs: bool
-    """True if the density differs by more than 1 % from that with the given step."""
+    """Whether the density is another than with that step, by more than 1 %."""
     gyro_noise: GyroNoise | None
-    """Noise of the gyros by their datasheet, states of the filter and of the truth; left out where there is none."""
+    """What the datasheet of the gyros says besides, states of the filter and of the truth; left out where there is none."""
     propagation: Propagation
-    """Propagation of the filter: exponential or rk4."""
+    """Propagation of the filter."""
     drift_scale: float
-    """Factor on the true drifts and their priors, dimensionless."""
+    """Factor on true drifts and their priors."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg, drift_noise, values, priors.
@@ -1544,31 +1537,31 @@ class ConditionsReport(Record):
 
 
 class TimelineReport(Record):
-    """Position or slew of the timeline."""
+    """A position or slew of the timeline."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position, or of the one that a slew leads to."""
+    """The position, or the one a slew goes to."""
     slew: bool
-    """True if this is a slew, false for a position."""
+    """Whether it is a slew."""
     start_s: float
-    """Start of the position or slew, in s."""
+    """Start in s."""
     end_s: float
-    """End of the position or slew, in s."""
+    """End in s."""
     turn: Turn | None
-    """Turn of the slew: its axis and angle; null for a position."""
+    """How a slew turns; null at a position."""
 
 
 class LinearEstimate(Record):
-    """Estimate of the linear filter at the end of the run."""
+    """What the linear filter says at the end of the run."""
 
     __slots__ = ()
 
     error: float
-    """Estimate minus true value, in the unit of the unknown."""
+    """Estimate minus truth."""
     sigma: float
-    """Standard deviation of the error by the linear filter, in the unit of the unknown."""
+    """What it believes of the error."""
 
 Outcome = Literal[
     "reached",
@@ -1580,173 +1573,167 @@ Outcome = Literal[
     "inconsistent",
     "no_number",
 ]
-"""Outcome of a run for one unknown or combination. reached: Reached: sigma is at or below the requirement. converging: Converging: sigma
-fell, but not to the requirement. determined: Determined: sigma fell; nothing is required of it. rests_on_prior: Determined by the
-samples, but sigma is (nearly) that of the prior. prior_only: Not determined by the samples: sigma comes from the prior alone.
-large_angles_only: Not determined for small angles; a filter with full attitudes learns of it through large ones. inconsistent:
-Inconsistent: the error is beyond four sigma, so the filter is wrong. no_number: Error or sigma that is not a finite number.
+"""What a run says of one unknown. reached: Sigma is at or below what is required. converging: Sigma fell, but not to what is required.
+determined: Sigma fell; nothing is required of it. rests_on_prior: The samples determine it, but sigma is (nearly) that of the prior.
+prior_only: The samples do not determine it: whatever sigma says, it comes of the prior. large_angles_only: The verdict, which is
+about small angles, has it undetermined; a filter with full attitudes learns of it through large ones. inconsistent: The error is
+beyond four sigma: the filter is wrong about it. no_number: The error or sigma is no number.
 """
 
 
 class Estimate(Record):
-    """Estimate of one unknown or combination at the end of the run."""
+    """The estimate of one unknown or combination at the end of the run."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, or the combination."""
+    """The unknown or combination."""
     unit: str
-    """Unit of the truth, the estimates and the sigmas."""
+    """Unit of all its numbers."""
     status: Status
-    """Verdict: observable, inseparable or not excited."""
+    """The exact verdict."""
     degree: int | None
-    """Observable degree; null if not observable."""
+    """The observable degree."""
     accuracy_order: int | None
-    """Accuracy order; null if no dwell makes it observable, or if none were computed."""
+    """The accuracy order."""
     truth: float
-    """True value, in the unit of `unit`."""
+    """The truth."""
     estimate: float
-    """Estimate at the end of the run, in the unit of `unit`."""
+    """The estimate."""
     error: float
-    """Estimate minus true value, in the unit of `unit`."""
+    """Estimate minus truth."""
     sigma: float
-    """Standard deviation of the error by the filter, in the unit of `unit`."""
+    """What the filter believes of the error."""
     predicted_sigma: float | None
-    """Predicted sigma under the stated conditions, in the unit of `unit`; null if neither samples nor stated priors bound it."""
+    """Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound it."""
     error_over_sigma: float
-    """Error over sigma, dimensionless; about -3 to 3 for a consistent filter."""
+    """Error over sigma."""
     linear: LinearEstimate | None
-    """Estimate of the linear filter from the same measurements; null if the run's filter is linear."""
+    """What the linear filter makes of the same measurements; null where it is the filter."""
     prior_sigma: float
-    """Standard deviation at the start of the run, in the unit of `unit`."""
+    """Sigma at the start."""
     required_sigma: float | None
-    """Largest sigma allowed, in the unit of `unit`; null if none is required."""
+    """The sigma to be reached."""
     time_to_requirement_s: float | None
-    """Time, in s, from which sigma meets the requirement to the end; null if it does not, or if the samples do not determine the
-    unknown.
-    """
+    """When it was reached first, in s; null for what the samples do not determine."""
     outcome: Outcome
-    """Outcome of the run for this unknown or combination."""
+    """What came out."""
     prior_of: list[str]
-    """Indistinguishable unknowns whose priors the estimate relies on besides its own. Empty unless it is known from the prior only."""
+    """On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only."""
 
 
 class SigmaRatio(Record):
-    """Ratio of a run's sigma to the predicted one."""
+    """The ratio of a run's sigma to the predicted one."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown with this ratio."""
+    """The unknown."""
     ratio: float
     """Sigma of the run over the predicted sigma, dimensionless."""
 
 RunDiffers = Literal["random_drift", "prior", "full_attitudes"]
-"""Reason why the sigmas of a run may differ from the predicted ones. random_drift: Random drift of the program, since none is stated.
-prior: Priors of the program, since not every unknown has a stated one. full_attitudes: Filter with full attitudes, while the
-prediction is for small angles.
+"""Reason why the sigmas of a run may differ from the predicted ones. random_drift: The random drift of the program: none is stated.
+prior: Priors of the program: not every unknown has a stated one. full_attitudes: A filter with full attitudes: the prediction is that
+of small angles.
 """
 
 
 class RunRequirements(Record):
-    """Requirements by the sigmas of a run, beside the prediction."""
+    """A run's sigmas against the requirements, beside the prediction."""
 
     __slots__ = ()
 
     requirements: Requirements
     """Outcome of the requirements in the run."""
     largest_ratio: SigmaRatio | None
-    """Largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null if none has."""
+    """The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null where none has."""
     smallest_ratio: SigmaRatio | None
-    """Smallest ratio of a sigma of the run to the predicted one; null if no unknown has both."""
+    """The smallest such ratio; null where no unknown has both."""
     differs: list[RunDiffers]
     """Reasons why the sigmas of the run may differ from the predicted ones."""
 
 Doubt = Literal["no_number", "nis", "nees", "error", "correlated"]
-"""Statistical evidence against a run. no_number: Statistic, estimate or sigma that is not a finite number. nis: Mean NIS outside its
-acceptance band of 99.9 %. nees: NEES above its acceptance band of 99.9 %. error: Error beyond four sigma of the filter. correlated:
-Innovations that are not white.
+"""What speaks against a run. no_number: A statistic, an estimate or a sigma is no number. nis: The mean NIS is outside its band of 99.9
+%. nees: The NEES is above the band of 99.9 %. error: An error is beyond four sigma. correlated: The innovations are not white.
 """
 
 
 class Consistency(Record):
-    """Consistency statistics of one run: NIS, NEES, whiteness and errors."""
+    """Statistics of one run."""
 
     __slots__ = ()
 
     nis: float
-    """Mean normalised innovation squared (NIS), dimensionless; its expectation is the number of outputs."""
+    """Mean normalised innovation squared; its expectation is the number of outputs."""
     nis_band: tuple[float, float]
-    """Band of 95 % of the mean NIS, dimensionless."""
+    """The band of the mean NIS, 95 %."""
     nis_wide_band: tuple[float, float]
-    """Acceptance band of 99.9 % of the mean NIS, dimensionless."""
+    """The band of 99.9 %, in which it must be."""
     nees: float
-    """Normalised estimation error squared (NEES) at the end, dimensionless. Its expectation is the number of states (unknowns, and gyro
-    biases that are states) without the directions left out.
+    """Normalised estimation error squared at the end; its expectation is the number of states: unknowns, and the biases of the gyros
+    where these are states, but for the directions that are left out.
     """
     unresolved_directions: int
-    """Number of directions that the NEES leaves out: a filter linearised at its estimates claims to know them more than a million times
-    better than the unknowns themselves. 0 for a linear model.
+    """Directions that the NEES leaves out: known more than a million times better than the unknowns themselves, which a filter
+    linearised at its estimates believes but cannot know. None where the model is linear.
     """
     nees_band: tuple[float, float]
-    """Band of 95 % of the NEES, dimensionless."""
+    """Its band, 95 %."""
     nees_limit: float
-    """Upper end of the acceptance band of 99.9 % of the NEES, dimensionless. A small NEES is no evidence: true values are given, not
-    drawn.
-    """
+    """The upper end of its band of 99.9 %, which it must not exceed. A small one says nothing: true values are given, not drawn."""
     whiteness_probability: float
     """Probability that white noise has autocorrelations as large as the innovations', smallest over outputs."""
     beyond: list[str]
-    """Unknowns with an error beyond four sigma."""
+    """Unknowns whose error is beyond four sigma."""
     doubts: list[Doubt]
-    """Evidence against the run; empty if there is none."""
+    """What speaks against the run."""
     consistent: bool
-    """True if NIS, NEES, whiteness and errors all pass."""
+    """Whether nothing does."""
 
 FilterKind = Literal["linear", "extended", "iterated"]
-"""Filter that estimates the unknowns. linear: Linear model with gains that are known beforehand: small psi. extended: Extended filter:
-full attitudes, Jacobians at the current estimate. iterated: Iterated filter: full attitudes, relinearised along the whole run until
-it converges.
+"""Which filter estimates. linear: Of the linear model, with gains that are known beforehand: small psi. extended: With full attitudes,
+its Jacobians at the estimate of the moment. iterated: The same, linearised again along the whole run until that settles.
 """
 
 FilterReason = Literal["given", "linear_truth", "valid", "not_valid"]
-"""Reason for the choice of a filter. given: Choice by a file or an option. linear_truth: Truth of the linear model. valid: Validity of
-the small-angle model at the truth. not_valid: Invalidity of the small-angle model at the truth.
+"""Why a filter was chosen. given: It was asked for. linear_truth: The truth is that of the linear model. valid: The small-angle model
+holds for the truth. not_valid: It does not.
 """
 
 
 class FilterReport(Record):
-    """Filter of the run, and the reason for it."""
+    """Which filter ran."""
 
     __slots__ = ()
 
     kind: FilterKind
-    """Filter of the run: linear, extended or iterated."""
+    """The filter."""
     reason: FilterReason
-    """Reason for the choice of this filter."""
+    """Why this one."""
     passes: int
-    """Number of linearisations of the whole run: 1 except for the iterated filter."""
+    """Linearisations of the whole run: 1 but for the iterated filter."""
     converged: bool
-    """True if the linearisations converged."""
+    """Whether they settled."""
 
 
 class Simulation(Shape):
-    """Run of the filter against a simulated truth."""
+    """One run of the filter against a simulated truth."""
 
     schema: str
-    """Layout of this answer: `obsdeg.simulation/2`."""
+    """`obsdeg.simulation/2`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """What is carried between positions."""
     conditions: ConditionsReport
-    """Conditions of the run, with their units."""
+    """Under which conditions."""
     timeline: list[TimelineReport]
-    """Positions and slews of the run, in order of time."""
+    """The timeline."""
     quantities: list[Estimate]
-    """Estimates of the unknowns at the end of the run, in model order."""
+    """The unknowns in model order: at the end of the run."""
     combinations: list[Estimate]
-    """Estimates of observable combinations of unknowns that are not observable alone."""
+    """Observable combinations of unknowns that are not observable alone."""
     requirements: Requirements
     """Outcome of the requirements by prediction, as in every other command: the information of all samples with the noise, the random
     drift and the priors that are stated.
@@ -1754,148 +1741,151 @@ class Simulation(Shape):
     run: RunRequirements
     """Outcome of the requirements in this run, by the sigmas of its filter at the end."""
     other_carries: list[OtherCarry]
-    """Outcome of the same scheme under the other carries."""
+    """The same scheme under the other carries."""
     consistency: Consistency
-    """Consistency of errors and innovations with the filter's covariances."""
+    """Whether errors and innovations are what the filter believes."""
     filter: FilterReport
-    """Filter of the run, and the reason for it."""
+    """Which filter it is, and why."""
     validity: Validity
-    """Validity of the small-angle model at these drifts."""
+    """Whether the linear model holds for these drifts."""
     noise_floor: NoiseFloor | None
-    """Noise floor: the least sigmas of coefficients, however long the dwells; left out where the gyros have no noise of their own."""
+    """How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own."""
     gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
+    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
     seed: int
-    """Seed of the noise and of all random choices."""
+    """Seed of the noise."""
 
 
 class SystemEstimate(Record):
-    """Estimate of one unknown at the end of the run."""
+    """The estimate of one unknown at the end."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, as in the model."""
+    """Its name."""
     unit: str
-    """Unit of the unknown, as in the model file."""
+    """Its unit, as the file says."""
     status: Status | None
-    """Verdict on the unknown; null for a state with a known initial value."""
+    """The exact verdict; null for a state whose start is known."""
     degree: int | None
-    """Observable degree; null if the unknown is not observable."""
+    """The degree."""
     truth: float
-    """True value of the unknown, in its unit."""
+    """The truth."""
     estimate: float
-    """Estimate of the unknown, in its unit."""
+    """The estimate."""
     error: float
-    """Estimate minus true value, in the unit of the unknown."""
+    """Estimate minus truth."""
     sigma: float
-    """Standard deviation of the error by the filter, in the unit of the unknown."""
+    """What the filter believes of the error."""
     error_over_sigma: float
-    """Error over sigma, dimensionless; about -3 to 3 for a consistent filter."""
+    """Error over sigma."""
     prior_sigma: float
-    """Standard deviation at the start of the run, in the unit of the unknown."""
+    """Sigma at the start."""
     outcome: Outcome
-    """Outcome for the unknown; requirements do not exist here."""
+    """What came out; nothing is required."""
 
 
 class SystemRun(Shape):
-    """Simulated run of a system with an extended Kalman filter."""
+    """A run of a system."""
 
     schema: str
-    """Layout of this answer: `obsdeg.system-run/1`."""
+    """`obsdeg.system-run/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     name: str
-    """Name of the system, as in its file."""
+    """The system."""
     quantities: list[SystemEstimate]
-    """Estimates of the unknowns at the end of the run."""
+    """Estimates at the end."""
     consistency: Consistency
-    """Consistency of errors and innovations with the filter's covariances."""
+    """Whether errors and innovations are what the filter believes."""
+    time: float | None
+    """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
+    known inputs hold the time.
+    """
     duration: float
-    """Duration of every experiment, in the unit of `t` in the model."""
+    """How long every experiment ran, in the unit of the model."""
     step: float
-    """Time between two samples, in the unit of `t` in the model."""
+    """Between two samples."""
     noise: list[tuple[str, float]]
-    """Standard deviation of the noise of a sample, by output, in its unit."""
+    """Standard deviation of the noise of a sample, by output."""
     error_bound: float | None
-    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
+    """Of a model judged in prime fields: bound on the probability that a verdict is wrong."""
     digits: DigitsReport | None
-    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
+    """Of a model judged in real numbers: how clear its ranks were."""
     seed: int
     """Seed of the noise and of the initial errors."""
 
 
 class Counts(Record):
-    """Number of checks by outcome."""
+    """How many checks came out how."""
 
     __slots__ = ()
 
     agree: int
-    """Number of checks that agree with the verdicts."""
+    """Agree."""
     disagree: int
-    """Number of checks that disagree with the verdicts."""
+    """Disagree."""
     not_resolvable: int
-    """Number of checks that are not resolvable."""
+    """Are not resolvable."""
     not_tested: int
-    """Number of checks that were skipped."""
+    """Were not made."""
 
 Agreement = Literal["agrees", "disagrees", "not_resolvable", "not_tested"]
-"""Outcome of a check of a verdict. agrees: Agreement: the measurement confirms the verdict. disagrees: Disagreement: the measurement
-contradicts the verdict. not_resolvable: Measurement that neither supports nor contradicts the verdict, by a test that the answer
-states. not_tested: Check that was skipped: nothing was measured.
+"""What evidence makes of a verdict. agrees: What was measured is what the verdict says. disagrees: It is not. not_resolvable: Something
+was measured, but neither for nor against the verdict, by a test that the answer states. not_tested: Nothing was measured.
 """
 
 
 class SpaceCheck(Record):
-    """Property that is no number, predicted and measured."""
+    """Something that is no number, predicted and measured."""
 
     __slots__ = ()
 
     what: str
-    """Property that is compared with the samples."""
+    """What is held against the samples."""
     predicted: str
-    """Value by the exact verdicts."""
+    """By the exact verdicts."""
     measured: str
-    """Value by the samples; empty if nothing was measured."""
+    """By the samples; empty when nothing was measured."""
     outcome: Agreement
-    """Outcome of the comparison of both values."""
+    """Whether they agree."""
 
 
 class Measured(Record):
-    """Coverage of the predicted orders by measured slopes."""
+    """How many of the orders that the verdicts say were measured by a slope."""
 
     __slots__ = ()
 
     measured: int
-    """Number of orders that were measured by a slope."""
+    """Slopes that were measured."""
     of: int
-    """Number of unknowns and combinations that have an order."""
+    """Unknowns and combinations that have an order."""
 
 
 class Check(Record):
-    """Number that was predicted and measured."""
+    """A predicted and a measured number."""
 
     __slots__ = ()
 
     predicted: float
-    """Predicted number by the exact verdict: a slope, factor, part or correlation, dimensionless."""
+    """What the exact verdict says."""
     measured: float | None
-    """Measured number by the filter, dimensionless; null if it could not be measured."""
+    """What the filter shows; null when it could not be measured."""
     outcome: Agreement
-    """Outcome of the comparison of both numbers."""
+    """Whether they agree."""
 
 
 class Partners(Record):
-    """Unknowns indistinguishable from one: those in a common direction of minimal support that Z does not observe."""
+    """Unknowns that share with one a direction that Z does not see and that holds no shorter one."""
 
     __slots__ = ()
 
     predicted: list[str]
-    """Partners by the exact verdicts."""
+    """By the exact verdicts."""
     measured: list[str] | None
-    """Partners by the directions that the samples do not show; null if they were not measured."""
+    """Those of the directions that the samples do not show; null when they were not measured."""
     outcome: Agreement
-    """Outcome of the comparison of both lists."""
+    """Whether they are the same."""
 
 
 class QuantityEvidence(Record):
@@ -1904,33 +1894,31 @@ class QuantityEvidence(Record):
     __slots__ = ()
 
     name: str
-    """Name of the unknown, or the combination."""
+    """The unknown or combination."""
     status: Status
-    """Verdict: observable, inseparable or not excited."""
+    """The exact verdict."""
     degree: int | None
-    """Observable degree; null if not observable."""
+    """The observable degree."""
     accuracy_order: int | None
-    """Accuracy order; null if no dwell makes it observable, or if none were computed."""
+    """The accuracy order."""
     modelled: bool
-    """True if the filter contains the unknown. A filter with a deliberate error may lack it; then nothing is measured."""
+    """Whether the filter has it: one that was made wrong may lack an unknown, and nothing is measured then."""
     degree_slope: Check
-    """Evidence a: log-log slope of sigma against the dwell, with psi of the start of each position handed on to the next. Predicted
-    -(degree + 1/2); 0 if nothing is learnt.
+    """a: log-log slope of sigma against the dwell, psi handed on between positions as it was at the start of each: -(degree + 1/2); 0
+    when nothing is learnt.
     """
     status_measured: Status | None
-    """Evidence a: status by the same information, from the column of the unknown and the span of the rows; null if it was not measured."""
+    """a: whether its column of that information is zero, and whether it is in the span; null when it was not measured."""
     status_outcome: Agreement
-    """Outcome of the comparison with the verdict."""
+    """Whether that is the verdict."""
     partners: Partners | None
-    """Unknowns indistinguishable from it by derivatives; null for a combination."""
+    """Unknowns that derivatives do not tell it from; null for a combination."""
     slope: Check
-    """Evidence a: log-log slope of sigma (psi: of the start) against the dwell. Predicted -(accuracy order + 1/2); 0 if nothing is
-    learnt.
-    """
+    """a: log-log slope of sigma (psi: of the start) against the dwell: -(accuracy order + 1/2); 0 when nothing is learnt."""
     slope_at_end: Check
-    """Log-log slope of sigma with psi of the end, as in a filter."""
+    """The same with psi of the end, which is what a filter shows."""
     inflation: Check
-    """Evidence b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100."""
+    """b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100."""
 
 
 class NullEvidence(Record):
@@ -1939,62 +1927,62 @@ class NullEvidence(Record):
     __slots__ = ()
 
     direction: str
-    """Null vector, as in `psi_y = 1, D_FZ = 6.4e-5`, in SI units."""
+    """`psi_y = 1, D_FZ = 6.4e-5` in SI units."""
     seen: Check
-    """Effect of the null vector on Z, relative to the most observable direction: predicted 0."""
+    """How much of it Z sees, relative to the best seen direction: predicted 0."""
     correlation: Check | None
-    """Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1; null if other null vectors
-    share its unknowns, or if it has only one.
+    """Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1; null when other null vectors
+    share its unknowns, or when it has only one.
     """
 
 
 class Count(Record):
-    """Count that was predicted and measured."""
+    """A predicted and a measured count."""
 
     __slots__ = ()
 
     predicted: int
-    """Number that the exact verdicts predict."""
+    """By the exact verdicts."""
     measured: int
-    """Number that the samples show."""
+    """By the samples."""
     outcome: Agreement
-    """Outcome of the comparison of both numbers."""
+    """Whether they agree."""
 
 
 class CrossCheckDifference(Record):
-    """Largest difference of two covariances."""
+    """The largest difference of two covariances."""
 
     __slots__ = ()
 
     name: str
-    """Covariances or models that are compared."""
+    """What is compared."""
     difference: float
-    """Largest relative difference, dimensionless: `max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`."""
+    """`max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`."""
     limit: float
-    """Largest difference allowed, dimensionless."""
+    """The limit."""
     outcome: Agreement
-    """Outcome: agreement within the limit. Not resolvable if rounding may reach a tenth of the limit: largest variance of the prior,
-    over the smallest at the end, times steps times 2e-16.
+    """Whether it is kept; not resolvable where rounding may make a tenth of it: the largest variance of the prior, beside the smallest
+    at the end, times the steps times 2e-16.
     """
 
 
 class Statistic(Record):
-    """Averaged statistic with its acceptance bands."""
+    """A statistic with its bands."""
 
     __slots__ = ()
 
     name: str
-    """Name of the averaged statistic."""
+    """What is averaged."""
     expected: float
-    """Expectation of the average, dimensionless."""
+    """Its expectation."""
     measured: float
-    """Average over runs and samples, dimensionless."""
+    """The average."""
     band: tuple[float, float]
-    """Band of 95 % of the average, dimensionless."""
+    """The band of 95 %."""
     wide_band: tuple[float, float]
-    """Acceptance band of 99.9 % of the average, dimensionless."""
+    """The band of 99.9 %, in which it must be."""
     pass_: bool
-    """True if `measured` lies inside its acceptance band."""
+    """Whether it is."""
 
 
 class HistoryPoint(Record):
@@ -2003,143 +1991,141 @@ class HistoryPoint(Record):
     __slots__ = ()
 
     t_s: float
-    """Time since the start of the run, in s."""
+    """Time in s."""
     nees: float
-    """Average NEES of all unknowns, dimensionless."""
+    """ANEES of all unknowns."""
     nis: float
-    """Mean NIS since the point before, dimensionless."""
+    """Mean NIS since the point before."""
     samples: int
-    """Number of samples in the mean NIS, all runs together."""
+    """Number of samples in it, all runs together."""
 
 
 class MonteCarlo(Record):
-    """Evidence d: statistics of Monte Carlo runs."""
+    """Monte Carlo evidence."""
 
     __slots__ = ()
 
     filter: FilterKind
-    """Filter of the runs: linear, extended or iterated."""
+    """Which filter."""
     about_the_truth: bool
-    """True if all runs have the scheme's own truth and draw initial estimates about it from the prior. If false, truths are drawn about
-    the initial estimate.
+    """Whether all runs have the scheme's own truth, with initial estimates drawn about it from the prior; otherwise truths are drawn
+    about the initial estimate.
     """
     runs: int
-    """Number of runs, each with its own noise."""
+    """Number of runs."""
     unsettled: int
-    """Number of runs whose linearisations did not converge."""
+    """Runs whose linearisations did not settle."""
     statistics: list[Statistic]
-    """Average NEES and NIS, with their bands."""
+    """ANEES and NIS."""
     whiteness_probability: float
     """Probability that white innovations have autocorrelations as large."""
     white: bool
-    """True if `whiteness_probability` is above 0.001."""
+    """Whether that is above 0.001."""
     history: list[HistoryPoint]
-    """Average NEES and mean NIS over time."""
+    """ANEES and mean NIS over time."""
 
 
 class Ranking(Record):
-    """Rank correlation of all unknowns by predicted and measured orders."""
+    """Agreement of the order of all unknowns."""
 
     __slots__ = ()
 
     kendall_tau: float | None
-    """Kendall's tau-b of predicted and measured accuracy orders, dimensionless, -1 to 1; null if all are tied."""
+    """Kendall's tau-b of predicted and measured accuracy orders; null when all are tied."""
     pass_: bool
-    """True if `kendall_tau` is 1 (or all orders are tied on both sides)."""
+    """Whether it is 1 (or all are tied on both sides)."""
     errors: float | None
-    """Kendall's tau-b, dimensionless, of the predicted orders at the end and the errors of runs with full attitudes, root mean square in
-    sigmas of the prior; null for a linear filter. It decides nothing: orders hold for short dwells, errors for those of the scheme.
+    """Of runs with full attitudes: Kendall's tau-b of the predicted orders at the end and the errors there, root mean square in sigmas
+    of the prior; null where the filter is linear. It decides nothing: orders are of short dwells, errors of those of the scheme.
     """
 
 
 class Control(Record):
-    """Filter with a deliberate model error, which the checks must detect."""
+    """A filter that is wrong on purpose, and must be found out."""
 
     __slots__ = ()
 
     name: str
-    """Deliberate error of the filter's model."""
+    """What is wrong with it."""
     failed: int
-    """Number of checks of evidence a and b that fail with the filter."""
+    """How many checks of a and b fail with it."""
     checks: int
-    """Number of checks of evidence a and b performed."""
+    """Out of how many."""
     nis: float
-    """Mean NIS of the filter, dimensionless."""
+    """Its mean NIS."""
     band: tuple[float, float]
-    """Band of 99.9 % of the mean NIS of a right filter, dimensionless."""
+    """The band in which a right filter's would be (99.9 %)."""
     off_deg: float
-    """Angle in degrees by which the filter's latitude or attitude is wrong."""
+    """By how many degrees its latitude or an attitude is off."""
     outcome: Agreement
-    """Outcome: agreement if the error was detected. Not resolvable if it was not, and need not be."""
+    """Whether it was found out; not resolvable where it was not, and need not be."""
 
 
 class SlopeCurve(Record):
-    """Sigma against the dwell, for one unknown or combination."""
+    """Sigma against the dwell."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, or the combination."""
+    """The unknown or combination."""
     unit: str
-    """Unit of the sigmas in `points`."""
+    """Unit of sigma."""
     accuracy_order: int | None
-    """Accuracy order; null if no dwell makes it observable."""
+    """The accuracy order."""
     points: list[tuple[float, float]]
-    """Points of the curve: `(dwell in s, sigma)`, sigma in the unit of `unit`."""
+    """`(dwell in s, sigma)`."""
 
 
 class Correlation(Record):
-    """Correlation matrix of the estimates."""
+    """A correlation matrix."""
 
     __slots__ = ()
 
     names: list[str]
-    """Names of the unknowns, in the order of rows and columns."""
+    """The unknowns."""
     values: list[list[float]]
-    """Rows of the matrix: correlations, dimensionless, -1 to 1."""
+    """Row by row."""
 
 
 class CrossCheck(Shape):
-    """Cross-check of the verdicts on one scheme against filters and samples."""
+    """The cross-check of one scheme."""
 
     schema: str
-    """Layout of this answer: `obsdeg.crosscheck/1`."""
+    """`obsdeg.crosscheck/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """What is carried between positions."""
     filter: str | None
-    """Deliberate error of the filter's model; null for the right filter."""
+    """How the filter was made to differ from the truth; null for a right one."""
     conditions: ConditionsReport
-    """Conditions of the runs, with their units."""
+    """Under which conditions."""
     timeline: list[TimelineReport]
-    """Positions and slews of the run, in order of time."""
+    """The timeline."""
     passed: bool
-    """True if no check disagrees, evidence a to f."""
+    """Whether everything agrees."""
     verdicts_agree: bool
-    """True if no check but evidence d disagrees. Evidence d compares the filter with drawn truths and also fails if the small-angle
-    model does not hold.
-    """
+    """Whether all but d agrees: d holds the filter against drawn truths, which fails where the small-angle model does, too."""
     disagreements: list[str]
-    """Disagreements of the checks, in words."""
+    """What disagrees, in words."""
     unresolved: list[str]
     """Reasons why checks are not resolvable, one for each such check."""
     counts: Counts
-    """Number of checks by outcome."""
+    """How many checks agree, disagree, are not resolvable, were not made."""
     method: list[str]
-    """Method of measuring slopes, and criteria for a check that is not resolvable."""
+    """How slopes are measured, and when something is not resolvable."""
     not_tested: list[str]
-    """Statements of an analysis that no evidence checks."""
+    """What an analysis says and nothing here is held against."""
     spaces: list[SpaceCheck]
-    """Evidence a: ranks, null space and combinations against the samples."""
+    """a: ranks, null space and combinations against the samples."""
     orders: Measured
-    """Coverage of the accuracy orders by measured slopes."""
+    """How many accuracy orders were measured."""
     quantities: list[QuantityEvidence]
-    """Evidence a and b on each unknown and combination."""
+    """Evidence a and b per unknown and combination."""
     null_space: list[NullEvidence]
-    """Evidence on each direction that Z does not observe."""
+    """Directions that Z does not see."""
     defect: Count
-    """Number of independent directions that Z does not observe."""
+    """Number of directions that Z does not see."""
     covariance: list[CrossCheckDifference]
     """Evidence c: covariance of the filter against the inverse information."""
     monte_carlo: MonteCarlo
@@ -2147,128 +2133,132 @@ class CrossCheck(Shape):
     ranking: Ranking
     """Evidence e: rank correlation of predicted and measured orders."""
     controls: list[Control]
-    """Evidence f: filters with a deliberate model error."""
+    """Evidence f: filters that are wrong on purpose."""
     validity: Validity
-    """Validity of the small-angle model at the true values."""
+    """Whether the small-angle model holds for the true values."""
     slopes: list[SlopeCurve]
     """Sigma against dwell, for the plot."""
     correlation: Correlation
-    """Correlation matrix of the estimates under a diffuse prior."""
+    """Correlation of the estimate under a diffuse prior."""
     seed: int
-    """Seed of the noise and of all random choices."""
+    """Seed of the noise."""
     error_bound: float
     """Bound on the probability that a prediction is wrong."""
 
 
 class SystemQuantityEvidence(Record):
-    """Evidence on one unknown of a system, by the information of the samples."""
+    """What the information says of one unknown."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, as in the model."""
+    """The unknown."""
     status: Status
-    """Verdict on the unknown by the exact analysis."""
+    """The exact verdict."""
     degree: int | None
-    """Observable degree; null if the unknown is not observable."""
+    """The degree."""
     slope: Check
-    """Log-log slope of sigma against the horizon: predicted -(degree + 1/2); measured null if it does not settle above rounding."""
+    """Log-log slope of sigma against the horizon: -(degree + 1/2); measured null where it does not settle above rounding."""
     inflation: Check
-    """Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 for an unobservable unknown."""
+    """Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 where not observable."""
 
 
 class SymmetryEvidence(Record):
-    """Evidence on one symmetry, by the information of the samples."""
+    """A symmetry against the information."""
 
     __slots__ = ()
 
     words: str
-    """Symmetry in words, as in the analysis."""
+    """In words."""
     seen: Check
-    """Information along the symmetry, relative to the largest: predicted 0."""
+    """The information along it."""
 
 
 class SystemEvidence(Shape):
-    """Cross-check of the verdicts on one system against the information of simulated samples."""
+    """The evidence for one system."""
 
     schema: str
-    """Layout of this answer: `obsdeg.system-evidence/1`."""
+    """`obsdeg.system-evidence/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     name: str
-    """Name of the system, as in its file."""
+    """The system."""
     quantities: list[SystemQuantityEvidence]
-    """Evidence on each unknown, in model order."""
+    """Per unknown."""
     symmetries: list[SymmetryEvidence]
     """Symmetries: the information along each, relative to the largest."""
     defect: Count
-    """Number of unobservable directions: exact, and singular values that vanish."""
+    """Unobservable directions: exact, and singular values that vanish."""
     failures: int
-    """Number of checks that failed."""
+    """Checks that failed."""
     orders: Measured
-    """Coverage of the degrees by measured slopes."""
+    """How many degrees were measured."""
     checks: int
-    """Number of checks that agree or disagree, without those that are not resolvable or were skipped."""
+    """Checks that were made: what could not be measured, or not be resolved, is none."""
     not_resolvable: int
-    """Number of checks that neither support nor contradict a verdict: an unknown that affects the outputs by no more than rounding, or
-    whose diffuse prior shrinks by less than a hundredth; singular values between observable and unobservable.
+    """What was measured and is neither for nor against a verdict: an unknown that moves no output by more than rounding, or less than a
+    hundredth of its diffuse prior is learnt of it; singular values between what is seen and what is not.
     """
     passed: bool
-    """True if no check of the model failed."""
+    """Whether none failed."""
+    time: float | None
+    """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
+    known inputs hold the time.
+    """
     duration: float
-    """Longest horizon, of every experiment, in the unit of `t` in the model."""
+    """The longest horizon, of every experiment, in the unit of the model."""
     error_bound: float | None
-    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
+    """Of a model judged in prime fields: bound on the probability that a verdict is wrong."""
     digits: DigitsReport | None
-    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
+    """Of a model judged in real numbers: how clear its ranks were."""
     seed: int
     """Seed of all random choices."""
 
 
 class ForceLength(Record):
-    """Length of the specific force at a position."""
+    """How long the specific force is at a position."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position with this length."""
+    """The position."""
     length_g: float
-    """Length of the specific force, in g."""
+    """In g."""
 
 ForceError = Literal["scale", "zero"]
-"""Kind of error of one axis. scale: Scale error, a fraction of the output. zero: Zero error, in g of the output."""
+"""What an axis is off in. scale: Its scale. zero: Its zero."""
 
 
 class ForceCause(Record):
-    """Error of one axis that explains why the specific force is not one g long."""
+    """What one axis may be off by, so that the specific force is not one g long."""
 
     __slots__ = ()
 
     error: ForceError
-    """Kind of the error: scale or zero."""
+    """What it is an error of."""
     axis: str
-    """Output of the accelerometer: fx, fy, fz."""
+    """The output of the accelerometer: fx, fy, fz."""
     by: float
-    """Error of the axis: scale as a fraction (dimensionless) or zero in g, by which the recorded output is larger."""
+    """What is recorded is larger by this: as a part (scale), or in g (zero)."""
     sigma: float
-    """Standard deviation of the error, as `by`: dimensionless (scale) or in g (zero)."""
+    """Its standard deviation."""
     besides: float | None
-    """Fraction by which the force is longer besides, at all positions alike, dimensionless; null for none."""
+    """The part by which the force is longer besides, at all positions alike."""
 
 
 class ClockByEarth(Record):
-    """Rate error of a clock by the rate of the earth."""
+    """A clock by the rate of the earth."""
 
     __slots__ = ()
 
     fast: float
-    """Fraction by which the clock is fast, dimensionless."""
+    """The part by which it is fast."""
     sigma: float
-    """Standard deviation of `fast`, dimensionless: a fraction not much larger is not significant."""
+    """Its standard deviation: a part that is not much larger does not show."""
 
 
 class FindingInterrupted(Record):
-    """Interrupted iteration: the estimates are where it was then."""
+    """The iteration was interrupted: the estimates are where it was then."""
 
     __slots__ = ()
 
@@ -2276,7 +2266,7 @@ class FindingInterrupted(Record):
 
 
 class FindingNotSettled(Record):
-    """Iteration that did not converge."""
+    """The iteration did not settle."""
 
     __slots__ = ()
 
@@ -2284,109 +2274,109 @@ class FindingNotSettled(Record):
 
 
 class FindingForce(Record):
-    """Specific force that is not one g long, with no unknown that explains it."""
+    """The specific force is not one g long, and no unknown explains that."""
 
     __slots__ = ()
 
     kind: Literal["force"]
     record: str
-    """Name of the record with this finding."""
+    """The record."""
     length_g: float
-    """Mean length of the specific force in the record, in g."""
+    """Its mean length, in g."""
     alike: bool
-    """True if the length is the same at all positions."""
+    """Whether it is as long at all positions."""
     least: ForceLength
-    """Position with the shortest specific force."""
+    """Where it is shortest."""
     most: ForceLength
-    """Position with the longest specific force."""
+    """Where it is longest."""
     causes: list[ForceCause]
-    """Errors of one axis, each of which alone makes the force one g long; empty if several axes are wrong, or all alike."""
+    """Each of these alone makes it one g long: none where several axes are off, or all alike."""
 
 
 class FindingClock(Record):
-    """Clock of a record that does not run as fast as that of the scheme, or as the earth turns."""
+    """The clock of a record does not go as fast as that of the scheme, or as the earth turns."""
 
     __slots__ = ()
 
     kind: Literal["clock"]
     record: str
-    """Name of the record with this finding."""
+    """The record."""
     by_durations: float | None
-    """Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless; null if they show none."""
+    """By which part it is fast, as positions begin and end."""
     by_earth: ClockByEarth | None
-    """Fraction by which the clock is fast by the rate of the earth; null if that is within chance."""
+    """The same by the rate of the earth, where that is beyond chance."""
 
 
 class FindingPosition(Record):
-    """Position that fits worse than its measurements allow."""
+    """A position fits worse than its measurements allow."""
 
     __slots__ = ()
 
     kind: Literal["position"]
     record: str
-    """Name of the record with this finding."""
+    """The record."""
     position: str
-    """Name of the position with this finding."""
+    """The position."""
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
     factor: float
-    """Factor by which the sigmas are too small there, dimensionless: the root of `chi_square`."""
+    """How many times too small the sigmas are there: its root."""
 
 
 class FindingNoise(Record):
-    """Positions that all fit alike, and not as their sigmas say."""
+    """All positions fit alike, and not as their sigmas say."""
 
     __slots__ = ()
 
     kind: Literal["noise"]
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
     factor: float
-    """Factor to multiply the sigmas by, dimensionless."""
+    """What the sigmas are to be multiplied by."""
 
 
 class FindingChannel(Record):
-    """Component of Z that does not fit as its sigma says."""
+    """A component of Z fits not as its sigma says."""
 
     __slots__ = ()
 
     kind: Literal["channel"]
     channel: str
-    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
+    """The component."""
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
     factor: float
-    """Factor to multiply its sigma by, dimensionless."""
+    """What its sigma is to be multiplied by."""
 
 
 class FindingCorrelated(Record):
-    """Residuals of a component that are not independent of each other."""
+    """The residuals of a component are not independent of each other."""
 
     __slots__ = ()
 
     kind: Literal["correlated"]
     record: str
-    """Name of the record with this finding."""
+    """The record."""
     channel: str
-    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
+    """The component."""
     probability: float
-    """Probability that independent residuals are as correlated as these."""
+    """Probability that independent ones are correlated so."""
 
 
 class FindingTemperature(Record):
-    """Residuals of a component that follow the temperature."""
+    """The residuals of a component go with the temperature."""
 
     __slots__ = ()
 
     kind: Literal["temperature"]
     record: str
-    """Name of the record with this finding."""
+    """The record."""
     channel: str
-    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
+    """The component."""
     correlation: float
-    """Coefficient of correlation of residuals and temperature, dimensionless, -1 to 1."""
+    """The coefficient of correlation."""
     probability: float
-    """Probability that chance alone gives such a correlation."""
+    """Probability of that by chance."""
 
 
 class FindingOutliers(Record):
@@ -2396,39 +2386,39 @@ class FindingOutliers(Record):
 
     kind: Literal["outliers"]
     count: int
-    """Number of measurements that lie far off."""
+    """How many."""
     of: int
-    """Total number of measurements."""
+    """Of so many."""
 
 
 class FindingRepeatability(Record):
-    """Records that do not agree on the coefficients."""
+    """The records do not agree on the coefficients."""
 
     __slots__ = ()
 
     kind: Literal["repeatability"]
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
 
 
 class FindingSecondPath(Record):
-    """Filter and least squares that do not agree."""
+    """Filter and least squares do not agree."""
 
     __slots__ = ()
 
     kind: Literal["second_path"]
     difference: float
-    """Largest difference of both, in sigma, dimensionless."""
+    """The largest difference, in sigma."""
 
 
 class FindingKnown(Record):
-    """Prior knowledge that does not agree with the records."""
+    """What was known before does not agree with the records."""
 
     __slots__ = ()
 
     kind: Literal["known"]
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
 
 Finding = Union[
     FindingInterrupted,
@@ -2445,277 +2435,271 @@ Finding = Union[
     FindingSecondPath,
     FindingKnown,
 ]
-"""Evidence against the model or its sigmas."""
+"""What speaks against the model or its sigmas."""
 
 
 class Estimated(Record):
-    """Estimate of an unknown or a combination."""
+    """An unknown or a combination."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, or the combination."""
+    """Its name."""
     unit: str
-    """Unit of the estimate: deg, deg/h, deg/h/g, ..."""
+    """Its unit: deg, deg/h, deg/h/g, ..."""
     status: Status
-    """Verdict of the scheme on the unknown or combination."""
+    """The exact verdict of the scheme."""
     degree: int | None
-    """Observable degree; null if not observable."""
+    """The observable degree."""
     determined: bool
-    """True if scheme and records determine it. If false, there is no estimate."""
+    """Whether scheme and records determine it; otherwise there is no estimate."""
     estimate: float | None
-    """Estimate in the unit of `unit`; null if not determined."""
+    """The estimate."""
     sigma: float | None
-    """Standard deviation of the estimate by the assumed noise, in the unit of `unit`; null if not determined."""
+    """Its standard deviation, by the noise that was assumed."""
     sigma_rescaled: float | None
-    """Standard deviation, in the unit of `unit`, with errors of the records times the root of chi-square per degree of freedom, where
-    that is above one; prior knowledge stays as it is. Null if not determined.
+    """The same with errors of the records times the root of chi-square per degree of freedom, where that is above one; what was known
+    before stays as it is.
     """
     predicted_sigma: float | None
-    """Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with the times and the noise of the
-    records (and prior knowledge); null if not determined.
+    """What the linear model has at the times and with the noise of the records (and what was known before), where the platform is at the
+    attitudes of the scheme.
     """
     held_factor: float | None
-    """Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model couples an unknown
-    constrained by its prior to the estimate. Null if not determined.
+    """What sigma is times that with all known that nothing determines: above one where the nonlinear model bends what is held within its
+    prior into the estimate.
     """
     prior_shift: float | None
-    """Shift of the estimate by the prior of the scheme, in sigma (dimensionless); null if not determined."""
+    """How far the prior of the scheme would move the estimate, in sigma."""
     prior_factor: float | None
-    """Factor on sigma by the prior of the scheme, dimensionless: 1 where it does not matter; null if not determined."""
+    """What it would make of sigma: 1 where it does not matter."""
 
 
 class CovarianceTable(Record):
-    """Estimates with the covariance of their errors."""
+    """Estimates with their covariance."""
 
     __slots__ = ()
 
     names: list[str]
     """Names, in the order of rows and columns."""
     units: list[str]
-    """Units of the estimates, in the same order."""
+    """Their units."""
     estimates: list[float]
-    """Estimates in the same order, each in its unit."""
+    """Their estimates."""
     covariance: list[list[float]]
-    """Covariance of the errors by the assumed noise, in products of the units of row and column."""
+    """The covariance of their errors, by the noise that was assumed."""
     rescaled: list[list[float]]
-    """Covariance, in products of the units of row and column, with errors of the data times the root of chi-square per degree of
-    freedom, where that is above one; prior knowledge stays as it is.
+    """The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known
+    before stays as it is.
     """
 
 
 class Fit(Record):
-    """Quality of the whole fit: chi-square, its band and its factor."""
+    """How well everything fits."""
 
     __slots__ = ()
 
     chi_square: float
-    """Chi-square: the sum of squares of all residuals in sigma, dimensionless."""
+    """The sum of squares of all residuals, in sigma."""
     degrees_of_freedom: float
-    """Number of degrees of freedom of chi-square; fractions occur."""
+    """Its degrees of freedom."""
     band: tuple[float, float]
-    """Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless."""
+    """Where chi-square per degree of freedom lies with a probability of 99.9 %."""
     factor: float
-    """Factor to multiply sigmas by: the root of chi-square per degree of freedom, dimensionless."""
+    """The root of chi-square per degree of freedom: what sigmas are to be multiplied by."""
     passes: int
-    """Number of linearisations until convergence."""
+    """Linearisations."""
 
 
 class Moved(Record):
-    """Change of an unknown or combination without one position."""
+    """An unknown that moves."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, or the combination."""
+    """Its name."""
     sigmas: float
-    """Change over its standard deviation, dimensionless."""
+    """By how much, in standard deviations."""
 
 
 class PositionFit(Record):
-    """Quality of the fit at one position of a record."""
+    """How well a position fits."""
 
     __slots__ = ()
 
     record: str
-    """Name of the record with this position."""
+    """The record."""
     position: str
-    """Name of the position in the scheme."""
+    """The position."""
     start_s: float
-    """Start of the position, in s of the record's timeline."""
+    """From when, in s of the record's timeline."""
     end_s: float
-    """End of the position, in s of the record's timeline."""
+    """To when."""
     force_g: float | None
-    """Length of the specific force at the position, in g: a median, which single samples do not affect; null if the record has no
-    forces.
-    """
+    """How long the specific force is there, in g, where the record has it: a median, which single samples do not move."""
     measurements: int
-    """Number of measurements: components of Z of bins."""
+    """Measurements: components of Z of bins."""
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
     degrees_of_freedom: float
-    """Number of degrees of freedom of chi-square; fractions occur."""
+    """The degrees of freedom."""
     moves: Moved | None
-    """Unknown that changes most without the position; null if there is none."""
+    """Without it: the unknown that moves most, in standard deviations of the move."""
     loses: list[str]
-    """Unknowns and combinations that are not determined without the position."""
+    """Without it these are not determined."""
 
 
 class Warmth(Record):
-    """Correlation of residuals and temperature, position by position."""
+    """How residuals go with the temperature, position by position."""
 
     __slots__ = ()
 
     correlation: float
-    """Coefficient of correlation at the position where it is strongest, dimensionless, -1 to 1."""
+    """The coefficient of correlation at the position where it is strongest."""
     probability: float
-    """Probability that residuals independent of the temperature are as correlated, all positions together (R. A. Fisher, Metron 1,
-    1921).
-    """
+    """Probability that residuals that do not depend on it are correlated so, all positions together (R. A. Fisher, Metron 1, 1921)."""
 
 
 class ChannelFit(Record):
-    """Quality of the fit of one component of Z."""
+    """How well a component of Z fits."""
 
     __slots__ = ()
 
     channel: str
-    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
+    """`Z1`, `Z2`, `Z3` or `Za`."""
     unit: str
-    """Unit of `sigma` and `scatter`: g or rad."""
+    """Unit of its sigmas."""
     sigma: float
-    """Standard deviation of a sample as assumed, in the unit of `unit`."""
+    """Of a sample, as it was used."""
     scatter: float | None
-    """Standard deviation of a sample, in the unit of `unit`, by the scatter of the samples of a bin about a line; null if bins have too
-    few.
-    """
+    """Of a sample, by the scatter of the samples of a bin about a line; null where bins have too few."""
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
     degrees_of_freedom: float
-    """Number of degrees of freedom of chi-square; fractions occur."""
+    """The degrees of freedom."""
     whiteness_probability: float | None
-    """Smallest probability over the records that independent residuals are as correlated as these; null for few."""
+    """Smallest probability over the records that independent residuals are correlated as these are; null for few."""
     temperature: Warmth | None
-    """Correlation of residuals and temperature in the record where chance is least likely; null without temperature, and for few."""
+    """How residuals go with the temperature, in the record where that is least likely by chance; null without one, and for few."""
 
 
 class Outlier(Record):
-    """Measurement that was left out as an outlier."""
+    """A measurement that was left out."""
 
     __slots__ = ()
 
     record: str
-    """Name of the record with the outlier."""
+    """The record."""
     lines: tuple[int, int]
-    """First and last line number of the measurement in the record."""
+    """Its lines, from and to."""
     t_s: float
-    """Time of the measurement, in s of the record's timeline."""
+    """When, in s of the record's timeline."""
     channel: str
-    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
+    """The component."""
     sigmas: float
-    """Distance from the expected value, in standard deviations (dimensionless)."""
+    """How far it is off, in standard deviations."""
 
 
 class SecondPath(Record):
-    """Filter against least squares, with one wide prior for both."""
+    """The filter against least squares, with one wide prior for both."""
 
     __slots__ = ()
 
     difference: float
-    """Largest difference of the estimates at the end of a record, in sigma (dimensionless)."""
+    """The largest difference of the estimates at the end of a record, in sigma."""
     sigma_difference: float
-    """Largest relative difference of sigmas there, dimensionless."""
+    """The largest difference of sigmas there, as a part."""
 
 
 class Repeatability(Record):
-    """Agreement of several records of one platform."""
+    """Several records, one platform."""
 
     __slots__ = ()
 
     chi_square: float
-    """Chi-square per degree of freedom of the differences between the records' coefficients, dimensionless."""
+    """What the coefficients of the records differ by, as chi-square per degree of freedom."""
     degrees_of_freedom: float
-    """Number of degrees of freedom of chi-square; fractions occur."""
+    """The degrees of freedom."""
     band: tuple[float, float]
-    """Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless."""
+    """Where it lies with a probability of 99.9 %."""
 
 PositionsBy = Literal["labels", "timeline", "both", "static"]
-"""Source of the position of each sample. labels: Column of labels: a position ends with its last sample, and the next begins when the
-slew is over. timeline: Timeline of the scheme, by the times of the samples. both: Column of labels that agrees with the timeline of
-the scheme, which sets the start and end of a position. static: Intervals at rest that were found, as many as the scheme has
-positions; slews lie in the middle between them.
+"""What says where a sample was taken. labels: A column of labels: a position ends with its last sample, and the next begins when the
+slew is over. timeline: The timeline of the scheme. both: A column of labels that agrees with the timeline of the scheme, which says
+when a position begins and ends. static: Intervals at rest that were found, as many as the scheme has positions: turns are in the
+middle of what is between them.
 """
 
 
 class Clock(Record):
-    """Rate error of the clock of a record."""
+    """How right the clock of a record is."""
 
     __slots__ = ()
 
     by_durations: float | None
-    """Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all times stretched by it: a
-    clock, or a scheme run so; null if not.
+    """By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme
+    that was run so.
     """
     by_earth: ClockByEarth | None
-    """Fraction by which the clock is fast by the rate of the earth when all unknowns follow; drifts are too small by the same fraction.
-    Null if its sigma would be above a third.
+    """By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part. Nothing where
+    sigma would be above a third.
     """
 
 
 class RecordReport(Record):
-    """Record that was read, with its clock and columns."""
+    """A record that was read."""
 
     __slots__ = ()
 
     name: str
-    """Name of the record, as it was given."""
+    """Its name."""
     samples: int
-    """Number of samples in the record."""
+    """Its samples."""
     unused: int
-    """Number of samples at no position of the scheme."""
+    """Samples at no position of the scheme."""
     bins: int
-    """Number of bins of the samples."""
+    """Bins."""
     span_s: tuple[float, float]
-    """First and last time of the record, in s."""
+    """First and last time, in s as they are in the record."""
     positions_by: PositionsBy
-    """Source of the position of each sample."""
+    """What says where each sample was taken."""
     ignored: list[str]
-    """Columns that are not used."""
+    """Columns that nothing was made of."""
     force_g: float | None
-    """Mean length of the specific force, in g; null if the record has no forces."""
+    """The mean length of the specific force, in g, where the record has it."""
     gimbals_deg: float | None
-    """Largest distance of the gimbals from the attitudes of the scheme, in deg; null if the record has no gimbal angles."""
+    """How far the gimbals are from the attitudes of the scheme at most, in deg, where the record has their angles."""
     clock: Clock
-    """Rate error of the clock of the record."""
+    """Its clock."""
 
 
 class Assumed(Record):
-    """Assumptions of the estimates: conditions, noise, priors and gate."""
+    """What was assumed."""
 
     __slots__ = ()
 
     latitude_deg: float
-    """Latitude of the calibration, in deg."""
+    """In deg."""
     latitude_by_default: bool
-    """True if the scheme states no latitude."""
+    """Whether the scheme names no latitude."""
     gravity_m_s2: float
-    """Acceleration of one g, in m/s^2."""
+    """What one g is."""
     bin_s: float
-    """Width of a bin, in s: samples within it are taken together."""
+    """Samples within so many s are taken together."""
     accelerometer_noise_g: float
-    """White noise of Z per sample and axis as given, in g."""
+    """White noise of Z per sample and axis in g, as it was given."""
     noise_estimated: bool
-    """True if the noise was estimated from the records."""
+    """Whether the noise was estimated from the records."""
     drift_noise_deg_sqrt_h: float
-    """Density of the white drift, in deg/sqrt(h)."""
+    """White drift."""
     gate: float
     """Probability that no measurement of a right record is left out."""
     known: list[str]
-    """Names of the unknowns and combinations taken from a calibration before."""
+    """Names taken from a calibration before."""
     known_differs: list[str]
-    """Differences of the scheme of that calibration."""
+    """What is different in the scheme of that."""
     held: list[tuple[str, float, str]]
-    """Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit."""
+    """What nothing determines, unknown by unknown: the standard deviation within which it is held, in its unit."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, drift_noise."""
     seed: int
@@ -2723,107 +2707,107 @@ class Assumed(Record):
 
 
 class Setup(Record):
-    """Setup of a scheme: the meaning of its coefficients, and the identity of records of its runs."""
+    """What of a scheme says what its coefficients mean, and which records are of its runs."""
 
     __slots__ = ()
 
     terms: str
-    """Terms of the error model, as in `--terms`."""
+    """The terms, as in `--terms`."""
     geometry: Geometry
-    """Mounting of the gyros and accelerometers."""
+    """How gyros and accelerometers are mounted."""
     carry: Carry
-    """Carry: quantity that continues from one position to the next."""
+    """What is carried between positions."""
     latitude_deg: float
-    """Latitude in deg; 28.2 if the scheme states none."""
+    """In deg, by default that of the paper."""
     measured_azimuth: bool
-    """True if psi_y is measured."""
+    """Whether psi_y is measured."""
     positions: list[tuple[str, str]]
     """Names and Euler angles in deg of the positions."""
 
 
 class Basis2(Record):
-    """Record that estimates rest on."""
+    """A record that estimates rest on."""
 
     __slots__ = ()
 
     record: str
-    """Name of the record, as it was given."""
+    """What it was called."""
     digest: str
-    """Digest of the numbers of the record."""
+    """The digest of its numbers."""
 
 
 class ResidualSeries(Record):
-    """Residuals of a component in a record, in order of time."""
+    """What is left of a component of a record, in the order of time."""
 
     __slots__ = ()
 
     record: str
-    """Name of the record with these residuals."""
+    """The record."""
     channel: str
-    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
+    """The component."""
     unit: str
-    """Unit of the residuals: g or rad."""
+    """The unit of residuals."""
     points: list[tuple[float, float, float]]
-    """Time in s, residual and its sigma by the assumed noise in the unit of `unit`: at most a thousand points, evenly picked."""
+    """Time in s, residual and its sigma by the noise that was assumed: at most a thousand, evenly picked."""
     autocorrelation: list[float]
-    """Correlation of the residuals with those one, two, ... measurements later, dimensionless."""
+    """Their correlation with those one, two, ... measurements later."""
     count: int
-    """Number of residuals, listed here or not."""
+    """How many there are."""
     allan: list[tuple[float, float, float]]
-    """Cluster time in s, overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of white residuals of the
-    assumed sigma, both in the unit of `unit`; slews take no time here.
+    """Cluster time in s, the overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of white ones of the
+    assumed sigma; turns between positions take no time here.
     """
 
 
 class Calibration(Shape):
-    """Calibration of a scheme from one or several records."""
+    """A calibration from records."""
 
     schema: str
-    """Layout of this answer: `obsdeg.calibration/1`."""
+    """`obsdeg.calibration/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     consistent: bool
-    """True if the model and its sigmas explain the records."""
+    """Whether the model and its sigmas explain the records."""
     findings: list[Finding]
-    """Evidence against the model or its sigmas, the gravest first; empty if there is none."""
+    """What speaks against that, the gravest first; empty when nothing does."""
     quantities: list[Estimated]
-    """Estimates of the unknowns, psi of the start of each record."""
+    """Every unknown, psi of the start of each record."""
     requirements: Requirements | None
-    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null if none is
-    stated. Requirements on psi are not judged: a calibration estimates psi of the start of a record.
+    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null where none is
+    stated. Those on psi are not judged: a calibration estimates psi of the start of a record.
     """
     combinations: list[Estimated]
-    """Estimates of combinations of unknowns that are not determined alone, and of those asked for."""
+    """Combinations of what is not told apart one by one, and those asked for."""
     covariance: CovarianceTable
-    """Covariance of all estimates that do not follow from others."""
+    """Of all that has an estimate."""
     fit: Fit
-    """Quality of the whole fit: chi-square, its band and its factor."""
+    """The whole fit."""
     positions: list[PositionFit]
-    """Quality of the fit by record and position."""
+    """By record and position."""
     channels: list[ChannelFit]
-    """Quality of the fit by component of Z."""
+    """By component of Z."""
     outliers: list[Outlier]
-    """Measurements that were left out as outliers."""
+    """Measurements that were left out."""
     outlier_count: int
-    """Number of measurements that were left out as outliers."""
+    """How many samples were left out in all."""
     second_path: SecondPath
-    """Second path to the estimate: the filter against least squares."""
+    """The second path to the estimate."""
     repeatability: Repeatability | None
-    """Agreement of the coefficients of several records; null for one record."""
+    """How far the coefficients of several records agree."""
     records: list[RecordReport]
-    """Records that were read, with their clocks and columns."""
+    """What was read."""
     assumed: Assumed
-    """Assumptions of the estimates: conditions, noise, priors and gate."""
+    """What was assumed."""
     setup: Setup
-    """Scheme, geometry and carry that were calibrated."""
+    """What it is of."""
     rests_on: list[Basis2]
-    """Records that the estimates rest on, including those of the calibration before."""
+    """The records that it rests on, those of the calibration before too."""
     series: list[ResidualSeries]
-    """Residuals over time, by record and component."""
+    """What is left over time, by record and component."""
 
 
 class SystemFindingInterrupted(Record):
-    """Interrupted iteration: the estimates are where the best one was then."""
+    """Interrupted: the estimates are where the best iteration was then."""
 
     __slots__ = ()
 
@@ -2831,7 +2815,7 @@ class SystemFindingInterrupted(Record):
 
 
 class SystemFindingNotSettled(Record):
-    """Iteration that did not converge from any start."""
+    """No start settled."""
 
     __slots__ = ()
 
@@ -2839,41 +2823,41 @@ class SystemFindingNotSettled(Record):
 
 
 class SystemFindingNoise(Record):
-    """Chi-square that is outside its acceptance band."""
+    """Chi-square is outside its band."""
 
     __slots__ = ()
 
     kind: Literal["noise"]
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Per degree of freedom."""
     factor: float
-    """Factor to multiply the sigmas by, dimensionless."""
+    """What sigmas are to be multiplied by."""
 
 
 class SystemFindingCorrelated(Record):
-    """Residuals of an output that are not independent of each other."""
+    """The residuals of an output are not independent of each other."""
 
     __slots__ = ()
 
     kind: Literal["correlated"]
     output: str
-    """Name of the output with this finding."""
+    """The output."""
     probability: float
-    """Probability that independent residuals are as correlated as these."""
+    """Probability that independent ones are correlated so."""
 
 
 class SystemFindingOutlier(Record):
-    """Measurement that is far from its expected value."""
+    """A measurement is far off."""
 
     __slots__ = ()
 
     kind: Literal["outlier"]
     output: str
-    """Name of the output with this finding."""
+    """The output."""
     line: int
-    """Line number of the measurement in the record."""
+    """Its line in the record."""
     sigmas: float
-    """Residual in sigma by the other measurements (at least the given sigma), dimensionless."""
+    """By how much the others leave it off, in sigma as these have it (at least as it was given)."""
 
 SystemFinding = Union[
     SystemFindingInterrupted,
@@ -2882,186 +2866,181 @@ SystemFinding = Union[
     SystemFindingCorrelated,
     SystemFindingOutlier,
 ]
-"""Evidence against the model or the noise."""
+"""What speaks against model or noise."""
 
 
 class SystemEstimated(Record):
-    """Estimate of an unknown or a combination."""
+    """An unknown or a combination."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown, or the combination."""
+    """Its name."""
     unit: str
-    """Unit of the estimate, as in the model file."""
+    """Its unit, as the file says."""
     status: Status | None
-    """Verdict on the unknown or combination; null if it is known."""
+    """The exact verdict; null for what is known."""
     degree: int | None
-    """Observable degree; null if not observable."""
+    """The degree."""
     determined: bool
-    """True if model and data determine it."""
+    """Whether model and data determine it."""
     estimate: float | None
-    """Estimate in the unit of `unit`; null if not determined."""
+    """The estimate."""
     sigma: float | None
-    """Standard deviation of the estimate by the noise, in the unit of `unit`; null if not determined."""
+    """Its standard deviation by the noise."""
     sigma_rescaled: float | None
-    """Standard deviation, in the unit of `unit`, with errors of the data times the root of chi-square per degree of freedom, where that
-    is above one; prior knowledge stays as it is. Null if not determined.
+    """The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known
+    before stays as it is.
     """
 
 
 class OutputFit(Record):
-    """Quality of the fit of one output."""
+    """How well an output fits."""
 
     __slots__ = ()
 
     output: str
-    """Name of the output in the model."""
+    """The output."""
     measurements: int
-    """Number of measurements of the output."""
+    """Its measurements."""
     sigma: float | None
-    """Standard deviation of the noise of a measurement, in the unit of the output; null if rows have different ones."""
+    """The noise of a measurement; null where every row has its own."""
     estimated: bool
-    """True if the noise was estimated from the residuals."""
+    """Whether it was estimated from what is left."""
     chi_square: float
-    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """Chi-square per degree of freedom."""
     rms: float
-    """Root mean square of the residuals, in the unit of the output."""
+    """Root of the mean square of what is left, in the unit of the output."""
     expected_rms: float
-    """Root mean square of the residuals that the sigmas predict, in the unit of the output."""
+    """The same of what sigmas let expect."""
     degrees_of_freedom: float
-    """Number of degrees of freedom: measurements minus the unknowns that they determine; fractions occur."""
+    """Measurements minus what they determine."""
     outlier_gate: float | None
-    """Residual in sigma by the other measurements (dimensionless) above which a measurement is an outlier; null if there are too few
-    others.
-    """
+    """Further off than this, in sigma as the others have it, a measurement is named; null where too few others are left to say."""
     whiteness_probability: float | None
-    """Probability that independent residuals are as correlated as these; null for few."""
+    """Probability that independent residuals are correlated as these are; null for few."""
 
 
 class OtherSolution(Record):
-    """Other solution that fits nearly as well."""
+    """Another solution."""
 
     __slots__ = ()
 
     chi_square: float
-    """Sum of squares of all residuals in sigma, dimensionless."""
+    """Its sum of squares."""
     starts: int
-    """Number of starts that led to this solution."""
+    """How many starts led there."""
     values: list[float]
-    """Values of the unknowns, in their order and units."""
+    """Values of the unknowns, in their order."""
 
 
 class Profile(Record):
-    """Profile of one unknown: the fit as a function of its value when all others follow."""
+    """What the data say of one unknown when all others follow."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown that is fixed."""
+    """The unknown."""
     points: list[tuple[float, float]]
-    """Value of the unknown, in its unit, and the sum of squares there minus that at the solution, dimensionless."""
+    """Its values, and by how much the sum of squares is larger there than at the solution."""
     flat: bool
-    """True if the profile is flat: no value changes the sum of squares by more than 0.01."""
+    """Whether it is flat: no value changes the sum of squares by more than a hundredth of one."""
 
 
 class SystemCalibrationBasis(Record):
-    """Record that estimates rest on."""
+    """A record that estimates rest on."""
 
     __slots__ = ()
 
     record: str
-    """Name of the record, as it was given."""
+    """What it was called."""
     digest: str
-    """Digest of the numbers of the record."""
+    """The digest of its numbers."""
 
 
 class SystemCalibration(Shape):
-    """Calibration of a system from one record."""
+    """A calibration of a system."""
 
     schema: str
-    """Layout of this answer: `obsdeg.system-calibration/1`."""
+    """`obsdeg.system-calibration/1`."""
     version: str
-    """Version of the program that wrote it."""
+    """Version of the program."""
     name: str
-    """Name of the system, as in its file."""
+    """The system."""
     consistent: bool | None
-    """True if model and noise explain the data; null if the noise was estimated from the residuals, which then decide nothing."""
+    """Whether model and noise explain the data; null where the noise was estimated from what is left, which then decides nothing."""
     findings: list[SystemFinding]
-    """Evidence against the model or the noise; empty if there is none."""
+    """What speaks against it."""
     quantities: list[SystemEstimated]
-    """Estimates of states at the start of every experiment, parameters, and unknowns of inputs."""
+    """States at the start of every experiment, parameters, and what is unknown of inputs."""
     combinations: list[SystemEstimated]
-    """Estimates of combinations that the model asks for, and of products and sums that are determined though their unknowns alone are
-    not.
-    """
+    """The combinations that the model asks for, and products and sums of what is not determined alone that it determines."""
     covariance: CovarianceTable
-    """Covariance of all unknowns that are determined."""
+    """Of all unknowns that are determined."""
     chi_square: float
-    """Chi-square: the sum of squares of all residuals in sigma, dimensionless."""
+    """The sum of squares of all residuals, in sigma."""
     degrees_of_freedom: int
-    """Number of degrees of freedom: measurements minus determined unknowns."""
+    """Measurements minus what they determine."""
     band: tuple[float, float]
-    """Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless."""
+    """Where chi-square per degree of freedom lies with a probability of 99.9 %."""
     factor: float
-    """Root of chi-square per degree of freedom, dimensionless; 1 is expected."""
+    """The root of chi-square per degree of freedom."""
     outputs: list[OutputFit]
-    """Quality of the fit of each output."""
+    """By output."""
     others: list[OtherSolution]
     """Other solutions that fit nearly as well, the best first: the values of the unknowns."""
     starts: tuple[int, int]
-    """Number of starts that were tried, then the number that led to the solution."""
+    """Starts that were tried, and how many led to the solution."""
     starts_at_most: int
-    """Largest number of starts; fewer are enough when no other solution is to be expected."""
+    """How many would have been tried at most: fewer are enough when no other solution is to be expected."""
     profiles: list[Profile]
-    """Profiles of the unknowns that were asked for."""
+    """Profiles that were asked for."""
     samples: int
-    """Number of rows of the record."""
+    """Rows of the record."""
     intervals: int | None
-    """Number of intervals at rest; null if the file does not ask for them."""
+    """Intervals at rest, where the file says how they are found."""
     rows: int
-    """Number of rows that the model is fitted to: those of the record, or the intervals and the runs between them."""
+    """Rows that the model is held against: those of the record, or the intervals and what is between them."""
     ignored: list[str]
-    """Columns that are not used."""
+    """Columns that nothing was made of."""
     model: str
-    """Digest of the model, to recognise it."""
+    """The digest of the model."""
     rests_on: list[SystemCalibrationBasis]
-    """Records that the estimates rest on, including those of the calibration before."""
+    """The records that the estimates rest on, those of the calibration before too."""
     shared: bool
-    """True if the calibration before rests on the same record, by another model."""
+    """Whether the calibration before rests on the same record, by another model."""
     substeps: int
-    """Largest number of integration steps between two rows."""
+    """Steps of integration between two rows, at most."""
     seed: int
     """Seed of starts and verdicts."""
 
 AuditFinding = Literal["agree", "conditional", "disagree", "not_covered"]
-"""Outcome of checking an equation or claim of the paper. agree: True as printed in the paper. conditional: True under a condition that
-the paper does not state; the reason states it. disagree: False as printed in the paper. not_covered: Not judged; the reason gives the
-cause.
+"""Whether the paper is right. agree: It holds as printed. conditional: It holds under a condition that the paper does not state; the
+reason does. disagree: It does not. not_covered: It was not judged; the reason says why.
 """
 
 
 class Line(Record):
-    """Equation or claim of the paper, with its outcome."""
+    """One equation or claim."""
 
     __slots__ = ()
 
     place: str
-    """Place in the paper, such as `(21)` or `conclusion 2`."""
+    """Where in the paper, such as `(21)` or `conclusion 2`."""
     claim: str
-    """Equation or claim, in words."""
+    """What it says."""
     finding: AuditFinding
-    """Outcome: agree, conditional, disagree or not covered."""
+    """Whether it holds."""
     reason: str
-    """Reason of the outcome: the computation, for a slip the correction, and for a line that is not covered the cause."""
+    """Why: what was computed, for a slip the correction, and for what is not covered why it is not."""
 
 
 class Audit(Shape):
-    """Audit of the paper, equation by equation and claim by claim."""
+    """The whole audit."""
 
     schema: str
-    """Layout of this answer: `obsdeg.audit/1`."""
+    """`obsdeg.audit/1`."""
     seed: int
     """Seed of all random points and of the noise."""
     lines: list[Line]
-    """Equations by number, then claims in the order of the paper, then everything that is not covered."""
+    """The equations by number, then the claims in the order of the paper, then what is not covered."""

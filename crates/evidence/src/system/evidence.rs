@@ -67,6 +67,9 @@ pub struct SystemEvidence {
     pub not_resolvable: usize,
     /// True if no check of the model failed.
     pub passed: bool,
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
+    /// equations nor the known inputs hold the time.
+    pub time: Option<f64>,
     /// Longest horizon, of every experiment, in the unit of `t` in the model.
     pub duration: f64,
     /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
@@ -300,6 +303,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         checks: counts.agree + counts.disagree,
         not_resolvable: counts.not_resolvable,
         passed: counts.disagree == 0,
+        time: compiled.uses_time().then(|| model.time.number()),
         duration: setup.duration,
         error_bound: judged.error_bound(),
         digits: judged.digits(),

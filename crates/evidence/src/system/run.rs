@@ -50,6 +50,9 @@ pub struct SystemRun {
     pub quantities: Vec<SystemEstimate>,
     /// Consistency of errors and innovations with the filter's covariances.
     pub consistency: Consistency,
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
+    /// equations nor the known inputs hold the time.
+    pub time: Option<f64>,
     /// Duration of every experiment, in the unit of `t` in the model.
     pub duration: f64,
     /// Time between two samples, in the unit of `t` in the model.
@@ -331,6 +334,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             name: model.name.clone(),
             quantities: estimates,
             consistency: consistency.map_err(stopped(duration))?,
+            time: compiled.uses_time().then(|| model.time.number()),
             duration,
             step: dt,
             noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
