@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from . import _obsdeg
 from . import options as options
 from . import shapes as shapes
-from ._files import Judged, Model, Scheme, Text, Texted, source
+from ._files import Judged, Model, Scheme, Text, Texted, read_text, source
 from ._obsdeg import ProblemError, __version__
 from ._progress import heard
 from ._records import Record
@@ -438,7 +438,7 @@ def calibrate(what: Judged, *records: Any, prior: Any = None, progress: Progress
     """
     files: dict[str, Any] = {"sources": [source(what)]}
     if prior is not None:
-        text = prior.json() if isinstance(prior, Answer) else Path(prior).read_text(encoding="utf-8")
+        text = prior.json() if isinstance(prior, Answer) else read_text(prior)
         files["before"] = {"name": "prior", "text": text}
     request = _request(options, **files)
     given = [_record(r, i) for i, r in enumerate(records)]

@@ -32,6 +32,23 @@ def place(path: Path, text: bytes) -> None:
         raise
 
 
+#: Most characters of a text that is read.
+TEXT = 10_000_000
+
+
+def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
+    """The text of a file, which may be a device or a pipe that has no end.
+
+    Raises:
+        ValueError: more than :data:`TEXT` characters.
+    """
+    with open(path, encoding="utf-8", errors=errors) as file:
+        text = file.read(TEXT + 1)
+    if len(text) > TEXT:
+        raise ValueError(f"{os.fspath(path)}: found more than {TEXT} characters; expected a text of at most {TEXT}")
+    return text
+
+
 class Text:
     """A text with a name: what :class:`Scheme` and :class:`Model` are.
 
@@ -50,7 +67,7 @@ class Text:
     @classmethod
     def read(cls, path: Path_) -> Self:
         """From a file (TOML; a model may be JSON)."""
-        made: Self = cls._of(Path(path).read_text(encoding="utf-8"), os.fspath(path))
+        made: Self = cls._of(read_text(path), os.fspath(path))
         return made
 
     @classmethod
@@ -169,4 +186,4 @@ def source(what: Judged) -> dict[str, str]:
     if hasattr(what, "text") and hasattr(what, "name"):
         return {"name": str(what.name), "text": str(what.text)}
     name = os.fspath(what)
-    return {"name": name, "text": Path(name).read_text(encoding="utf-8")}
+    return {"name": name, "text": read_text(name)}
