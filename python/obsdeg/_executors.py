@@ -20,8 +20,8 @@ PULSE = 5.0
 def processes(workers: int | None = None) -> ProcessPoolExecutor:
     """A pool of processes on this machine, by default as many as it has cores.
 
-    They do not begin as copies of this process (``fork``), which would lack the threads of this one, and end
-    when it ends, also where it is killed.
+    They do not begin as copies of this process (``fork``), of which another thread may be half way through
+    something, and end when it ends, also where it is killed.
     """
     start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
     return ProcessPoolExecutor(workers, multiprocessing.get_context(start), initializer=_end_with_parent)
