@@ -44,7 +44,7 @@ def workers_of(pool: Executor) -> int:
     client = _dask(pool)
     if client is not None:
         try:
-            return sum(client.nthreads().values())
+            return sum(worker["nthreads"] for worker in _identity(client)["workers"].values())
         except Exception:  # a scheduler that does not answer is noticed by `unreachable`
             return 1
     counted = getattr(pool, "workers", None)
@@ -60,13 +60,18 @@ def unreachable(pool: Executor) -> str | None:
     client = _dask(pool)
     if client is None:
         return None
-    if client.status not in ("running", "connecting"):
-        return f"the client of Dask is {client.status}"
     try:
-        client.sync(client.scheduler.identity, callback_timeout=PULSE)
+        _identity(client)
     except Exception as e:
         return f"the scheduler of Dask does not answer ({type(e).__name__})"
     return None
+
+
+def _identity(client: Any) -> Any:
+    """What the scheduler of Dask says of itself and its workers, or an error after :data:`PULSE` seconds."""
+    if client.status not in ("running", "connecting"):
+        raise RuntimeError(f"the client of Dask is {client.status}")
+    return client.sync(client.scheduler.identity, callback_timeout=PULSE)
 
 
 def _dask(pool: Executor) -> Any:

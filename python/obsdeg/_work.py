@@ -17,7 +17,7 @@ INPUT = (ValueError, TypeError, PicklingError)
 #: What `draw` returns when there is no task.
 END: Any = object()
 #: Seconds for which a cluster may leave every look unanswered before it is given up.
-PATIENCE = 40.0
+PATIENCE = 30.0
 #: Executors in a row that may take no task.
 REFUSED = 3
 #: Seconds between two counts of the workers.
@@ -123,9 +123,9 @@ class Work:
                     # one that had tasks has them counted as losses, which end; one that takes none says
                     # nothing of any task
                     fruitless = 0 if self.waiting else fruitless + 1
-                    if fruitless > REFUSED:
-                        why = unreachable(pool) or str(broken) or type(broken).__name__
-                        raise self._without_workers(why) from broken
+                    why = unreachable(pool)
+                    if why is not None or fruitless > REFUSED:
+                        raise self._without_workers(why or str(broken) or type(broken).__name__) from broken
                     yield from self._lose(broken)
                     close(pool, at_once=True)
                     # what starts workers may itself be starting again

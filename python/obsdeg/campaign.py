@@ -70,7 +70,7 @@ def run(
 
     Raises:
         CampaignError: a task failed too often, no executor can be had, or the scheduler of a cluster has not
-            answered for 40 s; ``pending`` has the tasks that were drawn and are not done.
+            answered for 30 s; ``pending`` has the tasks that were drawn and are not done.
         obsdeg.ProblemError: what is wrong with a task, which it names and has as ``task``.
     """
     if ahead is not None:
