@@ -12,6 +12,7 @@ use std::borrow::Cow;
 use obsdeg_ekf::consistency::Nees;
 use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
+use obsdeg_exact::interrupt;
 
 use super::SimulationError;
 use super::answer::Validity;
@@ -56,6 +57,7 @@ impl Trajectory {
         for (segment, s) in filter.plan().segments.iter().enumerate() {
             let motion = filter.motion(segment);
             for i in 0..s.steps.min(most - out.states.len()) {
+                interrupt::check();
                 on_step(&motion, i as f64 * s.dt, s.dt, &mut x)?;
                 out.outputs.extend_from_slice(motion.h(0.0, &x).as_slice());
                 out.states.push(x.clone());

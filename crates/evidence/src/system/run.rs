@@ -8,6 +8,7 @@ use obsdeg_core::system::{
 };
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
+use obsdeg_exact::interrupt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -306,6 +307,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         let process = numeric.process(part);
         let measurement = numeric.measurement(part, &sigmas);
         for k in 0..samples as usize {
+            interrupt::check();
             let t = begin + k as f64 * dt;
             truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?.x;
             filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
