@@ -109,7 +109,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("frame", SOLUTIONS, "Axes of Z in solutions: n or platform"),
     ("formulas", SOLUTIONS, "Print Z, its derivatives, psi and eps as formulas"),
     ("symbolic_limit", SOLUTIONS, "Work of the symbolic engine for one formula; 0: none"),
-    ("engine_wait", SOLUTIONS, "Longest wait for the symbolic engine, in s (default: 60)"),
+    ("engine_wait", SOLUTIONS, "Longest wait for the symbolic engine, in s"),
     ("filter_carry", CONTROLS, "Make the filter wrong: another carry"),
     ("filter_latitude", CONTROLS, "Make the filter wrong: another latitude in degrees"),
     ("filter_drop", CONTROLS, "Make the filter wrong: it does not know of this position"),
