@@ -387,6 +387,15 @@ pub struct RecordReport {
     pub name: String,
     /// Its samples.
     pub samples: usize,
+    /// Usual interval between rows, in s.
+    #[serde(default)]
+    pub interval_s: f64,
+    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between; at most 1000.
+    #[serde(default)]
+    pub gaps: Vec<Gap>,
+    /// Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the first row at it where only rows say when positions begin.
+    #[serde(default)]
+    pub psi_at_s: f64,
     /// Samples at no position of the scheme.
     pub unused: usize,
     /// Bins.
@@ -405,9 +414,28 @@ pub struct RecordReport {
     pub clock: Clock,
 }
 
+/// An interval without rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gap {
+    /// Time of the row before it, in s as it is in the record.
+    pub from_s: f64,
+    /// Time of the row after it, in s as it is in the record.
+    pub to_s: f64,
+    /// Line of the row after it.
+    pub line: u64,
+    /// Position that the rows before and after it were taken at, or the two positions.
+    pub place: String,
+}
+
 /// How right the clock of a record is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
+    /// Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in the scheme, so that rows alone say when each begins.
+    #[serde(default)]
+    pub offset_s: Option<f64>,
+    /// Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree with it.
+    #[serde(default)]
+    pub offset_sigma_s: Option<f64>,
     /// By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme that was run so.
     pub by_durations: Option<f64>,
     /// By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part. Nothing where sigma would be above a third.

@@ -2,8 +2,8 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Assumed, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit,
-    PositionsBy, RecordReport, ResidualSeries,
+    Assumed, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
+    PositionFit, PositionsBy, RecordReport, ResidualSeries,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -64,6 +64,20 @@ pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth
 
 /// What is known of the clock of a record.
 fn clock(c: &Clock) -> String {
+    let begins = match (c.offset_s, c.offset_sigma_s) {
+        (Some(at), Some(sigma)) => format!(
+            "; the scheme begins at {} s of its clock (estimated, sigma {} s; labels leave it open)",
+            estimate(Some(at), Some(sigma)),
+            number(sigma)
+        ),
+        (Some(at), None) if at.abs() >= 5e-4 => format!("; the scheme begins at {at:.3} s of its clock"),
+        _ => String::new(),
+    };
+    format!("{begins}{}", rates(c))
+}
+
+/// What is known of the rate of the clock of a record.
+fn rates(c: &Clock) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
         format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
     });
@@ -236,6 +250,35 @@ fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> 
     out
 }
 
+/// Most gaps that are listed.
+const GAPS: usize = 5;
+
+/// Where rows are missing, the longest first, in the order of time.
+fn gaps(r: &RecordReport) -> String {
+    let mut all: Vec<&Gap> = r.gaps.iter().collect();
+    let length = |g: &Gap| g.to_s - g.from_s;
+    all.sort_by(|a, b| length(b).total_cmp(&length(a)));
+    let more = match all.len().saturating_sub(GAPS) {
+        0 => String::new(),
+        n => format!(", and {n} shorter gaps"),
+    };
+    all.truncate(GAPS);
+    all.sort_by_key(|g| g.line);
+    let each: Vec<String> = all
+        .iter()
+        .map(|g| {
+            format!(
+                "{} s from {} s on ({}, before line {})",
+                tenths(length(g)),
+                tenths(g.from_s),
+                g.place,
+                g.line
+            )
+        })
+        .collect();
+    if each.is_empty() { String::new() } else { format!("; rows are missing for {}{more}", each.join(", ")) }
+}
+
 /// What was read, a sentence for each record.
 fn records(c: &Calibration) -> Vec<String> {
     let of = |r: &RecordReport| {
@@ -257,6 +300,7 @@ fn records(c: &Calibration) -> Vec<String> {
                     "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two",
             }
         );
+        out += &gaps(r);
         if r.unused > 0 {
             out += &format!("; {} samples at no position were not used", r.unused);
         }
@@ -296,7 +340,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
         format!("white drift {} deg/sqrt(h)", number(a.drift_noise_deg_sqrt_h)),
         format!("samples within {} s are one measurement: the value of a line at their middle", a.bin_s),
         format!("one g is {} m/s^2", a.gravity_m_s2),
-        format!("psi is that of the start of a record; full attitudes; seed {}", a.seed),
+        format!("psi is that of {}; full attitudes; seed {}", moment(&c.records), a.seed),
     ];
     if !a.known.is_empty() {
         out.push(format!("known from a calibration before: {}", a.known.join(", ")));
@@ -308,6 +352,18 @@ fn assumed(c: &Calibration) -> Vec<String> {
         }
     }
     out
+}
+
+/// The moment whose psi is estimated.
+fn moment(records: &[RecordReport]) -> String {
+    let by_rows = |r: &RecordReport| matches!(r.positions_by, PositionsBy::Labels | PositionsBy::Static);
+    let start = "the start of the scheme's first position";
+    let first = "the first row at the first position";
+    match (records.iter().any(by_rows), records.iter().all(by_rows)) {
+        (false, _) => start.into(),
+        (true, true) => first.into(),
+        _ => format!("{start} ({first} where rows alone say when positions begin)"),
+    }
 }
 
 /// What nothing determines, and which sigmas that is in.

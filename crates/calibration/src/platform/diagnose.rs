@@ -13,12 +13,13 @@ use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
-use super::observe::{By, channel_name};
+use super::observe::{By, Reading, channel_name};
+use super::offset::Offset;
 use super::run::Key;
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
-    PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Gap, Moved, Outlier,
+    PositionFit, PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -171,6 +172,8 @@ pub(crate) struct Parts<'a> {
     pub problem: &'a Problem<'a>,
     pub estimate: &'a Estimate,
     pub found: &'a Diagnosed,
+    /// By run: the moment at which the scheme begins, where it was estimated.
+    pub offsets: &'a [Option<Offset>],
     pub too_many: Option<usize>,
     pub known: Vec<String>,
     pub rests_on: Vec<setup::Basis>,
@@ -460,11 +463,16 @@ impl Parts<'_> {
     fn records(&self) -> Vec<RecordReport> {
         let of = |(r, run): (usize, &super::run::Run)| RecordReport {
             clock: Clock {
+                offset_s: matches!(run.reading.by, By::Timeline | By::Both).then_some(run.reading.origin),
+                offset_sigma_s: self.offsets[r].as_ref().map(|o| o.sigma),
                 by_durations: run.reading.by_durations(self.planned),
                 by_earth: self.clock(r).ok().flatten(),
             },
             name: run.reading.name.clone(),
             samples: run.reading.samples,
+            interval_s: run.reading.interval,
+            gaps: self.gaps(&run.reading),
+            psi_at_s: run.reading.origin,
             unused: run.reading.unused,
             bins: run.len(),
             span_s: run.reading.span,
@@ -479,6 +487,25 @@ impl Parts<'_> {
             force_g: run.reading.force,
         };
         self.problem.runs.iter().enumerate().map(of).collect()
+    }
+
+    /// Where rows of a record are missing, in words.
+    fn gaps(&self, reading: &Reading) -> Vec<Gap> {
+        let name = |p: usize| self.scheme.positions[p].name.clone();
+        let place = |between: [Option<usize>; 2]| match between {
+            [Some(p), Some(q)] if p == q => name(p),
+            [Some(p), Some(q)] => format!("{} to {}", name(p), name(q)),
+            [Some(p), None] => format!("after {}", name(p)),
+            [None, Some(q)] => format!("before {}", name(q)),
+            [None, None] => "between positions".into(),
+        };
+        let of = |g: &super::timeline::Gap| Gap {
+            from_s: g.from,
+            to_s: g.to,
+            line: g.line,
+            place: place(g.between),
+        };
+        reading.gaps.iter().map(of).collect()
     }
 
     /// What joining the records adds to what each leaves alone.

@@ -1,7 +1,7 @@
 //! A record of a platform: which columns it has, at which position every sample was taken, and bins of them in n.
 
 use obsdeg_core::model::slew::apply;
-use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
+use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
@@ -9,6 +9,7 @@ use super::clock::{bounds, by_durations};
 use super::force::{ForceColumn, Forces};
 use super::length::Length;
 use super::mistaken::Mistaken;
+use super::timeline::{self, Gap, Intervals};
 use crate::Going;
 use crate::bins::{Bin, Binner, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
@@ -21,8 +22,10 @@ const FORCES: [(&str, Option<f64>); 4] =
 const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("um/s", 1e-6)];
 /// An interval so many times as long as the one before is a gap, in which increments may be lost.
 const GAP: f64 = 1.5;
-/// So many intervals between the first samples say how long one usually is.
-const FIRST: usize = 101;
+/// By this part of an interval the stamps of rows may differ from the timeline of the scheme, where the file states none.
+const TOLERANCE: f64 = 0.05;
+/// By this part of an interval a row may be late by rounding alone, where positions follow each other at once.
+const ROUNDED: f64 = 1e-3;
 const ANGLES: [(&str, f64); 4] = [
     ("rad", 1.0),
     ("mrad", 1e-3),
@@ -73,8 +76,16 @@ pub(crate) struct Reading {
     pub bins: Vec<Vec<Bin>>,
     /// The time of the record, in s, that is 0 there.
     pub origin: f64,
+    /// Earliest and latest origin, in s, where labels leave it open and it is not that of the scheme's clock.
+    pub open: Option<(f64, f64)>,
+    /// The usual interval between rows, in s.
+    pub interval: f64,
+    /// Where rows are missing.
+    pub gaps: Vec<Gap>,
     /// First and last sample of every position, in s alike.
     pub stays: Vec<(f64, f64)>,
+    /// The row after the last of every position, in s alike; infinite for the last of the record.
+    pub after: Vec<f64>,
     pub spikes: Vec<Spike>,
     pub samples: usize,
     /// Samples at no position.
@@ -94,6 +105,17 @@ pub(crate) struct Reading {
 }
 
 impl Reading {
+    /// The same with the scheme beginning `by` s later by the clock of the record.
+    pub(crate) fn later(&self, by: f64) -> Self {
+        let mut out = self.clone();
+        out.origin += by;
+        out.bins.iter_mut().flatten().for_each(|b| b.t -= by);
+        out.spikes.iter_mut().for_each(|s| s.t -= by);
+        out.stays.iter_mut().for_each(|s| *s = (s.0 - by, s.1 - by));
+        out.after.iter_mut().for_each(|t| *t -= by);
+        out
+    }
+
     /// The part by which its clock is fast as positions begin and end, where the record says that.
     pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
         let used = self.samples.saturating_sub(self.unused).max(1) as f64;
@@ -272,14 +294,16 @@ impl Layout {
     }
 }
 
-/// The position of a time of the scheme, while Z is observed.
-fn at_time(plan: &Plan, t: f64) -> Option<usize> {
-    let within = |s: &&obsdeg_evidence::simulation::Segment| {
-        t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + 1e-9
+/// The position of a time of the scheme, while Z is observed; a stamp may be late by `rounding` s where one position follows another at once.
+fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
+    let slew = |k: usize| plan.segments.get(k).is_none_or(|s| matches!(s.kind, SegmentKind::Slew(_)));
+    let within = |(k, s): &(usize, &obsdeg_evidence::simulation::Segment)| {
+        let late = if slew(*k) || slew(k + 1) { 0.0 } else { rounding };
+        t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + late.max(1e-9)
     };
     // the end of one position is rather that than the start of the next
-    let found = plan.segments.iter().find(within)?;
-    (!matches!(found.kind, SegmentKind::Slew(_))).then_some(found.position)
+    let (k, found) = plan.segments.iter().enumerate().find(within)?;
+    (!slew(k)).then_some(found.position)
 }
 
 /// A row that is kept: its line, its numbers, and how long before it the one before was.
@@ -295,8 +319,6 @@ struct Taking<'a> {
     /// The position of the bin, and the time of the first sample.
     now: Option<usize>,
     begin: f64,
-    /// Whether every label is what the timeline of the scheme has there.
-    agrees: bool,
     /// The forces, and the sum of their lengths with their number.
     forces: Forces,
     length: (f64, usize),
@@ -304,8 +326,8 @@ struct Taking<'a> {
     noise: f64,
     /// The time of the sample before, and how long before it the one before that was.
     before: Option<(f64, Option<f64>)>,
-    /// The first intervals between samples.
-    intervals: Vec<f64>,
+    /// Intervals between rows.
+    intervals: Intervals,
     /// Finds the positions, where the file says how.
     detector: Option<Detector<Kept>>,
     told: Vec<Told<Kept>>,
@@ -323,10 +345,10 @@ impl Taking<'_> {
     }
 
     /// The position of a row.
-    fn position(&self, row: &Row<'_>, t: f64) -> Result<Option<usize>, CalibrationError> {
+    fn position(&self, row: &Row<'_>, t: f64, dt: Option<f64>) -> Result<Option<usize>, CalibrationError> {
         let positions = &self.plan.platform.scheme().positions;
         match self.out.by {
-            By::Timeline | By::Both | By::Static => Ok(at_time(self.plan, t)),
+            By::Timeline | By::Both | By::Static => Ok(at_time(self.plan, t, ROUNDED * dt.unwrap_or(0.0))),
             By::Label if row.label.is_empty() => Ok(None),
             By::Label => {
                 let found = positions.iter().position(|p| p.name == row.label);
@@ -379,7 +401,8 @@ impl Taking<'_> {
             self.detector = Some(detector);
             return Ok(());
         }
-        let found = self.position(row, time - if self.out.by == By::Label { self.begin } else { 0.0 })?;
+        let found = self.position(row, time, dt)?;
+        self.intervals.push(time, row.line, found);
         if self.layout.increments && found != self.now {
             // a part of it is of the way here
             self.layout.divide(&mut numbers, None);
@@ -392,9 +415,6 @@ impl Taking<'_> {
         let dt = self.before.map(|(t, _)| time - t);
         let regular =
             dt.filter(|dt| self.before.and_then(|(_, last)| last).is_none_or(|last| *dt <= GAP * last));
-        if let Some(dt) = dt.filter(|_| self.intervals.len() < FIRST) {
-            self.intervals.push(dt);
-        }
         self.before = Some((time, dt));
         regular
     }
@@ -409,7 +429,9 @@ impl Taking<'_> {
             self.rests[k].1 = time;
         }
         let positions = self.plan.attitudes.len();
-        self.put(&told.sample, time, told.interval.filter(|k| *k < positions))
+        let found = told.interval.filter(|k| *k < positions);
+        self.intervals.push(time, told.sample.0, found);
+        self.put(&told.sample, time, found)
     }
 
     /// Puts a sample where it was taken.
@@ -423,6 +445,9 @@ impl Taking<'_> {
         let own_time = matches!(self.out.by, By::Label | By::Static);
         if found != self.now {
             self.end();
+            if let Some(after) = self.now.and_then(|p| self.out.after.get_mut(p)) {
+                *after = time - if own_time { self.begin } else { 0.0 };
+            }
         }
         let Some(p) = found else {
             self.out.unused += 1;
@@ -432,12 +457,12 @@ impl Taking<'_> {
         if own_time && self.out.stays.is_empty() {
             self.begin = time;
         }
-        self.agrees &= at_time(self.plan, time) == Some(p);
         let t = time - if own_time { self.begin } else { 0.0 };
         if self.now != Some(p) {
             // the timeline may begin late, or leave positions out
             while self.out.stays.len() <= p {
                 self.out.stays.push((t, t));
+                self.out.after.push(f64::INFINITY);
             }
         }
         self.now = Some(p);
@@ -513,10 +538,18 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
     }
 }
 
-/// The median of some intervals; one second of none.
-fn median(of: &mut [f64]) -> f64 {
-    let middle = of.len() / 2;
-    if of.is_empty() { 1.0 } else { *of.select_nth_unstable_by(middle, f64::total_cmp).1 }
+/// Lays positions that are known by labels on the timeline of the scheme, which says when each begins and ends where rows only say what is between; where they lie inside no
+/// such timeline they were held otherwise, and end with their last rows.
+fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
+    let by_clock: Vec<(f64, f64)> =
+        reading.stays.iter().map(|(from, to)| (from + reading.origin, to + reading.origin)).collect();
+    match timeline::begin(&by_clock, plan, tolerance) {
+        Some(begin) => {
+            *reading = reading.later(begin.at - reading.origin);
+            (reading.by, reading.origin, reading.open) = (By::Both, begin.at, begin.open);
+        }
+        None => timeline::ends(&mut reading.stays, &reading.after, plan, reading.interval, tolerance),
+    }
 }
 
 /// The name of a component of Z.
@@ -550,7 +583,11 @@ pub(crate) fn observe(
         by,
         bins: vec![Vec::new(); positions],
         origin: 0.0,
+        open: None,
+        interval: 1.0,
+        gaps: Vec::new(),
         stays: Vec::new(),
+        after: Vec::new(),
         spikes: Vec::new(),
         samples: 0,
         unused: 0,
@@ -571,12 +608,11 @@ pub(crate) fn observe(
         out,
         now: None,
         begin: 0.0,
-        agrees: true,
         forces: Forces::new(positions, bin_s),
         length: (0.0, 0),
         noise,
         before: None,
-        intervals: Vec::new(),
+        intervals: Intervals::default(),
         detector: still.map(Detector::new),
         told: Vec::new(),
         rests: Vec::new(),
@@ -609,7 +645,8 @@ pub(crate) fn observe(
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
     // forces that are increments of velocity by what the header says, or the other way round
-    let between = median(&mut taking.intervals);
+    let (between, gaps) = std::mem::take(&mut taking.intervals).finish(plan);
+    (taking.out.interval, taking.out.gaps) = (between, gaps);
     let per =
         |(u, size): (&'static str, f64)| (u, size * between.powi(if layout.increments { 1 } else { -1 }));
     let others = units_of_force(!layout.increments, gravity).map(per);
@@ -621,7 +658,8 @@ pub(crate) fn observe(
         &units_of_force(layout.increments, gravity),
         &others,
     )?;
-    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes)?;
+    let inertial = plan.platform.scheme().carry == Carry::Inertial;
+    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes, inertial)?;
     if matches!(by, By::Label | By::Static) {
         check_times(&taking.out, plan, &layout.time)?;
     }
@@ -637,20 +675,16 @@ pub(crate) fn observe(
     }
     let (length, count) = taking.length;
     let force = (layout.observed == Observed::Force && count > 0).then(|| length / count as f64);
-    let (agrees, begin) = (taking.agrees, taking.begin);
+    let begin = taking.begin;
     let gimbals = taking.gimbals.map(|(_, off, _)| off);
     let lengths = force.map(|_| taking.forces.lengths());
     let mut out = taking.out;
     out.lengths = lengths.unwrap_or(out.lengths);
     (out.force, out.gimbals, out.digest) = (force, gimbals, digest);
     out.origin = if matches!(by, By::Label | By::Static) { begin } else { 0.0 };
-    if out.by == By::Label && agrees {
-        out.origin = 0.0;
-        // which says when each position begins and ends, where samples only say what is between
-        out.by = By::Both;
-        out.bins.iter_mut().flatten().for_each(|b| b.t += begin);
-        out.spikes.iter_mut().for_each(|s| s.t += begin);
-        out.stays.iter_mut().for_each(|s| *s = (s.0 + begin, s.1 + begin));
+    if out.by == By::Label && out.stays.len() == positions {
+        let part = plan.platform.scheme().recording.tolerance.unwrap_or(TOLERANCE);
+        lay(&mut out, plan, part * between);
     }
     if let Some(p) = out.bins.iter().position(|b| b.iter().all(|b| b.channels.iter().all(Option::is_none))) {
         let scheme = plan.platform.scheme();

@@ -8,3 +8,4 @@ mod handheld;
 mod models;
 mod round_trip;
 mod simulator;
+mod timeline;

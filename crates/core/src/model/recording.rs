@@ -16,6 +16,8 @@ pub struct Recording {
     pub values: BTreeMap<String, f64>,
     /// How the intervals at rest are found from the data.
     pub still: Option<Still>,
+    /// By which part of the interval between rows their stamps may differ from the timeline of a scheme; `None`: as the program has it.
+    pub tolerance: Option<f64>,
 }
 
 /// Intervals at rest are where the scatter within a window about each sample, all columns together, is within so many times that of the beginning of the
@@ -48,6 +50,9 @@ pub(crate) struct SchemeRecord {
     /// Positions are intervals at rest, found by the scatter of the forces, where no column `position` says what is where.
     #[serde(default, rename = "static")]
     still: Option<SchemeStill>,
+    /// Part of the interval between rows by which their stamps may differ from the timeline of the scheme: 0.05 when left out, 0 to 0.5.
+    #[serde(default)]
+    tolerance: Option<f64>,
 }
 
 /// At rest is what scatters, within a window about each sample, by at most so many times the variance of the beginning.
@@ -107,7 +112,7 @@ impl From<SchemeRecord> for Recording {
             factor,
             shortest,
         });
-        Self { columns: r.columns, units: r.units, values: BTreeMap::new(), still }
+        Self { columns: r.columns, units: r.units, values: BTreeMap::new(), still, tolerance: r.tolerance }
     }
 }
 
@@ -120,7 +125,7 @@ impl From<ModelRecord> for Recording {
             factor,
             shortest,
         });
-        Self { columns: r.columns, units: BTreeMap::new(), values: r.values, still }
+        Self { columns: r.columns, units: BTreeMap::new(), values: r.values, still, tolerance: None }
     }
 }
 
@@ -157,6 +162,9 @@ impl Recording {
                     s.initial, s.window
                 ));
             }
+        }
+        if let Some(x) = self.tolerance.filter(|x| !(0.0..=0.5).contains(x)) {
+            return Err(format!("tolerance is {x}; expected a part of the sample interval, 0 to 0.5"));
         }
         let bad = self.values.iter().find(|(_, x)| !x.is_finite());
         bad.map_or(Ok(()), |(name, x)| Err(format!("values.{name} is {x}; expected a finite number")))

@@ -114,6 +114,9 @@ fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
 }
 
 fn recording(out: &mut String, r: &Recording) {
+    if let Some(part) = r.tolerance {
+        table(out, "record", &format!("tolerance = {}\n", number(part)));
+    }
     for (name, texts) in [("record.columns", &r.columns), ("record.units", &r.units)] {
         let mut lines = String::new();
         texts.iter().for_each(|(key, text)| line(&mut lines, &quoted(key), &quoted(text)));
@@ -303,6 +306,7 @@ mod tests {
                 columns: texts(),
                 units: if mirrored { texts() } else { [].into() },
                 still: mirrored.then_some(still),
+                tolerance: mirrored.then_some(0.25),
                 ..Recording::default()
             };
             let limits = limit.map(|(low, high)| [low * 1_234_567_891, high * 1_000_000_000]);
