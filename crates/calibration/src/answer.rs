@@ -97,6 +97,21 @@ pub enum Finding {
         /// Each of these alone makes it one g long: none where several axes are off, or all alike.
         causes: Vec<ForceCause>,
     },
+    /// Cells of a column that hold one value again and again, far from their neighbours or many times in a row; they were left out.
+    Cells {
+        /// The record.
+        record: String,
+        /// The column, as its header is written.
+        column: String,
+        /// What these cells may be.
+        kind_of_cells: CellKind,
+        /// The value, as it is written.
+        value: f64,
+        /// Number of cells.
+        count: usize,
+        /// First and last line.
+        lines: (u64, u64),
+    },
     /// The clock of a record does not go as fast as that of the scheme, or as the earth turns.
     Clock {
         /// The record.
@@ -175,6 +190,16 @@ pub enum Finding {
         /// Chi-square per degree of freedom.
         chi_square: f64,
     },
+}
+
+/// What cells may be that hold one value again and again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellKind {
+    /// A code of missing values: it is far from its neighbours.
+    Code,
+    /// An output that is stuck: it is what the rows before it have to the last digit.
+    Stuck,
 }
 
 /// How long the specific force is at a position.
@@ -354,7 +379,7 @@ pub struct Outlier {
     pub lines: (u64, u64),
     /// When, in s of the record's timeline.
     pub t_s: f64,
-    /// The component.
+    /// The component of Z or, of a single cell, the column of the record.
     pub channel: String,
     /// How far it is off, in standard deviations.
     pub sigmas: f64,
@@ -393,6 +418,9 @@ pub struct RecordReport {
     /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between; at most 1000.
     #[serde(default)]
     pub gaps: Vec<Gap>,
+    /// Number of empty cells at positions, by column that is read; columns without are left out.
+    #[serde(default)]
+    pub empty_cells: Vec<EmptyCells>,
     /// Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the first row at it where only rows say when positions begin.
     #[serde(default)]
     pub psi_at_s: f64,
@@ -412,6 +440,15 @@ pub struct RecordReport {
     pub gimbals_deg: Option<f64>,
     /// Its clock.
     pub clock: Clock,
+}
+
+/// Empty cells of a column.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EmptyCells {
+    /// The column, as its header is written.
+    pub column: String,
+    /// Number of its cells that are empty or NaN, in rows at positions.
+    pub count: usize,
 }
 
 /// An interval without rows.

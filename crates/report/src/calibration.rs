@@ -2,7 +2,7 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Assumed, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
+    Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
     PositionFit, PositionsBy, RecordReport, ResidualSeries,
 };
 
@@ -124,6 +124,18 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             let each: Vec<String> = causes.iter().map(cause).collect();
             let told = if causes.len() > 1 { " (these positions do not tell which)" } else { "" };
             format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
+        }
+        Finding::Cells { record, column, kind_of_cells, value, count, lines } => {
+            let (cells, hold) = if *count == 1 { ("cell", "holds") } else { ("cells", "hold") };
+            let place = format!("column `{column}`{}, lines {} to {}", of(record, records), lines.0, lines.1);
+            match kind_of_cells {
+                CellKind::Code => format!(
+                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and were left out; if that is a code of missing values, state `missing = [{value}]` under [record]"
+                ),
+                CellKind::Stuck => format!(
+                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, and were left out; check whether the output is stuck"
+                ),
+            }
         }
         Finding::Clock { record, by_durations, by_earth } => {
             let of = of(record, records);
@@ -301,6 +313,11 @@ fn records(c: &Calibration) -> Vec<String> {
             }
         );
         out += &gaps(r);
+        let empty: Vec<String> =
+            r.empty_cells.iter().map(|e| format!("{} of `{}`", e.count, e.column)).collect();
+        if !empty.is_empty() {
+            out += &format!("; empty cells that were skipped: {}", empty.join(", "));
+        }
         if r.unused > 0 {
             out += &format!("; {} samples at no position were not used", r.unused);
         }

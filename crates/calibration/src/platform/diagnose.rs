@@ -13,13 +13,14 @@ use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
+use super::gross::Why;
 use super::observe::{By, Reading, channel_name};
 use super::offset::Offset;
 use super::run::Key;
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Gap, Moved, Outlier,
-    PositionFit, PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, EmptyCells, Estimated, Fit, Gap, Moved,
+    Outlier, PositionFit, PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -472,6 +473,12 @@ impl Parts<'_> {
             samples: run.reading.samples,
             interval_s: run.reading.interval,
             gaps: self.gaps(&run.reading),
+            empty_cells: run
+                .reading
+                .missing
+                .iter()
+                .map(|(column, count)| EmptyCells { column: column.clone(), count: *count })
+                .collect(),
             psi_at_s: run.reading.origin,
             unused: run.reading.unused,
             bins: run.len(),
@@ -527,6 +534,15 @@ impl Parts<'_> {
         let mut out = Vec::new();
         let channel = |c: usize| channel_name(self.planned.components[c]);
         for run in self.problem.runs {
+            for (cell, column) in run.reading.cells.iter().filter(|(c, _)| c.why == Why::Far) {
+                out.push(Outlier {
+                    record: run.reading.name.clone(),
+                    lines: cell.lines,
+                    t_s: run.reading.origin + cell.t,
+                    channel: column.clone(),
+                    sigmas: cell.sigmas,
+                });
+            }
             for s in &run.reading.spikes {
                 out.push(Outlier {
                     record: run.reading.name.clone(),

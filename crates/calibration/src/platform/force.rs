@@ -153,6 +153,11 @@ impl Forces {
         });
     }
 
+    /// Leaves out the piece of a position that is of these lines.
+    pub(crate) fn leave_out(&mut self, position: usize, lines: (u64, u64)) {
+        self.pieces[position].retain(|piece| piece.lines != lines);
+    }
+
     /// By position: how long the force is, whatever single samples are. Its standard deviation is that of a median, by what is known of the samples and by how its
     /// pieces scatter, whichever is greater.
     pub(crate) fn lengths(&self) -> Vec<Option<Length>> {

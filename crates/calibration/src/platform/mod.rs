@@ -6,6 +6,7 @@ mod earth;
 mod estimate;
 mod findings;
 mod force;
+mod gross;
 mod length;
 mod mistaken;
 mod observe;

@@ -1,5 +1,7 @@
 //! A record of a platform: which columns it has, at which position every sample was taken, and bins of them in n.
 
+use std::cmp::Ordering;
+
 use obsdeg_core::model::slew::apply;
 use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
@@ -7,11 +9,12 @@ use obsdeg_evidence::simulation::{Plan, SegmentKind};
 use super::CalibrationError;
 use super::clock::{bounds, by_durations};
 use super::force::{ForceColumn, Forces};
+use super::gross;
 use super::length::Length;
 use super::mistaken::Mistaken;
 use super::timeline::{self, Gap, Intervals};
 use crate::Going;
-use crate::bins::{Bin, Binner, Sample, Spike};
+use crate::bins::{Bin, Binner, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{Detector, Told};
 
@@ -35,8 +38,10 @@ const ANGLES: [(&str, f64); 4] = [
 /// Units of a temperature, whose zero does not matter.
 const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
-pub(crate) const TIMES: [(&str, f64); 5] =
-    [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0), ("h", 3600.0)];
+pub(crate) const TIMES: [(&str, f64); 6] =
+    [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
+/// So many samples of a dense bin say what is usual in it.
+const SOME: usize = 64;
 /// What the gimbals read is no further from the attitude of the scheme than this, in deg.
 const GIMBALS_DEG: f64 = 5.0;
 
@@ -87,6 +92,10 @@ pub(crate) struct Reading {
     /// The row after the last of every position, in s alike; infinite for the last of the record.
     pub after: Vec<f64>,
     pub spikes: Vec<Spike>,
+    /// Cells that do not count, with the text of their column.
+    pub cells: Vec<(gross::Cell, String)>,
+    /// By column that is read: its text, and how many of its cells are empty at positions.
+    pub missing: Vec<(String, usize)>,
     pub samples: usize,
     /// Samples at no position.
     pub unused: usize,
@@ -111,6 +120,7 @@ impl Reading {
         out.origin += by;
         out.bins.iter_mut().flatten().for_each(|b| b.t -= by);
         out.spikes.iter_mut().for_each(|s| s.t -= by);
+        out.cells.iter_mut().for_each(|(c, _)| c.t -= by);
         out.stays.iter_mut().for_each(|s| *s = (s.0 - by, s.1 - by));
         out.after.iter_mut().for_each(|t| *t -= by);
         out
@@ -142,6 +152,8 @@ struct Layout {
     temperature: Option<usize>,
     label: Option<usize>,
     ignored: Vec<String>,
+    /// Texts of the three columns that are observed.
+    columns: [String; 3],
 }
 
 /// Units of the force, or of increments of velocity, with what they are of g, or of g s.
@@ -190,6 +202,7 @@ impl Layout {
                 scale: own[i].1.scale,
             })
         });
+        let columns = std::array::from_fn(|i| record.columns()[own[i].1.column].text.clone());
         let time = (record.columns()[time].text.clone(), wanted[0].scale);
         let azimuth = plan.components.contains(&AZIMUTH);
         if azimuth {
@@ -240,7 +253,22 @@ impl Layout {
             temperature,
             label,
             ignored,
+            columns,
         })
+    }
+
+    /// Whether the record has the column `i` of the three that are observed: where it has none, the number is that of the time.
+    fn own(&self, i: usize) -> bool {
+        self.wanted[i + 1].column != self.wanted[0].column
+    }
+
+    /// The columns with empty cells, with their number.
+    fn missing(&self, columns: &[String], empty: &[usize]) -> Vec<(String, usize)> {
+        let mut out: Vec<(usize, usize)> =
+            self.wanted.iter().zip(empty).map(|(w, n)| (w.column, *n)).filter(|(_, n)| *n > 0).collect();
+        out.sort_unstable();
+        out.dedup();
+        out.into_iter().map(|(c, n)| (columns[c].clone(), n)).collect()
     }
 
     /// Makes mean forces of the increments of a row, those over `dt` s; nothing of them where it is not known over which time they are.
@@ -333,6 +361,11 @@ struct Taking<'a> {
     told: Vec<Told<Kept>>,
     /// First and last time of every interval at rest.
     rests: Vec<(f64, f64)>,
+    /// Line, time and values of the samples of the bin, then what the robust pass is to see of every position.
+    samples: Vec<(u64, f64, [f64; 3])>,
+    rows: Vec<Vec<gross::Row>>,
+    /// By wanted number: how many cells are empty at positions.
+    empty: Vec<usize>,
     /// The position whose gimbals are furthest off, by how much in deg, and the line.
     gimbals: Option<(usize, f64, u64)>,
 }
@@ -384,6 +417,13 @@ impl Taking<'_> {
         self.out.span.1 = time;
         self.out.samples += 1;
         let mut numbers = row.numbers.to_vec();
+        // values that the file says are missing ones
+        let codes = &self.plan.platform.scheme().recording.missing;
+        if !codes.is_empty() {
+            for (number, w) in numbers.iter_mut().zip(&self.layout.wanted).skip(1) {
+                *number = number.filter(|x| codes.iter().all(|code| *x != code * w.scale));
+            }
+        }
         let dt = self.interval(time);
         if self.layout.increments {
             self.layout.divide(&mut numbers, dt);
@@ -481,8 +521,12 @@ impl Taking<'_> {
             // the length is what goes up
             let up = self.layout.sigmas_in_n(numbers, c).and_then(|s| s[1]);
             self.forces.push(p, line, time, own, up.unwrap_or(self.noise));
-            self.length.0 += (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt();
-            self.length.1 += 1;
+            // codes of missing values have no length
+            let length = (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt();
+            if (length - 1.0).abs() < 0.5 {
+                self.length.0 += length;
+                self.length.1 += 1;
+            }
         }
         let z = self.plan.components.iter().map(|&k| if k == AZIMUTH { in_n[3] } else { in_n[k - 1] });
         let z: Vec<Option<f64>> = z.collect();
@@ -503,16 +547,97 @@ impl Taking<'_> {
         let temperature = self.layout.temperature.and_then(|i| numbers[i]);
         // a mean is of the middle
         let t = t - dt.filter(|_| self.layout.increments).map_or(0.0, |dt| dt / 2.0);
+        let spikes = self.out.spikes.len();
         let bin = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
         if let Some(bin) = bin {
-            self.out.bins[p].push(bin);
+            self.put_bin(p, bin, spikes);
+        }
+        let values =
+            std::array::from_fn(|i| numbers[i + 1].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
+        self.samples.push((line, t, values));
+        for (count, number) in self.empty.iter_mut().zip(numbers) {
+            *count += usize::from(number.is_none());
         }
         Ok(())
     }
 
     fn end(&mut self) {
+        let spikes = self.out.spikes.len();
         if let (Some(bin), Some(p)) = (self.binner.end(&mut self.out.spikes), self.now) {
-            self.out.bins[p].push(bin);
+            self.put_bin(p, bin, spikes);
+        }
+    }
+
+    /// Takes a bin of a position, whose spikes are those from `spikes` on: of the samples of each the column that is furthest off is named.
+    fn put_bin(&mut self, p: usize, bin: Bin, spikes: usize) {
+        let samples = std::mem::take(&mut self.samples);
+        let index = self.out.bins[p].len();
+        self.out.bins[p].push(bin);
+        let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return };
+        if samples.len() < FEWEST {
+            let row = |&(line, t, values): &(u64, f64, [f64; 3])| gross::Row {
+                lines: (line, line),
+                t,
+                values,
+                bin: index,
+            };
+            self.rows[p].extend(samples.iter().map(row));
+            return;
+        }
+        // some of many say what is usual
+        let some = samples.iter().step_by(samples.len().div_ceil(SOME));
+        let usual: [f64; 3] = std::array::from_fn(|i| {
+            gross::median(some.clone().map(|s| s.2[i]).filter(|x| x.is_finite()).collect())
+        });
+        self.rows[p].push(gross::Row { lines: (first.0, last.0), t: first.1, values: usual, bin: index });
+        let mut found: Vec<Spike> = self.out.spikes.drain(spikes..).collect();
+        found.sort_by(|a, b| {
+            (a.line, b.sigmas.abs()).partial_cmp(&(b.line, a.sigmas.abs())).unwrap_or(Ordering::Equal)
+        });
+        found.dedup_by_key(|s| s.line);
+        for spike in found {
+            let Some(s) = samples.iter().find(|s| s.0 == spike.line) else { continue };
+            let off = |i: usize| (s.2[i] - usual[i]).abs();
+            let axis = (0..3).filter(|&i| s.2[i].is_finite()).max_by(|a, b| off(*a).total_cmp(&off(*b)));
+            // a measured azimuth is no such column
+            let Some(axis) = axis.filter(|_| self.plan.components[spike.channel] != AZIMUTH) else {
+                self.out.spikes.push(spike);
+                continue;
+            };
+            self.cell(gross::Cell {
+                lines: (spike.line, spike.line),
+                t: spike.t,
+                axis,
+                value: s.2[axis],
+                sigmas: spike.sigmas,
+                why: gross::Why::Far,
+            });
+        }
+    }
+
+    /// Takes a cell that does not count, with its value as it is written.
+    fn cell(&mut self, mut cell: gross::Cell) {
+        cell.value /= self.layout.wanted[cell.axis + 1].scale;
+        self.out.cells.push((cell.clone(), self.layout.columns[cell.axis].clone()));
+    }
+
+    /// Leaves out what a robust pass over every position finds gross. What is a turn (one g long still, at either end) is left to say so.
+    fn leave_out_gross(&mut self) {
+        let noise = self.noise;
+        for p in 0..self.rows.len() {
+            let rows = std::mem::take(&mut self.rows[p]);
+            let mut found = gross::cells(&rows, noise);
+            if self.layout.observed == Observed::Force {
+                gross::keep_turns(&rows, &mut found);
+            }
+            for cell in &found {
+                let lines = cell.lines;
+                if let Some(row) = rows.iter().find(|r| r.lines == lines) {
+                    self.out.bins[p][row.bin].channels.iter_mut().for_each(|c| *c = None);
+                }
+                self.forces.leave_out(p, lines);
+            }
+            found.into_iter().for_each(|cell| self.cell(cell));
         }
     }
 }
@@ -589,6 +714,8 @@ pub(crate) fn observe(
         stays: Vec::new(),
         after: Vec::new(),
         spikes: Vec::new(),
+        cells: Vec::new(),
+        missing: Vec::new(),
         samples: 0,
         unused: 0,
         span: (0.0, 0.0),
@@ -616,9 +743,13 @@ pub(crate) fn observe(
         detector: still.map(Detector::new),
         told: Vec::new(),
         rests: Vec::new(),
+        samples: Vec::new(),
+        rows: vec![Vec::new(); positions],
+        empty: vec![0; layout.wanted.len()],
         gimbals: None,
     };
     let (name, mut rows) = (record.name().to_string(), 0_usize);
+    let record_columns: Vec<String> = record.columns().iter().map(|c| c.text.clone()).collect();
     let digest = record.read(&layout.wanted, layout.label, false, |row| {
         rows += 1;
         if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
@@ -642,6 +773,7 @@ pub(crate) fn observe(
     }
     taking.end();
     taking.forces.end();
+    taking.out.missing = layout.missing(&record_columns, &taking.empty);
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
     // forces that are increments of velocity by what the header says, or the other way round
@@ -658,6 +790,7 @@ pub(crate) fn observe(
         &units_of_force(layout.increments, gravity),
         &others,
     )?;
+    taking.leave_out_gross();
     let inertial = plan.platform.scheme().carry == Carry::Inertial;
     taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes, inertial)?;
     if matches!(by, By::Label | By::Static) {

@@ -89,7 +89,7 @@ fn the_timeline_of_the_scheme_stands() {
         let gaps: Vec<_> = r.gaps.iter().filter(|g| g.to_s - g.from_s > 400.0).collect();
         if name == "half of p3" {
             let [gap] = &gaps[..] else { panic!("{:?}", r.gaps) };
-            assert!((gap.to_s - gap.from_s - 500.0).abs() < 20.0 && gap.place == "p3", "{gap:?}");
+            assert!((gap.to_s - gap.from_s - 500.0).abs() < 20.0 && gap.place == "after p3", "{gap:?}");
         } else {
             assert!(gaps.is_empty(), "{name}: {gaps:?}");
         }
