@@ -18,6 +18,7 @@ const AFTER_HELP: &str = "\
 Examples:
   obsdeg calibrate scheme.toml monday.csv
   obsdeg calibrate scheme.toml monday.csv tuesday.parquet --noise 2e-5 -o calibration
+  obsdeg calibrate scheme.toml monday.csv --dry-run
   obsdeg calibrate scheme.toml wednesday.csv --prior calibration/calibration.json
   gzip -dc record.csv.gz | obsdeg calibrate scheme.toml -
   obsdeg calibrate examples/influenza/model.toml examples/influenza/data.csv --profile beta
@@ -90,7 +91,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let found = calibrate(&a.asked, named, records, before.as_ref(), &host)?;
     drop(bar);
     a.met.check(found.requirements())?;
-    a.output.write_folder(&found, "calibration.json", || found.files())?;
+    let file = if a.asked.dry_run { "records.json" } else { "calibration.json" };
+    a.output.write_folder(&found, file, || found.files())?;
     match found.passed() {
         _ if found.interrupted() => Err(Failure::unfinished("interrupted".into())),
         true => a.met.decide(found.requirements()),

@@ -492,6 +492,71 @@ fn compressed(text: &str, codec: Compression) -> Vec<u8> {
     writer.into_inner().expect("closed")
 }
 
+/// How a record is read is shown before anything is estimated, also where an estimate would not be.
+#[test]
+fn how_a_record_is_read() {
+    let found = json(&["calibrate", SCHEME, RECORD, "--dry-run", "--format", "json"]);
+    assert_eq!((found["schema"].as_str(), found.get("quantities")), (Some("obsdeg.records/1"), None));
+    let read = &found["records"][0];
+    assert_eq!(
+        (&read["samples"], &read["positions_by"], &read["origin_s"]),
+        (&963.into(), &"both".into(), &0.0.into())
+    );
+    assert_eq!(
+        (&read["interval_s"], &read["gaps"], &read["left_out"]),
+        (&4.0.into(), &Value::Array(vec![]), &Value::Array(vec![]))
+    );
+    let columns: Vec<&str> =
+        read["columns"].as_array().expect("columns").iter().filter_map(|c| c["column"].as_str()).collect();
+    assert_eq!(columns, ["t [s]", "fx [g]", "fy [g]", "fz [g]"]);
+    let names: Vec<&str> = read["positions"]
+        .as_array()
+        .expect("positions")
+        .iter()
+        .filter_map(|p| p["position"].as_str())
+        .collect();
+    assert_eq!(names, ["p1", "p2", "p3", "p4", "p5", "p6"]);
+    // in German, late, with a gap, a code and an empty cell
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("record.csv");
+    let text = fs::read_to_string(crate_root(RECORD)).expect("the record");
+    let mut spoiled = String::new();
+    for (k, line) in text.lines().enumerate() {
+        let mut cells: Vec<String> = line.split(',').map(String::from).collect();
+        if let Ok(t) = cells[0].parse::<f64>() {
+            cells[0] = (t + 1000.0).to_string();
+        }
+        match k {
+            20..40 => continue,
+            60 => cells[2].clear(),
+            70 | 71 => cells[3] = "-9999".into(),
+            _ => {}
+        }
+        spoiled += &(cells.join(";").replace('.', ",") + "\n");
+    }
+    fs::write(&path, spoiled).expect("written");
+    let output = run(&["calibrate", SCHEME, &path.display().to_string(), "--dry-run"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let said = stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in [
+        "nothing was estimated",
+        "columns are separated by semicolons, decimals by commas",
+        "the scheme begins between",
+        "rows are missing for 84 s from 1084 s on (p1, before line 21)",
+        "empty cells at positions: 1 of `fx [g]`",
+        "51 fy [g] -9999 code",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let output =
+        run(&["calibrate", "examples/influenza/model.toml", "examples/influenza/data.csv", "--dry-run"]);
+    assert!(
+        output.status.code() == Some(2) && stderr(&output).contains("--dry-run is about schemes"),
+        "{}",
+        stderr(&output)
+    );
+}
+
 /// Every codec but one is read, and that one is named; of a pipe of Parquet only so much is taken.
 #[test]
 fn codecs_of_parquet() {

@@ -97,7 +97,8 @@ pub enum Finding {
         /// Each of these alone makes it one g long: none where several axes are off, or all alike.
         causes: Vec<ForceCause>,
     },
-    /// Cells of a column that hold one value again and again, far from their neighbours or many times in a row; they were left out.
+    /// Cells of a column that hold one value again and again, far from their neighbours or many times in a
+    /// row; they were left out.
     Cells {
         /// The record.
         record: String,
@@ -415,13 +416,15 @@ pub struct RecordReport {
     /// Usual interval between rows, in s.
     #[serde(default)]
     pub interval_s: f64,
-    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between; at most 1000.
+    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies
+    /// between; at most 1000.
     #[serde(default)]
     pub gaps: Vec<Gap>,
     /// Number of empty cells at positions, by column that is read; columns without are left out.
     #[serde(default)]
     pub empty_cells: Vec<EmptyCells>,
-    /// Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the first row at it where only rows say when positions begin.
+    /// Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the
+    /// first row at it where only rows say when positions begin.
     #[serde(default)]
     pub psi_at_s: f64,
     /// Samples at no position of the scheme.
@@ -467,10 +470,12 @@ pub struct Gap {
 /// How right the clock of a record is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
-    /// Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in the scheme, so that rows alone say when each begins.
+    /// Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in
+    /// the scheme, so that rows alone say when each begins.
     #[serde(default)]
     pub offset_s: Option<f64>,
-    /// Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree with it.
+    /// Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree
+    /// with it.
     #[serde(default)]
     pub offset_sigma_s: Option<f64>,
     /// By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme that was run so.

@@ -155,7 +155,8 @@ pub struct Column {
     pub dates: bool,
 }
 
-/// A date with a time (ISO 8601, UTC where no offset is given) as seconds since 1970-01-01T00:00Z: `2026-11-23T10:00:00.25+01:00`, a blank in the place of T too.
+/// A date with a time (ISO 8601, UTC where no offset is given) as seconds since 1970-01-01T00:00Z:
+/// `2026-11-23T10:00:00.25+01:00`, a blank in the place of T too.
 fn unix_seconds(text: &str) -> Option<f64> {
     let (date, time) = text.split_once(['T', ' '])?;
     let whole = |text: &str, digits: usize| {

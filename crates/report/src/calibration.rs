@@ -266,8 +266,8 @@ fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> 
 const GAPS: usize = 5;
 
 /// Where rows are missing, the longest first, in the order of time.
-fn gaps(r: &RecordReport) -> String {
-    let mut all: Vec<&Gap> = r.gaps.iter().collect();
+pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
+    let mut all: Vec<&Gap> = of.iter().collect();
     let length = |g: &Gap| g.to_s - g.from_s;
     all.sort_by(|a, b| length(b).total_cmp(&length(a)));
     let more = match all.len().saturating_sub(GAPS) {
@@ -288,7 +288,23 @@ fn gaps(r: &RecordReport) -> String {
             )
         })
         .collect();
-    if each.is_empty() { String::new() } else { format!("; rows are missing for {}{more}", each.join(", ")) }
+    (!each.is_empty()).then(|| format!("rows are missing for {}{more}", each.join(", ")))
+}
+
+/// What says where samples were taken.
+pub(crate) fn by_what(by: PositionsBy) -> &'static str {
+    match by {
+        PositionsBy::Labels => {
+            "the column `position`: one ends with its last sample, the next begins when the slew is over"
+        }
+        PositionsBy::Timeline => "the timeline of the scheme",
+        PositionsBy::Both => {
+            "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end"
+        }
+        PositionsBy::Static => {
+            "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two"
+        }
+    }
 }
 
 /// What was read, a sentence for each record.
@@ -301,18 +317,9 @@ fn records(c: &Calibration) -> Vec<String> {
             tenths(r.span_s.0),
             tenths(r.span_s.1),
             r.bins,
-            match r.positions_by {
-                PositionsBy::Labels => {
-                    "the column `position`: one ends with its last sample, the next begins when the slew is over"
-                }
-                PositionsBy::Timeline => "the timeline of the scheme",
-                PositionsBy::Both =>
-                    "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end",
-                PositionsBy::Static =>
-                    "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two",
-            }
+            by_what(r.positions_by)
         );
-        out += &gaps(r);
+        out += &gaps(&r.gaps).map_or_else(String::new, |gaps| format!("; {gaps}"));
         let empty: Vec<String> =
             r.empty_cells.iter().map(|e| format!("{} of `{}`", e.count, e.column)).collect();
         if !empty.is_empty() {
@@ -425,7 +432,7 @@ fn is_whole(x: f64) -> bool {
 }
 
 /// With a tenth where there is one.
-fn tenths(x: f64) -> String {
+pub(crate) fn tenths(x: f64) -> String {
     if is_whole(x) { format!("{x:.0}") } else { format!("{x:.1}") }
 }
 

@@ -14,13 +14,13 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
 use super::gross::Why;
-use super::observe::{By, Reading, channel_name};
+use super::observe::{By, channel_name};
 use super::offset::Offset;
 use super::run::Key;
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, EmptyCells, Estimated, Fit, Gap, Moved,
-    Outlier, PositionFit, PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
+    RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -472,47 +472,18 @@ impl Parts<'_> {
             name: run.reading.name.clone(),
             samples: run.reading.samples,
             interval_s: run.reading.interval,
-            gaps: self.gaps(&run.reading),
-            empty_cells: run
-                .reading
-                .missing
-                .iter()
-                .map(|(column, count)| EmptyCells { column: column.clone(), count: *count })
-                .collect(),
+            gaps: run.reading.gaps(self.scheme),
+            empty_cells: run.reading.empty_cells(),
             psi_at_s: run.reading.origin,
             unused: run.reading.unused,
             bins: run.len(),
             span_s: run.reading.span,
-            positions_by: match run.reading.by {
-                By::Label => PositionsBy::Labels,
-                By::Timeline => PositionsBy::Timeline,
-                By::Both => PositionsBy::Both,
-                By::Static => PositionsBy::Static,
-            },
+            positions_by: run.reading.by.into(),
             gimbals_deg: run.reading.gimbals,
             ignored: run.reading.ignored.clone(),
             force_g: run.reading.force,
         };
         self.problem.runs.iter().enumerate().map(of).collect()
-    }
-
-    /// Where rows of a record are missing, in words.
-    fn gaps(&self, reading: &Reading) -> Vec<Gap> {
-        let name = |p: usize| self.scheme.positions[p].name.clone();
-        let place = |between: [Option<usize>; 2]| match between {
-            [Some(p), Some(q)] if p == q => name(p),
-            [Some(p), Some(q)] => format!("{} to {}", name(p), name(q)),
-            [Some(p), None] => format!("after {}", name(p)),
-            [None, Some(q)] => format!("before {}", name(q)),
-            [None, None] => "between positions".into(),
-        };
-        let of = |g: &super::timeline::Gap| Gap {
-            from_s: g.from,
-            to_s: g.to,
-            line: g.line,
-            place: place(g.between),
-        };
-        reading.gaps.iter().map(of).collect()
     }
 
     /// What joining the records adds to what each leaves alone.

@@ -9,9 +9,11 @@ use super::clock;
 use super::length::Length;
 use super::mistaken::Mistaken;
 
-/// The specific force of a position is no further than this from the vertical or, where psi goes on in n, from where the position before left it, in deg.
+/// The specific force of a position is no further than this from the vertical or, where psi goes on in n,
+/// from where the position before left it, in deg.
 const TILT_DEG: f64 = 20.0;
-/// From one position to the next drift moves the vertical by less than this, in deg, beside so many times what it moves it from half to half of the positions about the slew.
+/// From one position to the next drift moves the vertical by less than this, in deg, beside so many times
+/// what it moves it from half to half of the positions about the slew.
 const JUMP_DEG: f64 = 3.0;
 const MOVES: f64 = 2.0;
 /// Another position fits better where it is nearer by this factor.
@@ -251,8 +253,9 @@ impl Forces {
         length(&off) <= within && (length(force) - 1.0).abs() <= CLOSE
     }
 
-    /// Refuses positions whose force is not that of the scheme's attitude. A platform that drifts by degrees tilts further and further, but not at once: where psi goes on in n
-    /// (`inertial`), the vertical of a position begins where that of the one before ended.
+    /// Refuses positions whose force is not that of the scheme's attitude. A platform that drifts by degrees
+    /// tilts further and further, but not at once: where psi goes on in n (`inertial`), the vertical of a
+    /// position begins where that of the one before ended.
     pub(crate) fn check_attitudes(
         &self,
         record: &str,
@@ -261,7 +264,8 @@ impl Forces {
         inertial: bool,
     ) -> Result<(), CalibrationError> {
         const UP: [f64; 3] = [0.0, 1.0, 0.0];
-        // of the position before: the vertical of its second half in n, and by how much it moved from the first
+        // of the position before: the vertical of its second half in n, and by how much it moved from the
+        // first
         let mut before: Option<([f64; 3], f64)> = None;
         for (p, line, _) in self.usual() {
             // medians, which rows at the wrong position do not move

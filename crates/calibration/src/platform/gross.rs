@@ -1,7 +1,9 @@
 //! Cells of a record that cannot be: a robust pass over every position before anything is estimated.
 //!
-//! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row that is furthest from the cubic of all others is left out, and the cubic is fitted again, until
-//! none is far. Scatter is that of third differences, which neither a slow turn nor single rows move. Values that repeat to the last digit, and are far from their neighbours, are codes of missing values.
+//! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row that is
+//! furthest from the cubic of all others is left out, and the cubic is fitted again, until none is far.
+//! Scatter is that of third differences, which neither a slow turn nor single rows move. Values that repeat
+//! to the last digit, and are far from their neighbours, are codes of missing values.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -74,7 +76,8 @@ fn scatter(values: &[f64]) -> f64 {
     1.4826 * median(values.windows(4).map(third).collect()) / 20f64.sqrt()
 }
 
-/// How far the value of row `i` is from those beside it, the nearer of both; those of the same value left out.
+/// How far the value of row `i` is from those beside it, the nearer of both; those of the same value left
+/// out.
 fn beside(values: &[f64], i: usize) -> f64 {
     let other = |x: &&f64| **x != values[i];
     let left = values[..i].iter().rev().filter(other).take(BESIDE);
@@ -83,7 +86,8 @@ fn beside(values: &[f64], i: usize) -> f64 {
     off.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
-/// The cells of a window whose values are gross: index, sigmas and why. `noise` is about the standard deviation of a row.
+/// The cells of a window whose values are gross: index, sigmas and why. `noise` is about the standard
+/// deviation of a row.
 fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
     let n = values.len();
     let mut sorted = values.to_vec();
@@ -167,18 +171,27 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
     out
 }
 
-/// The force is as long as usual, in g.
+/// A turn leaves the force as long as usual, in g, and turns it by more than so many degrees.
 const LONG: f64 = 1e-3;
+const TURNS_DEG: f64 = 1.0;
 
-/// Keeps rows at the beginning and the end of a position whose force is as long as usual: there the platform turns.
+/// Keeps rows at the beginning and the end of a position whose force is as long as usual, and elsewhere:
+/// there the platform turns.
 pub(crate) fn keep_turns(rows: &[Row], found: &mut Vec<Cell>) {
-    let length = |r: &Row| r.values.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let usual = median(rows.iter().map(length).filter(|l| l.is_finite()).collect());
-    let is_found = |found: &[Cell], r: &Row| found.iter().any(|c| c.lines == r.lines && c.why == Why::Far);
-    let turns = |r: &&Row| is_found(found, r) && (length(r) - usual).abs() < LONG;
-    let begin: Vec<_> = rows.iter().take_while(turns).map(|r| r.lines).collect();
-    let end: Vec<_> = rows.iter().rev().take_while(turns).map(|r| r.lines).collect();
-    found.retain(|c| !begin.contains(&c.lines) && !end.contains(&c.lines));
+    let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let is_found = |r: &Row| found.iter().any(|c| c.lines == r.lines && c.why == Why::Far);
+    let good: Vec<&Row> = rows.iter().filter(|r| !is_found(r)).collect();
+    let (Some(first), Some(last)) = (good.first(), good.last()) else { return };
+    let turns = |r: &Row, beside: &Row| {
+        let dot: f64 = r.values.iter().zip(&beside.values).map(|(a, b)| a * b).sum();
+        let (own, usual) = (length(&r.values), length(&beside.values));
+        let turned = (dot / (own * usual)).clamp(-1.0, 1.0).acos().to_degrees();
+        is_found(r) && (own - usual).abs() < LONG && turned > TURNS_DEG
+    };
+    let begin = rows.iter().take_while(|r| turns(r, first)).map(|r| r.lines);
+    let end = rows.iter().rev().take_while(|r| turns(r, last)).map(|r| r.lines);
+    let kept: Vec<(u64, u64)> = begin.chain(end).collect();
+    found.retain(|c| !kept.contains(&c.lines));
 }
 
 #[cfg(test)]

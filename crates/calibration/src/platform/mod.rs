@@ -11,6 +11,7 @@ mod length;
 mod mistaken;
 mod observe;
 mod offset;
+mod reading;
 mod residuals;
 mod run;
 mod timeline;
@@ -37,6 +38,7 @@ use offset::Offset;
 use run::Run;
 
 pub use mistaken::Mistaken;
+pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
 
 /// Why a scheme cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

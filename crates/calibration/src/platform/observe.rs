@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use obsdeg_core::model::slew::apply;
-use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3, elementary, product};
+use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3, Scheme, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
@@ -14,6 +14,7 @@ use super::length::Length;
 use super::mistaken::Mistaken;
 use super::timeline::{self, Gap, Intervals};
 use crate::Going;
+use crate::answer::{self, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Binner, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{Detector, Told};
@@ -25,9 +26,11 @@ const FORCES: [(&str, Option<f64>); 4] =
 const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("um/s", 1e-6)];
 /// An interval so many times as long as the one before is a gap, in which increments may be lost.
 const GAP: f64 = 1.5;
-/// By this part of an interval the stamps of rows may differ from the timeline of the scheme, where the file states none.
+/// By this part of an interval the stamps of rows may differ from the timeline of the scheme, where the file
+/// states none.
 const TOLERANCE: f64 = 0.05;
-/// By this part of an interval a row may be late by rounding alone, where positions follow each other at once.
+/// By this part of an interval a row may be late by rounding alone, where positions follow each other at
+/// once.
 const ROUNDED: f64 = 1e-3;
 const ANGLES: [(&str, f64); 4] = [
     ("rad", 1.0),
@@ -111,6 +114,21 @@ pub(crate) struct Reading {
     pub gimbals: Option<f64>,
     /// The digest of its numbers.
     pub digest: String,
+    /// The columns that are used, and what one of their numbers is in s, g, g s, rad or degC.
+    pub columns: Vec<(String, f64)>,
+    /// How it is written, where columns are not separated by commas.
+    pub written: Option<String>,
+}
+
+impl From<By> for PositionsBy {
+    fn from(by: By) -> Self {
+        match by {
+            By::Label => Self::Labels,
+            By::Timeline => Self::Timeline,
+            By::Both => Self::Both,
+            By::Static => Self::Static,
+        }
+    }
 }
 
 impl Reading {
@@ -124,6 +142,26 @@ impl Reading {
         out.stays.iter_mut().for_each(|s| *s = (s.0 - by, s.1 - by));
         out.after.iter_mut().for_each(|t| *t -= by);
         out
+    }
+
+    /// Where rows are missing, by the names of positions.
+    pub(crate) fn gaps(&self, scheme: &Scheme) -> Vec<answer::Gap> {
+        let name = |p: usize| scheme.positions[p].name.clone();
+        let place = |between: [Option<usize>; 2]| match between {
+            [Some(p), Some(q)] if p == q => name(p),
+            [Some(p), Some(q)] => format!("{} to {}", name(p), name(q)),
+            [Some(p), None] => format!("after {}", name(p)),
+            [None, Some(q)] => format!("before {}", name(q)),
+            [None, None] => "between positions".into(),
+        };
+        let of = |g: &Gap| answer::Gap { from_s: g.from, to_s: g.to, line: g.line, place: place(g.between) };
+        self.gaps.iter().map(of).collect()
+    }
+
+    /// How many cells are empty at positions, by column.
+    pub(crate) fn empty_cells(&self) -> Vec<EmptyCells> {
+        let of = |(column, count): &(String, usize)| EmptyCells { column: column.clone(), count: *count };
+        self.missing.iter().map(of).collect()
     }
 
     /// The part by which its clock is fast as positions begin and end, where the record says that.
@@ -257,9 +295,18 @@ impl Layout {
         })
     }
 
-    /// Whether the record has the column `i` of the three that are observed: where it has none, the number is that of the time.
+    /// Whether the record has the column `i` of the three that are observed: where it has none, the number is
+    /// that of the time.
     fn own(&self, i: usize) -> bool {
         self.wanted[i + 1].column != self.wanted[0].column
+    }
+
+    /// The columns that are used, in their order, with what one of their numbers is.
+    fn used(&self, record: &Record) -> Vec<(String, f64)> {
+        let mut all: Vec<&Wanted> = self.wanted.iter().collect();
+        all.sort_by_key(|w| w.column);
+        all.dedup_by_key(|w| w.column);
+        all.into_iter().map(|w| (record.columns()[w.column].text.clone(), w.scale)).collect()
     }
 
     /// The columns with empty cells, with their number.
@@ -322,7 +369,8 @@ impl Layout {
     }
 }
 
-/// The position of a time of the scheme, while Z is observed; a stamp may be late by `rounding` s where one position follows another at once.
+/// The position of a time of the scheme, while Z is observed; a stamp may be late by `rounding` s where one
+/// position follows another at once.
 fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
     let slew = |k: usize| plan.segments.get(k).is_none_or(|s| matches!(s.kind, SegmentKind::Slew(_)));
     let within = |(k, s): &(usize, &obsdeg_evidence::simulation::Segment)| {
@@ -361,7 +409,8 @@ struct Taking<'a> {
     told: Vec<Told<Kept>>,
     /// First and last time of every interval at rest.
     rests: Vec<(f64, f64)>,
-    /// Line, time and values of the samples of the bin, then what the robust pass is to see of every position.
+    /// Line, time and values of the samples of the bin, then what the robust pass is to see of every
+    /// position.
     samples: Vec<(u64, f64, [f64; 3])>,
     rows: Vec<Vec<gross::Row>>,
     /// By wanted number: how many cells are empty at positions.
@@ -568,7 +617,8 @@ impl Taking<'_> {
         }
     }
 
-    /// Takes a bin of a position, whose spikes are those from `spikes` on: of the samples of each the column that is furthest off is named.
+    /// Takes a bin of a position, whose spikes are those from `spikes` on: of the samples of each the column
+    /// that is furthest off is named.
     fn put_bin(&mut self, p: usize, bin: Bin, spikes: usize) {
         let samples = std::mem::take(&mut self.samples);
         let index = self.out.bins[p].len();
@@ -621,7 +671,8 @@ impl Taking<'_> {
         self.out.cells.push((cell.clone(), self.layout.columns[cell.axis].clone()));
     }
 
-    /// Leaves out what a robust pass over every position finds gross. What is a turn (one g long still, at either end) is left to say so.
+    /// Leaves out what a robust pass over every position finds gross. What is a turn (one g long still, at
+    /// either end) is left to say so.
     fn leave_out_gross(&mut self) {
         let noise = self.noise;
         for p in 0..self.rows.len() {
@@ -663,8 +714,9 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
     }
 }
 
-/// Lays positions that are known by labels on the timeline of the scheme, which says when each begins and ends where rows only say what is between; where they lie inside no
-/// such timeline they were held otherwise, and end with their last rows.
+/// Lays positions that are known by labels on the timeline of the scheme, which says when each begins and
+/// ends where rows only say what is between; where they lie inside no such timeline they were held otherwise,
+/// and end with their last rows.
 fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
     let by_clock: Vec<(f64, f64)> =
         reading.stays.iter().map(|(from, to)| (from + reading.origin, to + reading.origin)).collect();
@@ -724,6 +776,8 @@ pub(crate) fn observe(
         lengths: vec![None; positions],
         gimbals: None,
         digest: String::new(),
+        columns: layout.used(&record),
+        written: record.written().map(Into::into),
     };
     let of_force = plan.components.iter().zip(&sigmas).find(|(k, _)| **k != AZIMUTH);
     let noise = of_force.map_or(0.0, |(_, sigma)| *sigma);

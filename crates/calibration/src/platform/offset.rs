@@ -1,8 +1,8 @@
-//! The moment at which the scheme begins by the clock of a record, where labels leave it open: drift differs from position to position, so a beginning that is wrong by some
-//! seconds shows at every change of position.
+//! The moment at which the scheme begins by the clock of a record, where labels leave it open: drift differs
+//! from position to position, so a beginning that is wrong by some seconds shows at every change of position.
 //!
-//! The sum of squares that is left when all unknowns follow is a parabola of that moment. Labels bound it: it is uniform between these bounds beforehand, which is taken as a normal
-//! distribution of the same variance.
+//! The sum of squares that is left when all unknowns follow is a parabola of that moment. Labels bound it: it
+//! is uniform between these bounds beforehand, which is taken as a normal distribution of the same variance.
 
 use nalgebra::DVector;
 use obsdeg_ekf::consistency::chi_square_band;
@@ -20,6 +20,9 @@ pub(super) const SETTLED: f64 = 0.1;
 /// Standard deviations from which on a beginning that is not that of the scheme's clock is believed.
 const BELIEVED: f64 = 4.0;
 
+/// Such a beginning leaves less than this part of the sum of squares: far from it the parabola is not all.
+const EXPLAINED: f64 = 0.2;
+
 /// A better beginning of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Offset {
@@ -34,7 +37,8 @@ pub(super) struct Offset {
 }
 
 impl Problem<'_> {
-    /// The beginning of run `r` that fits best between `from` and `to` (s of its clock) when all unknowns follow; `lay` lays a reading on the timeline.
+    /// The beginning of run `r` that fits best between `from` and `to` (s of its clock) when all unknowns
+    /// follow; `lay` lays a reading on the timeline.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is none.
@@ -86,7 +90,8 @@ impl Problem<'_> {
         self.runs.iter().enumerate().map(of).collect()
     }
 
-    /// Whether a fit that is not consistent is with run `r` beginning elsewhere within an interval between rows.
+    /// Whether a fit that is not consistent is with run `r` beginning elsewhere within an interval between
+    /// rows.
     ///
     /// # Errors
     /// As [`Self::offset`].
@@ -111,6 +116,7 @@ impl Problem<'_> {
             (reading.origin - reading.interval, reading.origin + reading.interval),
             lay,
         )?;
-        Ok(found.left <= most && found.by.abs() > BELIEVED * found.sigma)
+        let explains = found.left <= most.max(EXPLAINED * estimate.at.cost);
+        Ok(explains && found.by.abs() > BELIEVED * found.sigma)
     }
 }

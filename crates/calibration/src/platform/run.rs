@@ -42,7 +42,8 @@ pub(crate) fn conditions(of: &Conditions) -> Conditions {
     Conditions { drift_noise: DriftNoise::RandomWalk(density), ..of.clone() }
 }
 
-/// Parts of a position that begins at `begin`: the steps to its bins, and what is left of it. Bins are inside it, whatever their stamps.
+/// Parts of a position that begins at `begin`: the steps to its bins, and what is left of it. Bins are inside
+/// it, whatever their stamps.
 fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
     let mut at = begin;
     let mut out: Vec<(usize, f64)> = Vec::with_capacity(bins.len() + 1);

@@ -1,7 +1,9 @@
-//! The clock of a record beside the timeline of its scheme: when the scheme begins by that clock, and where rows are missing.
+//! The clock of a record beside the timeline of its scheme: when the scheme begins by that clock, and where
+//! rows are missing.
 //!
-//! A row labelled with a position lies inside it. So the first and the last row of every position bound the moment at which the scheme begins. Where these bounds hold zero, the
-//! clock of the record is that of the scheme.
+//! A row labelled with a position lies inside it. So the first and the last row of every position bound the
+//! moment at which the scheme begins. Where these bounds hold zero, the clock of the record is that of the
+//! scheme.
 
 use obsdeg_evidence::simulation::{Plan, Segment, SegmentKind};
 
@@ -21,7 +23,8 @@ const FASTEST: f64 = 0.1;
 pub(crate) struct Begin {
     /// The one that is taken, in s.
     pub at: f64,
-    /// The earliest and the latest, in s; `None` where the one that is taken is that of the scheme's own clock.
+    /// The earliest and the latest, in s; `None` where the one that is taken is that of the scheme's own
+    /// clock.
     pub open: Option<(f64, f64)>,
 }
 
@@ -33,8 +36,9 @@ fn window(stays: &[(f64, f64)], bounds: &[(f64, f64)], rate: f64) -> (f64, f64) 
     (from, to)
 }
 
-/// When the scheme begins by the clock of a record whose positions have their first and last rows at `stays` (s): all of these lie inside the positions of the timeline, but
-/// for `tolerance` s. `None` where no beginning makes them.
+/// When the scheme begins by the clock of a record whose positions have their first and last rows at `stays`
+/// (s): all of these lie inside the positions of the timeline, but for `tolerance` s. `None` where no
+/// beginning makes them.
 pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option<Begin> {
     let (from, to) = window(stays, &bounds(plan), 0.0);
     let tolerance = tolerance.max(ROUNDING_S);
@@ -49,7 +53,8 @@ pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option
     Some(Begin { at: open.map_or(at, |(from, to)| (from + to) / 2.0), open })
 }
 
-/// The rate, as a part, by which positions last longer than in the scheme so that all rows lie inside them: the middle of the rates that do.
+/// The rate, as a part, by which positions last longer than in the scheme so that all rows lie inside them:
+/// the middle of the rates that do.
 fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f64> {
     let beyond = |rate: f64| {
         let (from, to) = window(stays, bounds, rate);
@@ -82,7 +87,8 @@ pub(crate) fn slews(plan: &Plan) -> Vec<f64> {
     (0..plan.attitudes.len()).map(of).collect()
 }
 
-/// The ends of positions that were held otherwise than in the scheme: the last row of each or, where rows are missing behind it, so many intervals later as a common rate has it;
+/// The ends of positions that were held otherwise than in the scheme: the last row of each or, where rows are
+/// missing behind it, so many intervals later as a common rate has it;
 /// `after` has the next row of any kind.
 pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interval: f64, tolerance: f64) {
     let (own, slews) = (bounds(plan), slews(plan));
@@ -157,7 +163,8 @@ impl Intervals {
         }
     }
 
-    /// The usual interval in s, one second of a single row; and the gaps: of those over a slew what of them is longer than it.
+    /// The usual interval in s, one second of a single row; and the gaps: of those over a slew what of them
+    /// is longer than it.
     pub(crate) fn finish(mut self, plan: &Plan) -> (f64, Vec<Gap>) {
         if self.usual.is_none() {
             self.end();

@@ -51,7 +51,8 @@ pub struct SystemCalibration {
     pub samples: usize,
     /// Intervals at rest, where the file says how they are found.
     pub intervals: Option<usize>,
-    /// Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than 100 times its own length after 0 starts with its first row.
+    /// Time of the record at which the model starts, in its unit; null where that is 0. A record that begins
+    /// more than 100 times its own length after 0 starts with its first row.
     pub begins: Option<f64>,
     /// Rows that the model is held against: those of the record, or the intervals and what is between them.
     pub rows: usize,

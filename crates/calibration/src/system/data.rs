@@ -267,7 +267,8 @@ pub(super) fn read(
 /// A record that begins so many times its own length after 0 has times of another clock.
 const CLOCK: f64 = 100.0;
 
-/// Times from the first row of every experiment, where all of them begin by another clock than that of the model; gives the first such row's time.
+/// Times from the first row of every experiment, where all of them begin by another clock than that of the
+/// model; gives the first such row's time.
 fn from_first_rows(rows: &mut [Data]) -> Option<f64> {
     let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
     let other = |of: &[Data]| {

@@ -54,7 +54,8 @@ fn a_gross_cell_is_named_and_left_out() {
     }
 }
 
-/// Codes of missing values are asked about; where the file states them they are empty cells, which are counted as NaN are.
+/// Codes of missing values are asked about; where the file states them they are empty cells, which are
+/// counted as NaN are.
 #[test]
 fn codes_are_asked_about() {
     let bench = bench();

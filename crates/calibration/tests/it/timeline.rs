@@ -1,5 +1,5 @@
-//! Records whose times are not those of the scheme to the last digit: rows are lost, stamps are rounded, late, or of another clock. The timeline of the scheme stands, and
-//! the estimate is what the bench had.
+//! Records whose times are not those of the scheme to the last digit: rows are lost, stamps are rounded,
+//! late, or of another clock. The timeline of the scheme stands, and the estimate is what the bench had.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::PositionsBy;
@@ -96,7 +96,8 @@ fn the_timeline_of_the_scheme_stands() {
     }
 }
 
-/// Where nothing says that rows are missing, a timeline that is late by less than an interval shows in the fit.
+/// Where nothing says that rows are missing, a timeline that is late by less than an interval shows in the
+/// fit.
 #[test]
 fn a_beginning_shows_in_the_fit() {
     let bench = bench(8);
@@ -124,7 +125,8 @@ fn the_tolerance_is_stated() {
     }
 }
 
-/// Drifts that tilt the platform by more than any bound on single positions: each position begins where the one before ended. Another position is still named.
+/// Drifts that tilt the platform by more than any bound on single positions: each position begins where the
+/// one before ended. Another position is still named.
 #[test]
 fn positions_are_known_at_any_tilt() {
     let tilted = |scale: f64| Bench {

@@ -16,7 +16,8 @@ pub struct Recording {
     pub values: BTreeMap<String, f64>,
     /// How the intervals at rest are found from the data.
     pub still: Option<Still>,
-    /// By which part of the interval between rows their stamps may differ from the timeline of a scheme; `None`: as the program has it.
+    /// By which part of the interval between rows their stamps may differ from the timeline of a scheme;
+    /// `None`: as the program has it.
     pub tolerance: Option<f64>,
     /// Values that stand for missing ones in the columns of a scheme's record, as they are written.
     pub missing: Vec<f64>,
@@ -52,7 +53,8 @@ pub(crate) struct SchemeRecord {
     /// Positions are intervals at rest, found by the scatter of the forces, where no column `position` says what is where.
     #[serde(default, rename = "static")]
     still: Option<SchemeStill>,
-    /// Part of the interval between rows by which their stamps may differ from the timeline of the scheme: 0.05 when left out, 0 to 0.5.
+    /// Part of the interval between rows by which their stamps may differ from the timeline of the scheme:
+    /// 0.05 when left out, 0 to 0.5.
     #[serde(default)]
     tolerance: Option<f64>,
     /// Values that stand for missing ones, as they are written in the record: `missing = [-9999, 0]`.
