@@ -57,6 +57,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("calibrate.step", ASSUMED, "Samples within so many s are one measurement"),
     ("calibrate.slew_rate", ASSUMED, "Rate of turns between positions in deg/s"),
     ("calibrate.drift_noise", ASSUMED, "Random drift with its unit: \"0.01 deg/h\""),
+    ("dry_run", OUTPUT, "Show how the records are read, and estimate nothing"),
     ("estimate_noise", ASSUMED, "Estimate the noise of every component of Z from the residuals"),
     ("gravity", ASSUMED, "One g in m/s^2"),
     ("gate", ASSUMED, "Probability that no good sample is taken as outlier"),

@@ -2245,6 +2245,11 @@ class ForceCause(Record):
     besides: float | None
     """The part by which the force is longer besides, at all positions alike."""
 
+CellKind = Literal["code", "stuck"]
+"""What cells may be that hold one value again and again. code: A code of missing values: it is far from its neighbours. stuck: An output
+that is stuck: it is what the rows before it have to the last digit.
+"""
+
 
 class ClockByEarth(Record):
     """A clock by the rate of the earth."""
@@ -2291,6 +2296,26 @@ class FindingForce(Record):
     """Where it is longest."""
     causes: list[ForceCause]
     """Each of these alone makes it one g long: none where several axes are off, or all alike."""
+
+
+class FindingCells(Record):
+    """Cells of a column that hold one value again and again, far from their neighbours or many times in a row; they were left out."""
+
+    __slots__ = ()
+
+    kind: Literal["cells"]
+    record: str
+    """The record."""
+    column: str
+    """The column, as its header is written."""
+    kind_of_cells: CellKind
+    """What these cells may be."""
+    value: float
+    """The value, as it is written."""
+    count: int
+    """Number of cells."""
+    lines: tuple[int, int]
+    """First and last line."""
 
 
 class FindingClock(Record):
@@ -2424,6 +2449,7 @@ Finding = Union[
     FindingInterrupted,
     FindingNotSettled,
     FindingForce,
+    FindingCells,
     FindingClock,
     FindingPosition,
     FindingNoise,
@@ -2595,7 +2621,7 @@ class Outlier(Record):
     t_s: float
     """When, in s of the record's timeline."""
     channel: str
-    """The component."""
+    """The component of Z or, of a single cell, the column of the record."""
     sigmas: float
     """How far it is off, in standard deviations."""
 
@@ -2623,6 +2649,32 @@ class Repeatability(Record):
     band: tuple[float, float]
     """Where it lies with a probability of 99.9 %."""
 
+
+class Gap(Record):
+    """An interval without rows."""
+
+    __slots__ = ()
+
+    from_s: float
+    """Time of the row before it, in s as it is in the record."""
+    to_s: float
+    """Time of the row after it, in s as it is in the record."""
+    line: int
+    """Line of the row after it."""
+    place: str
+    """Position that the rows before and after it were taken at, or the two positions."""
+
+
+class EmptyCells(Record):
+    """Empty cells of a column."""
+
+    __slots__ = ()
+
+    column: str
+    """The column, as its header is written."""
+    count: int
+    """Number of its cells that are empty or NaN, in rows at positions."""
+
 PositionsBy = Literal["labels", "timeline", "both", "static"]
 """What says where a sample was taken. labels: A column of labels: a position ends with its last sample, and the next begins when the
 slew is over. timeline: The timeline of the scheme. both: A column of labels that agrees with the timeline of the scheme, which says
@@ -2636,6 +2688,12 @@ class Clock(Record):
 
     __slots__ = ()
 
+    offset_s: float | None
+    """Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in the scheme, so that rows
+    alone say when each begins.
+    """
+    offset_sigma_s: float | None
+    """Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree with it."""
     by_durations: float | None
     """By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme
     that was run so.
@@ -2655,6 +2713,16 @@ class RecordReport(Record):
     """Its name."""
     samples: int
     """Its samples."""
+    interval_s: float
+    """Usual interval between rows, in s."""
+    gaps: list[Gap]
+    """Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between; at most 1000."""
+    empty_cells: list[EmptyCells]
+    """Number of empty cells at positions, by column that is read; columns without are left out."""
+    psi_at_s: float
+    """Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the first row at it where only
+    rows say when positions begin.
+    """
     unused: int
     """Samples at no position of the scheme."""
     bins: int
@@ -2999,6 +3067,10 @@ class SystemCalibration(Shape):
     """Rows of the record."""
     intervals: int | None
     """Intervals at rest, where the file says how they are found."""
+    begins: float | None
+    """Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than 100 times its own
+    length after 0 starts with its first row.
+    """
     rows: int
     """Rows that the model is held against: those of the record, or the intervals and what is between them."""
     ignored: list[str]

@@ -162,7 +162,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "figures" => &["pictures", ".", "s.toml"],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "require-met"
-        | "force" | "quiet" | "help" | "estimate-noise" | "ascii" => {
+        | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" => {
             return None;
         }
         _ => number,

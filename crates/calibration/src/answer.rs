@@ -98,6 +98,22 @@ pub enum Finding {
         /// wrong, or all alike.
         causes: Vec<ForceCause>,
     },
+    /// Cells of a column that hold one value again and again, far from their neighbours or many times in a
+    /// row; they were left out.
+    Cells {
+        /// Name of the record with this finding.
+        record: String,
+        /// The column, as its header is written.
+        column: String,
+        /// What these cells may be.
+        kind_of_cells: CellKind,
+        /// The value, as it is written.
+        value: f64,
+        /// Number of cells.
+        count: usize,
+        /// First and last line.
+        lines: (u64, u64),
+    },
     /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
     Clock {
         /// Name of the record with this finding.
@@ -177,6 +193,16 @@ pub enum Finding {
         /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
     },
+}
+
+/// What cells may be that hold one value again and again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellKind {
+    /// A code of missing values: it is far from its neighbours.
+    Code,
+    /// An output that is stuck: it is what the rows before it have to the last digit.
+    Stuck,
 }
 
 /// Length of the specific force at a position.
@@ -368,7 +394,7 @@ pub struct Outlier {
     pub lines: (u64, u64),
     /// Time of the measurement, in s of the record's timeline.
     pub t_s: f64,
-    /// Component of Z: `Z1`, `Z2`, `Z3` or `Za`.
+    /// Component of Z (`Z1`, `Z2`, `Z3` or `Za`) or, for a single cell, the column of the record.
     pub channel: String,
     /// Distance from the expected value, in standard deviations (dimensionless).
     pub sigmas: f64,
@@ -401,6 +427,20 @@ pub struct RecordReport {
     pub name: String,
     /// Number of samples in the record.
     pub samples: usize,
+    /// Usual interval between rows, in s.
+    #[serde(default)]
+    pub interval_s: f64,
+    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies
+    /// between; at most 1000.
+    #[serde(default)]
+    pub gaps: Vec<Gap>,
+    /// Number of empty cells at positions, by column that is read; columns without are left out.
+    #[serde(default)]
+    pub empty_cells: Vec<EmptyCells>,
+    /// Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the
+    /// first row at it where only rows say when positions begin.
+    #[serde(default)]
+    pub psi_at_s: f64,
     /// Number of samples at no position of the scheme.
     pub unused: usize,
     /// Number of bins of the samples.
@@ -420,9 +460,39 @@ pub struct RecordReport {
     pub clock: Clock,
 }
 
-/// Rate error of the clock of a record.
+/// Empty cells of a column.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EmptyCells {
+    /// The column, as its header is written.
+    pub column: String,
+    /// Number of its cells that are empty or NaN, in rows at positions.
+    pub count: usize,
+}
+
+/// An interval without rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gap {
+    /// Time of the row before it, in s as it is in the record.
+    pub from_s: f64,
+    /// Time of the row after it, in s as it is in the record.
+    pub to_s: f64,
+    /// Line of the row after it.
+    pub line: u64,
+    /// Position that the rows before and after it were taken at, or the two positions.
+    pub place: String,
+}
+
+/// Offset and rate error of the clock of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
+    /// Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in
+    /// the scheme, so that rows alone say when each begins.
+    #[serde(default)]
+    pub offset_s: Option<f64>,
+    /// Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree
+    /// with it.
+    #[serde(default)]
+    pub offset_sigma_s: Option<f64>,
     /// Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all
     /// times stretched by it: a clock, or a scheme run so; null if not.
     pub by_durations: Option<f64>,

@@ -53,6 +53,9 @@ pub struct SystemCalibration {
     pub samples: usize,
     /// Number of intervals at rest; null if the file does not ask for them.
     pub intervals: Option<usize>,
+    /// Time of the record at which the model starts, in its unit; null where that is 0. A record that begins
+    /// more than 100 times its own length after 0 starts with its first row.
+    pub begins: Option<f64>,
     /// Number of rows that the model is fitted to: those of the record, or the intervals and the runs between
     /// them.
     pub rows: usize,
@@ -220,6 +223,22 @@ pub enum SystemCalibrationError {
     TooMany {
         /// How many.
         found: usize,
+    },
+    /// Times that take too long to follow.
+    #[error(
+        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
+    )]
+    TooLong {
+        /// The record.
+        record: String,
+        /// The last time.
+        last: f64,
+        /// How many steps they take.
+        found: f64,
+        /// The longest step.
+        longest: f64,
+        /// How many there may be.
+        most: f64,
     },
     /// Rows that the model cannot have.
     #[error("{record}: line {line}, column `{column}`: found {found}, expected {expected}")]

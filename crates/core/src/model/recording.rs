@@ -16,6 +16,11 @@ pub struct Recording {
     pub values: BTreeMap<String, f64>,
     /// How the intervals at rest are found from the data.
     pub still: Option<Still>,
+    /// By which part of the interval between rows their stamps may differ from the timeline of a scheme;
+    /// `None`: as the program has it.
+    pub tolerance: Option<f64>,
+    /// Values that stand for missing ones in the columns of a scheme's record, as they are written.
+    pub missing: Vec<f64>,
 }
 
 /// Intervals at rest are where the scatter within a window about each sample, all columns together, is within so many times that of the beginning of the
@@ -50,6 +55,13 @@ pub(crate) struct SchemeRecord {
     /// `position` labels the samples.
     #[serde(default, rename = "static")]
     still: Option<SchemeStill>,
+    /// Part of the interval between rows by which their stamps may differ from the timeline of the scheme:
+    /// 0.05 when left out, 0 to 0.5.
+    #[serde(default)]
+    tolerance: Option<f64>,
+    /// Values that stand for missing ones, as they are written in the record: `missing = [-9999, 0]`.
+    #[serde(default)]
+    missing: Vec<f64>,
 }
 
 /// Detection of intervals at rest: the variance within a window about each sample is at most `factor` times
@@ -113,7 +125,14 @@ impl From<SchemeRecord> for Recording {
             factor,
             shortest,
         });
-        Self { columns: r.columns, units: r.units, values: BTreeMap::new(), still }
+        Self {
+            columns: r.columns,
+            units: r.units,
+            values: BTreeMap::new(),
+            still,
+            tolerance: r.tolerance,
+            missing: r.missing,
+        }
     }
 }
 
@@ -126,7 +145,14 @@ impl From<ModelRecord> for Recording {
             factor,
             shortest,
         });
-        Self { columns: r.columns, units: BTreeMap::new(), values: r.values, still }
+        Self {
+            columns: r.columns,
+            units: BTreeMap::new(),
+            values: r.values,
+            still,
+            tolerance: None,
+            missing: Vec::new(),
+        }
     }
 }
 
@@ -163,6 +189,12 @@ impl Recording {
                     s.initial, s.window
                 ));
             }
+        }
+        if let Some(x) = self.tolerance.filter(|x| !(0.0..=0.5).contains(x)) {
+            return Err(format!("tolerance is {x}; expected a part of the sample interval, 0 to 0.5"));
+        }
+        if let Some(x) = self.missing.iter().find(|x| !x.is_finite()) {
+            return Err(format!("missing has {x}; expected finite numbers"));
         }
         let bad = self.values.iter().find(|(_, x)| !x.is_finite());
         bad.map_or(Ok(()), |(name, x)| Err(format!("values.{name} is {x}; expected a finite number")))
