@@ -103,15 +103,15 @@ pub enum Finding {
     Cells {
         /// Name of the record with this finding.
         record: String,
-        /// The column, as its header is written.
+        /// Column of these cells, as in the header of the record.
         column: String,
-        /// What these cells may be.
+        /// Kind of these cells: a code of missing values, or a stuck output.
         kind_of_cells: CellKind,
-        /// The value, as it is written.
+        /// Value of these cells, in the unit of the column.
         value: f64,
-        /// Number of cells.
+        /// Number of cells that hold the value.
         count: usize,
-        /// First and last line.
+        /// First and last line number of these cells in the record.
         lines: (u64, u64),
     },
     /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
@@ -195,13 +195,13 @@ pub enum Finding {
     },
 }
 
-/// What cells may be that hold one value again and again.
+/// Kind of cells that hold one value again and again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CellKind {
-    /// A code of missing values: it is far from its neighbours.
+    /// Code of missing values: far from its neighbours.
     Code,
-    /// An output that is stuck: it is what the rows before it have to the last digit.
+    /// Stuck output: equal to the rows before it to the last digit.
     Stuck,
 }
 
@@ -460,25 +460,25 @@ pub struct RecordReport {
     pub clock: Clock,
 }
 
-/// Empty cells of a column.
+/// Number of empty cells in a column of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EmptyCells {
-    /// The column, as its header is written.
+    /// Column of the cells, as in the header of the record.
     pub column: String,
-    /// Number of its cells that are empty or NaN, in rows at positions.
+    /// Number of cells that are empty or NaN, in rows at positions.
     pub count: usize,
 }
 
-/// An interval without rows.
+/// Gap in a record: an interval without rows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Gap {
-    /// Time of the row before it, in s as it is in the record.
+    /// Time of the row before the gap, in s as in the record.
     pub from_s: f64,
-    /// Time of the row after it, in s as it is in the record.
+    /// Time of the row after the gap, in s as in the record.
     pub to_s: f64,
-    /// Line of the row after it.
+    /// Line number of the row after the gap.
     pub line: u64,
-    /// Position that the rows before and after it were taken at, or the two positions.
+    /// Position of the rows before and after the gap, or both positions if they differ.
     pub place: String,
 }
 

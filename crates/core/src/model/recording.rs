@@ -55,11 +55,11 @@ pub(crate) struct SchemeRecord {
     /// `position` labels the samples.
     #[serde(default, rename = "static")]
     still: Option<SchemeStill>,
-    /// Part of the interval between rows by which their stamps may differ from the timeline of the scheme:
-    /// 0.05 when left out, 0 to 0.5.
+    /// Fraction of the interval between rows, dimensionless, 0 to 0.5, by which their times may differ from
+    /// the timeline of the scheme; 0.05 when left out.
     #[serde(default)]
     tolerance: Option<f64>,
-    /// Values that stand for missing ones, as they are written in the record: `missing = [-9999, 0]`.
+    /// Codes of missing values, in the unit of their column: `missing = [-9999, 0]`.
     #[serde(default)]
     missing: Vec<f64>,
 }
