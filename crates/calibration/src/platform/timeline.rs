@@ -42,7 +42,7 @@ fn window(stays: &[(f64, f64)], bounds: &[(f64, f64)], rate: f64) -> (f64, f64) 
 pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option<Begin> {
     let (from, to) = window(stays, &bounds(plan), 0.0);
     let tolerance = tolerance.max(ROUNDING_S);
-    if !(from - to <= 2.0 * tolerance) {
+    if from - to > 2.0 * tolerance {
         return None;
     }
     let (from, to) = if from <= to { (from, to) } else { ((from + to) / 2.0, (from + to) / 2.0) };

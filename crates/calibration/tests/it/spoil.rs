@@ -237,7 +237,7 @@ fn times(c: &mut Cases) {
     for to in [1e-6, 1e-3, 0.05] {
         c.each("times", format!("rounded to {to} s"), |_, s| time(s, (s.t / to).round() * to), Right);
     }
-    for wrap in [3600.0, 4294.967_296, 1000.0] {
+    for wrap in [3600.0, 4_294.967_296, 1000.0] {
         c.each("times", format!("wrapped at {wrap} s"), |_, s| time(s, s.t % wrap), Says(&["is not after"]));
     }
     let mut rows = c.samples.clone();
