@@ -167,6 +167,12 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
         }
         from = to;
     }
+    // a run of equal values that a window ends in
+    let stuck: Vec<(usize, f64)> =
+        out.iter().filter(|c| c.why == Why::Stuck).map(|c| (c.axis, c.value)).collect();
+    for cell in out.iter_mut().filter(|c| c.why == Why::Far && stuck.contains(&(c.axis, c.value))) {
+        (cell.why, cell.sigmas) = (Why::Stuck, 0.0);
+    }
     out.sort_by_key(|c| (c.lines, c.axis));
     out
 }

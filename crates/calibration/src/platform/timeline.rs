@@ -202,7 +202,6 @@ mod tests {
         for k in (0..300).filter(|k| !(40..44).contains(k) && !(200..203).contains(k) && *k != 250) {
             of.push(f64::from(k) / 2.0, k as u64 + 2, None);
         }
-        of.end();
         assert_eq!(of.usual, Some(0.5));
         let found: Vec<(f64, u64)> = of.found.iter().map(|g| (g.from, g.line)).collect();
         assert_eq!(found, [(19.5, 46), (99.5, 205)]);
