@@ -151,7 +151,7 @@ pub struct Column {
     pub count: f64,
     /// As it is written.
     pub text: String,
-    /// Whether its cells are dates (ISO 8601), which are read as Unix seconds.
+    /// True if its cells are dates (ISO 8601), which are read as Unix seconds.
     pub dates: bool,
 }
 
@@ -222,13 +222,13 @@ struct Lines {
     line: u64,
     cells: Vec<String>,
     buffer: Vec<u8>,
-    /// What separates columns.
+    /// Separator of columns.
     separator: char,
-    /// Whether the cells are those of a row that is still to be read.
+    /// True if the cells belong to a row that is still to be read.
     held: bool,
 }
 
-/// What separates columns, where no commas do, and its name.
+/// Separators of columns besides the comma, with their names.
 const SEPARATORS: [(char, &str); 2] = [(';', "semicolons"), ('\t', "tabs")];
 
 /// A number as it is written: with a decimal comma where columns are separated by something else.
@@ -312,7 +312,7 @@ pub struct Record {
     name: String,
     columns: Vec<Column>,
     rows: Rows,
-    /// How it is written, where that is not with commas and points.
+    /// Separator and decimal mark; none for commas and points.
     written: Option<String>,
 }
 
@@ -447,7 +447,7 @@ impl Record {
         Ok(Self { name: name.into(), columns, rows: Rows::Csv(lines), written })
     }
 
-    /// How it is written, where columns are not separated by commas.
+    /// Separator and decimal mark; none where columns are separated by commas.
     pub fn written(&self) -> Option<&str> {
         self.written.as_deref()
     }

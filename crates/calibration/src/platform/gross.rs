@@ -7,59 +7,59 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows within so many s are one cubic, but at least so many rows.
+/// Length of a window that is fitted by one cubic, in s; the fewest rows of a window follow.
 const WINDOW_S: f64 = 1000.0;
 const FEWEST: usize = 16;
-/// A row is gross from so many standard deviations on.
+/// Distance from the cubic at which a row is gross, in standard deviations.
 const GROSS: f64 = 8.0;
-/// A code is further off than so many.
+/// Least distance of a code of missing values from its neighbours, in standard deviations.
 const CODE: f64 = 20.0;
-/// No more than this part of a window is gross.
+/// Largest fraction of a window that may be gross.
 const MOST: f64 = 0.3;
-/// Scatter is at least this part of the noise that is stated.
+/// Least scatter, as a fraction of the stated noise.
 const LEAST: f64 = 0.1;
-/// So many rows on either side are neighbours.
+/// Number of neighbouring rows on either side.
 const BESIDE: usize = 2;
-/// A code is further off than so many usual differences of one row from the next.
+/// Least distance of a code from its neighbours, in usual differences between rows.
 const STEPS: f64 = 10.0;
-/// A value that so many rows in a row hold is stuck, where values seldom repeat.
+/// Number of equal rows in succession that are stuck, where values seldom repeat.
 const STUCK: usize = 4;
 
-/// Some rows of a record: one, or the median of a dense bin.
+/// Row of a record, or the median of a dense bin of rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
     /// First and last line.
     pub lines: (u64, u64),
-    /// In s.
+    /// Time of the row, in s of the record's clock.
     pub t: f64,
-    /// What the three columns hold; NaN where there is none.
+    /// Values of the three columns, in their unit; NaN for an empty cell.
     pub values: [f64; 3],
-    /// The bin of the position that it is of.
+    /// Index of the bin within its position.
     pub bin: usize,
 }
 
-/// Why a cell does not count.
+/// Reason to leave a cell out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Why {
-    /// It is far from what the rows about it say.
+    /// Far from the cubic of the rows around it.
     Far,
-    /// It holds what other cells hold to the last digit, and is far: a code of missing values.
+    /// Code of missing values: far from its neighbours, and equal to other cells to the last digit.
     Code,
-    /// It holds what the rows before it hold to the last digit.
+    /// Stuck output: equal to the rows before it to the last digit.
     Stuck,
 }
 
-/// A cell that does not count.
+/// Cell that is left out.
 #[derive(Debug, Clone)]
 pub(crate) struct Cell {
     /// First and last line.
     pub lines: (u64, u64),
     pub t: f64,
-    /// The column, of three.
+    /// Index of the column, 0 to 2.
     pub axis: usize,
-    /// What it holds.
+    /// Value of the cell, in the unit of its column.
     pub value: f64,
-    /// How far it is off, in standard deviations.
+    /// Distance from the expected value, in standard deviations.
     pub sigmas: f64,
     pub why: Why,
 }
@@ -76,8 +76,7 @@ fn scatter(values: &[f64]) -> f64 {
     1.4826 * median(values.windows(4).map(third).collect()) / 20f64.sqrt()
 }
 
-/// How far the value of row `i` is from those beside it, the nearer of both; those of the same value left
-/// out.
+/// Distance of the value of row `i` from its nearest neighbours; equal values are skipped.
 fn beside(values: &[f64], i: usize) -> f64 {
     let other = |x: &&f64| **x != values[i];
     let left = values[..i].iter().rev().filter(other).take(BESIDE);
@@ -177,7 +176,7 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
     out
 }
 
-/// A turn leaves the force as long as usual, in g, and turns it by more than so many degrees.
+/// Largest change of the length of the force during a turn, in g; the least angle of a turn, in deg, follows.
 const LONG: f64 = 1e-3;
 const TURNS_DEG: f64 = 1.0;
 

@@ -43,7 +43,7 @@ const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
 pub(crate) const TIMES: [(&str, f64); 6] =
     [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
-/// So many samples of a dense bin say what is usual in it.
+/// Number of samples of a dense bin from which its median is taken.
 const SOME: usize = 64;
 /// What the gimbals read is no further from the attitude of the scheme than this, in deg.
 const GIMBALS_DEG: f64 = 5.0;
@@ -116,7 +116,7 @@ pub(crate) struct Reading {
     pub digest: String,
     /// The columns that are used, and what one of their numbers is in s, g, g s, rad or degC.
     pub columns: Vec<(String, f64)>,
-    /// How it is written, where columns are not separated by commas.
+    /// Separator and decimal mark; none where columns are separated by commas.
     pub written: Option<String>,
 }
 
@@ -158,7 +158,7 @@ impl Reading {
         self.gaps.iter().map(of).collect()
     }
 
-    /// How many cells are empty at positions, by column.
+    /// Number of empty cells at positions, by column.
     pub(crate) fn empty_cells(&self) -> Vec<EmptyCells> {
         let of = |(column, count): &(String, usize)| EmptyCells { column: column.clone(), count: *count };
         self.missing.iter().map(of).collect()

@@ -26,13 +26,13 @@ const EXPLAINED: f64 = 0.2;
 /// A better beginning of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Offset {
-    /// How much later it is, in s.
+    /// Shift of the beginning, in s; positive is later.
     pub by: f64,
     /// Its standard deviation, in s.
     pub sigma: f64,
     /// The sum of squares that is left there.
     pub left: f64,
-    /// What all unknowns move by for one second.
+    /// Change of all unknowns per second of shift.
     pub direction: DVector<f64>,
 }
 
@@ -90,7 +90,7 @@ impl Problem<'_> {
         self.runs.iter().enumerate().map(of).collect()
     }
 
-    /// Whether a fit that is not consistent is with run `r` beginning elsewhere within an interval between
+    /// True if an inconsistent fit becomes consistent when run `r` begins elsewhere within one interval between
     /// rows.
     ///
     /// # Errors

@@ -12,7 +12,7 @@ use crate::Going;
 use crate::answer::{EmptyCells, Gap, PositionsBy};
 use crate::record::Record;
 
-/// How records are read.
+/// Reading of records, as `calibrate --dry-run` shows it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RecordsRead {
     /// `obsdeg.records/1`.
@@ -23,12 +23,12 @@ pub struct RecordsRead {
     pub records: Vec<RecordRead>,
 }
 
-/// How a record is read.
+/// Reading of one record.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RecordRead {
     /// Name of the record.
     pub record: String,
-    /// How columns are separated and decimals written; null for commas and points, and for Parquet.
+    /// Separator of columns and decimal mark; null for commas and points, and for Parquet.
     pub written: Option<String>,
     /// Columns that are used.
     pub columns: Vec<ColumnRead>,
@@ -67,7 +67,7 @@ pub struct RecordRead {
 pub struct ColumnRead {
     /// The header, as it is written.
     pub column: String,
-    /// What its numbers are multiplied by: to s, g, g s (increments of velocity), rad or degC.
+    /// Factor from the unit of the column to s, g, g s (increments of velocity), rad or degC.
     pub factor: f64,
 }
 
@@ -95,7 +95,7 @@ pub struct CellRead {
     pub column: String,
     /// Its value, as it is written.
     pub value: f64,
-    /// Why it is left out: `far` from the rows beside it, a `code` of missing values, `stuck`.
+    /// Reason to leave it out: `far` from the rows beside it, a `code` of missing values, `stuck`.
     pub why: &'static str,
 }
 

@@ -78,7 +78,7 @@ fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f
     (beyond(best) <= 0.0).then(|| (end(-FASTEST) + end(FASTEST)) / 2.0)
 }
 
-/// How long the slew to each position takes, in s.
+/// Duration of the slew to each position, in s.
 pub(crate) fn slews(plan: &Plan) -> Vec<f64> {
     let of = |p: usize| {
         let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
@@ -126,7 +126,7 @@ pub(crate) struct Intervals {
     found: Vec<Gap>,
 }
 
-/// So many intervals say how long one usually is.
+/// Number of intervals from which the usual interval is taken.
 const FIRST: usize = 101;
 
 impl Intervals {
