@@ -175,7 +175,7 @@ fn everybody_waits_for_a_turn() {
         let answer: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         let list = answer["quantities"].as_array().expect("a list");
         let by_engine = |q: &serde_json::Value| q["solution"]["found_by"] == "symbolic_engine";
-        assert!(list.iter().any(by_engine), "{answer}");
+        assert!(list.iter().any(by_engine) && answer["engine_busy"].is_null(), "{answer}");
     }
 }
 
@@ -204,6 +204,32 @@ fn a_held_engine_keeps_no_verdict_waiting() {
     let list = answer["quantities"].as_array().expect("a list");
     assert!(list.iter().any(|q| q["status"] == "observable" && q["degree"].is_u64()), "{answer}");
     assert!(answer["notes"].to_string().contains("held the symbolic engine for more than 0 s"), "{answer}");
+    let mark = &answer["engine_busy"];
+    assert!(mark["waited_s"] == 0 && mark["advice"].to_string().contains("--engine-wait"), "{mark}");
+}
+
+/// No model starts the engine: with expressions, of every third reference model, nothing is missing while another
+/// process keeps it.
+#[test]
+fn no_model_starts_the_engine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let _held = hold(&folder.path().join("obsdeg-symbolic.lock"));
+    let models = format!("{}/tests/data/models", env!("CARGO_MANIFEST_DIR"));
+    let mut files: Vec<_> =
+        std::fs::read_dir(models).expect("models").map(|f| f.expect("a file").path()).collect();
+    files.retain(|f| f.extension() == Some("json".as_ref()));
+    files.sort();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+    command.args(["analyze", "--format", "json", "-q", "--engine-wait", "0"]);
+    command.args(files.iter().step_by(3)).env("XDG_RUNTIME_DIR", folder.path());
+    let output = command.output().expect("it runs");
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.matches("\"one_by_expression\"").count() > 60 && !text.contains("symbolic engine"));
 }
 
 #[test]

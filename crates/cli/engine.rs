@@ -22,7 +22,7 @@ pub(crate) struct EngineArguments {
     /// Longest wait for other obsdeg processes of the same user, 0 to 86400 s: the symbolic engine runs once
     /// per user. Then the answer comes without the formulas that need the engine, and says so. No other option
     /// depends on the clock
-    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = whole::<u64>(0..=86_400))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10, value_parser = whole::<u64>(0..=86_400))]
     engine_wait: u64,
 }
 

@@ -97,7 +97,7 @@ fn models() {
             let text = std::fs::read_to_string(path).expect("readable");
             let model = model_file::read(&text).expect("a model");
             let no_solutions = SystemOptions { solutions: false, ..SystemOptions::default() };
-            let a = analyze_system(&model, no_solutions, None).expect("judged");
+            let a = analyze_system(&model, no_solutions).expect("judged");
             insta::assert_snapshot!(format!("model_{name}"), model_table(&a));
         });
     });

@@ -643,7 +643,7 @@ fn held_out_models() {
 fn the_answer_says_what_it_leaves_open() {
     let analysis = |text: &str| {
         let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
-        analyze_system(&model, SystemOptions::default(), None).expect("judged")
+        analyze_system(&model, SystemOptions::default()).expect("judged")
     };
     let of = |output: &str| analysis(&still("x z", output, "")).branches;
     assert_eq!(of("sqrt(x^2) + abs(z)"), ["sqrt", "abs"]);

@@ -14,6 +14,7 @@ mod crosscheck;
 mod design;
 mod engines;
 mod examples;
+mod expressions;
 #[cfg(unix)]
 mod files;
 mod formulas;

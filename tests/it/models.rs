@@ -149,8 +149,7 @@ fn primes_are_text() {
     let text = "name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz = \"x\"\n";
     let model = model_file::read(text).expect("a model");
     let options = SystemOptions { solutions: false, ..SystemOptions::default() };
-    let system =
-        serde_json::to_value(analyze_system(&model, options, None).expect("analysed")).expect("JSON");
+    let system = serde_json::to_value(analyze_system(&model, options).expect("analysed")).expect("JSON");
     let scheme = Scheme::of_angles([cardinal("NUE").expect("an attitude")]);
     let options = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
     let platform = serde_json::to_value(analyze(&scheme, options, None).expect("analysed")).expect("JSON");
@@ -544,7 +543,7 @@ fn directions_that_are_polynomials() {
             format!("name = \"m\"\n[states]\n{states}\n[parameters]\n{parameters}\n[outputs]\ny = \"{y}\"\n");
         let model = model_file::read(&text).expect("a model");
         let options = SystemOptions { solutions: false, ..SystemOptions::default() };
-        let a = analyze_system(&model, options, None).expect("judged");
+        let a = analyze_system(&model, options).expect("judged");
         assert!(a.other_directions.is_empty(), "{:?}", a.other_directions);
         a.symmetries.into_iter().map(|s| s.words).collect::<Vec<_>>()
     };
@@ -618,7 +617,7 @@ fn the_input_chooses_the_primes() {
 fn three_solutions_that_give_the_same_outputs() {
     let (_, _, text) = models().into_iter().find(|m| m.0 == "hiv_latent").expect("a reference");
     let model = json::read(&text).expect("a model");
-    let found = analyze_system(&model, SystemOptions::default(), None).expect("judged");
+    let found = analyze_system(&model, SystemOptions::default()).expect("judged");
     for name in ["w2", "c"] {
         let q = found.quantities.iter().find(|q| q.name == name).expect("an unknown");
         assert_eq!(q.number_of_solutions, Some(NumberOfSolutions::Counted(3)), "{name}");

@@ -275,9 +275,8 @@ fn of_models(step: usize) -> usize {
     let mut tried = 0;
     for (name, value, text) in models().into_iter().step_by(step) {
         let options = SystemOptions { solutions: false, ..SystemOptions::default() };
-        let remedies = analyze_system(&json::read(&text).expect("a model"), options, None)
-            .expect("an answer")
-            .to_resolve;
+        let remedies =
+            analyze_system(&json::read(&text).expect("a model"), options).expect("an answer").to_resolve;
         let before = judged_model(&text);
         let mut found = complete(&remedies, &before);
         for remedy in &remedies.remedies {

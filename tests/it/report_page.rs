@@ -295,7 +295,7 @@ fn a_model_says_what_to_know_beforehand() {
             let names: Vec<&str> = list.split(", ").collect();
             for name in &names {
                 let options = SystemOptions { solutions: false, ..SystemOptions::default() };
-                let found = analyze_system(&knowing(&model, name), options, None).expect("judged");
+                let found = analyze_system(&knowing(&model, name), options).expect("judged");
                 for other in names.iter().filter(|other| *other != name) {
                     let q = found.quantities.iter().find(|q| q.name == *other).expect("there");
                     assert_eq!(q.status, Status::Observable, "{file}: {other} with {name} known");
@@ -310,7 +310,7 @@ fn a_model_says_what_to_know_beforehand() {
     let one = "name='one'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[simulation]\nduration=10\nstep=0.1\n\
                values={x=1,k=0.5}\npriors={x=0.01,k=0.01}\nnoise={y=0.001}\n";
     let all = page(&written("one.toml", one));
-    assert!(all.len() == 1 && all[0].starts_with("none: every unknown is observable"), "{all:?}");
+    assert!(all.len() == 1 && all[0].starts_with("No action: every unknown is observable"), "{all:?}");
 }
 
 /// The box of a calibration says what to do about what speaks against it, or that there is nothing.
@@ -329,9 +329,9 @@ fn a_calibration_says_what_to_do() {
     };
     let (none, json) = of("examples/bench-day/scheme.toml", "right");
     assert!(json.contains("\"findings\": []"));
-    assert!(none.len() == 1 && none[0].starts_with("none: every unknown is determined"), "{none:?}");
+    assert!(none.len() == 1 && none[0].starts_with("No action: every unknown is determined"), "{none:?}");
     let (some, json) = of("examples/six-positions/scheme.toml", "wrong");
     assert!(json.contains("\"kind\": \"position\""));
-    assert!(some.iter().any(|l| l.starts_with("a look at the record at ") && l.contains("p6")), "{some:?}");
+    assert!(some.iter().any(|l| l.starts_with("Look at the record at ") && l.contains("p6")), "{some:?}");
     assert!(!some.iter().any(|l| l.starts_with("none")), "{some:?}");
 }

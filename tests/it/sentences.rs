@@ -11,7 +11,7 @@ use obsdeg_core::system::{
 type Point = BTreeMap<String, f64>;
 
 fn without_solutions(model: &SystemModel) -> Result<SystemAnalysis, ModelError> {
-    analyze_system(model, SystemOptions { solutions: false, ..SystemOptions::default() }, None)
+    analyze_system(model, SystemOptions { solutions: false, ..SystemOptions::default() })
 }
 
 fn read(text: &str) -> SystemModel {
@@ -299,6 +299,66 @@ fn what_is_not_counted_has_no_number() {
             assert!((y(own) - y(other)).abs() < 1e-12);
         }
     }
+}
+
+/// First lines say of what is determined locally only, and of nothing else, that it is: other values give the same
+/// outputs, or nobody has counted.
+#[test]
+fn first_lines_say_local() {
+    let said = |output: &str, solutions: bool| {
+        let model = read(&format!("name='m'\n[states]\nth='0'\n[outputs]\ny='{output}'"));
+        let a = analyze_system(&model, SystemOptions { solutions, ..SystemOptions::default() });
+        let text = obsdeg_report::written(
+            &a.expect("judged"),
+            obsdeg_report::Format::Table,
+            obsdeg_report::Layout::default(),
+        );
+        text.expect("text").lines().nth(1).expect("a first line").trim().to_string()
+    };
+    let determined = "th is determined by the outputs themselves";
+    for (output, tail) in [
+        ("th", ""),
+        ("2*th - 1", ""),
+        ("th^2", "; several solutions: th"),
+        ("sin(th)", "; locally, number of solutions not decided: th"),
+    ] {
+        assert_eq!(said(output, true), format!("{determined}{tail}"), "{output}");
+        assert_eq!(said(output, false), format!("{determined}; locally: solutions are not counted"));
+    }
+}
+
+/// Beyond the bound on the order outputs may change: from t = 0 on, y = (a + b) t + a t^71/71 does.
+#[test]
+fn beyond_the_bound_no_output_is_said_to_stay() {
+    let text = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n[outputs]\ny='x'";
+    let said = table(text);
+    assert!(said.contains("add c to a; subtract c from b"), "{said}");
+    let y = |a: f64, b: f64| (a + b) * 1.2 + a * 1.2f64.powi(71) / 71.0;
+    assert!((y(0.7, 0.3) - y(0.7 + 1.0, 0.3 - 1.0)).abs() > 1.0);
+    let heading = "No derivative up to order 60 changes at the start when you";
+    assert!(said.contains(heading) && !said.contains("No output changes"), "{said}");
+    // an end that is proven
+    let said = table("name='m'\nparameters=['a', 'b']\n[states]\nx='-a*b*x'\n[outputs]\ny='x'");
+    assert!(said.contains("No output changes when you") && !said.contains("No derivative up to"), "{said}");
+    // nothing is listed, so there is no heading
+    let alone = text.replace("a + b + a*u", "a*u").replace("'a', 'b'", "'a'");
+    let said = table(&alone);
+    assert!(!said.contains("No output changes") && !said.contains("No derivative up to"), "{said}");
+}
+
+/// The cross-check of a model is one of the information of samples: no filter runs, and none is named.
+#[test]
+fn models_are_checked_without_a_filter() {
+    let model = read(
+        "name='m'\nparameters=['a']\n[states]\nx='-a*x'\n[outputs]\ny='x'\n[simulation]\nduration=2.0\nstep=0.1\n\
+         noise={y=0.01}\nvalues={a=0.5, x=1.0}\npriors={a=1.0, x=1.0}",
+    );
+    let evidence = obsdeg_evidence::system::crosscheck_system(&model, 1).expect("evidence");
+    let text =
+        obsdeg_report::written(&evidence, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+    let text = text.expect("text");
+    assert!(text.contains("agrees with the exact verdicts") && text.contains("(no filter is run)"), "{text}");
+    assert!(!text.contains("filter and exact verdicts"), "{text}");
 }
 
 /// Verdicts hold at the time that is named: degrees of x' = a + b t^2 by hand at 0, at 2 and at almost every

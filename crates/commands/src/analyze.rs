@@ -172,16 +172,19 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
     let &Analyze { seed, solutions, formulas, frame, count_limit, order, .. } = options;
-    let worker = host.worker.as_deref_mut();
     Ok(match input {
         Input::Scheme(scheme) => {
             let options = AnalysisOptions { seed, solutions, formulas, frame };
-            Judged::Scheme(Box::new(obsdeg_core::analysis::analyze(scheme, options, worker)?))
+            Judged::Scheme(Box::new(obsdeg_core::analysis::analyze(
+                scheme,
+                options,
+                host.worker.as_deref_mut(),
+            )?))
         }
         Input::Model(file) => {
             let count_limit = count_limit.unwrap_or(COUNT_LIMIT);
             let options = SystemOptions { seed, solutions, count_limit, order: order.map(Into::into) };
-            let found = analyze_system(&file.model, options, worker).map_err(|e| file.wrong(&e))?;
+            let found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
             Judged::Model(Box::new(found))
         }
     })

@@ -71,7 +71,7 @@ fn all_references(bencher: Bencher<'_, '_>) {
 fn all_references_counted() {
     for text in references() {
         let model = json::read(&text).expect("a model");
-        black_box(analyze_system(&model, SystemOptions::default(), None).expect("judged").counting_order);
+        black_box(analyze_system(&model, SystemOptions::default()).expect("judged").counting_order);
     }
 }
 

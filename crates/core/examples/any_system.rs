@@ -14,7 +14,7 @@ y = "x1"
 "#;
 
 fn main() -> Result<(), ModelError> {
-    let answer = analyze_system(&model_file::read(MODEL)?, SystemOptions::default(), None)?;
+    let answer = analyze_system(&model_file::read(MODEL)?, SystemOptions::default())?;
     println!("rank {} of {}", answer.rank, answer.unknowns);
     for q in &answer.quantities {
         let degree = q.degree.map_or_else(|| "-".to_string(), |k| k.to_string());

@@ -27,7 +27,7 @@
 //! outputs = { z = "x" }
 //! "#;
 //! let model = model_file::read(text)?;
-//! let answer = analyze_system(&model, SystemOptions::default(), None)?;
+//! let answer = analyze_system(&model, SystemOptions::default())?;
 //! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
 //! # Ok::<(), obsdeg_core::system::ModelError>(())
 //! ```
@@ -40,6 +40,7 @@
 pub mod accuracy;
 pub mod analysis;
 pub mod degree;
+pub mod engine;
 pub mod findings;
 pub mod model;
 pub mod remedies;

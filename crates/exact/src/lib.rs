@@ -15,6 +15,7 @@
 //! - [`radical`]: numbers of `Q(sqrt 2, sqrt 3)` recovered from their images;
 //! - [`polynomial`]: roots of small polynomials in the field;
 //! - [`multivariate`], [`groebner`]: polynomials in several variables, and bases of their ideals;
+//! - [`divisor`], [`fraction`]: common divisors of these, and rational functions;
 //! - [`certainty`]: the bound on the error probability;
 //! - [`interrupt`]: the end of work for which nobody waits any longer.
 //!
@@ -26,9 +27,11 @@
 
 pub mod ball;
 pub mod certainty;
+pub mod divisor;
 pub mod echelon;
 mod elementary;
 pub mod field;
+pub mod fraction;
 mod gcd;
 pub mod groebner;
 pub mod interrupt;

@@ -1,7 +1,7 @@
 //! Sparse polynomials in several variables over the field.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Field;
 
@@ -78,6 +78,44 @@ impl Polynomial {
         }
     }
 
+    /// The variables that occur.
+    pub fn variables(&self) -> BTreeSet<u32> {
+        self.terms.keys().flat_map(|m| m.iter().map(|p| p.0)).collect()
+    }
+
+    /// The highest power of a variable.
+    pub fn degree_in(&self, v: u32) -> u32 {
+        self.terms.keys().flat_map(|m| m.iter().filter(|p| p.0 == v)).map(|p| p.1).max().unwrap_or(0)
+    }
+
+    /// What each power of a variable is multiplied with.
+    pub fn split(&self, v: u32) -> BTreeMap<u32, Self> {
+        let mut out: BTreeMap<u32, Self> = BTreeMap::new();
+        for (m, &c) in &self.terms {
+            let mut rest = m.clone();
+            let at = rest.iter().position(|p| p.0 == v);
+            let power = at.map_or(0, |i| rest.remove(i).1);
+            out.entry(power).or_default().terms.insert(rest, c);
+        }
+        out
+    }
+
+    /// The partial derivative.
+    pub fn derivative(&self, f: &Field, v: u32) -> Self {
+        let mut out = Self::default();
+        for (m, &c) in &self.terms {
+            let Some(at) = m.iter().position(|p| p.0 == v) else { continue };
+            let mut m = m.clone();
+            let power = m[at].1;
+            match power {
+                1 => drop(m.remove(at)),
+                _ => m[at].1 -= 1,
+            }
+            out.put(f, m, f.mul(c, f.from_u64(power.into())));
+        }
+        out
+    }
+
     /// In how many terms a variable occurs.
     pub fn terms_with(&self, v: u32) -> usize {
         self.terms.keys().filter(|m| m.iter().any(|p| p.0 == v)).count()
@@ -89,7 +127,7 @@ impl Polynomial {
     }
 
     /// Adds a term.
-    pub(crate) fn put(&mut self, f: &Field, m: Monomial, c: u64) {
+    pub fn put(&mut self, f: &Field, m: Monomial, c: u64) {
         if c == 0 {
             return;
         }

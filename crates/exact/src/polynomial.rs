@@ -4,7 +4,7 @@
 
 use crate::{Field, SplitMix64};
 
-fn trim(mut a: Vec<u64>) -> Vec<u64> {
+pub(crate) fn trim(mut a: Vec<u64>) -> Vec<u64> {
     while a.last() == Some(&0) {
         a.pop();
     }
@@ -35,7 +35,7 @@ pub fn interpolate(f: &Field, points: &[(u64, u64)]) -> Vec<u64> {
     trim(result)
 }
 
-fn remainder(f: &Field, a: &[u64], m: &[u64]) -> Vec<u64> {
+pub(crate) fn remainder(f: &Field, a: &[u64], m: &[u64]) -> Vec<u64> {
     let mut a = a.to_vec();
     let lead = f.inv(m[m.len() - 1]);
     while a.len() >= m.len() {
@@ -50,7 +50,26 @@ fn remainder(f: &Field, a: &[u64], m: &[u64]) -> Vec<u64> {
     a
 }
 
-fn gcd(f: &Field, mut a: Vec<u64>, mut b: Vec<u64>) -> Vec<u64> {
+/// `a / b` for a divisor `b` of `a`.
+pub(crate) fn quotient(f: &Field, a: &[u64], b: &[u64]) -> Vec<u64> {
+    let mut rest = a.to_vec();
+    let lead = f.inv(b.last().copied().unwrap_or(0));
+    let mut out = vec![0; (a.len() + 1).saturating_sub(b.len())];
+    for (shift, slot) in out.iter_mut().enumerate().rev() {
+        *slot = f.mul(rest[shift + b.len() - 1], lead);
+        for (i, &c) in b.iter().enumerate() {
+            rest[shift + i] = f.sub(rest[shift + i], f.mul(*slot, c));
+        }
+    }
+    trim(out)
+}
+
+/// The value at `x`.
+pub(crate) fn value(f: &Field, a: &[u64], x: u64) -> u64 {
+    a.iter().rev().fold(0, |sum, &c| f.add(f.mul(sum, x), c))
+}
+
+pub(crate) fn gcd(f: &Field, mut a: Vec<u64>, mut b: Vec<u64>) -> Vec<u64> {
     while !b.is_empty() {
         let r = remainder(f, &a, &b);
         (a, b) = (b, r);
@@ -58,7 +77,7 @@ fn gcd(f: &Field, mut a: Vec<u64>, mut b: Vec<u64>) -> Vec<u64> {
     a
 }
 
-fn multiply(f: &Field, a: &[u64], b: &[u64]) -> Vec<u64> {
+pub(crate) fn multiply(f: &Field, a: &[u64], b: &[u64]) -> Vec<u64> {
     if a.is_empty() || b.is_empty() {
         return Vec::new();
     }
@@ -124,10 +143,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn evaluate(f: &Field, a: &[u64], x: u64) -> u64 {
-        a.iter().rev().fold(0, |acc, &c| f.add(f.mul(acc, x), c))
-    }
-
     proptest! {
         #[test]
         fn finds_a_root_of_a_product(roots in prop::collection::vec(-50i64..50, 1..5), seed in any::<u64>()) {
@@ -147,7 +162,7 @@ mod tests {
             let a = interpolate(&f, &points);
             prop_assert!(a.len() <= points.len());
             for (x, y) in points {
-                prop_assert_eq!(evaluate(&f, &a, x), y);
+                prop_assert_eq!(value(&f, &a, x), y);
             }
         }
     }

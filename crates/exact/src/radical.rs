@@ -25,16 +25,21 @@ impl Ratio {
 
     /// The rational number with numerator and denominator up to 2^20 whose image is `value`, if there is one.
     pub fn recover(field: &Field, value: u64) -> Option<Self> {
+        Self::within(field, value, BOUND)
+    }
+
+    /// The rational number with numerator and denominator up to `bound` whose image is `value`, if there is one.
+    pub fn within(field: &Field, value: u64, bound: u64) -> Option<Self> {
         // half-extended Euclid (Wang 1981, doi:10.1145/800206.806398)
         let (mut r0, mut r1) = (field.modulus(), field.to_u64(value));
         let (mut t0, mut t1) = (0i64, 1i64);
-        while r1 > BOUND {
+        while r1 > bound {
             let q = r0 / r1;
             (r0, r1) = (r1, r0 - q * r1);
             (t0, t1) = (t1, t0.checked_sub((q as i64).checked_mul(t1)?)?);
         }
         let (num, den) = if t1 < 0 { (-(r1 as i64), -t1) } else { (r1 as i64, t1) };
-        (den > 0 && den as u64 <= BOUND && field.from_ratio(num, den) == value).then_some(Self { num, den })
+        (den > 0 && den as u64 <= bound && field.from_ratio(num, den) == value).then_some(Self { num, den })
     }
 }
 

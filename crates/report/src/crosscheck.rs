@@ -8,7 +8,7 @@ use obsdeg_evidence::crosscheck::{
 use crate::Answer;
 use crate::document::{Block, Document, left, number, optional, right};
 use crate::simulation::{conditions, validity, warning};
-use crate::words::{self, band};
+use crate::words::{self, at_most, band};
 
 /// The mark of a check.
 fn mark(outcome: Agreement) -> String {
@@ -243,7 +243,7 @@ impl Answer for CrossCheck {
         assumed.push(format!("carry {}; seed {}; {drawn}", self.carry, self.seed));
         let wrong = self.filter.as_ref();
         assumed.extend(wrong.map(|filter| format!("the filter is wrong on purpose: {filter}")));
-        assumed.push(format!("a prediction is wrong with probability below {:.0e}", self.error_bound));
+        assumed.push(format!("a prediction is wrong with probability below {}", at_most(self.error_bound)));
         blocks.push(Block::list("Assumed", assumed));
         let verdict = match (self.passed, self.verdicts_agree) {
             (true, _) if self.counts.not_resolvable > 0 => {

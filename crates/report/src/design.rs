@@ -187,8 +187,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         )
     } else if s.ties.is_some() {
         format!(
-            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a probability of {:.0e}",
-            d.error_bound
+            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a probability of up to {}",
+            words::at_most(d.error_bound)
         )
     } else if s.interrupted {
         let known = known.map_or_else(String::new, |k| format!(", {k}"));
@@ -417,7 +417,7 @@ fn fewest(d: &Design) -> String {
 
 fn minimum(d: &Design) -> Vec<String> {
     let m = &d.minimum;
-    let chance = format!("not proven: wrong with a probability of up to {:.0e}", d.error_bound);
+    let chance = format!("not proven: wrong with a probability of up to {}", words::at_most(d.error_bound));
     if !m.never.is_empty() {
         let never = format!("all candidates together leave {} unobservable", m.never.join(", "));
         let reasons = words::reasons(&d.terms, &d.candidates);
@@ -517,8 +517,8 @@ impl Answer for Design {
             assumed.push(format!("beyond the gimbal limits: {}", shortened(&self.beyond_gimbals)));
         }
         assumed.push(format!(
-        "ranks of sets modulo {} random 61-bit primes: an observable set is overlooked with probability below {:.0e}",
-        self.primes, self.error_bound
+        "ranks of sets modulo {} random 61-bit primes: an observable set is overlooked with probability below {}",
+        self.primes, words::at_most(self.error_bound)
     ));
         blocks.push(Block::list("Assumed", assumed));
         let what = self.search.as_ref().map_or_else(

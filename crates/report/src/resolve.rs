@@ -95,6 +95,19 @@ pub(crate) fn of_model(a: &SystemAnalysis) -> Vec<String> {
     if !several.is_empty() {
         answer.push_str(&format!("; several solutions: {}", names(several)));
     }
+    // without a number they are determined near a generic point only
+    let open = a.quantities.iter().filter(|q| {
+        q.degree.is_some() && matches!(q.number_of_solutions, None | Some(NumberOfSolutions::Undecided(_)))
+    });
+    let open: Vec<&str> = open.map(|q| q.name.as_str()).collect();
+    let counted = a.quantities.iter().any(|q| q.number_of_solutions.is_some());
+    match (open.is_empty(), counted) {
+        (true, _) => {}
+        (false, true) => {
+            answer.push_str(&format!("; locally, number of solutions not decided: {}", names(open)))
+        }
+        (false, false) => answer.push_str("; locally: solutions are not counted"),
+    }
     std::iter::once(answer).chain(to_resolve_in_model(a)).collect()
 }
 

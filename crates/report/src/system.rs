@@ -28,7 +28,9 @@ fn explanation(q: &SystemQuantity) -> String {
 /// zero is taken to be.
 fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
     match (error_bound, digits) {
-        (Some(bound), _) => format!("a verdict is wrong with probability below {bound:.0e}; seed {seed}"),
+        (Some(bound), _) => {
+            format!("a verdict is wrong with probability below {}; seed {seed}", words::at_most(bound))
+        }
         (None, Some(d)) => {
             let zero = d.zero_log10.map_or_else(
                 || "what counts as zero is so exactly".into(),
@@ -132,7 +134,7 @@ impl Answer for SystemAnalysis {
             blocks.push(combinations("Combinations asked for", &self.combinations));
         }
         if !self.invariants.is_empty() {
-            blocks.push(combinations("What stays observable of the unobservable", &self.invariants));
+            blocks.push(combinations("Identifiable combinations", &self.invariants));
         }
         if self.unobservable_directions > 0 {
             let mut lines: Vec<String> = self.symmetries.iter().map(|s| s.words.clone()).collect();
@@ -144,7 +146,14 @@ impl Answer for SystemAnalysis {
                 moved.join(", ")
             )
         }));
-            blocks.push(Block::list("No output changes when you", lines));
+            // beyond the bound a derivative may change
+            let heading = match self.rests_on_bound {
+                true => {
+                    format!("No derivative up to order {} changes at the start when you", self.last_order)
+                }
+                false => "No output changes when you".into(),
+            };
+            blocks.extend(Block::list_if_any(&heading, lines));
         }
         blocks.push(Block::list("The system", self.equations.clone()));
         let mut assumed = Vec::new();
@@ -207,7 +216,8 @@ impl Answer for SystemAnalysis {
         }
         assumed.push(match (&self.primes, self.error_bound) {
             (Some([p, q]), Some(bound)) => format!(
-                "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {bound:.0e}; seed {}",
+                "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {}; seed {}",
+                words::at_most(bound),
                 self.seed
             ),
             _ => certainty(self.error_bound, self.digits, self.seed),
@@ -360,9 +370,9 @@ impl Answer for SystemEvidence {
         blocks.push(Block::list("How", how));
         let open = self.orders.measured < self.orders.of || self.not_resolvable > 0;
         let verdict = match (self.passed, open) {
-            (false, _) => "filter and exact verdicts DISAGREE",
-            (true, true) => "filter and exact verdicts agree as far as measured",
-            (true, false) => "filter and exact verdicts agree",
+            (false, _) => "the information of samples DISAGREES with the exact verdicts",
+            (true, true) => "the information of samples agrees with the exact verdicts as far as measured",
+            (true, false) => "the information of samples agrees with the exact verdicts",
         };
         let open = match self.not_resolvable {
             0 => String::new(),
@@ -372,7 +382,7 @@ impl Answer for SystemEvidence {
         Document {
             title: format!("Cross-check: {}", self.name),
             lead: vec![format!(
-                "{verdict}: {passed}, {} of {} degrees measured",
+                "{verdict} (no filter is run): {passed}, {} of {} degrees measured",
                 self.orders.measured, self.orders.of
             )],
             blocks,

@@ -4,7 +4,7 @@ use obsdeg_design::design::Walks;
 
 use crate::Answer;
 use crate::document::{Block, Document, left, right};
-use crate::words::reasons;
+use crate::words::{at_most, reasons};
 
 /// What was examined, and what that says.
 fn examined(w: &Walks) -> Vec<String> {
@@ -22,13 +22,19 @@ fn examined(w: &Walks) -> Vec<String> {
     out.push(match (w.positions, w.proven) {
         (Some(k), true) if w.none_of.is_empty() => format!("so {k} positions are the fewest, by counting"),
         (Some(k), true) => format!(
-            "so {k} positions are the fewest of these candidates and turns (wrong with probability below {:.0e})",
-            w.error_bound
+            "so {k} positions are the fewest of these candidates and turns (wrong with probability below {})",
+            at_most(w.error_bound)
         ),
         (Some(k), false) if w.interrupted => format!("interrupted: whether fewer than {k} do is not known"),
-        (Some(k), false) => format!("longer walks are too many to be examined: whether fewer than {k} do is not known"),
+        (Some(k), false) => {
+            format!("longer walks are too many to be examined: whether fewer than {k} do is not known")
+        }
         (None, _) if !w.never.is_empty() => {
-            format!("even a tour of all {} turns leaves {} unobservable: no walk was sought", w.turns, w.never.join(", "))
+            format!(
+                "even a tour of all {} turns leaves {} unobservable: no walk was sought",
+                w.turns,
+                w.never.join(", ")
+            )
         }
         (None, _) => "no walk was found that does".into(),
     });

@@ -341,12 +341,30 @@ pub(crate) const UNSEEN: &str = "Directions that derivatives of Z do not see";
 pub(crate) const ACCURACY: &str =
     "Accuracy order where it differs from the degree (dwell T at every position)";
 
+/// A bound on a probability to one digit, rounded up: `8e-23`.
+pub(crate) fn at_most(bound: f64) -> String {
+    let near = format!("{bound:.0e}");
+    let below = near.parse::<f64>().is_ok_and(|shown| shown < bound);
+    let parts = near.split_once('e').filter(|_| below);
+    let parts =
+        parts.and_then(|(digit, power)| Some((digit.parse::<u32>().ok()?, power.parse::<i32>().ok()?)));
+    match parts {
+        None => near,
+        Some((9.., power)) => format!("1e{}", power + 1),
+        Some((digit, power)) => format!("{}e{power}", digit + 1),
+    }
+}
+
 /// How certain the verdicts and solutions are.
 pub(crate) fn certainty(a: &Analysis) -> String {
     let c = &a.certainty;
     let mut out = format!(
-        "{} (p = {}, {}; seed {}): a verdict is wrong with probability below {:.0e}",
-        c.method, c.primes[0], c.primes[1], c.seed, c.error_bound
+        "{} (p = {}, {}; seed {}): a verdict is wrong with probability below {}",
+        c.method,
+        c.primes[0],
+        c.primes[1],
+        c.seed,
+        at_most(c.error_bound)
     );
     let solutions: Vec<&Solution> = a
         .quantities
@@ -611,6 +629,20 @@ pub(crate) fn turn(t: &Turn) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is printed is no smaller than the bound, and at most a digit above.
+    #[test]
+    fn bounds_are_rounded_up() {
+        let cases = [(8.4e-23, "9e-23"), (8e-23, "8e-23"), (9.5e-5, "1e-4"), (9.001e-1, "1e0"), (0.0, "0e0")];
+        for (x, said) in cases {
+            assert_eq!(at_most(x), said);
+        }
+        for k in 0..500 {
+            let x = 10f64.powf(-0.0737 * f64::from(k)) * 1.3;
+            let said: f64 = at_most(x).parse().expect("a number");
+            assert!(said >= x && said <= 2.0 * x, "{x}: {said}");
+        }
+    }
 
     #[test]
     fn directions_read_as_sums_of_axes() {

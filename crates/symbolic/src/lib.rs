@@ -31,4 +31,4 @@ pub mod protocol;
 pub mod worker;
 
 pub use client::{Worker, WorkerConfig, WorkerError};
-pub use protocol::{Check, Dynamics, Job, Order, RationalSystem, Request, Response, System};
+pub use protocol::{Check, Dynamics, Job, Order, Request, Response, System};

@@ -53,12 +53,6 @@ pub enum Job {
         /// Highest order.
         order: usize,
     },
-    /// Solve a rational system for its unknowns, one after the other; answer with one expression per state, then one
-    /// per parameter, empty where there is none.
-    Unknowns {
-        /// The system.
-        system: RationalSystem,
-    },
     /// The irreducible factors of one maximal minor of a matrix of rational functions of the symbols.
     MinorFactors {
         /// The matrix.
@@ -86,32 +80,6 @@ pub struct Dynamics {
     pub equations: Vec<String>,
     /// `h`.
     pub outputs: Vec<String>,
-}
-
-/// `x' = f`, `y = h`, rational in states, parameters, signals and whatever else is announced as a symbol.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RationalSystem {
-    /// The states.
-    pub states: Vec<String>,
-    /// `f`, one per state.
-    pub equations: Vec<String>,
-    /// The unknown constants.
-    pub parameters: Vec<String>,
-    /// Per output `h` and the names of `y, y', y'', ...`.
-    pub outputs: Vec<(String, Vec<String>)>,
-    /// The names of `u, u', ...` of every known input, and whether derivatives beyond vanish.
-    pub inputs: Vec<(Vec<String>, bool)>,
-    /// The name of the time, if it occurs.
-    pub time: Option<String>,
-    /// Known starts: state and name of its value.
-    pub starts: Vec<(usize, String)>,
-    /// The degree of every state, then of every parameter; what has a lower one may stand in its expression.
-    pub degrees: Vec<Option<usize>>,
-    /// So many orders beyond its degree an expression may go: what has finitely many solutions there may have one.
-    pub beyond: usize,
-    /// Parameters that may take any value, since a symmetry moves them: no expression of an observable unknown depends
-    /// on it.
-    pub free: Vec<usize>,
 }
 
 /// A claim `sum_i x_i sum_t factor_t (d/dt)^order_t z_output_t at segment_t = target`, to be verified
@@ -153,7 +121,6 @@ impl Request {
             }
             Job::Solve { system, .. } => Some(system.outputs.len()),
             Job::Derive { dynamics, order } => Some(dynamics.outputs.len() * (order + 1)),
-            Job::Unknowns { system } => Some(system.states.len() + system.parameters.len()),
             Job::MinorFactors { .. } => None,
         }
     }

@@ -86,6 +86,8 @@ fn schemes_drawn_at_random_agree() {
     sweep(0..25, 100, |seed| drawn(seed, false));
     // a psi that is not excited, but for what cosines of right angles leave of its column
     sweep(296..297, 100, |seed| drawn(seed, false));
+    // psi at the end, in which a psi that is not excited cancels but for rounding
+    sweep(666..667, 100, |seed| drawn(seed, false));
     sweep(1000..1010, 10, |seed| drawn(seed, true));
     // sines of right angles are rounded, times a psi that nobody sees
     sweep(1060..1061, 10, |seed| drawn(seed, true));
@@ -103,6 +105,12 @@ fn whole_platforms_drawn_at_random_agree() {
 #[test]
 #[ignore = "minutes"]
 fn many_schemes_drawn_at_random_agree() {
+    // SEEDS=667..800 for a part of them
+    let part = std::env::var("SEEDS").ok();
+    if let Some((first, end)) = part.as_deref().and_then(|s| s.split_once("..")) {
+        let [first, end] = [first, end].map(|x| x.parse().expect("a seed"));
+        return sweep(first..end, 100, |seed| drawn(seed, false));
+    }
     sweep(0..2000, 100, |seed| drawn(seed, false));
     sweep(1000..1100, 10, |seed| drawn(seed, true));
 }

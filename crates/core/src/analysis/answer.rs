@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::degree::coefficient::Form;
 use crate::degree::status::{Difference, Status};
+use crate::engine::EngineBusy;
 use crate::model::geometry::Geometry;
 use crate::model::slew::Turn;
 use crate::model::{Carry, GimbalReport};
@@ -68,6 +69,9 @@ pub struct Analysis {
     pub certainty: Certainty,
     /// Limitations of this answer, each with its reason.
     pub notes: Vec<String>,
+    /// Mark of an answer without the formulas that need the symbolic engine, because other processes held it
+    /// for the whole of --engine-wait; null otherwise.
+    pub engine_busy: Option<EngineBusy>,
 }
 
 /// Position of the scheme, with gravity in platform axes.

@@ -13,6 +13,7 @@ use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::degrees;
 use crate::degree::findings::Findings;
 use crate::degree::status::{Difference, Verdict};
+use crate::engine::EngineBusy;
 use crate::findings::{CombinationFinding, Judged, SchemeFindings};
 use crate::model::attitude::Matrix3;
 use crate::model::attitude::c_n_from_euler;
@@ -95,10 +96,14 @@ pub fn analyze(
     let mut solved = solved.chain(combinations.iter().map(|c| (c.degree, &c.solution)));
     let exact = |s: &Option<Solution>| s.as_ref().is_some_and(|s| s.found_by != FoundBy::FloatingPoint);
     let wanting = solved.any(|(degree, s)| degree.is_some() && !exact(s));
-    if options.solutions && !course && (wanting || !scheme.generic_names().is_empty()) {
+    let sought = options.solutions && !course && (wanting || !scheme.generic_names().is_empty());
+    if sought {
         let note = engine_note(built, &mut printer.solver);
         printer.notes.extend(note);
     }
+    let failure = printer.solver.worker().and_then(|w| w.failure().cloned());
+    let missing = sought || (options.formulas && formulas.is_none());
+    let engine_busy = failure.filter(|_| missing).and_then(|failure| EngineBusy::of(&failure));
 
     Ok(Analysis {
         schema: SCHEMA.into(),
@@ -130,6 +135,7 @@ pub fn analyze(
             seed: findings.verdicts.seed,
         },
         notes: printer.notes,
+        engine_busy,
     })
 }
 

@@ -1,6 +1,5 @@
 //! The answer for one system: plain data, serialisable.
 
-use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -56,7 +55,8 @@ pub struct SystemAnalysis {
     pub combinations: Vec<SystemCombination>,
     /// Number of independent directions that change no output.
     pub unobservable_directions: usize,
-    /// Scalings, translations and polynomials among the unobservable directions, exactly.
+    /// Scalings, translations and polynomials among the unobservable directions, exactly; up to the bound on the
+    /// order only if `rests_on_bound`.
     pub symmetries: Vec<SymmetryReport>,
     /// Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was
     /// found describes it.
@@ -77,7 +77,7 @@ pub struct SystemAnalysis {
     pub branches: Vec<String>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
-    /// Reason why there are no solving expressions; null if there are.
+    /// Reason why solving expressions were not sought, or not all of them; null otherwise.
     pub note: Option<String>,
     /// Order of the derivatives with which solutions were counted by elimination; null if none were.
     pub counting_order: Option<usize>,
@@ -160,7 +160,8 @@ pub struct SystemCombination {
 /// Symmetry of the system, in words.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SymmetryReport {
-    /// Change that leaves every output as it is, for every `c` (every positive one where something is
+    /// Change that leaves every output as it is (if `rests_on_bound`: its derivatives up to the bound at the
+    /// start), for every `c` (every positive one where something is
     /// multiplied or divided): `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is
     /// multiplied or divided at c = 0, nothing changes.
     pub words: String,
@@ -217,15 +218,11 @@ impl Default for SystemOptions {
     }
 }
 
-/// Judges a model. The worker, if given, is started only when solving expressions are wanted; without it they are noted as missing.
+/// Judges a model, without the symbolic engine.
 ///
 /// # Errors
 /// [`ModelError`].
-pub fn analyze_system(
-    model: &SystemModel,
-    options: SystemOptions,
-    worker: Option<&mut Worker>,
-) -> Result<SystemAnalysis, ModelError> {
+pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<SystemAnalysis, ModelError> {
     let SystemOptions { seed, order, .. } = options;
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, order)?;
@@ -243,10 +240,8 @@ pub fn analyze_system(
     let (counts, counting_order) =
         values_taken(model, &compiled, &judged, seed, options.count_limit.saturating_mul(1_000_000));
     let single: Vec<bool> = counts.iter().map(|c| *c == Some(Ok(1))).collect();
-    let found = solutions(model, &compiled, &judged, seed, worker, &single).unwrap_or_else(|reason| {
-        out.note = Some(reason.to_string());
-        vec![None; counts.len()]
-    });
+    let (found, missing) = solutions(model, &compiled, &judged, seed, &single);
+    out.note = missing.map(|reason| reason.to_string());
     for ((u, count), found) in judged.layout.unknowns.iter().zip(counts).zip(found) {
         if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
             let shown =

@@ -300,7 +300,11 @@ impl Equations<'_> {
 }
 
 /// The nodes that some nodes are made of; `follow` leads on from a state.
-fn reached(compiled: &Compiled, from: &[usize], follow: impl Fn(usize) -> Option<usize>) -> Vec<bool> {
+pub(super) fn reached(
+    compiled: &Compiled,
+    from: &[usize],
+    follow: impl Fn(usize) -> Option<usize>,
+) -> Vec<bool> {
     let mut out = vec![false; compiled.dag.ops.len()];
     let mut left = from.to_vec();
     while let Some(i) = left.pop() {

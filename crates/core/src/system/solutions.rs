@@ -1,16 +1,26 @@
 //! Solving expressions: what an unknown is in terms of outputs, inputs, their derivatives, and unknowns that are solved
 //! with fewer.
 //!
-//! The symbolic worker eliminates; every expression is then evaluated at random points of both prime fields, where it
-//! must give the unknown's value, and only what holds is shown.
+//! Elimination over the first prime field finds them (`elimination`), with integers recovered from it (`formula`). Every
+//! expression is then evaluated at random points of both prime fields, where it must give the unknown's value, and only
+//! what holds is shown.
 
+use std::collections::BTreeSet;
+
+use obsdeg_exact::divisor::Algebra;
+use obsdeg_exact::fraction::Fraction;
+use obsdeg_exact::groebner::{OverLimit, Work};
+use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Field, SplitMix64};
-use obsdeg_symbolic::{Job, RationalSystem, Request, Worker, WorkerError};
 
-use super::dag::{Dag, Op};
+use super::dag::Op;
+use super::elimination::{System, eliminate};
+use super::fibre::reached;
+use super::formula;
 use super::judge::Judgement;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::SystemRows;
+use super::values::Values;
 use crate::model::expression::{Environment, Names, evaluate, parse_with};
 
 /// Most unknowns.
@@ -19,29 +29,26 @@ const UNKNOWNS: usize = 30;
 const ORDER: usize = 16;
 /// Orders beyond its degree to which an expression may go: there what has finitely many solutions may have one.
 const BEYOND: usize = 2;
-/// Longest formula that is sent.
-const LENGTH: usize = 20_000;
 /// Longest expression that is kept.
 const KEPT: usize = 50_000;
+/// Products of coefficients that the elimination may take: about a second.
+const WORK: u64 = 100_000_000;
 
-/// A symbol that the worker is told about.
+/// A symbol of expressions.
 #[derive(Debug, Clone)]
 struct Symbol {
-    /// Its name there.
+    /// Its name, which is that of no other.
     raw: String,
-    /// Its name here.
+    /// Its name in the answer.
     shown: String,
     /// The node and the order of the derivative that it stands for.
     node: Option<usize>,
     order: usize,
 }
 
-/// Why there are no solving expressions.
+/// Why there are no solving expressions, or some are missing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NoExpressions {
-    /// Nobody solves.
-    #[error("this build has no symbolic engine: no solving expressions")]
-    NoEngine,
     /// Experiments or segments.
     #[error("no solving expressions: they are sought for a single experiment without segments")]
     Parts,
@@ -56,12 +63,9 @@ pub(super) enum NoExpressions {
         "solving expressions are sought for models without functions only (elsewhere only where an unknown is an output or its derivative)"
     )]
     NotRational,
-    /// Too long an equation.
-    #[error("no solving expressions: the equations are too long")]
-    TooLong,
-    /// The engine gave up.
-    #[error("no solving expressions: {0}")]
-    Engine(WorkerError),
+    /// The work of the elimination.
+    #[error("solving expressions are missing where the elimination is beyond its limit of work")]
+    OverLimit,
 }
 
 /// What an unknown is.
@@ -74,69 +78,193 @@ pub(super) struct Expression {
     pub(super) unique: bool,
 }
 
-/// Expressions for the unknowns, in the order of the layout, or why there are none; `single` says of which it is known
-/// otherwise that they have one solution.
-///
-/// # Errors
-/// A sentence for the reader.
+/// Expressions for the unknowns, in the order of the layout, and why there are none, or some are missing; `single`
+/// says of which it is known otherwise that they have one solution.
 pub(super) fn solutions(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
     seed: u64,
-    worker: Option<&mut Worker>,
     single: &[bool],
-) -> Result<Vec<Option<Expression>>, NoExpressions> {
-    let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
+) -> (Vec<Option<Expression>>, Option<NoExpressions>) {
     let n = judged.layout.unknowns.len();
-    let Some(highest) = highest else { return Ok(vec![None; n]) };
-    if judged.fields.is_none() {
-        return Err(NoExpressions::NotRational);
-    }
-    let worker = worker.ok_or(NoExpressions::NoEngine)?;
-    let (request, symbols) = request(model, compiled, judged, highest)?;
-    let (texts, _) = worker.ask(&request).map_err(NoExpressions::Engine)?;
-    let mut out: Vec<Option<String>> = vec![None; n];
-    let Job::Unknowns { system } = &request.job else { return Ok(vec![None; n]) };
-    let roles = (0..system.states.len()).map(Role::State).chain(roles_of_parameters(model));
-    for (role, text) in roles.zip(&texts) {
-        let lane = judged.layout.unknowns.iter().position(|u| u.role == role);
-        if let Some(lane) = lane.filter(|_| !text.is_empty() && text.len() <= KEPT) {
-            out[lane] = Some(text.clone());
-        }
-    }
-    let mut rng = model.random(seed, "solving expressions");
-    for field in judged.fields.into_iter().flatten() {
-        let held = check(model, compiled, judged, field, &mut rng, &symbols, &out);
-        for (slot, held) in out.iter_mut().zip(held) {
-            if !held {
-                *slot = None;
-            }
-        }
-    }
-    let unique = unique(judged, compiled, &symbols, &out, single);
-    let kept = |(text, unique): (Option<String>, bool)| {
-        text.map(|t| Expression { text: shown(&t, &symbols), unique })
+    let none = |reason| (vec![None; n], reason);
+    let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
+    let Some(highest) = highest else { return none(None) };
+    let Some(fields) = judged.fields else { return none(Some(NoExpressions::NotRational)) };
+    let signals = match Signals::new(model, compiled, judged, highest) {
+        Ok(signals) => signals,
+        Err(reason) => return none(Some(reason)),
     };
-    Ok(out.into_iter().zip(unique).map(kept).collect())
+    let mut rng = model.random(seed, "solving expressions");
+    let s = Algebra { f: fields[0], rng: model.random(seed, "elimination"), work: Work { left: WORK } };
+    let (mut out, complete) = match by_elimination(s, model, compiled, judged, &signals) {
+        Ok(found) => found,
+        Err(reason) => return none(Some(reason)),
+    };
+    for field in fields {
+        let held = check(model, compiled, judged, field, &mut rng, &signals.symbols, &out);
+        for (slot, held) in out.iter_mut().zip(held) {
+            slot.take_if(|_| !held);
+        }
+    }
+    let mut sought = out.iter().zip(&judged.findings.degrees.degree);
+    let missing = sought.any(|(e, degree)| e.is_none() && degree.is_some());
+    let reason = (!complete && missing).then_some(NoExpressions::OverLimit);
+    let mut rests_on = rests_on(judged, compiled, &signals.symbols, &out);
+    drop_circles(&mut rests_on);
+    let unique = unique(&rests_on, single);
+    let kept = |((text, on), unique): ((Option<String>, Option<BTreeSet<usize>>), bool)| {
+        let text = on.and(text)?;
+        Some(Expression { text: shown(&text, &signals.symbols), unique })
+    };
+    (out.into_iter().zip(rests_on).zip(unique).map(kept).collect(), reason)
 }
 
-/// Which expressions rest on nothing but what is `single` or has an expression that does, and not on themselves.
-fn unique(
+/// The name of an unknown in expressions before they are shown.
+fn raw(role: Role) -> String {
+    match role {
+        Role::State(i) => format!("x_{i}"),
+        Role::Parameter(i) => format!("p_{i}"),
+        Role::UnknownInput(i) => format!("w_{i}"),
+        Role::Constant(i) => format!("k_{i}"),
+        Role::KnownInput(i) => format!("u_{i}_0"),
+        Role::Time => "t_0".into(),
+    }
+}
+
+/// The texts of states, then of constants, in the order of the layout, without those that are too long.
+fn in_layout(
+    model: &SystemModel,
+    judged: &Judgement,
+    texts: impl IntoIterator<Item = Option<String>>,
+) -> Vec<Option<String>> {
+    let mut out: Vec<Option<String>> = vec![None; judged.layout.unknowns.len()];
+    let roles = (0..model.states.len()).map(Role::State).chain(roles_of_parameters(model));
+    for (role, text) in roles.zip(texts) {
+        let lane = judged.layout.unknowns.iter().position(|u| u.role == role);
+        if let Some(lane) = lane {
+            out[lane] = text.filter(|t| !t.is_empty() && t.len() <= KEPT);
+        }
+    }
+    out
+}
+
+/// Expressions by elimination over the field, and whether all were sought within its work.
+fn by_elimination(
+    mut s: Algebra,
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    signals: &Signals,
+) -> Result<(Vec<Option<String>>, bool), NoExpressions> {
+    let fractions = match fractions(&mut s, compiled, signals)? {
+        Some(fractions) => fractions,
+        None => return Ok((vec![None; judged.layout.unknowns.len()], false)),
+    };
+    let numbers = |list: &[usize]| -> Vec<u32> { list.iter().map(|&i| i as u32).collect() };
+    let fraction = |node: usize| fractions[node].clone().ok_or(NoExpressions::NotRational);
+    let system = System {
+        states: numbers(&signals.states),
+        rates: compiled.rates(0).iter().map(|&r| fraction(r)).collect::<Result<_, _>>()?,
+        parameters: numbers(&signals.parameters),
+        outputs: (compiled.outputs(0).iter().zip(&signals.outputs))
+            .map(|(&node, chain)| Ok((fraction(node)?, numbers(chain))))
+            .collect::<Result<_, _>>()?,
+        inputs: signals.inputs.iter().map(|(chain, ends)| (numbers(chain), *ends)).collect(),
+        time: signals.time.map(|t| t as u32),
+        starts: signals.starts.iter().map(|&(i, value)| (i, value as u32)).collect(),
+        degrees: signals.degrees.clone(),
+        beyond: BEYOND,
+        free: signals.free.clone(),
+    };
+    let (found, mut complete) = eliminate(&mut s, &system);
+    let names: Vec<String> = signals.symbols.iter().map(|s| s.raw.clone()).collect();
+    let mut texts = Vec::new();
+    for e in found {
+        let text = e.map(|e| formula::text(&mut s, &e, &names));
+        complete &= !matches!(text, Some(Err(_)));
+        texts.push(text.and_then(Result::ok).flatten());
+    }
+    Ok((in_layout(model, judged, texts), complete))
+}
+
+/// The nodes that rates and outputs are made of, as fractions; `None` where their work is beyond the limit.
+fn fractions(
+    s: &mut Algebra,
+    compiled: &Compiled,
+    signals: &Signals,
+) -> Result<Option<Vec<Option<Fraction>>>, NoExpressions> {
+    let roots: Vec<usize> = compiled.rates(0).iter().chain(compiled.outputs(0)).copied().collect();
+    let needed = reached(compiled, &roots, |_| None);
+    let mut out: Vec<Option<Fraction>> = Vec::with_capacity(needed.len());
+    for (op, needed) in compiled.dag.ops.iter().zip(needed) {
+        if !needed {
+            out.push(None);
+            continue;
+        }
+        let value = |node: usize| out.get(node).and_then(Option::as_ref).ok_or(NoExpressions::NotRational);
+        let made = match *op {
+            Op::Number { mantissa, decimals } => {
+                let number = Values::number(&s.f, mantissa, decimals);
+                Ok(s.whole(Polynomial::constant(number)))
+            }
+            Op::Slot(slot) => {
+                let symbol = signals.slots.get(slot).copied().flatten().ok_or(NoExpressions::NotRational)?;
+                Ok(s.whole(Polynomial::variable(&s.f, symbol as u32)))
+            }
+            Op::Add(a, b) => s.sum(value(a)?, value(b)?),
+            Op::Subtract(a, b) => {
+                let minus = s.minus(value(b)?);
+                s.sum(value(a)?, &minus)
+            }
+            Op::Multiply(a, b) => s.times(value(a)?, value(b)?),
+            Op::Divide(a, b) => match value(b)? {
+                zero if zero.is_zero() => return Err(NoExpressions::NotRational),
+                below => {
+                    let inverse = s.inverse(below);
+                    s.times(value(a)?, &inverse)
+                }
+            },
+            Op::Primitive { .. } | Op::Pi => return Err(NoExpressions::NotRational),
+        };
+        match made {
+            Ok(fraction) => out.push(Some(fraction)),
+            Err(OverLimit) => return Ok(None),
+        }
+    }
+    Ok(Some(out))
+}
+
+/// The unknowns in every expression.
+fn rests_on(
     judged: &Judgement,
     compiled: &Compiled,
     symbols: &[Symbol],
     expressions: &[Option<String>],
-    single: &[bool],
-) -> Vec<bool> {
+) -> Vec<Option<BTreeSet<usize>>> {
     let lane_of = |word: &str| {
         // of states, parameters and inputs that are unknown; an output may share the node of one
         let symbol = symbols.iter().find(|s| s.raw == word && word.starts_with(['x', 'p', 'w']))?;
         judged.layout.unknowns.iter().position(|u| compiled.node_of(u.role) == symbol.node)
     };
-    let rests_on: Vec<Option<Vec<usize>>> =
-        expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(lane_of).collect())).collect();
-    let mut unique = vec![false; expressions.len()];
+    expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(lane_of).collect())).collect()
+}
+
+/// Drops what is no solution: an expression that holds its own unknown, itself or in those of the unknowns in it.
+fn drop_circles(rests_on: &mut [Option<BTreeSet<usize>>]) {
+    for lane in 0..rests_on.len() {
+        let (mut seen, mut left) = (BTreeSet::new(), vec![lane]);
+        while let Some(at) = left.pop() {
+            left.extend(rests_on[at].iter().flatten().filter(|&&on| seen.insert(on)));
+        }
+        rests_on[lane].take_if(|_| seen.contains(&lane));
+    }
+}
+
+/// Which expressions rest on nothing but what is `single` or has an expression that does.
+fn unique(rests_on: &[Option<BTreeSet<usize>>], single: &[bool]) -> Vec<bool> {
+    let mut unique = vec![false; rests_on.len()];
     loop {
         let before = unique.clone();
         for (lane, on) in rests_on.iter().enumerate() {
@@ -156,120 +284,110 @@ fn roles_of_parameters(model: &SystemModel) -> impl Iterator<Item = Role> {
         .chain((0..model.unknown_inputs.len()).map(Role::UnknownInput))
 }
 
-fn request(
-    model: &SystemModel,
-    compiled: &Compiled,
-    judged: &Judgement,
-    highest: usize,
-) -> Result<(Request, Vec<Symbol>), NoExpressions> {
-    if model.experiments > 1 || !model.segments.is_empty() {
-        return Err(NoExpressions::Parts);
+/// The symbols of a system, by their places in the list.
+struct Signals {
+    symbols: Vec<Symbol>,
+    /// The symbol of every slot; `None` of one that has none.
+    slots: Vec<Option<usize>>,
+    states: Vec<usize>,
+    /// Unknown constants.
+    parameters: Vec<usize>,
+    /// Of every output: `y, y', y'', ...`.
+    outputs: Vec<Vec<usize>>,
+    /// Of every known input: `u, u', ...`, and whether the derivatives beyond vanish.
+    inputs: Vec<(Vec<usize>, bool)>,
+    time: Option<usize>,
+    /// Known starts: state, and the symbol of its value.
+    starts: Vec<(usize, usize)>,
+    /// Degree of every state, then of every unknown constant.
+    degrees: Vec<Option<usize>>,
+    /// Unknown constants that a symmetry moves.
+    free: Vec<usize>,
+}
+
+impl Signals {
+    /// Of a model whose expressions are sought.
+    fn new(
+        model: &SystemModel,
+        compiled: &Compiled,
+        judged: &Judgement,
+        highest: usize,
+    ) -> Result<Self, NoExpressions> {
+        if model.experiments > 1 || !model.segments.is_empty() {
+            return Err(NoExpressions::Parts);
+        }
+        if model.unknown_inputs.iter().any(|u| u.1 != Some(0)) {
+            return Err(NoExpressions::UnknownInput);
+        }
+        if judged.layout.unknowns.len() > UNKNOWNS || highest > ORDER {
+            return Err(NoExpressions::TooMany);
+        }
+        let mut symbols: Vec<Symbol> = Vec::new();
+        let mut put = |raw: String, shown: String, node: Option<usize>, order: usize| {
+            symbols.push(Symbol { raw, shown, node, order });
+            symbols.len() - 1
+        };
+        let (mut states, mut parameters, mut inputs, mut slots) = (vec![], vec![], vec![], vec![]);
+        let mut time = None;
+        for role in &compiled.roles {
+            let node = compiled.node_of(*role);
+            let symbol = match *role {
+                Role::State(i) => {
+                    states.push(put(raw(*role), model.states[i].named.name.clone(), node, 0));
+                    states.last().copied()
+                }
+                Role::Parameter(i) => {
+                    parameters.push(put(raw(*role), model.parameters[i].name.clone(), node, 0));
+                    parameters.last().copied()
+                }
+                Role::UnknownInput(i) => {
+                    parameters.push(put(raw(*role), model.unknown_inputs[i].0.name.clone(), node, 0));
+                    parameters.last().copied()
+                }
+                Role::Constant(i) => Some(put(raw(*role), model.constants[i].0.name.clone(), node, 0)),
+                Role::KnownInput(i) => {
+                    let (named, kind) = &model.known_inputs[i];
+                    let last = match kind {
+                        KnownInput::Polynomial(d) => (*d).min(highest + 1 + BEYOND),
+                        _ => highest + 1 + BEYOND,
+                    };
+                    let chain: Vec<usize> = (0..=last)
+                        .map(|k| put(format!("u_{i}_{k}"), derivative(&named.name, k), node, k))
+                        .collect();
+                    let first = chain.first().copied();
+                    inputs.push((chain, matches!(kind, KnownInput::Polynomial(d) if *d <= last)));
+                    first
+                }
+                Role::Time => {
+                    time = node.map(|_| put(raw(*role), "t".into(), node, 0));
+                    time
+                }
+            };
+            slots.push(symbol);
+        }
+        let mut outputs = Vec::new();
+        for (j, &node) in compiled.outputs(0).iter().enumerate() {
+            let name = &model.outputs[j].0.name;
+            let chain = (0..=highest + 1 + BEYOND)
+                .map(|k| put(format!("y_{j}_{k}"), derivative(name, k), Some(node), k))
+                .collect();
+            outputs.push(chain);
+        }
+        let mut starts = Vec::new();
+        for (i, s) in model.states.iter().enumerate().filter(|(_, s)| s.start != StateStart::Unknown) {
+            let (node, shown) = (compiled.node_of(Role::State(i)), format!("{}(0)", s.named.name));
+            starts.push((i, put(format!("s_{i}"), shown, node, 0)));
+        }
+        let lane = |role: Role| judged.layout.unknowns.iter().position(|u| u.role == role);
+        let roles = (0..states.len()).map(Role::State).chain(roles_of_parameters(model));
+        let degrees = roles.map(|role| lane(role).and_then(|l| judged.findings.degrees.degree[l])).collect();
+        let is_free = |role: Role| {
+            lane(role).is_some_and(|l| judged.span.as_ref().is_some_and(|s| s.pivots().all(|p| p != l)))
+        };
+        let free = roles_of_parameters(model).enumerate().filter(|(_, role)| is_free(*role));
+        let free = free.map(|(p, _)| p).collect();
+        Ok(Self { symbols, slots, states, parameters, outputs, inputs, time, starts, degrees, free })
     }
-    if model.unknown_inputs.iter().any(|u| u.1 != Some(0)) {
-        return Err(NoExpressions::UnknownInput);
-    }
-    if judged.layout.unknowns.len() > UNKNOWNS || highest > ORDER {
-        return Err(NoExpressions::TooMany);
-    }
-    let mut symbols: Vec<Symbol> = Vec::new();
-    let mut names: Vec<String> = Vec::new();
-    let put = |symbols: &mut Vec<Symbol>, raw: String, shown: String, node: Option<usize>, order: usize| {
-        symbols.push(Symbol { raw: raw.clone(), shown, node, order });
-        raw
-    };
-    let mut time = None;
-    let mut states = Vec::new();
-    let mut inputs = Vec::new();
-    let mut parameters = Vec::new();
-    for role in &compiled.roles {
-        let node = compiled.node_of(*role);
-        names.push(match *role {
-            Role::State(i) => {
-                states.push(put(&mut symbols, format!("x_{i}"), model.states[i].named.name.clone(), node, 0));
-                format!("x_{i}")
-            }
-            Role::Parameter(i) => {
-                parameters.push(put(
-                    &mut symbols,
-                    format!("p_{i}"),
-                    model.parameters[i].name.clone(),
-                    node,
-                    0,
-                ));
-                format!("p_{i}")
-            }
-            Role::UnknownInput(i) => {
-                let name = model.unknown_inputs[i].0.name.clone();
-                parameters.push(put(&mut symbols, format!("w_{i}"), name, node, 0));
-                format!("w_{i}")
-            }
-            Role::Constant(i) => {
-                put(&mut symbols, format!("k_{i}"), model.constants[i].0.name.clone(), node, 0)
-            }
-            Role::KnownInput(i) => {
-                let (named, kind) = &model.known_inputs[i];
-                let last = match kind {
-                    KnownInput::Polynomial(d) => (*d).min(highest + 1 + BEYOND),
-                    _ => highest + 1 + BEYOND,
-                };
-                let chain = (0..=last)
-                    .map(|k| put(&mut symbols, format!("u_{i}_{k}"), derivative(&named.name, k), node, k))
-                    .collect();
-                inputs.push((chain, matches!(kind, KnownInput::Polynomial(d) if *d <= last)));
-                format!("u_{i}_0")
-            }
-            Role::Time => {
-                time = node.map(|_| put(&mut symbols, "t_0".into(), "t".into(), node, 0));
-                "t_0".into()
-            }
-        });
-    }
-    // a constant that is given by a formula is no symbol of its own: its value is
-    let texts = texts(&compiled.dag, &names)?;
-    let text = |node: usize| texts[node].clone().ok_or(NoExpressions::NotRational);
-    let mut outputs = Vec::new();
-    for (j, &node) in compiled.outputs(0).iter().enumerate() {
-        let name = &model.outputs[j].0.name;
-        let chain = (0..=highest + 1 + BEYOND)
-            .map(|k| put(&mut symbols, format!("y_{j}_{k}"), derivative(name, k), Some(node), k))
-            .collect();
-        outputs.push((text(node)?, chain));
-    }
-    let mut starts = Vec::new();
-    for (i, s) in model.states.iter().enumerate().filter(|(_, s)| s.start != StateStart::Unknown) {
-        let (node, shown) = (compiled.node_of(Role::State(i)), format!("{}(0)", s.named.name));
-        starts.push((i, put(&mut symbols, format!("s_{i}"), shown, node, 0)));
-    }
-    let roles = (0..states.len()).map(Role::State).chain(roles_of_parameters(model));
-    let degree = |role: Role| {
-        let lane = judged.layout.unknowns.iter().position(|u| u.role == role)?;
-        judged.findings.degrees.degree[lane]
-    };
-    let role_is_free = |role: Role| {
-        let lane = judged.layout.unknowns.iter().position(|u| u.role == role);
-        lane.is_some_and(|lane| judged.span.as_ref().is_some_and(|s| s.pivots().all(|p| p != lane)))
-    };
-    let free = roles_of_parameters(model).enumerate().filter(|(_, role)| role_is_free(*role));
-    let free = free.map(|(p, _)| p).collect();
-    let system = RationalSystem {
-        equations: compiled.rates(0).iter().map(|&r| text(r)).collect::<Result<_, _>>()?,
-        states,
-        parameters,
-        outputs,
-        inputs,
-        time,
-        starts,
-        degrees: roles.map(degree).collect(),
-        beyond: BEYOND,
-        free,
-    };
-    let request = Request {
-        symbols: symbols.iter().map(|s| s.raw.clone()).collect(),
-        generators: vec![],
-        angles: vec![],
-        job: Job::Unknowns { system },
-    };
-    Ok((request, symbols))
 }
 
 /// `y`, `y'`, `y''`, `y'''`, `y^(4)`.
@@ -278,32 +396,6 @@ fn derivative(name: &str, order: usize) -> String {
         0..=3 => format!("{name}{}", "'".repeat(order)),
         k => format!("{name}^({k})"),
     }
-}
-
-/// Every node as text, in the names of the slots; `None` for what is not rational.
-fn texts(dag: &Dag, names: &[String]) -> Result<Vec<Option<String>>, NoExpressions> {
-    let mut out: Vec<Option<String>> = Vec::with_capacity(dag.ops.len());
-    for op in &dag.ops {
-        let two = |a: usize, b: usize, sign: &str| {
-            let (a, b) = (out.get(a)?.as_ref()?, out.get(b)?.as_ref()?);
-            Some(format!("({a}{sign}{b})"))
-        };
-        let text = match *op {
-            Op::Number { mantissa, decimals } if decimals > 0 => Some(format!("({mantissa}/10^{decimals})")),
-            Op::Number { mantissa, decimals } => Some(format!("({mantissa}*10^{})", -decimals)),
-            Op::Slot(slot) => names.get(slot).cloned(),
-            Op::Add(a, b) => two(a, b, "+"),
-            Op::Subtract(a, b) => two(a, b, "-"),
-            Op::Multiply(a, b) => two(a, b, "*"),
-            Op::Divide(a, b) => two(a, b, "/"),
-            Op::Primitive { .. } | Op::Pi => None,
-        };
-        if text.as_ref().is_some_and(|t| t.len() > LENGTH) {
-            return Err(NoExpressions::TooLong);
-        }
-        out.push(text);
-    }
-    Ok(out)
 }
 
 struct Point<'a>(&'a [(String, u64)]);

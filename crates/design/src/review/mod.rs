@@ -102,7 +102,7 @@ pub fn review(
     let mut out = Vec::new();
     for (i, model) in models.iter().enumerate() {
         step(entries.len() + i, 0.0, &model.name)?;
-        let part = self::model(model, options.seed, worker.as_deref_mut());
+        let part = self::model(model, options.seed);
         out.push(part.map_err(|error| ReviewError::Model { model: i, error })?);
     }
     let numeric: Vec<Entry> =
@@ -351,10 +351,8 @@ fn rest(worker: Option<&mut Worker>) {
 }
 
 /// A model with its run and its evidence, where it has the numbers for them.
-fn model(model: &SystemModel, seed: u64, mut worker: Option<&mut Worker>) -> Result<ModelReview, ModelError> {
-    let analysis =
-        analyze_system(model, SystemOptions { seed, ..SystemOptions::default() }, worker.as_deref_mut())?;
-    rest(worker);
+fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
+    let analysis = analyze_system(model, SystemOptions { seed, ..SystemOptions::default() })?;
     let mut refused = None;
     let run = simulate_system(model, seed);
     let evidence = run.as_ref().ok().map(|_| crosscheck_system(model, seed));

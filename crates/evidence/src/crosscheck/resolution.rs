@@ -21,6 +21,8 @@ pub(super) const ROUNDING: i32 = -46;
 const DRAWS: usize = 2;
 /// The factor between the two priors of evidence b.
 const WIDER: f64 = 10.0;
+/// How far a number of the filter may be from that by many digits to be called the same, relative.
+const SAME: f64 = 0.01;
 /// How far the value by many digits may be from what a prior without bounds shows, a fifth of the tolerance
 /// of what is measured in doubles: of an inflation, relative, and of a correlation.
 const CLOSE: [f64; 2] = [2e-3, 2e-4];
@@ -104,15 +106,17 @@ impl<'a> Resolution<'a> {
         self.rounded.get_or_init(compute).as_deref()
     }
 
-    /// Why doubles may show something else than `limit`, to which a prior without bounds leads by many
-    /// digits; `None` where they must show it. `of` is what is shown.
-    fn why(&self, limit: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
+    /// Why doubles, which show `measured`, may show something else than `limit`, to which a prior without
+    /// bounds leads by many digits; `None` where they must show it. `of` is what is shown.
+    fn why(&self, limit: f64, measured: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
         const UNKNOWN: &str = "many digits do not tell what the filter must show";
         let close = |x: f64| (x - limit).abs() <= close * limit;
         let Some(exact) = self.exact().map(of) else { return Some(UNKNOWN.into()) };
         if !close(exact) {
+            let same = (measured - exact).abs() <= SAME * exact.abs();
+            let doubles = if same { "as the filter shows" } else { "and the filter shows neither" };
             return Some(format!(
-                "by many digits {exact:.4} at the prior of the filter, which is too narrow to show {limit:.0}"
+                "by many digits {exact:.4} at the prior of the filter, which is too narrow to show {limit:.0}; {doubles}"
             ));
         }
         let Some(rounded) = self.rounded() else { return Some(UNKNOWN.into()) };
@@ -122,17 +126,19 @@ impl<'a> Resolution<'a> {
         ))
     }
 
-    /// Why the prior inflation of a combination of the filter's unknowns may be another than that of what is
-    /// determined, or is not.
-    pub(super) fn inflation(&self, terms: &Combination, determined: bool) -> Option<String> {
+    /// Why the prior inflation of a combination of the filter's unknowns, which is `measured`, may be another
+    /// than that of what is determined, or is not.
+    pub(super) fn inflation(&self, terms: &Combination, determined: bool, measured: f64) -> Option<String> {
         let f = functional(Digits { bits: BITS }, &|c| self.is_psi(c), terms, false);
-        self.why(if determined { 1.0 } else { WIDER }, CLOSE[0], &|filtered| filtered.inflation(&f))
+        let limit = if determined { 1.0 } else { WIDER };
+        self.why(limit, measured, CLOSE[0], &|filtered| filtered.inflation(&f))
     }
 
-    /// Why the correlation of two unknowns, with the sign that it must have, may be another than one.
-    pub(super) fn correlation(&self, pair: [usize; 2], sign: f64) -> Option<String> {
+    /// Why the correlation of two unknowns, with the sign that it must have, may be another than one;
+    /// `measured` is that of the filter, with this sign.
+    pub(super) fn correlation(&self, pair: [usize; 2], sign: f64, measured: f64) -> Option<String> {
         let unit = |c: usize| functional(Digits { bits: BITS }, &|c| self.is_psi(c), &[(c, 1.0)], false);
         let [a, b] = pair.map(unit);
-        self.why(1.0, CLOSE[1], &|filtered| sign * filtered.prior.correlation(&a, &b))
+        self.why(1.0, measured, CLOSE[1], &|filtered| sign * filtered.prior.correlation(&a, &b))
     }
 }

@@ -132,7 +132,7 @@ fn decide_inflation(
     }
     let measured = q.inflation.measured.filter(|_| q.inflation.fails())?;
     let why = match determined {
-        Some(determined) => resolution.inflation(terms, determined)?,
+        Some(determined) => resolution.inflation(terms, determined, measured)?,
         None => "many digits do not tell whether it is determined".into(),
     };
     q.inflation.outcome = Agreement::NotResolvable;
@@ -156,10 +156,10 @@ fn decide_seen(v: &mut Direction) -> Option<String> {
 fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<String> {
     let NullEvidence { direction, correlation, .. } = &mut v.evidence;
     let check = correlation.as_mut().filter(|c| c.fails())?;
-    let (pair, sign) = v.weakest?;
-    let why = resolution.correlation(pair, sign)?;
+    let ((pair, sign), measured) = (v.weakest?, check.measured?);
+    let why = resolution.correlation(pair, sign, measured)?;
     check.outcome = Agreement::NotResolvable;
-    Some(format!("{direction}: correlation {:.6}: {why}", check.measured?))
+    Some(format!("{direction}: correlation {measured:.6}: {why}"))
 }
 
 /// What samples show as the dwell goes to zero.

@@ -13,6 +13,11 @@ use crate::calibration::is_clock;
 use crate::document::number;
 use crate::{resolve, stated, words};
 
+/// Advice where a run is not consistent.
+const INCONSISTENT: &str = "Do not use the filter's sigmas: its run is inconsistent with the truth.";
+/// Advice where checks of the filter fail.
+const FAILING: &str = "First explain the filter checks that fail (section Evidence by a filter).";
+
 /// What follows from what was found of a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
     let mut out = Vec::new();
@@ -22,7 +27,10 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     let unseen = missed(Miss::NotObservable);
     if !unseen.is_empty() {
         let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
-        out.push(format!("other positions: these do not determine {}{fewest}", words::names(unseen)));
+        out.push(format!(
+            "Add or change positions: these do not determine {}{fewest}.",
+            words::names(unseen)
+        ));
         out.extend(resolve::to_resolve_in_scheme(&s.analysis));
     }
     let large = missed(Miss::TooLarge);
@@ -34,7 +42,7 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
     if !only_there.is_empty() {
         out.push(format!(
-            "a look at the run, which misses {} although the prediction does not: {}",
+            "Look at the run: it misses {} although the prediction does not ({}).",
             words::names(only_there),
             stated::run(&s.simulation.run, &s.simulation.conditions)
         ));
@@ -42,27 +50,24 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     if !s.simulation.validity.holds && !stated::drifts_by_default(&s.simulation.conditions) {
         out.push(
             "Compensate known drifts before the run, or use a filter with full attitudes (`obsdeg simulate --truth exact` shows its sigmas): \
-             at these drifts the small-angle model does not hold"
+             at these drifts the small-angle model does not hold."
                 .into(),
         );
     }
     if !s.simulation.consistency.consistent {
-        out.push(
-            "no use of the filter's sigmas as they are: its run is not consistent with its truth".into(),
-        );
+        out.push(INCONSISTENT.into());
     }
     match &s.evidence {
-        Ok(e) if !e.passed => out
-            .push("the checks of the filter that fail to be understood first (Evidence by a filter)".into()),
+        Ok(e) if !e.passed => out.push(FAILING.into()),
         _ => {}
     }
     let met = review.requirements.all_met();
     if out.is_empty() {
         out.push(match (review.requirements.stated, met, &s.evidence) {
-            (0, ..) => "requirements to be stated: nothing says yet what is good enough".into(),
-            (_, false, _) => "the unknowns without a number to be looked at (Unknowns, Evidence by a filter)".into(),
-            (_, _, Ok(_)) => "none: every requirement is met, in the run too, and no check fails".into(),
-            (_, _, Err(_)) => "none from what was computed: every requirement is met, in the run too; evidence by a filter is not taken".into(),
+            (0, ..) => "State requirements: nothing says yet what is good enough.".into(),
+            (_, false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
+            (_, _, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no check fails.".into(),
+            (_, _, Err(_)) => "No action from what was computed: every requirement is met, by prediction and in the run. Evidence by a filter was not taken.".into(),
         });
     }
     out
@@ -80,14 +85,14 @@ fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
     match longer().find(|(_, row)| large.iter().all(|name| meets(row, name))) {
         Some((factor, _)) => {
             format!(
-                "dwells {} times as long: by prediction they meet the requirement of {names}",
+                "Dwell {} times as long: by prediction this meets the requirement of {names}.",
                 number(*factor)
             )
         }
         None => {
             let most = s.dwells.x.last().copied().unwrap_or(1.0);
             format!(
-                "other positions, less noise of Z or other requirements: dwells up to {} times as long do not meet those of {names}",
+                "Change the positions, the noise of Z or the requirements: dwells up to {} times as long do not meet those of {names}.",
                 number(most)
             )
         }
@@ -102,13 +107,13 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     };
     let mut out = Vec::new();
     if m.evidence.as_ref().is_some_and(|e| !e.passed) {
-        out.push("the checks of the filter that fail to be understood first (Evidence by a filter)".into());
+        out.push("First explain the checks that fail (section Evidence by samples and a filter).".into());
     }
     out.extend(resolve::to_resolve_in_model(a));
     let unseen = named(&|q| q.status == Exact::NotSeen);
     if !unseen.is_empty() {
         out.push(format!(
-            "higher orders (`obsdeg analyze --order`, above {}) for {}: no end is proven",
+            "Look at orders above {} (`obsdeg analyze --order`) for {}: no end is proven.",
             a.last_order,
             words::names(unseen)
         ));
@@ -116,27 +121,25 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     let several = named(&|q| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(k)) if k > 1));
     if !several.is_empty() {
         out.push(format!(
-            "a start near the truth, or knowledge that tells solutions apart, for {}: the outputs allow several",
+            "Start near the truth, or add knowledge that distinguishes the solutions, for {}: the outputs allow several.",
             words::names(several)
         ));
     }
     match &m.run {
         None => out.push(
-            "numbers for a run ([simulation] of the model file): no accuracy is predicted without".into(),
+            "State numbers for a run ([simulation] of the model file): without them no accuracy is predicted.".into(),
         ),
-        Some((run, _)) if !run.consistency.consistent => out.push(
-            "no use of the filter's sigmas as they are: its run is not consistent with its truth".into(),
-        ),
+        Some((run, _)) if !run.consistency.consistent => out.push(INCONSISTENT.into()),
         Some(_) => {}
     }
     if out.is_empty() {
         out.push(match &m.evidence {
             Some(_) => {
-                "none: every unknown is observable, the run is consistent with its truth, and no check fails"
+                "No action: every unknown is observable, the run is consistent with its truth, and no check fails."
                     .into()
             }
             None => {
-                "none from what was computed: every unknown is observable; evidence by a filter is not taken"
+                "No action from what was computed: every unknown is observable. No run was made, and no evidence taken."
                     .into()
             }
         });
@@ -160,19 +163,19 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     let by_scheme = without(|u| u.degree.is_none());
     if !by_scheme.is_empty() {
         out.push(format!(
-            "other positions for {}: the scheme does not determine them",
+            "Add or change positions for {}: the scheme does not determine them.",
             words::names(by_scheme)
         ));
     }
     let by_record = without(|u| u.degree.is_some());
     if !by_record.is_empty() {
         out.push(format!(
-            "longer or more records for {}: these do not determine them",
+            "Record longer or more runs for {}: these do not determine them.",
             words::names(by_record)
         ));
     }
     if out.is_empty() {
-        out.push("none: every unknown is determined, and model and sigmas explain the record".into());
+        out.push("No action: every unknown is determined, and model and sigmas explain the record.".into());
     }
     out
 }
@@ -189,61 +192,61 @@ fn at_positions(c: &Calibration) -> String {
         .collect();
     let names = words::names(unfit.iter().map(|p| p.position.as_str()));
     let without = match unfit[..] {
-        [p] if p.loses.is_empty() => "; without it all that has an estimate keeps one".into(),
+        [p] if p.loses.is_empty() => ". Without it every estimate remains".into(),
         [p] => {
             format!(
-                "; without it {} would have no estimate",
+                ". Without it {} would have no estimate",
                 words::names(p.loses.iter().map(String::as_str))
             )
         }
         _ if unfit.len() == c.positions.len() => {
-            "; where none fits it may be the record of another scheme".into()
+            ". No position fits: it may be the record of another scheme".into()
         }
         _ => String::new(),
     };
-    format!("a look at the record at {names}: attitudes, labels, whether it was at rest{without}")
+    format!("Look at the record at {names}: attitudes, labels, rest{without}.")
 }
 
 /// What to do about what speaks against a calibration.
 fn of_finding(c: &Calibration, f: &Finding) -> String {
     match f {
-        Finding::Interrupted => "the same command again, to its end".into(),
+        Finding::Interrupted => "Run the same command again, to its end.".into(),
         Finding::NotSettled => {
-            "a look at units, labels and times of the record, and first estimates near the truth ([simulation.estimates])".into()
+            "Look at units, labels and times of the record, and state first estimates near the truth ([simulation.estimates]).".into()
         }
         Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
             (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
-                "the times of the record set right: its clock is that of neither the scheme nor the earth, and drifts are wrong by the same part or more"
+                "Correct the times of the record: its clock fits neither the scheme nor the earth rate. Drifts are wrong by the same part or more."
             }
             (_, Some(_)) => {
-                "a look at latitude, rate of turns and times of the record, and at errors that are no unknowns: its rates are not those of the scheme"
+                "Look at latitude, rate of turns and times of the record, and at errors that are no unknowns: its rates are not those of the scheme."
             }
             (_, None) => {
-                "the times of the record held against those of its run: if its clock is wrong so are drifts, by the same part or more"
+                "Compare the times of the record with those of its run: if its clock is wrong, drifts are wrong by the same part or more."
             }
         }
         .into(),
         Finding::Cells { column, .. } => format!(
-            "a look at column `{column}` of the record: codes of missing values are stated as `missing` under [record], an output that is stuck is no measurement"
+            "Look at column `{column}` of the record: state codes of missing values as `missing` under [record]. A stuck output is no measurement."
         ),
         Finding::Force { .. } => {
-            "scales and zeros of the accelerometers among the unknowns (K1, K0 in `terms`), or the gravity of the place (--gravity, of forces in m/s^2)".into()
+            "Add scales and zeros of the accelerometers to the unknowns (K1, K0 in `terms`), or state the gravity of the place (--gravity, for forces in m/s^2).".into()
         }
         Finding::Position { .. } => at_positions(c),
         Finding::Noise { .. } | Finding::Channel { .. } => {
-            "the noise estimated (--estimate-noise), or the rescaled sigmas in place of those of the assumed noise".into()
+            "Estimate the noise (--estimate-noise), or use the rescaled sigmas instead of those of the assumed noise.".into()
         }
         Finding::Correlated { .. } => {
-            "noise with memory in the conditions (--drift-noise, --bias-instability), or an unknown for what drifts: sigmas of white noise are too small".into()
+            "State noise with memory (--drift-noise, --bias-instability), or add an unknown for what drifts: sigmas of white noise are too small.".into()
         }
-        Finding::Temperature { .. } => "a run at a steady temperature: the residuals go with it".into(),
-        Finding::Outliers { .. } => "the noise of the record checked (--noise): too much of it is far off".into(),
+        Finding::Temperature { .. } => "Repeat the run at a steady temperature: the residuals follow it.".into(),
+        Finding::Outliers { .. } => "Check the noise of the record (--noise): too many of its samples are far off.".into(),
         Finding::Repeatability { .. } => {
-            "a calibration of each record alone: the coefficients changed between the runs, or sigmas are too small".into()
+            "Calibrate each record alone: the coefficients changed between the runs, or sigmas are too small.".into()
         }
-        Finding::SecondPath { .. } => "no use of the estimates: two ways to compute them do not agree".into(),
+        Finding::SecondPath { .. } => "Do not use the estimates: two ways to compute them do not agree.".into(),
         Finding::Known { .. } => {
-            "a calibration without --prior: what was known before does not agree with these records".into()
+            "Calibrate without --prior: the earlier knowledge does not agree with these records.".into()
         }
     }
 }

@@ -18,16 +18,20 @@ fn verdict(m: &ModelReview) -> String {
     let derivatives = worst.map_or_else(String::new, |k| {
         format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
     });
+    let what = match a.rests_on_bound {
+        true => format!("no derivative up to order {}", a.last_order),
+        false => "no output".into(),
+    };
     let lost = match a.unobservable_directions {
         0 => "nothing is lost".to_string(),
-        1 => "one direction changes no output".into(),
-        n => format!("{n} independent directions change no output"),
+        1 => format!("one direction changes {what}"),
+        n => format!("{n} independent directions change {what}"),
     };
     let limits = limits(m);
     let whole = |e: &SystemEvidence| e.passed && e.not_resolvable == 0 && e.orders.measured == e.orders.of;
     let filter = match &m.evidence {
         Some(e) if whole(e) && limits.is_empty() => {
-            " The information of a simulated run confirms the verdicts."
+            " The information of a simulated run agrees with all verdicts."
         }
         Some(e) if e.passed => {
             " The information of a simulated run agrees with the verdicts as far as it shows them."
@@ -122,7 +126,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
     let mut rows = vec![
         row("Observable", (every, format!("{seen} of {} unknowns: {}", a.quantities.len(), solutions(a)))),
         row("Filter, one run", credible(m)),
-        row("Filter and exact verdicts", evidence(m)),
+        row("Samples and exact verdicts", evidence(m)),
     ];
     let prior = by_prior(m);
     if !prior.is_empty() {
@@ -141,7 +145,7 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
     blocks.push(section(level, "Unknowns and equations"));
     blocks.extend(document.blocks);
     blocks.push(pictures::model_staircase(a, &format!("{id}_staircase")));
-    blocks.push(section(level, "Evidence by a filter"));
+    blocks.push(section(level, "Evidence by samples and a filter"));
     let refused = |e| Block::Text(format!("no run or no evidence: {e}."));
     blocks.extend(m.refused.as_ref().map(refused));
     if let Some(e) = &m.evidence {

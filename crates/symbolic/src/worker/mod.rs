@@ -4,7 +4,6 @@ mod derive;
 mod factor;
 mod solve;
 mod tower;
-mod unknowns;
 
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -148,7 +147,6 @@ fn answer(request: &Request, limit: u64) -> Response {
         match &request.job {
             Job::Solve { system, check } => solve::solve(&tower, system, check.as_ref()),
             Job::Derive { dynamics, order } => derive::formulas(dynamics, *order).map(|v| (v, false)),
-            Job::Unknowns { system } => unknowns::unknowns(&tower, system).map(|v| (v, false)),
             Job::MinorFactors { matrix } => factor::minor_factors(&tower, matrix).map(|v| (v, false)),
         }
     });

@@ -94,12 +94,6 @@ impl Tower {
         Ok(s)
     }
 
-    /// The place of a symbol among the variables.
-    pub(crate) fn place(&self, name: &str) -> usize {
-        let wanted = variable(name);
-        self.variables.iter().position(|v| *v == wanted).unwrap_or(usize::MAX)
-    }
-
     /// Accounts for an operation on two scalars: its cost follows their products of terms (a common divisor is sought
     /// among them).
     pub(crate) fn charge(&self, x: &Scalar, y: &Scalar) {

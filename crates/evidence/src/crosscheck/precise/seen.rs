@@ -1,5 +1,7 @@
 //! What of the information is seen, and what is rounding.
 
+use std::collections::BTreeMap;
+
 use super::digits::{Digits, ROUNDING, Real, Vector, log2};
 use super::information::Information;
 
@@ -149,9 +151,18 @@ impl Seen {
         vanishes(&rest, &sizes, &variance).then(|| log2(&variance).map(|v| v / 2.0)).flatten()
     }
 
-    /// A functional of psi at the end and the coefficients as one of the unknowns at the start.
+    /// A functional of psi at the end and the coefficients as one of the unknowns at the start, without what rounding
+    /// leaves of unknowns that no sample holds (`cos^2 + sin^2 - 1` where attitudes cancel).
     pub(in super::super) fn at_start(&self, functional: &Functional) -> Functional {
-        at_start(self.digits, &self.psi_at_end, functional)
+        let mut moved: BTreeMap<usize, Real> = BTreeMap::new();
+        for (c, x) in at_start(self.digits, &self.psi_at_end, functional) {
+            let sum = moved.entry(c).or_insert_with(|| self.digits.int(0));
+            *sum = self.digits.add(sum, &x);
+        }
+        let largest = moved.values().filter_map(log2).fold(f64::MIN, f64::max);
+        let counts = |x: &Real| log2(x).is_some_and(|x| x - largest > self.rounding());
+        moved.retain(|c, x| self.excited[*c] || counts(x));
+        moved.into_iter().collect()
     }
 
     /// Unknowns that are excited and no pivots.

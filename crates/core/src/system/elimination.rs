@@ -1,0 +1,390 @@
+//! The unknowns of a rational system, one after the other, by elimination over a prime field.
+//!
+//! States are eliminated first: an equation that is linear in one gives it by all others, and its derivative is the
+//! next equation. Then parameters and signals are left, at any time; these equations and their derivatives are linear
+//! in the products of parameters that occur, and elimination over rational functions of the signals shows which
+//! parameters stand alone.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+
+use obsdeg_exact::divisor::Algebra;
+use obsdeg_exact::fraction::Fraction;
+use obsdeg_exact::groebner::OverLimit;
+use obsdeg_exact::multivariate::{Monomial, Polynomial};
+
+/// Most terms of an equation that is used.
+const TERMS: usize = 150;
+/// Most products of parameters in an equation that is solved.
+const PRODUCTS: usize = 12;
+/// Most terms of an expression that replaces a state.
+const SUBSTITUTED: usize = 60;
+/// Most terms that a product may have before like terms are added.
+const PRODUCT: usize = 4000;
+
+/// A system `x' = f`, `y = h` in numbered variables: states, parameters, and signals with their derivatives.
+pub(super) struct System {
+    /// Variables of the states.
+    pub(super) states: Vec<u32>,
+    /// `f`, one per state.
+    pub(super) rates: Vec<Fraction>,
+    /// Variables of the unknown constants.
+    pub(super) parameters: Vec<u32>,
+    /// `h` of every output, with the variables of `y, y', y'', ...`.
+    pub(super) outputs: Vec<(Fraction, Vec<u32>)>,
+    /// Variables of `u, u', ...` of every known input; true if the derivatives beyond vanish.
+    pub(super) inputs: Vec<(Vec<u32>, bool)>,
+    /// Variable of the time, if it occurs.
+    pub(super) time: Option<u32>,
+    /// Known starts: state and variable of its value.
+    pub(super) starts: Vec<(usize, u32)>,
+    /// Degree of every state, then of every parameter.
+    pub(super) degrees: Vec<Option<usize>>,
+    /// Orders beyond its degree to which an expression may go.
+    pub(super) beyond: usize,
+    /// Parameters that a symmetry may give any value: no observable unknown depends on them.
+    pub(super) free: Vec<usize>,
+}
+
+/// An equation `polynomial = 0`, at any time or at the start only.
+struct Equation {
+    zero: Polynomial,
+    at_any_time: bool,
+}
+
+/// How little an elimination is liked: division by a parameter, by a signal, its order, its terms.
+type Cost = (bool, bool, usize, usize);
+
+/// An equation as linear in products of parameters: their coefficients.
+type Row = BTreeMap<Monomial, Fraction>;
+
+/// What a symbol's derivative is: nothing, an expression, or one without a name.
+enum Rate {
+    Zero,
+    Is(Fraction),
+    Nameless,
+}
+
+struct Elimination<'a> {
+    s: &'a mut Algebra,
+    system: &'a System,
+    /// `f`, without the states that are gone.
+    rates: Vec<Fraction>,
+    /// Every state that is gone, in terms of those left.
+    solved: Vec<Option<Fraction>>,
+    /// Every parameter that was found.
+    found: Vec<Option<Fraction>>,
+}
+
+/// Expressions of the states, then of the parameters, and whether all were sought within the limit of work.
+pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fraction>>, bool) {
+    let mut work = Elimination {
+        s,
+        system,
+        rates: system.rates.clone(),
+        solved: vec![None; system.states.len()],
+        found: vec![None; system.parameters.len()],
+    };
+    let ended = work.run();
+    let mut complete = ended.is_ok();
+    let known: Vec<usize> = system.starts.iter().map(|s| s.0).collect();
+    let all: Vec<Option<Fraction>> = work.solved.iter().chain(&work.found).cloned().collect();
+    let mut out = Vec::new();
+    for (i, expression) in all.into_iter().enumerate() {
+        let sought = !known.contains(&i) && system.degrees[i].is_some();
+        let expression = expression.filter(|_| sought).map(|e| work.without_unobservable(&e));
+        complete &= !matches!(expression, Some(Err(_)));
+        out.push(expression.and_then(Result::ok).filter(|e| work.is_solution(i, e)));
+    }
+    (out, complete)
+}
+
+impl Elimination<'_> {
+    fn run(&mut self) -> Result<(), OverLimit> {
+        let (mut equations, system) = (Vec::new(), self.system);
+        for (h, chain) in &system.outputs {
+            let Some(&y) = chain.first() else { continue };
+            let y = self.s.whole(Polynomial::variable(&self.s.f, y));
+            let minus = self.s.minus(h);
+            equations.push(Equation { zero: self.s.sum(&y, &minus)?.numerator, at_any_time: true });
+        }
+        let mut relations = self.eliminate_states(equations)?;
+        for &(state, value) in &system.starts {
+            if let Some(x) = &self.solved[state] {
+                let value = self.s.whole(Polynomial::variable(&self.s.f, value));
+                let minus = self.s.minus(x);
+                let zero = self.s.sum(&value, &minus)?.numerator;
+                if !self.holds_state(&zero) {
+                    relations.push(Equation { zero, at_any_time: false });
+                }
+            }
+        }
+        self.parameters(relations)
+    }
+
+    fn holds_state(&self, p: &Polynomial) -> bool {
+        self.system.states.iter().any(|&v| p.terms_with(v) > 0)
+    }
+
+    /// What time makes of a variable.
+    fn rate(&self, v: u32) -> Rate {
+        if let Some(i) = self.system.states.iter().position(|&x| x == v) {
+            return Rate::Is(self.rates[i].clone());
+        }
+        let outputs = self.system.outputs.iter().map(|o| (&o.1, false));
+        for (chain, ends) in outputs.chain(self.system.inputs.iter().map(|u| (&u.0, u.1))) {
+            let Some(k) = chain.iter().position(|&x| x == v) else { continue };
+            return match chain.get(k + 1) {
+                Some(&next) => Rate::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
+                None if ends => Rate::Zero,
+                None => Rate::Nameless,
+            };
+        }
+        match self.system.time == Some(v) {
+            true => Rate::Is(self.s.whole(Polynomial::constant(self.s.f.one()))),
+            false => Rate::Zero,
+        }
+    }
+
+    /// `d/dt` along the motion; `None` when it needs a derivative without a name.
+    fn derivative(&mut self, p: &Polynomial) -> Result<Option<Fraction>, OverLimit> {
+        let mut sum = self.s.whole(Polynomial::default());
+        for v in p.variables() {
+            let rate = match self.rate(v) {
+                Rate::Zero => continue,
+                Rate::Nameless => return Ok(None),
+                Rate::Is(rate) => rate,
+            };
+            let slope = self.s.whole(p.derivative(&self.s.f, v));
+            let part = self.s.times(&slope, &rate)?;
+            sum = self.s.sum(&sum, &part)?;
+        }
+        Ok(Some(sum))
+    }
+
+    /// Order of the outputs' derivatives in a polynomial.
+    fn order(&self, p: &Polynomial) -> usize {
+        let variables = p.variables();
+        let highest = |o: &(Fraction, Vec<u32>)| o.1.iter().rposition(|y| variables.contains(y)).unwrap_or(0);
+        self.system.outputs.iter().map(highest).max().unwrap_or(0)
+    }
+
+    /// The equation that is linear in a state at the least cost: its number, the state, and what that is.
+    fn best(&mut self, equations: &[Equation]) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
+        let mut best: Option<(Cost, usize, usize, [Polynomial; 2])> = None;
+        for (e, equation) in equations.iter().enumerate() {
+            for (i, &v) in self.system.states.iter().enumerate() {
+                let Some([slope, rest]) = linear(&equation.zero, v) else { continue };
+                if self.holds_state(&slope) || rest.len() + slope.len() > SUBSTITUTED {
+                    continue;
+                }
+                let unknown = self.system.parameters.iter().any(|&p| slope.terms_with(p) > 0);
+                let order = self.order(&equation.zero);
+                let cost = (unknown, slope.as_constant().is_none(), order, rest.len());
+                if best.as_ref().is_none_or(|b| cost < b.0) {
+                    best = Some((cost, e, i, [slope, rest]));
+                }
+            }
+        }
+        let Some((_, e, i, [slope, rest])) = best else { return Ok(None) };
+        let minus = self.s.f.neg(self.s.f.one());
+        let x = self.s.fraction(&rest.scaled(&self.s.f, minus), &slope)?;
+        Ok(Some((e, i, x)))
+    }
+
+    /// Eliminates states by equations that are linear in them; the equations left that hold none.
+    fn eliminate_states(&mut self, mut equations: Vec<Equation>) -> Result<Vec<Equation>, OverLimit> {
+        while let Some((e, i, x)) = self.best(&equations)? {
+            let v = self.system.states[i];
+            // its derivative, before anything is put in
+            let next = self.derivative(&equations.swap_remove(e).zero)?;
+            let put = |s: &mut Algebra, a: &Fraction| s.replaced(a, v, &x)?.ok_or(OverLimit);
+            let below = x.denominator.clone();
+            for k in 0..self.rates.len() {
+                self.rates[k] = put(self.s, &self.rates[k])?;
+                if let Some(own) = &self.solved[k] {
+                    self.solved[k] = Some(put(self.s, own)?);
+                }
+            }
+            equations.extend(next.map(|d| Equation { zero: d.numerator, at_any_time: true }));
+            for equation in &mut equations {
+                if equation.zero.terms_with(v) > 0 {
+                    let zero = self.s.put_into(&equation.zero, v, &x)?.numerator;
+                    equation.zero = self.without(zero, &below)?;
+                }
+            }
+            self.solved[i] = Some(x);
+            equations.retain(|e| !e.zero.is_empty() && e.zero.len() < TERMS);
+        }
+        equations.retain(|e| !self.holds_state(&e.zero));
+        Ok(equations)
+    }
+
+    /// A polynomial without a divisor that is not zero, as often as it is there.
+    fn without(&mut self, p: Polynomial, divisor: &Polynomial) -> Result<Polynomial, OverLimit> {
+        let mut rest = p;
+        if divisor.as_constant().is_none() && !rest.is_empty() {
+            while let Some(next) = self.s.quotient(&rest, divisor)? {
+                rest = next;
+            }
+        }
+        Ok(rest)
+    }
+
+    /// Finds the parameters that stand alone in the relations, at the lowest order. Beyond its degree a parameter
+    /// counts as known at first, since others may be solved by it, and then as open.
+    fn parameters(&mut self, relations: Vec<Equation>) -> Result<(), OverLimit> {
+        let system = self.system;
+        let (degrees, beyond) = (&system.degrees[system.states.len()..], system.beyond);
+        let highest = degrees.iter().flatten().copied().max().unwrap_or(0) + beyond;
+        // by order; a relation is differentiated when its turn comes
+        let mut waiting: Vec<(usize, Equation)> =
+            relations.into_iter().map(|r| (self.order(&r.zero), r)).collect();
+        let mut pool: Vec<Polynomial> = Vec::new();
+        for order in 0..=highest {
+            let (now, later): (Vec<_>, Vec<_>) = waiting.into_iter().partition(|w| w.0 <= order);
+            waiting = later;
+            for (_, equation) in now {
+                if equation.zero.len() > TERMS {
+                    continue;
+                }
+                if equation.at_any_time
+                    && let Some(next) = self.derivative(&equation.zero)?.filter(|d| !d.is_zero())
+                {
+                    let next = Equation { zero: next.numerator, at_any_time: true };
+                    waiting.push((self.order(&next.zero).max(order + 1), next));
+                }
+                pool.push(equation.zero);
+            }
+            loop {
+                let open = |beyond: usize| -> Vec<usize> {
+                    let left = |p: &usize| {
+                        self.found[*p].is_none()
+                            && !self.system.free.contains(p)
+                            && degrees[*p].is_none_or(|d| d + beyond >= order)
+                    };
+                    (0..self.found.len()).filter(left).collect()
+                };
+                let (now, more) = (open(0), open(beyond));
+                let mut new = self.standing_alone(&pool, &now)?;
+                if new.is_empty() && more != now {
+                    new = self.standing_alone(&pool, &more)?;
+                }
+                if new.is_empty() {
+                    break;
+                }
+                for (p, value) in new {
+                    self.found[p] = Some(self.without_unobservable(&value)?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The expression with what is not observable, but found once a free parameter is given, replaced: the free one
+    /// goes with it.
+    fn without_unobservable(&mut self, value: &Fraction) -> Result<Fraction, OverLimit> {
+        let n = self.system.states.len();
+        let mut out = value.clone();
+        for p in (0..self.found.len()).filter(|p| self.system.degrees[n + p].is_none()) {
+            if let Some(known) = &self.found[p] {
+                out = self.s.replaced(&out, self.system.parameters[p], known)?.ok_or(OverLimit)?;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Reduces the equations as linear ones in the products of the open parameters; parameters that stand alone.
+    fn standing_alone(
+        &mut self,
+        pool: &[Polynomial],
+        open: &[usize],
+    ) -> Result<Vec<(usize, Fraction)>, OverLimit> {
+        let places: Vec<u32> = open.iter().map(|&p| self.system.parameters[p]).collect();
+        let mut rows: Vec<Row> = Vec::new();
+        for zero in pool {
+            let parts = by_products(&self.s.f, zero, &places);
+            rows.push(parts.into_iter().map(|(m, c)| (m, self.s.whole(c))).collect());
+        }
+        let total = |m: &Monomial| m.iter().map(|x| x.1).sum::<u32>();
+        let mut done: Vec<(Monomial, Row)> = Vec::new();
+        loop {
+            rows.retain(|r| !r.is_empty());
+            // products go first, so that what is left is linear; of these the simplest pivot
+            if rows.iter().any(|r| r.len() > PRODUCTS) {
+                return Ok(Vec::new());
+            }
+            let pivot = (rows.iter().enumerate())
+                .flat_map(|(i, row)| row.iter().map(move |(m, c)| (i, m, c, row.len())))
+                .filter(|(_, m, ..)| total(m) > 0)
+                .min_by_key(|(_, m, c, len)| (Reverse(total(m)), c.terms(), *len));
+            let Some((i, m, c, _)) = pivot else { break };
+            let (m, inverse) = (m.clone(), self.s.inverse(c));
+            let mut row = Row::new();
+            for (k, c) in rows.swap_remove(i) {
+                row.insert(k, self.s.times(&c, &inverse)?);
+            }
+            for other in rows.iter_mut().chain(done.iter_mut().map(|d| &mut d.1)) {
+                let Some(factor) = other.get(&m).map(|c| self.s.minus(c)) else { continue };
+                for (k, c) in &row {
+                    if factor.terms() * c.terms() > PRODUCT {
+                        return Ok(Vec::new());
+                    }
+                    let mut sum = self.s.times(&factor, c)?;
+                    if let Some(old) = other.get(k) {
+                        sum = self.s.sum(old, &sum)?;
+                    }
+                    if sum.terms() > TERMS {
+                        return Ok(Vec::new());
+                    }
+                    if sum.is_zero() {
+                        other.remove(k);
+                    } else {
+                        other.insert(k.clone(), sum);
+                    }
+                }
+            }
+            done.push((m, row));
+        }
+        let mut out = Vec::new();
+        for (m, row) in done {
+            let alone = row.keys().all(|k| *k == m || k.is_empty());
+            let place = open.iter().find(|&&p| m == [(self.system.parameters[p], 1)]);
+            if let Some(&p) = place.filter(|_| alone) {
+                let zero = self.s.whole(Polynomial::default());
+                out.push((p, row.get(&Monomial::new()).map_or(zero, |c| self.s.minus(c))));
+            }
+        }
+        Ok(out)
+    }
+
+    /// Whether an expression holds no unknown of a higher degree than its own, and no derivative of an order too far
+    /// beyond that.
+    fn is_solution(&self, unknown: usize, e: &Fraction) -> bool {
+        let Some(degree) = self.system.degrees[unknown] else { return false };
+        let variables = self.system.states.iter().chain(&self.system.parameters);
+        let fits = |(&v, d): (&u32, &Option<usize>)| !e.holds(v) || d.is_some_and(|d| d <= degree);
+        self.order(&e.numerator).max(self.order(&e.denominator)) <= degree + self.system.beyond
+            && variables.zip(&self.system.degrees).all(fits)
+    }
+}
+
+/// `[a, b]` with `p = a v + b`, where `v` occurs to the first power.
+fn linear(p: &Polynomial, v: u32) -> Option<[Polynomial; 2]> {
+    if p.degree_in(v) != 1 {
+        return None;
+    }
+    let mut parts = p.split(v);
+    let slope = parts.remove(&1)?;
+    Some([slope, parts.remove(&0).unwrap_or_default()])
+}
+
+/// A polynomial by the products of some variables in it.
+fn by_products(f: &obsdeg_exact::Field, p: &Polynomial, variables: &[u32]) -> BTreeMap<Monomial, Polynomial> {
+    let mut out: BTreeMap<Monomial, Polynomial> = BTreeMap::new();
+    for (m, c) in p.terms() {
+        let (inside, outside): (Monomial, Monomial) = m.iter().partition(|x| variables.contains(&x.0));
+        out.entry(inside).or_default().put(f, outside, c);
+    }
+    out
+}

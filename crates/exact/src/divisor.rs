@@ -1,0 +1,487 @@
+//! Quotients, common divisors and factors of polynomials in several variables.
+//!
+//! A greatest common divisor is interpolated from its images at points, one variable at a time (Brown 1971,
+//! doi:10.1145/321662.321664). Images in one variable first say which variables it holds at all; the others are numbers
+//! from then on. What is found is divided by before it is believed.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use crate::groebner::{OverLimit, Work};
+use crate::multivariate::{Monomial, Polynomial};
+use crate::{Field, SplitMix64, polynomial};
+
+/// Polynomial algebra within a limit of work.
+pub struct Algebra {
+    /// The field of the coefficients.
+    pub f: Field,
+    /// Where its random points come from.
+    pub rng: SplitMix64,
+    /// The work that is left.
+    pub work: Work,
+}
+
+/// A monomial in lexicographic order, the first variable greatest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Lex(Monomial);
+
+impl Ord for Lex {
+    fn cmp(&self, other: &Self) -> Ordering {
+        lexicographic(&self.0, &other.0)
+    }
+}
+
+impl PartialOrd for Lex {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// Lexicographic order of monomials, the first variable greatest: one that products keep.
+pub fn lexicographic(a: &[(u32, u32)], b: &[(u32, u32)]) -> Ordering {
+    for (x, y) in a.iter().zip(b) {
+        let order = y.0.cmp(&x.0).then(x.1.cmp(&y.1));
+        if order != Ordering::Equal {
+            return order;
+        }
+    }
+    a.len().cmp(&b.len())
+}
+
+/// The greatest monomial in lexicographic order with its coefficient.
+fn lead(p: &Polynomial) -> Option<(&Monomial, u64)> {
+    p.terms().max_by(|a, b| lexicographic(a.0, b.0))
+}
+
+/// `a / b` of monomials, where `b` divides `a`.
+fn ratio(a: &[(u32, u32)], b: &[(u32, u32)]) -> Option<Monomial> {
+    let mut out = a.to_vec();
+    for &(v, e) in b {
+        let at = out.iter().position(|x| x.0 == v && x.1 >= e)?;
+        out[at].1 -= e;
+    }
+    out.retain(|x| x.1 > 0);
+    Some(out)
+}
+
+/// The greatest monomial that divides every term.
+fn monomial_content(p: &Polynomial) -> Monomial {
+    let mut terms = p.terms();
+    let mut out = terms.next().map(|t| t.0.clone()).unwrap_or_default();
+    for (m, _) in terms {
+        for x in &mut out {
+            x.1 = x.1.min(m.iter().find(|y| y.0 == x.0).map_or(0, |y| y.1));
+        }
+        out.retain(|x| x.1 > 0);
+    }
+    out
+}
+
+/// `p / m`, where `m` divides every term.
+fn without(f: &Field, p: &Polynomial, m: &[(u32, u32)]) -> Polynomial {
+    let mut out = Polynomial::default();
+    for (n, c) in p.terms() {
+        out.put(f, ratio(n, m).unwrap_or_default(), c);
+    }
+    out
+}
+
+/// A polynomial by what else a term holds: its coefficients along one variable.
+fn along(p: &Polynomial, v: u32) -> BTreeMap<Lex, Vec<u64>> {
+    let mut out: BTreeMap<Lex, Vec<u64>> = BTreeMap::new();
+    for (m, c) in p.terms() {
+        let mut rest = m.clone();
+        let at = rest.iter().position(|x| x.0 == v);
+        let power = at.map_or(0, |i| rest.remove(i).1) as usize;
+        let list = out.entry(Lex(rest)).or_default();
+        list.resize(list.len().max(power + 1), 0);
+        list[power] = c;
+    }
+    out
+}
+
+/// The inverse of [`along`].
+fn joined(f: &Field, parts: &BTreeMap<Lex, Vec<u64>>, v: u32) -> Polynomial {
+    let mut out = Polynomial::default();
+    for (m, coefficients) in parts {
+        for (k, &c) in coefficients.iter().enumerate() {
+            let mut m = m.0.clone();
+            if k > 0 {
+                let at = m.partition_point(|x| x.0 < v);
+                m.insert(at, (v, k as u32));
+            }
+            out.put(f, m, c);
+        }
+    }
+    out
+}
+
+impl Algebra {
+    /// A number that is not zero.
+    fn number(&mut self) -> u64 {
+        self.f.from_u64(1 + self.rng.below(self.f.modulus() - 1))
+    }
+
+    /// `a b`.
+    ///
+    /// # Errors
+    /// [`OverLimit`].
+    pub fn product(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
+        self.work.take(1 + 4 * (a.len() * b.len()) as u64)?;
+        let mut out = Polynomial::default();
+        out.add_product(&self.f, a, b);
+        Ok(out)
+    }
+
+    /// The polynomial with leading coefficient one.
+    pub fn monic(&self, p: &Polynomial) -> Polynomial {
+        lead(p).map_or_else(Polynomial::default, |(_, c)| p.scaled(&self.f, self.f.inv(c)))
+    }
+
+    /// The coefficient of the leading term in lexicographic order; 0 of zero.
+    pub fn leading(&self, p: &Polynomial) -> u64 {
+        lead(p).map_or(0, |t| t.1)
+    }
+
+    /// `a / b`, or `None` where `b` does not divide `a`; `b` is not zero.
+    ///
+    /// # Errors
+    /// [`OverLimit`].
+    pub fn quotient(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Option<Polynomial>, OverLimit> {
+        let f = self.f;
+        if let Some(c) = b.as_constant() {
+            return Ok(Some(a.scaled(&f, f.inv(c))));
+        }
+        // along one variable first, which shows most of what does not divide
+        let point = self.point(a, b);
+        for v in b.variables() {
+            let [x, y] = [a, b].map(|p| image(&f, p, &point, v));
+            if !polynomial::remainder(&f, &x, &y).is_empty() {
+                return Ok(None);
+            }
+        }
+        let mut rest: BTreeMap<Lex, u64> = a.terms().map(|(m, c)| (Lex(m.clone()), c)).collect();
+        let Some((top, c)) = lead(b) else { return Ok(None) };
+        let inverse = f.inv(c);
+        let mut out = Polynomial::default();
+        while let Some((m, c)) = rest.last_key_value() {
+            let Some(m) = ratio(&m.0, top) else { return Ok(None) };
+            let c = f.mul(*c, inverse);
+            self.work.take(1 + 4 * b.len() as u64)?;
+            let mut step = Polynomial::default();
+            step.put(&f, m, f.neg(c));
+            let mut product = Polynomial::default();
+            product.add_product(&f, &step, b);
+            for (n, d) in product.terms() {
+                let slot = rest.entry(Lex(n.clone())).or_insert(0);
+                *slot = f.add(*slot, d);
+                if *slot == 0 {
+                    rest.remove(&Lex(n.clone()));
+                }
+            }
+            out.add_scaled(&f, &step, f.neg(f.one()));
+        }
+        Ok(Some(out))
+    }
+
+    /// Random numbers for all variables of two polynomials.
+    fn point(&mut self, a: &Polynomial, b: &Polynomial) -> Vec<u64> {
+        let last = a.variables().into_iter().chain(b.variables()).max().map_or(0, |v| v as usize + 1);
+        (0..last).map(|_| self.number()).collect()
+    }
+
+    /// The greatest common divisor, with leading coefficient one.
+    ///
+    /// # Errors
+    /// [`OverLimit`].
+    pub fn divisor(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
+        let f = self.f;
+        if a.is_empty() || b.is_empty() {
+            return Ok(self.monic(if a.is_empty() { b } else { a }));
+        }
+        let (m, n) = (monomial_content(a), monomial_content(b));
+        let smaller = |&(v, e): &(u32, u32)| {
+            let other = n.iter().find(|y| y.0 == v)?.1;
+            Some((v, e.min(other)))
+        };
+        let mut common = Polynomial::default();
+        common.put(&f, m.iter().filter_map(smaller).collect(), f.one());
+        let rest = self.divisor_of_rest(&without(&f, a, &m), &without(&f, b, &n))?;
+        self.product(&common, &rest)
+    }
+
+    /// The greatest common divisor of what no monomial divides.
+    fn divisor_of_rest(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
+        let f = self.f;
+        let one = Polynomial::constant(f.one());
+        if a.as_constant().is_some() || b.as_constant().is_some() {
+            return Ok(one);
+        }
+        let point = self.point(a, b);
+        let (of_a, of_b) = (a.variables(), b.variables());
+        self.work.take((of_a.len() * a.len() + of_b.len() * b.len()) as u64)?;
+        let mut held: Vec<(u32, usize)> = Vec::new();
+        for &v in of_a.intersection(&of_b) {
+            let [x, y] = [a, b].map(|p| image(&f, p, &point, v));
+            let degree = polynomial::gcd(&f, x, y).len().saturating_sub(1);
+            held.extend((degree > 0).then_some((v, degree)));
+        }
+        if held.is_empty() {
+            return Ok(one);
+        }
+        // one of them, as a whole
+        for (p, other) in [(a, b), (b, a)] {
+            let whole =
+                p.variables().len() == held.len() && held.iter().all(|&(v, d)| p.degree_in(v) as usize == d);
+            if whole && self.quotient(other, p)?.is_some() {
+                return Ok(self.monic(p));
+            }
+        }
+        let kept = |v: u32| held.iter().any(|h| h.0 == v);
+        let mut parts = Vec::new();
+        for p in [a, b] {
+            let mut out = Polynomial::default();
+            for (m, c) in p.terms() {
+                let (inside, outside): (Monomial, Monomial) = m.iter().partition(|x| kept(x.0));
+                let power = |x: u64, &(v, e): &(u32, u32)| f.mul(x, f.pow(point[v as usize], e.into()));
+                out.put(&f, inside, outside.iter().fold(c, power));
+            }
+            parts.push(out);
+        }
+        let found = self.interpolated(&parts[0], &parts[1], &held)?;
+        let divides = self.quotient(a, &found)?.is_some() && self.quotient(b, &found)?.is_some();
+        // an unlucky point is as likely as a number that is guessed
+        if divides { Ok(found) } else { Err(OverLimit) }
+    }
+
+    /// The greatest common divisor of two polynomials in some variables, of which it has the given degrees.
+    fn interpolated(
+        &mut self,
+        a: &Polynomial,
+        b: &Polynomial,
+        held: &[(u32, usize)],
+    ) -> Result<Polynomial, OverLimit> {
+        let f = self.f;
+        let Some((&(v, bound), others)) = held.split_last() else {
+            return Ok(Polynomial::constant(f.one()));
+        };
+        self.work.take(4 * (a.len() + b.len()) as u64)?;
+        let [mut a, mut b] = [a, b].map(|p| along(p, v));
+        let mut content = Vec::new();
+        for parts in [&mut a, &mut b] {
+            let mut own = Vec::new();
+            for c in parts.values() {
+                own = polynomial::gcd(&f, own, c.clone());
+            }
+            for c in parts.values_mut() {
+                *c = polynomial::quotient(&f, c, &own);
+            }
+            content = polynomial::gcd(&f, content, own);
+        }
+        let top = |parts: &BTreeMap<Lex, Vec<u64>>| parts.values().next_back().cloned().unwrap_or_default();
+        let scale = polynomial::gcd(&f, top(&a), top(&b));
+        let points = bound + scale.len();
+        let mut values: BTreeMap<Lex, Vec<(u64, u64)>> = BTreeMap::new();
+        let mut at = Vec::new();
+        while at.len() < points {
+            let x = self.number();
+            let leads = [top(&a), top(&b)].map(|c| polynomial::value(&f, &c, x));
+            if leads.contains(&0) || at.contains(&x) {
+                self.work.take(1)?;
+                continue;
+            }
+            let [p, q] = [&a, &b].map(|parts| {
+                let mut out = Polynomial::default();
+                parts.iter().for_each(|(m, c)| out.put(&f, m.0.clone(), polynomial::value(&f, c, x)));
+                out
+            });
+            let image = self.interpolated(&p, &q, others)?;
+            let factor = f.mul(polynomial::value(&f, &scale, x), f.inv(self.leading(&image)));
+            for (m, c) in image.terms() {
+                let list = values.entry(Lex(m.clone())).or_default();
+                list.push((x, f.mul(c, factor)));
+            }
+            at.push(x);
+        }
+        let mut parts = BTreeMap::new();
+        let mut own = Vec::new();
+        for (m, mut list) in values {
+            // where a term is missing it is zero
+            let missing: Vec<u64> = at.iter().copied().filter(|x| !list.iter().any(|y| y.0 == *x)).collect();
+            list.extend(missing.into_iter().map(|x| (x, 0)));
+            self.work.take((points * points) as u64)?;
+            let c = polynomial::interpolate(&f, &list);
+            own = polynomial::gcd(&f, own, c.clone());
+            parts.insert(m, c);
+        }
+        for c in parts.values_mut() {
+            *c = polynomial::multiply(&f, &polynomial::quotient(&f, c, &own), &content);
+        }
+        Ok(self.monic(&joined(&f, &parts, v)))
+    }
+
+    /// Factors with their powers: those that single variables, contents along a variable and repetition show; of each
+    /// the leading coefficient is one. Not all of them need be irreducible.
+    ///
+    /// # Errors
+    /// [`OverLimit`].
+    pub fn factors(&mut self, p: &Polynomial) -> Result<Vec<(Polynomial, u32)>, OverLimit> {
+        let f = self.f;
+        let content = monomial_content(p);
+        let mut out: Vec<(Polynomial, u32)> =
+            content.iter().map(|&(v, e)| (Polynomial::variable(&f, v), e)).collect();
+        let mut left = vec![self.monic(&without(&f, p, &content))];
+        while let Some(p) = left.pop() {
+            if p.as_constant().is_some() {
+                continue;
+            }
+            match self.divisor_within(&p)? {
+                Some(d) => {
+                    let rest = self.quotient(&p, &d)?.ok_or(OverLimit)?;
+                    // what both hold is a factor twice
+                    let both = self.divisor(&d, &rest)?;
+                    for part in [d, rest] {
+                        let part = self.quotient(&part, &both)?.ok_or(OverLimit)?;
+                        left.extend([both.clone(), self.monic(&part)]);
+                    }
+                }
+                None => match out.iter_mut().find(|x| x.0 == p) {
+                    Some(same) => same.1 += 1,
+                    None => out.push((p, 1)),
+                },
+            }
+        }
+        Ok(out)
+    }
+
+    /// A divisor that is neither one nor the whole: a content along a variable, or what is there twice.
+    fn divisor_within(&mut self, p: &Polynomial) -> Result<Option<Polynomial>, OverLimit> {
+        let f = self.f;
+        for v in p.variables() {
+            let mut parts = p.split(v).into_values();
+            let Some(first) = parts.next() else { continue };
+            let mut others = Polynomial::default();
+            for other in parts {
+                let factor = self.number();
+                others.add_scaled(&f, &other, factor);
+            }
+            let content = self.divisor(&first, &others)?;
+            if content.as_constant().is_none() && content.len() < p.len() {
+                return Ok(Some(content));
+            }
+            let repeated = self.divisor(p, &p.derivative(&f, v))?;
+            if repeated.as_constant().is_none() && repeated.degree() < p.degree() {
+                return Ok(Some(repeated));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A polynomial along one variable, with numbers for all others.
+fn image(f: &Field, p: &Polynomial, point: &[u64], v: u32) -> Vec<u64> {
+    let mut out = vec![0; p.degree_in(v) as usize + 1];
+    for (m, c) in p.terms() {
+        let (mut value, mut power) = (c, 0);
+        for &(w, e) in m {
+            match w == v {
+                true => power = e as usize,
+                false => value = f.mul(value, f.pow(point[w as usize], e.into())),
+            }
+        }
+        out[power] = f.add(out[power], value);
+    }
+    polynomial::trim(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const P: u64 = (1 << 60) + 33;
+
+    fn algebra(seed: u64) -> Algebra {
+        Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: Work { left: 1 << 32 } }
+    }
+
+    /// A polynomial of some small terms.
+    fn drawn(f: &Field) -> impl Strategy<Value = Polynomial> + use<> {
+        let f = *f;
+        let term = (prop::collection::vec((0u32..5, 1u32..3), 0..3), 1i64..20);
+        prop::collection::vec(term, 1..5).prop_map(move |terms| {
+            let mut out = Polynomial::default();
+            for (powers, c) in terms {
+                let mut product = Polynomial::constant(f.from_i64(c));
+                for (v, e) in powers {
+                    for _ in 0..e {
+                        let mut next = Polynomial::default();
+                        next.add_product(&f, &product, &Polynomial::variable(&f, v));
+                        product = next;
+                    }
+                }
+                out.add_scaled(&f, &product, f.one());
+            }
+            out
+        })
+    }
+
+    proptest! {
+        /// `gcd(a c, b c) / c` divides what `a` and `b` have in common, which is what they have at points too.
+        #[test]
+        fn common_divisors(
+            a in drawn(&Field::new(P)),
+            b in drawn(&Field::new(P)),
+            c in drawn(&Field::new(P)),
+            seed in any::<u64>(),
+        ) {
+            let mut s = algebra(seed);
+            let (x, y) = (s.product(&a, &c).expect("work"), s.product(&b, &c).expect("work"));
+            let d = s.divisor(&x, &y).expect("work");
+            let (p, q) = (s.quotient(&x, &d).expect("work"), s.quotient(&y, &d).expect("work"));
+            let (p, q) = (p.expect("it divides"), q.expect("it divides"));
+            prop_assert!(s.quotient(&d, &c).expect("work").is_some(), "{d:?} without {c:?}");
+            // nothing is left in common: along no variable, at a random point
+            let point: Vec<u64> = (0..5).map(|_| s.number()).collect();
+            for v in 0..5 {
+                let [p, q] = [&p, &q].map(|p| image(&s.f, p, &point, v));
+                prop_assert_eq!(polynomial::gcd(&s.f, p, q).len(), 1);
+            }
+            prop_assert_eq!(s.product(&p, &d).expect("work"), x);
+        }
+
+        /// Factors give the whole again, and those drawn apart by their variables are told apart.
+        #[test]
+        fn factors_multiply_to_the_whole(a in drawn(&Field::new(P)), b in drawn(&Field::new(P)), seed in any::<u64>()) {
+            let mut s = algebra(seed);
+            let square = s.product(&b, &b).expect("work");
+            let whole = s.product(&a, &square).expect("work");
+            let mut product = Polynomial::constant(s.leading(&whole));
+            let factors = s.factors(&whole).expect("work");
+            for (p, e) in &factors {
+                for _ in 0..*e {
+                    product = s.product(&product, p).expect("work");
+                }
+            }
+            prop_assert_eq!(product, whole);
+            if b.degree() > 0 {
+                prop_assert!(factors.iter().any(|x| x.1 > 1), "{:?}", factors);
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_divide_and_what_is_too_much() {
+        let mut s = algebra(1);
+        let f = s.f;
+        let [x, y] = [0, 1].map(|v| Polynomial::variable(&f, v));
+        let mut sum = x.clone();
+        sum.add_scaled(&f, &y, f.one());
+        assert_eq!(s.quotient(&x, &sum), Ok(None));
+        assert_eq!(s.quotient(&sum, &x), Ok(None));
+        let square = s.product(&sum, &sum).expect("work");
+        assert_eq!(s.quotient(&square, &sum), Ok(Some(sum.clone())));
+        s.work.left = 3;
+        assert_eq!(s.product(&sum, &sum), Err(OverLimit));
+    }
+}
