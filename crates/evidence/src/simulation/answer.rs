@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::carries::OtherCarry;
 use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
+use super::datasheet::GyroNoise;
 use super::floor::NoiseFloor;
-use super::gyro_noise::GyroNoise;
+pub use super::validity::Validity;
 use crate::requirements::{Miss, Requirements, meets};
 
 /// Name and version of the JSON layout.
@@ -378,21 +379,4 @@ impl Outcome {
             Self::NoNumber => Some(Miss::NoNumber),
         }
     }
-}
-
-/// Whether the small-angle model holds for the drifts of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Validity {
-    /// Largest `|psi|`, in deg.
-    pub largest_psi_deg: f64,
-    /// Largest `|psi|^2/2`, in g: what the observation model (6) leaves out.
-    pub neglected_g: f64,
-    /// Noise of the observation, in g.
-    pub accelerometer_noise_g: f64,
-    /// Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: what the drift model (3) leaves out.
-    pub neglected_dph: f64,
-    /// The smallest sigma required of a drift coefficient, in deg/h (per g).
-    pub smallest_requirement_dph: Option<f64>,
-    /// Whether both are small.
-    pub holds: bool,
 }

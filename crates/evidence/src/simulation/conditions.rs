@@ -10,8 +10,8 @@ use obsdeg_core::model::{Latitude, Platform, Position, Scheme};
 
 use obsdeg_ekf::SensorNoise;
 
-use super::SimulationError;
-use super::gyro_noise::GyroNoise;
+use super::datasheet::GyroNoise;
+use super::error::SimulationError;
 use crate::requirements::Basis;
 
 /// Everything that a run needs besides the scheme.
