@@ -17,6 +17,7 @@ fn worker_of(limit: u64) -> Worker {
         program: env!("CARGO_BIN_EXE_obsdeg").into(),
         arguments: vec!["symbolic-worker".into()],
         limit,
+        wait: std::time::Duration::from_secs(600),
         waiting: || {},
     })
 }
@@ -176,6 +177,33 @@ fn everybody_waits_for_a_turn() {
         let by_engine = |q: &serde_json::Value| q["solution"]["found_by"] == "symbolic_engine";
         assert!(list.iter().any(by_engine), "{answer}");
     }
+}
+
+/// While another process keeps the engine the verdicts come all the same, and what is missing is said, quiet or not.
+#[test]
+fn a_held_engine_keeps_no_verdict_waiting() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let _held = hold(&folder.path().join("obsdeg-symbolic.lock"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+    command.args([
+        "analyze",
+        "--angles",
+        "25,0,0",
+        "--angles",
+        "NUE",
+        "--format",
+        "json",
+        "-q",
+        "--engine-wait",
+        "0",
+    ]);
+    let output = command.env("XDG_RUNTIME_DIR", folder.path()).output().expect("it runs");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && stderr.contains("--engine-wait"), "{stderr}");
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let list = answer["quantities"].as_array().expect("a list");
+    assert!(list.iter().any(|q| q["status"] == "observable" && q["degree"].is_u64()), "{answer}");
+    assert!(answer["notes"].to_string().contains("held the symbolic engine for more than 0 s"), "{answer}");
 }
 
 #[test]

@@ -18,6 +18,7 @@ const AFTER_HELP: &str = "\
 Examples:
   obsdeg calibrate scheme.toml monday.csv
   obsdeg calibrate scheme.toml monday.csv tuesday.parquet --noise 2e-5 -o calibration
+  obsdeg calibrate scheme.toml monday.csv --dry-run
   obsdeg calibrate scheme.toml wednesday.csv --prior calibration/calibration.json
   gzip -dc record.csv.gz | obsdeg calibrate scheme.toml -
   obsdeg calibrate examples/influenza/model.toml examples/influenza/data.csv --profile beta
@@ -27,7 +28,7 @@ A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (
 `Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the \
 scheme (empty while the platform turns); without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a mean with a sigma of \
 its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts \
-instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. With -o it writes calibration.json, coefficients.csv, \
+instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. Columns are separated by commas, semicolons or tabs (then with decimal commas too); a column `t` without a unit may hold dates. With -o it writes calibration.json, coefficients.csv, \
 covariance.csv, residuals.csv and figures.
 
 Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are \
@@ -90,7 +91,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let found = calibrate(&a.asked, named, records, before.as_ref(), &host)?;
     drop(bar);
     a.met.check(found.requirements())?;
-    a.output.write_folder(&found, "calibration.json", || found.files())?;
+    let file = if a.asked.dry_run { "records.json" } else { "calibration.json" };
+    a.output.write_folder(&found, file, || found.files())?;
     match found.passed() {
         _ if found.interrupted() => Err(Failure::unfinished("interrupted".into())),
         true => a.met.decide(found.requirements()),

@@ -1,8 +1,10 @@
 //! The symbolic engine as the commands use it.
 
+use std::time::Duration;
+
 use clap::Args;
 use obsdeg_commands::whole;
-use obsdeg_symbolic::{Worker, WorkerConfig};
+use obsdeg_symbolic::{Worker, WorkerConfig, WorkerError};
 
 use crate::failure::{Failure, say};
 use crate::progress::Spinner;
@@ -16,6 +18,12 @@ pub(crate) struct EngineArguments {
     /// processor time per unit
     #[arg(long, value_name = "UNITS", default_value_t = 5, value_parser = whole::<u64>(0..=1_000_000))]
     symbolic_limit: u64,
+
+    /// Longest wait for other obsdeg processes of the same user, 0 to 86400 s: the symbolic engine runs once
+    /// per user. Then the answer comes without the formulas that need the engine, and says so. No other option
+    /// depends on the clock
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = whole::<u64>(0..=86_400))]
+    engine_wait: u64,
 }
 
 impl EngineArguments {
@@ -30,6 +38,7 @@ impl EngineArguments {
             program,
             arguments: vec!["symbolic-worker".into()],
             limit: self.symbolic_limit,
+            wait: Duration::from_secs(self.engine_wait),
             waiting: if quiet { || {} } else { say_waiting },
         })))
     }
@@ -47,8 +56,19 @@ impl EngineArguments {
         drop(spinner);
         if let Some(worker) = worker.as_mut() {
             worker.rest();
+            say_busy(worker);
         }
         Ok((found?, worker.iter().flat_map(Worker::banner).cloned().collect()))
+    }
+}
+
+/// What is missing since other processes held the engine, and how to get it; quiet or not.
+pub(crate) fn say_busy(worker: &Worker) {
+    if let Some(WorkerError::Busy { seconds }) = worker.failure() {
+        say(&format!(
+            "solutions that need the symbolic engine are missing: another obsdeg process held it for more than \
+             {seconds} s. Run the command again, or wait longer (--engine-wait)"
+        ));
     }
 }
 

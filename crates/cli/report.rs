@@ -7,7 +7,7 @@ use obsdeg_commands::{CalibrationFile, Given, Host, Report, Source, Word, one_of
 use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
 
 use crate::arguments::{AllFiles, RequireMet};
-use crate::engine::{EngineArguments, notice};
+use crate::engine::{EngineArguments, notice, say_busy};
 use crate::failure::Failure;
 use crate::input::read;
 use crate::interrupt;
@@ -104,6 +104,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let written = reviewed.files(&origin, format, &folder)?;
     drop(bar);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
+    worker.iter().for_each(say_busy);
     notice(worker.as_ref().map_or(&[], |w| w.banner()), a.target.quiet);
     a.met.decide(reviewed.requirements())
 }

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from . import _obsdeg
 from . import options as options
 from . import shapes as shapes
-from ._files import Judged, Model, Scheme, Text, Texted, source
+from ._files import Judged, Model, Scheme, Text, Texted, read_text, source
 from ._obsdeg import ProblemError, __version__
 from ._progress import heard
 from ._records import Record
@@ -215,7 +215,8 @@ def analyze(*what: Judged, progress: Progress | bool | None = None, **options: A
 
     Args:
         what: schemes, models, or files with them; none where ``angles`` are given.
-        progress: hears how far it is; ``True`` for a bar of tqdm.
+        progress: called ten times a second; ``True`` for a bar of tqdm. Where it returns False the analysis ends
+            with a ``KeyboardInterrupt``, as it does where a key is pressed.
         options: ``angles``, ``carry``, ``latitude`` [deg], ``terms``, ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``,
             ``count_limit``, ``solutions``, ``frame``, ``formulas``, ``seed``: those of ``obsdeg analyze``.
 
@@ -230,26 +231,29 @@ def analyze(*what: Judged, progress: Progress | bool | None = None, **options: A
 
 
 @overload
-def simulate(**options: Unpack[options.Simulate]) -> Simulation: ...
+def simulate(*, progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]) -> Simulation: ...
 
 
 @overload
-def simulate(what: Scheme, /, **options: Unpack[options.Simulate]) -> Simulation: ...
+def simulate(what: Scheme, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]) -> Simulation: ...
 
 
 @overload
-def simulate(what: Model, /, **options: Unpack[options.Simulate]) -> SystemRun: ...
+def simulate(what: Model, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]) -> SystemRun: ...
 
 
 @overload
-def simulate(what: str | os.PathLike[str] | Texted, /, **options: Unpack[options.Simulate]) -> Simulation | SystemRun: ...
+def simulate(
+    what: str | os.PathLike[str] | Texted, /, *, progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]
+) -> Simulation | SystemRun: ...
 
 
-def simulate(*what: Judged, **options: Any) -> Any:
+def simulate(*what: Judged, progress: Progress | bool | None = None, **options: Any) -> Any:
     """One run of the filter against a simulated truth.
 
     Args:
         what: a scheme or model with numbers, or a file with one; none where ``angles`` are given.
+        progress: called ten times a second; where it returns False the run ends with a ``KeyboardInterrupt``.
         options: those of ``obsdeg simulate``: ``dwell`` and ``step`` [s], ``noise`` [g], ``requirement``, ``truth``, ``filter``, ...
 
     Returns:
@@ -258,7 +262,7 @@ def simulate(*what: Judged, **options: Any) -> Any:
     Raises:
         ProblemError: what is wrong, with its place.
     """
-    return _ask(_kinds(what, Simulation, SystemRun), "simulate", _request(options, sources=_several(what)))
+    return _ask(_kinds(what, Simulation, SystemRun), "simulate", _request(options, sources=_several(what)), progress)
 
 
 @overload
@@ -296,17 +300,19 @@ def crosscheck(*what: Judged, progress: Progress | bool | None = None, **options
     return _ask(_kinds(what, CrossCheck, SystemEvidence), "crosscheck", _request(options, sources=_several(what)), progress)
 
 
-def compare(*what: Judged, **options: Unpack[options.Compare]) -> Comparison:
+def compare(*what: Judged, progress: Progress | bool | None = None, **options: Unpack[options.Compare]) -> Comparison:
     """Schemes side by side: degrees, and sigmas of the coefficients at the end of each.
 
     Args:
         what: schemes, or files with them.
+        progress: called ten times a second; where it returns False the comparison ends with a
+            ``KeyboardInterrupt``.
         options: those of ``obsdeg compare``: ``dwell`` and ``step`` [s], ``noise`` [g], ``requirement``, ...
 
     Raises:
         ProblemError: what is wrong, with its place.
     """
-    answer: Comparison = _ask((Comparison,), "compare", _request(options, sources=_several(what)))
+    answer: Comparison = _ask((Comparison,), "compare", _request(options, sources=_several(what)), progress)
     return answer
 
 
@@ -438,7 +444,7 @@ def calibrate(what: Judged, *records: Any, prior: Any = None, progress: Progress
     """
     files: dict[str, Any] = {"sources": [source(what)]}
     if prior is not None:
-        text = prior.json() if isinstance(prior, Answer) else Path(prior).read_text(encoding="utf-8")
+        text = prior.json() if isinstance(prior, Answer) else read_text(prior)
         files["before"] = {"name": "prior", "text": text}
     request = _request(options, **files)
     given = [_record(r, i) for i, r in enumerate(records)]

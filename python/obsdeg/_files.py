@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Union
@@ -14,6 +15,38 @@ if TYPE_CHECKING:
 
 #: A file, or what is in one.
 Path_ = Union[str, "os.PathLike[str]"]
+
+
+def place(path: Path, text: bytes) -> None:
+    """Writes a file whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(name, path)
+    except BaseException:
+        os.unlink(name)
+        raise
+
+
+#: Most characters of a text that is read.
+TEXT = 10_000_000
+
+
+def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
+    """The text of a file, which may be a device or a pipe that has no end.
+
+    Raises:
+        ValueError: more than :data:`TEXT` characters.
+    """
+    with open(path, encoding="utf-8", errors=errors) as file:
+        text = file.read(TEXT + 1)
+    if len(text) > TEXT:
+        raise ValueError(f"{os.fspath(path)}: found more than {TEXT} characters; expected a text of at most {TEXT}")
+    return text
 
 
 class Text:
@@ -34,7 +67,7 @@ class Text:
     @classmethod
     def read(cls, path: Path_) -> Self:
         """From a file (TOML; a model may be JSON)."""
-        made: Self = cls._of(Path(path).read_text(encoding="utf-8"), os.fspath(path))
+        made: Self = cls._of(read_text(path), os.fspath(path))
         return made
 
     @classmethod
@@ -153,4 +186,4 @@ def source(what: Judged) -> dict[str, str]:
     if hasattr(what, "text") and hasattr(what, "name"):
         return {"name": str(what.name), "text": str(what.text)}
     name = os.fspath(what)
-    return {"name": name, "text": Path(name).read_text(encoding="utf-8")}
+    return {"name": name, "text": read_text(name)}

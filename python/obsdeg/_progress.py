@@ -11,7 +11,11 @@ def heard(progress: Progress | bool | None) -> tuple[Any, Any]:
     """What the engine calls, and what is to be closed at the end: ``True`` stands for a bar of tqdm."""
     if progress is not True:
         return (progress or None), None
-    from tqdm.auto import tqdm
+    try:
+        from tqdm.auto import tqdm
+    except ModuleNotFoundError:
+        text = "progress=True draws a bar with the package `tqdm`, which is not installed"
+        raise ImportError(f"{text}: pip install 'obsdeg[progress]', or give a function") from None
 
     bar = tqdm(total=None, leave=False)
 

@@ -1,55 +1,53 @@
 """Searches and sweeps on as many machines as there are, through any executor of :mod:`concurrent.futures`.
 
-A search is cut into parts (``obsdeg design --part``), a sweep into chunks; each is a file in a folder, written whole or not at all and named by what was asked, so that a
-driver that was killed goes on where it was, and a worker that was killed costs what it had in hand. There is no scheduler here: that is the executor's.
+A search is cut into parts (``obsdeg design --part``), a sweep into chunks. Each is a file in a folder,
+written whole or not at all and named by what was asked: a driver that was killed goes on where it was, a
+worker that was killed costs what it had in hand. Every task is done, pending, or reported by name. There is
+no scheduler here: that is the executor's.
 
 With Dask Distributed::
 
     with distributed.Client("scheduler:8786") as client:
         found = campaign.design("search", 40, executor=client.get_executor, positions=7, carry="inertial")
 
-With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: :func:`processes`. A script that starts processes has its work below
-``if __name__ == "__main__":``, as everywhere in Python.
+With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: :func:`processes`. A script that
+starts processes has its work below ``if __name__ == "__main__":``, as everywhere in Python.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-import multiprocessing
 import os
+import shutil
 import tempfile
+import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
-from decimal import Decimal
-from itertools import islice, product
+from contextlib import contextmanager
+from functools import partial
+from itertools import chain, islice, product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import obsdeg
 
-from ._files import Text
-from .options import Analyze, Simulate
+from ._asked import digest, key
+from ._executors import Executors, RayExecutor, processes
+from ._files import place
+from ._judged import FOUND, Judged, judge, name_of, parquet, row_of
+from ._judged import done as there_in
+from ._work import END, INPUT, CampaignError, Ended, Work
 
-#: Makes an executor; one that is broken, because a worker was killed, is replaced by another.
-Executors = Callable[[], Executor]
+__all__ = ["CampaignError", "Executors", "RayExecutor", "design", "grid", "processes", "run", "sweep"]
 
-
-def processes(workers: int | None = None) -> ProcessPoolExecutor:
-    """A pool of processes on this machine, as many as cores where nothing else is said.
-
-    They do not begin as copies of this process (``fork``): the threads of the engine, which are no part of a copy, would be waited for without end.
-    """
-    start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context(start))
-
-
-class CampaignError(RuntimeError):
-    """A task failed as often as it may: `task` says which."""
-
-    def __init__(self, task: Any, tries: int, cause: BaseException) -> None:
-        super().__init__(f"{task!r} failed {tries} times, last with {type(cause).__name__}: {cause}")
-        self.task = task
+#: Seconds of work in a file of a sweep, where chunks follow the measured time.
+FILE_SECONDS = 10.0
+#: Most tasks in such a file.
+FILE_TASKS = 5000
+#: Tasks whose options are columns of every file; later ones add columns where they have others.
+FIRST = 500
+#: Seconds after which a part of a search is written as far as it is.
+CHECKPOINT = 300.0
 
 
 def run(
@@ -58,65 +56,50 @@ def run(
     *,
     executor: Executors = processes,
     retries: int = 2,
-    ahead: int = 64,
+    ahead: int | None = None,
 ) -> Iterator[tuple[Any, Any]]:
     """Yields every task with its result, in the order in which they end.
 
     Args:
         function: what is done, importable by the workers.
-        tasks: hashable or not; at most ``ahead`` are handed out at a time, so that memory does not grow with them.
+        tasks: hashable or not; they are drawn as they are handed out, so that memory does not grow with them.
         executor: makes the executor.
-        retries: how often a task is tried again when its worker was lost. An error that the function raises itself is not tried again where it is one
-            of input (:class:`obsdeg.ProblemError`).
+        retries: how often a task is tried again when its worker was lost or its function failed. Errors of
+            input (``ValueError``, ``TypeError``) are not tried again.
+        ahead: most tasks that are handed out at a time; by default twice the number of workers, at least 8.
 
     Raises:
-        CampaignError: a task failed too often.
+        CampaignError: a task failed too often, no executor can be had, or the scheduler of a cluster has not
+            answered for 30 s; ``pending`` has the tasks that were drawn and are not done.
+        obsdeg.ProblemError: what is wrong with a task, which it names and has as ``task``.
     """
-    _check("ahead", ahead, 1)
+    if ahead is not None:
+        _check("ahead", ahead, 1)
     _check("retries", retries, 0)
-    left = iter(enumerate(tasks))
-    again: list[tuple[int, Any]] = []
-    tries: dict[int, int] = {}
-    pool = executor()
-    waiting: dict[Future[Any], tuple[int, Any]] = {}
-    try:
-        while True:
-            try:
-                for i, task in [*again, *islice(left, ahead - len(waiting) - len(again))]:
-                    again = [a for a in again if a[0] != i]
-                    waiting[pool.submit(function, task)] = (i, task)
-            except RuntimeError:
-                # broken since: what it was not given comes again with another
-                again.append((i, task))
-                again.extend(waiting.values())
-                waiting.clear()
-                pool = _another(pool, executor)
-                continue
-            if not waiting:
-                return
-            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            lost = False
-            for future in done:
-                i, task = waiting.pop(future)
-                try:
-                    result = future.result()
-                except obsdeg.ProblemError:
-                    raise
-                except (Exception, CancelledError) as e:
-                    tries[i] = tries.get(i, 0) + 1
-                    if tries[i] > retries:
-                        raise CampaignError(task, tries[i], e) from e
-                    again.append((i, task))
-                    lost |= _is_broken(pool, e)
-                else:
-                    tries.pop(i, None)
-                    yield task, result
-            if lost:
-                again.extend(waiting.values())
-                waiting.clear()
-                pool = _another(pool, executor)
-    finally:
-        _close(pool)
+    left = iter(tasks)
+    work = Work(function, lambda: next(left, END), executor, retries, ahead)
+    for end in work.ended():
+        if end.error is not None:
+            raise _failed(end, repr(end.task), work)
+        yield end.task, end.result
+
+
+def _failed(end: Ended, name: str, work: Work | None = None) -> Exception:
+    """The error of a task that names it: one of input stays what it is, with the task before its text."""
+    error = end.error
+    assert error is not None
+    if isinstance(error, INPUT):
+        try:
+            named = type(error)(f"task {name}: {error}")
+        except TypeError:
+            named = ValueError(f"task {name}: {error}")
+        named.__dict__.update(error.__dict__, task=end.task)
+        named.__cause__ = error
+        return named
+    text = f"{name} failed {end.tries} times, last with {type(error).__name__}: {error}"
+    failed = CampaignError(text, end.task, work.open() if work else [])
+    failed.__cause__ = error
+    return failed
 
 
 def _check(name: str, found: int, least: int) -> None:
@@ -124,72 +107,28 @@ def _check(name: str, found: int, least: int) -> None:
         raise ValueError(f"{name}: found {found}; expected at least {least}")
 
 
-def _is_whole(part: Path) -> bool:
-    """Whether a part is there, as it was written."""
+#: A part of a search: its options, its number of how many, the part as far as it is, and seconds until the
+#: next checkpoint.
+_Part = tuple[dict[str, Any], int, int, "str | None", float]
+
+
+def _search(task: _Part) -> tuple[str, bool]:
+    """A part as far as it comes until the next checkpoint, and True if it is complete."""
+    options, number, of, before, seconds = task
+    end = time.monotonic() + seconds
+    resumed = {} if before is None else {"resume": before}
+    asked = {**options, **resumed, "part": (number, of), "progress": lambda *_: time.monotonic() < end}
+    found = obsdeg.design(**asked)
+    return found.json(), bool(found.to_dict()["complete"])
+
+
+def _part(file: Path) -> tuple[str | None, bool]:
+    """A part as it was written, and True if it is complete; None where there is none."""
     try:
-        json.loads(part.read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):
-        return False
-    return True
-
-
-def _is_broken(pool: Executor, e: BaseException) -> bool:
-    return isinstance(pool, ProcessPoolExecutor) and "Broken" in type(e).__name__
-
-
-def _another(pool: Executor, executor: Executors) -> Executor:
-    _close(pool)
-    return executor()
-
-
-def _close(pool: Executor) -> None:
-    try:
-        pool.shutdown(wait=False, cancel_futures=True)
-    except TypeError:
-        # Dask's has no such option
-        pool.shutdown(wait=False)
-
-
-def _plain(value: Any) -> Any:
-    """What is no JSON by itself, with all its digits."""
-    if isinstance(value, Text):
-        return value.text
-    if isinstance(value, (Decimal, os.PathLike)):
-        return str(value)
-    if isinstance(value, range):
-        return list(value)
-    if hasattr(value, "tolist"):
-        # arrays and numbers of numpy
-        return value.tolist()
-    raise TypeError(f"found {value!r} of type {type(value).__name__}; expected what JSON can hold, a decimal, an array or a Scheme")
-
-
-def _asked(options: Any) -> str:
-    return json.dumps(options, sort_keys=True, default=_plain)
-
-
-def _digest(asked: Any) -> str:
-    return hashlib.sha256(_asked([obsdeg.__version__, asked]).encode()).hexdigest()[:16]
-
-
-def _place(path: Path, text: bytes) -> None:
-    """Writes a file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
-
-
-def _search(task: tuple[dict[str, Any], int, int]) -> str:
-    options, number, of = task
-    return str(obsdeg.design(**options, part=(number, of)).json())
+        text = file.read_text(encoding="utf-8")
+        return text, bool(json.loads(text)["complete"])
+    except (FileNotFoundError, ValueError, KeyError, TypeError):
+        return None, False
 
 
 def design(
@@ -198,36 +137,56 @@ def design(
     *,
     executor: Executors = processes,
     retries: int = 2,
+    checkpoint: float = CHECKPOINT,
     heard: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> obsdeg.Design:
     """Searches in parts, and puts them together: the answer of ``obsdeg.design(**options)``, byte for byte.
 
     Args:
-        folder: holds the parts that are done; the same search in the same folder goes on with them.
+        folder: holds the parts; the same search in the same folder goes on with them.
         parts: how many.
+        checkpoint: seconds after which a part that is not complete is written as far as it is: most of the
+            work of a part that a kill costs.
         heard: told how many parts are done, of how many.
         options: those of :func:`obsdeg.design`.
 
     Raises:
-        CampaignError: a part failed too often.
+        CampaignError: a part failed too often, or the scheduler of a cluster does not answer.
         obsdeg.ProblemError: what is wrong with the options.
     """
     _check("parts", parts, 1)
-    files = {i: Path(folder) / f"{_digest([options, parts])}-{i}-of-{parts}.json" for i in range(1, parts + 1)}
-    missing = [(options, i, parts) for i, file in files.items() if not _is_whole(file)]
-    done = parts - len(missing)
-    for (_, i, _), text in run(_search, missing, executor=executor, retries=retries):
-        _place(files[i], text.encode())
+    if not checkpoint > 0:
+        raise ValueError(f"checkpoint: found {checkpoint}; expected more than 0 s")
+    asked = digest([options, parts])
+    files = {i: Path(folder) / f"{asked}-{i}-of-{parts}.json" for i in range(1, parts + 1)}
+    there = {i: _part(file) for i, file in files.items()}
+    missing = {i: text for i, (text, complete) in there.items() if not complete}
+    left: deque[_Part] = deque((options, i, parts, text, checkpoint) for i, text in missing.items())
+    done = parts - len(left)
+    work = Work(_search, lambda: left.popleft() if left else END, executor, retries, None)
+    for end in work.ended():
+        _, i, _, before, seconds = end.task
+        if isinstance(end.error, INPUT):
+            raise end.error
+        if end.error is not None:
+            raise _failed(end, f"part {i} of {parts}", work)
+        text, complete = end.result
+        place(files[i], text.encode())
+        if not complete:
+            # what is searched at once may take longer than until the next checkpoint
+            left.append((options, i, parts, text, 2 * seconds if text == before else seconds))
+            continue
         done += 1
         if heard is not None:
             heard(done, parts)
-    merged: obsdeg.Design = obsdeg.design(**options, merge=[f.read_text(encoding="utf-8") for f in files.values()])
+    found = [file.read_text(encoding="utf-8") for file in files.values()]
+    merged: obsdeg.Design = obsdeg.design(**options, merge=found)
     return merged
 
 
 def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
-    """Every combination of options: ``grid(angles=[...], latitude=range(0, 91), carry=["platform", "inertial"])``."""
+    """Every combination of options: ``grid(angles=[...], latitude=range(91), carry=["platform", "reset"])``."""
     for name, values_of in axes.items():
         if isinstance(values_of, (str, bytes)):
             raise TypeError(f"{name}: found {values_of!r}; expected a list of values, as in [{values_of!r}]")
@@ -235,129 +194,200 @@ def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
     return (dict(zip(names, chosen, strict=True)) for chosen in product(*values))
 
 
-# what only numbers have: noise, dwells, requirements
-_MEASURED = Simulate.__optional_keys__ - Analyze.__optional_keys__
-_JUDGED = Analyze.__optional_keys__ - Simulate.__optional_keys__
+@contextmanager
+def _alone(folder: Path) -> Iterator[Path]:
+    """A folder within a folder for what workers write, while no other driver works there."""
+    lock = _locked(folder)
+    try:
+        for left in folder.glob(".sweep-*"):
+            # of a driver that was killed; its workers, if they still work, have nowhere to write
+            shutil.rmtree(left, ignore_errors=True)
+        stage = Path(tempfile.mkdtemp(prefix=".sweep-", dir=folder))
+        try:
+            # workers may be other users
+            stage.chmod(folder.stat().st_mode & 0o777)
+            yield stage
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
+    finally:
+        if lock is not None:
+            os.close(lock)
 
 
-def _rows(task: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """What is found of a task, a row per unknown."""
-    given: Any = task.get("scheme")
-    what = [given if isinstance(given, obsdeg.Scheme) else obsdeg.Scheme.from_text(given)] if "scheme" in task else []
-    options = {name: value for name, value in task.items() if name != "scheme"}
-    verdicts = obsdeg.analyze(*what, **{"solutions": False, **{k: v for k, v in options.items() if k not in _MEASURED}}).to_dict()
-    numbers = {}
-    if _MEASURED & options.keys():
-        run = obsdeg.simulate(*what, **{k: v for k, v in options.items() if k not in _JUDGED}).to_dict()
-        numbers = {q["name"]: q for q in run["quantities"]}
-    asked = {"task": _asked(task), **{name: str(value) for name, value in options.items()}}
-    for q in verdicts["quantities"]:
-        n = numbers.get(q["name"], {})
-        found = {"rank": verdicts["rank"], "name": q["name"], "status": q["status"], "degree": q.get("degree")}
-        yield {**asked, **found, "sigma": n.get("sigma"), "unit": n.get("unit"), "outcome": n.get("outcome")}
+def _locked(folder: Path) -> int | None:
+    """Holds a folder as long as this process lives; None where the system has no such locks."""
+    if os.name != "posix":
+        return None
+    import fcntl
+
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise RuntimeError(f"{folder}: found another sweep at work in it; expected one at a time") from None
+    except OSError:
+        # some network file systems
+        os.close(handle)
+        return None
+    return handle
 
 
-def _verdicts(tasks: list[dict[str, Any]]) -> bytes:
-    import pyarrow
-    import pyarrow.parquet
+class _Chunks:
+    """Number of tasks in a file: a fixed one, or those of :data:`FILE_SECONDS` by the time of others."""
 
-    sink = pyarrow.BufferOutputStream()
-    rows = [row for task in tasks for row in _rows(task)]
-    kinds = {"rank": pyarrow.int64(), "degree": pyarrow.int32(), "sigma": pyarrow.float64()}
-    names = dict.fromkeys(name for row in rows for name in row)
-    schema = pyarrow.schema([(name, kinds.get(name, pyarrow.string())) for name in names], {"obsdeg": obsdeg.__version__})
-    table = pyarrow.Table.from_pylist(rows, schema)
-    pyarrow.parquet.write_table(table, sink)
-    return bytes(sink.getvalue())
+    def __init__(self, fixed: int | None) -> None:
+        self.fixed, self.seconds, self.size = fixed, 0.0, 1
 
+    def next(self) -> int:
+        return self.fixed if self.fixed is not None else self.size
 
-def _done(folder: Path) -> set[str]:
-    """The tasks of this version that the files of a folder hold."""
-    import pyarrow.parquet
-
-    done: set[str] = set()
-    for file in folder.glob("*.parquet"):
-        head = pyarrow.parquet.read_schema(file)
-        if "task" in head.names and (head.metadata or {}).get(b"obsdeg") == obsdeg.__version__.encode():
-            tasks = pyarrow.parquet.read_table(file, columns=["task"]).column("task").unique().to_pylist()
-            done.update(hashlib.sha256(task.encode()).hexdigest()[:16] for task in tasks)
-    return done
+    def took(self, seconds: float, tasks: int) -> None:
+        each = seconds / tasks
+        self.seconds = each if self.seconds == 0 else 0.7 * self.seconds + 0.3 * each
+        # four times as many at most: the first tasks may be the easy ones
+        self.size = max(1, min(FILE_TASKS, 4 * self.size, int(FILE_SECONDS / max(self.seconds, 1e-6))))
 
 
 def sweep(
     folder: str | os.PathLike[str],
     tasks: Iterable[Mapping[str, Any]],
     *,
-    chunk: int = 500,
+    chunk: int | None = None,
     executor: Executors = processes,
     retries: int = 2,
+    errors: Literal["raise", "record"] = "raise",
     heard: Callable[[int], None] | None = None,
 ) -> Path:
     """Judges many schemes: a row per unknown, in Parquet files that come as they are done.
 
     Args:
-        folder: holds the files, one a chunk, named by what it asks; tasks that are there are not asked again, whatever the chunks. Read all with
-            ``pandas.read_parquet(folder)``. The column ``task`` holds all options of a row as JSON; each option is a column of text too, in the files
-            where a task has it (pandas shows the columns of one file: where options differ from file to file, take them from ``task``).
-        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is a :class:`obsdeg.Scheme`, or the text of a scheme file. A task with options that only
-            :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated too: ``sigma`` is the standard deviation at the
-            end of the run in ``unit``, and ``outcome`` says whether it is a measured one; elsewhere these are empty.
-        chunk: tasks that are judged together.
+        folder: holds the files, one a chunk, named by what it asks, written by the workers where they see the
+            folder; one sweep at a time works in it. Tasks that are there are not asked again, whatever the
+            chunks; tasks are the same where their options have the same values: 0, ``"0"`` and
+            ``numpy.float64(0)`` are one. Read all with ``pandas.read_parquet(folder)``. The column ``task``
+            holds all options of a row as JSON; each option of the first 500 tasks is a column of text too,
+            others in the files where a task has them (pandas shows the columns of one file: take those from
+            ``task``).
+        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is a
+            :class:`obsdeg.Scheme`, or the text of a scheme file. A task with options that only
+            :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated
+            too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and ``outcome`` says
+            whether it is a measured one; elsewhere these are empty.
+        chunk: tasks that are judged together; by default those of about 10 s, by measured time.
+        retries: how often tasks are tried again whose worker was lost; then a chunk is divided, until the
+            task that did it is found.
+        errors: a task that cannot be judged ends the sweep and is named (``"raise"``), or has one row with
+            the message in the column ``error`` (``"record"``), and counts as done.
         heard: told how many tasks are done.
 
     Raises:
-        CampaignError: a chunk failed too often.
-        obsdeg.ProblemError: what is wrong with a task.
+        CampaignError: a task failed too often, or the scheduler of a cluster does not answer; the folder
+            holds what is done, and the same sweep goes on with the rest.
+        obsdeg.ProblemError: what is wrong with a task, which it names and has as ``task``; the rest of its
+            chunk is kept.
+        RuntimeError: another sweep is at work in the folder.
     """
-    _check("chunk", chunk, 1)
+    if chunk is not None:
+        _check("chunk", chunk, 1)
+    _check("retries", retries, 0)
+    if errors not in ("raise", "record"):
+        raise ValueError(f"errors: found {errors!r}; expected 'raise' or 'record'")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    done = told = 0
-    there = _done(folder)
+    with _alone(folder) as stage:
+        _sweep(folder, stage, tasks, _Chunks(chunk), executor, retries, errors == "record", heard)
+    return folder
 
-    def is_missing(task: dict[str, Any]) -> bool:
+
+def _sweep(
+    folder: Path,
+    stage: Path,
+    tasks: Iterable[Mapping[str, Any]],
+    chunks: _Chunks,
+    executor: Executors,
+    retries: int,
+    record: bool,
+    heard: Callable[[int], None] | None,
+) -> None:
+    there = there_in(folder)
+    done, told = 0, 0
+    seen_by_workers = True
+    again: deque[list[dict[str, Any]]] = deque()
+    rest = iter(tasks)
+    first = list(islice(rest, FIRST))
+    options = [name for task in first for name in task if name != "scheme"]
+    columns = list(dict.fromkeys(["task", *options, *FOUND]))
+
+    def wrong(end: Ended, task: dict[str, Any]) -> None:
+        """Records the error of a task without an answer in a file of its own, or raises it."""
+        assert end.error is not None
+        if not record:
+            raise _failed(Ended(task, error=end.error, tries=end.tries), name_of(task), work)
+        name = digest(["error", name_of(task)])
+        place(folder / f"{name}.parquet", parquet([row_of(task, end.error)], columns))
+
+    def missing() -> Iterator[dict[str, Any]]:
         nonlocal done
-        known = bool(there) and hashlib.sha256(_asked(task).encode()).hexdigest()[:16] in there
-        done += known
-        return not known
+        for task in map(dict, chain(first, rest)):
+            try:
+                by_value = key(task)
+            except (TypeError, ValueError) as e:
+                wrong(Ended(task, error=e), task)
+                done += 1
+                continue
+            if by_value in there:
+                done += 1
+                continue
+            there.add(by_value)
+            yield task
 
-    def missing() -> Iterator[list[dict[str, Any]]]:
-        rest = filter(is_missing, map(dict, tasks))
-        while some := list(islice(rest, chunk)):
-            yield some
+    fresh = missing()
 
-    for some, table in run(_verdicts, missing(), executor=executor, retries=retries):
-        _place(folder / f"{_digest(some)}.parquet", table)
+    def draw() -> Any:
+        some = again.popleft() if again else list(islice(fresh, chunks.next()))
+        return (some, str(stage) if seen_by_workers else None) if some else END
+
+    work = Work(partial(judge, columns=columns, record=record), draw, executor, retries, None, divide=_halves)
+    for end in work.ended():
+        some: list[dict[str, Any]] = end.task[0]
+        if end.error is not None:
+            wrong(end, some[0])
+        else:
+            judged: Judged = end.result
+            if not _published(judged, stage, folder):
+                seen_by_workers = False
+                again.append(some)
+                continue
+            chunks.took(judged.seconds, len(some))
+            if judged.wrong and not record:
+                i, error = judged.wrong[0]
+                wrong(Ended(some[i], error=error), some[i])
         done += len(some)
         told = done
         if heard is not None:
             heard(done)
     if heard is not None and told != done:
         heard(done)
-    return folder
 
 
-def _call(fn: Callable[..., Any], args: Any, kwargs: Any) -> Any:
-    # what Ray takes must be a function; a partial one is none
-    return fn(*args, **kwargs)
+def _halves(chunk: tuple[list[dict[str, Any]], str | None]) -> list[Any]:
+    """The two halves of a chunk that failed too often; none of a single task."""
+    tasks, stage = chunk
+    half = len(tasks) // 2
+    return [(tasks[:half], stage), (tasks[half:], stage)] if half else []
 
 
-class RayExecutor(Executor):
-    """Ray as an executor.
-
-    Args:
-        options: those of ``ray.init``, where Ray does not run yet; it then runs until the process ends.
-    """
-
-    def __init__(self, **options: Any) -> None:
-        import ray
-
-        if not ray.is_initialized():
-            ray.init(**options)
-        # what a lost worker had in hand is tried again by the campaign, not there
-        self._remote = ray.remote(max_retries=0)(_call)
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Hands a call to Ray."""
-        future: Future[Any] = self._remote.remote(fn, args, kwargs).future()
-        return future
+def _published(judged: Judged, stage: Path, folder: Path) -> bool:
+    """Moves the file of a chunk to where it is read; False if the worker wrote it where this machine does not
+    see it."""
+    if judged.name is None:
+        return True
+    if judged.table is not None:
+        place(folder / judged.name, judged.table)
+        return True
+    try:
+        os.replace(stage / judged.name, folder / judged.name)
+    except FileNotFoundError:
+        return False
+    return True

@@ -7,330 +7,333 @@ from typing import Literal, Union
 from ._records import Record, Shape
 
 Carry = Literal["platform", "inertial", "reset"]
-"""What is carried from one position to the next (the paper does not say). platform: `psi^c` is carried: what the paper's simulation did.
-inertial: `psi^n` is carried: right for real torqued slews. reset: `psi` is a new unknown at each position.
+"""Carry: quantity that continues from one position to the next (the paper does not state it). platform: Platform carry: `psi^c`
+continues, as in the paper's simulation. inertial: Inertial carry: `psi^n` continues, as in real torqued slews. reset: Reset carry:
+`psi` is a new unknown at each position.
 """
 
 SignedAxis = str
-"""A signed platform axis such as `+x` or `-z`."""
+"""Signed platform axis such as `+x` or `-z`."""
 
 
 class GyroAxes(Record):
-    """The axes of one gyro: input I, output O, spin S, as signed platform axes."""
+    """Axes of one gyro: input I, output O, spin S, as signed platform axes."""
 
     __slots__ = ()
 
     I: SignedAxis
-    """Input axis."""
+    """Input axis of the gyro, a signed platform axis."""
     O: SignedAxis
-    """Output axis."""
+    """Output axis of the gyro, a signed platform axis."""
     S: SignedAxis
-    """Spin axis."""
+    """Spin axis of the gyro, a signed platform axis."""
 
 
 class Accelerometers(Record):
-    """The input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default."""
+    """Input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default."""
 
     __slots__ = ()
 
     X: SignedAxis
-    """Of the accelerometer whose coefficients end in X, or have it first."""
+    """Input axis of accelerometer X, whose coefficients end in X or have it first."""
     Y: SignedAxis
-    """Of Y."""
+    """Input axis of accelerometer Y, a signed platform axis."""
     Z: SignedAxis
-    """Of Z."""
+    """Input axis of accelerometer Z, a signed platform axis."""
 
 
 class Geometry(Record):
-    """The mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23), (27) and (28)."""
+    """Mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23), (27) and (28)."""
 
     __slots__ = ()
 
     X: GyroAxes
-    """The gyro whose coefficients end in X."""
+    """Axes of the gyro whose coefficients end in X."""
     Y: GyroAxes
-    """The gyro whose coefficients end in Y."""
+    """Axes of the gyro whose coefficients end in Y."""
     Z: GyroAxes
-    """The gyro whose coefficients end in Z."""
+    """Axes of the gyro whose coefficients end in Z."""
     accelerometers: Accelerometers | None
-    """The input axes of the accelerometers."""
+    """Input axes of the accelerometers; X_p, Y_p, Z_p when left out."""
 
 AngleReport = Union[float, str]
-"""An angle."""
+"""Angle in degrees, or name of a generic angle."""
 
 
 class Turn(Record):
-    """A turn about a fixed axis."""
+    """Turn of the platform about a fixed axis."""
 
     __slots__ = ()
 
     about: tuple[float, float, float]
-    """The axis: a unit vector (North, Up, East)."""
+    """Axis of the turn: a unit vector (North, Up, East), dimensionless."""
     angle_deg: float
-    """The angle in degrees, right-handed about the axis, above 0."""
+    """Angle of the turn in degrees, right-handed about the axis, above 0."""
 
 
 class PositionReport(Record):
-    """One position."""
+    """Position of the scheme, with gravity in platform axes."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the position in the scheme."""
     angles_deg: tuple[AngleReport, AngleReport, AngleReport]
-    """Euler angles alpha, beta, gamma in degrees, or names."""
+    """Euler angles alpha, beta, gamma in degrees, or names of generic angles."""
     attitude: str | None
-    """Where X_p, Y_p, Z_p point, for a cardinal attitude."""
+    """Directions of X_p, Y_p, Z_p for a cardinal attitude, as in 'NUE'; null for others."""
     rotation: str | None
-    """The rotation that starts there, such as `X_p:360`."""
+    """Rotation that starts at the position, such as `X_p:360`; null for none."""
     turns: list[Turn]
-    """The turns that lead there from the position before, where torquer errors act on them."""
+    """Turns from the position before to this one, where torquer errors act on them."""
     g_c: tuple[float, float, float] | None
     """Gravity in platform axes (at the start of a rotation), in g; null for generic angles."""
 
 
 class StationLabel(Record):
-    """Where derivatives of Z are taken, as formulas name it."""
+    """Label, in formulas, of a station: a point at which derivatives of Z are taken."""
 
     __slots__ = ()
 
     label: str
-    """As in formulas: `p1`, `'about X'`, `p1[45 deg]`."""
+    """Label in formulas: `p1`, `'about X'`, `p1[45 deg]`."""
     position: str
-    """The name of the position or rotation."""
+    """Name of the position or rotation."""
     turned_deg: float | None
-    """How far the rotation has come, in degrees, right-handed; null for a position that stands. Derivatives of Z at such a station are
-    those of a platform that is turning, not of one that stopped there.
+    """Angle of the rotation at this station, in degrees, right-handed; null for a position at rest. Derivatives of Z at such a station
+    are those of a turning platform, not of one that stopped there.
     """
     about: str | None
-    """What it turns about: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`."""
+    """Axis of the rotation: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`; null for a position at rest."""
     rate: str | None
-    """The rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s."""
+    """Rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s; null for a position at rest."""
 
 Status = Literal["observable", "inseparable", "not_excited", "not_seen"]
-"""Whether an unknown can be solved. observable: It is in the span of the derivative rows. inseparable: It moves Z, but only together
-with its partners. not_excited: It does not move Z at all. not_seen: No order up to the last that was looked at solves it, and a
-higher one may: of systems with special starts, jumps or arbitrary inputs.
+"""Verdict on an unknown or a combination. observable: Observable: the unknown is in the span of the derivative rows. inseparable:
+Inseparable: it affects Z, but only together with its partners. not_excited: Not excited: it does not affect Z at all. not_seen: Not
+resolved up to the bound on the order; a higher order may resolve it. For systems with special starts, jumps or arbitrary inputs.
 """
 
 
 class SolutionTerm(Record):
-    """One term of a solution, for programs."""
+    """Term of a solution, machine-readable."""
 
     __slots__ = ()
 
     coefficient: str
-    """The coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits."""
+    """Coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits."""
     observation: str
-    """The derivative of the observation, such as `Z1'`."""
+    """Derivative of the observation, such as `Z1'`."""
     station: str
-    """Where it is taken: a label of the stations."""
+    """Label of the station at which the derivative is taken."""
 
 Form = Literal["exact", "symbolic", "decimal"]
-"""How exact a printed coefficient is. exact: Rationals and square roots. symbolic: Sines and cosines of angles. decimal: Decimals,
-rounded to six places (small ones to six digits).
+"""Form of a printed coefficient. exact: Rational numbers and square roots, exact. symbolic: Sines and cosines of angles. decimal:
+Decimals, rounded to six places (small ones to six digits).
 """
 
 FoundBy = Literal["prime_fields", "symbolic_engine", "floating_point"]
-"""Where the coefficients of a solution come from. prime_fields: Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images
-in two prime fields. symbolic_engine: Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields
-are the same. floating_point: Decimals.
+"""Source of the coefficients of a solution. prime_fields: Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images in
+two prime fields. symbolic_engine: Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are
+the same. floating_point: Decimals from floating-point arithmetic.
 """
 
 Verification = Literal["symbolic", "modular", "numeric"]
-"""How a solution was checked before it was printed. symbolic: By exact substitution of the derivatives of Z, and by substitution in two
-prime fields. modular: By substitution in two prime fields. numeric: By substitution in floating point: residual below 1e-9 of the sum
-of magnitudes.
+"""Check that a solution passed before it was printed. symbolic: Exact substitution of the derivatives of Z, and substitution in two
+prime fields. modular: Substitution in two prime fields. numeric: Substitution in floating point: residual below 1e-9 of the sum of
+magnitudes.
 """
 
 
 class Solution(Record):
-    """A solving expression."""
+    """Solving expression of an unknown or a combination."""
 
     __slots__ = ()
 
     text: str
-    """The expression in one line."""
+    """Solving expression in one line."""
     terms: list[SolutionTerm]
-    """Its terms one by one."""
+    """Terms of the solving expression, one by one."""
     turning: bool
-    """Whether derivatives in it are taken while the platform turns: at stations with a rate."""
+    """True if derivatives in it are taken while the platform turns: at stations with a rate."""
     form: Form
-    """How exact its coefficients are."""
+    """Form of its coefficients: exact, symbolic or decimal."""
     found_by: FoundBy
-    """Where its coefficients come from."""
+    """Source of its coefficients: prime fields, symbolic engine or floating point."""
     verification: Verification
-    """How it was checked."""
+    """Check that the expression passed before it was printed."""
 
 
 class Elsewhere(Record):
-    """Degrees of an unobservable unknown under other conditions; null where it stays unobservable or the condition is the given one."""
+    """Observable degrees of an unobservable unknown under other conditions; each is null if the unknown stays unobservable or the
+    condition is the given one.
+    """
 
     __slots__ = ()
 
     other_latitudes: int | None
-    """At other latitudes (the given one is special)."""
+    """Observable degree at other latitudes; null unless the given one is special (equator, pole), or if unobservable there too."""
     other_angles: int | None
-    """With the same number of positions at generic angles."""
+    """Observable degree with the same number of positions at generic angles; null if unobservable there too, or if they were not judged."""
 
 
 class Quantity(Record):
-    """The verdict on one unknown."""
+    """Verdict on one unknown of a scheme."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, as in the model."""
     unit: str
-    """Its unit."""
+    """Unit of the unknown: deg, deg/h, deg/h/g, ..."""
     status: Status
-    """Whether it can be solved."""
+    """Verdict: observable, inseparable or not excited."""
     degree: int | None
-    """The observable degree; null when it is not observable."""
+    """Observable degree: the smallest order of derivatives that determines the unknown; null if it is not observable."""
     accuracy_order: int | None
-    """The accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null when no dwell makes it observable."""
+    """Accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null if no dwell makes it observable."""
     partners: list[str]
-    """Unknowns that it cannot be told from: those that share with it a direction that Z does not see and that holds no shorter one."""
+    """Unknowns indistinguishable from it: those in a common unobservable direction of minimal support."""
     solution: Solution | None
-    """How it is solved."""
+    """Solving expression of the unknown; null if there is none."""
     elsewhere: Elsewhere | None
-    """Where it would be observable."""
+    """Degrees under conditions where the unknown is observable; null if it is observable, or under none of them."""
 
 
 class CombinationReport(Record):
-    """An observable combination, or one that was asked for."""
+    """Observable combination of unknowns, or one that was asked for."""
 
     __slots__ = ()
 
     expression: str
-    """The combination."""
+    """Combination of unknowns, as an expression."""
     requested: bool
-    """Whether it was asked for."""
+    """True if the combination was asked for."""
     status: Status
-    """Whether it can be solved."""
+    """Verdict: observable, inseparable or not excited."""
     degree: int | None
-    """Its observable degree."""
+    """Observable degree of the combination; null if it is not observable."""
     accuracy_order: int | None
-    """Its accuracy order."""
+    """Accuracy order of the combination, as of an unknown; null if no dwell makes it observable."""
     solution: Solution | None
-    """How it is solved."""
+    """Solving expression of the combination; null if there is none."""
 
 
 class Component(Record):
-    """One component of a null vector."""
+    """Component of a null vector."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown, as in the model."""
     coefficient: str | None
-    """Its coefficient; null when it was not computed."""
+    """Coefficient of the unknown in the null vector; null if it was not computed."""
 
 
 class Verdict(Record):
-    """Status and degree."""
+    """Verdict on one unknown: status and degree."""
 
     __slots__ = ()
 
     status: Status
-    """Whether it can be solved."""
+    """Status: observable, inseparable, not excited or not seen."""
     degree: int | None
-    """The observable degree."""
+    """Observable degree of the unknown; null if it is not observable."""
 
 
 class Difference(Record):
-    """A verdict that depends on the carry."""
+    """Verdict that depends on the carry."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown whose verdict differs."""
     here: Verdict
-    """Under the carry of the scheme."""
+    """Verdict under the carry of the scheme, or at generic angles."""
     there: Verdict
-    """Under the other one."""
+    """Verdict under the other carry, or at the special angles."""
 
 
 class CarryReport(Record):
-    """What changes under another carry."""
+    """Verdicts of the scheme under another carry."""
 
     __slots__ = ()
 
     carry: Carry
-    """The carry."""
+    """Carry for which these verdicts hold."""
     rank_profile: list[int]
-    """Its rank profile."""
+    """Rank profile under this carry: dim V_0, dim V_1, ..."""
     unknowns: int
-    """Its number of unknowns."""
+    """Number of unknowns under this carry."""
     differs: list[Difference]
-    """The unknowns of both carries whose verdict differs."""
+    """Unknowns of both carries whose verdict differs."""
 
 
 class ChangeKnown(Record):
-    """The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of every experiment, of an
-    input at all times.
+    """Known value of an unknown: of a parameter, of psi or a coefficient, of a state at the start of every experiment, of an input at
+    all times.
     """
 
     __slots__ = ()
 
     kind: Literal["known"]
     name: str
-    """Name of the unknown."""
+    """Name of the unknown whose value is given."""
 
 
 class ChangeOutput(Record):
-    """A state is one more output of the model."""
+    """State that becomes one more output of the model."""
 
     __slots__ = ()
 
     kind: Literal["output"]
     state: str
-    """Name of the state."""
+    """Name of the state that becomes an output."""
 
 
 class ChangeAttitude(Record):
-    """One more position at the end of the scheme."""
+    """Position that is added at the end of the scheme."""
 
     __slots__ = ()
 
     kind: Literal["attitude"]
     position: str
-    """Name of the new position."""
+    """Name of the position that is added."""
     attitude: str
-    """Cardinal attitude: where X_p, Y_p and Z_p point."""
+    """Cardinal attitude: directions of X_p, Y_p and Z_p."""
 
 
 class ChangeCarry(Record):
-    """Another carry between positions."""
+    """Carry between positions that replaces the scheme's own."""
 
     __slots__ = ()
 
     kind: Literal["carry"]
     carry: Carry
-    """The carry."""
+    """Carry of the changed scheme."""
 
 Change = Union[ChangeKnown, ChangeOutput, ChangeAttitude, ChangeCarry]
-"""A change of a scheme or model."""
+"""Change of a scheme or model."""
 
 
 class Resolved(Record):
-    """An unknown that a remedy makes observable."""
+    """Unknown that a remedy makes observable."""
 
     __slots__ = ()
 
     name: str
-    """Name of the unknown."""
+    """Name of the resolved unknown."""
     degree: int
     """Observable degree of the unknown after the change."""
 
 
 class Remedy(Record):
-    """One change, or two changes that are needed together."""
+    """Change of the scheme or model, or two changes that are needed together."""
 
     __slots__ = ()
 
     changes: list[Change]
-    """The changes."""
+    """Changes that resolve the unknowns, one or two."""
     resolves: list[Resolved]
     """Unknowns that are observable with the changes and not without them, in model order; without those whose value is given."""
     loses: list[str]
@@ -353,180 +356,178 @@ class Remedies(Record):
 
 
 class Locus(Record):
-    """A condition and what it does."""
+    """Condition on generic angles, and its effect on the verdicts."""
 
     __slots__ = ()
 
     condition: str
-    """Where: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that vanishes; one that is too long to be
-    read is described.
+    """Condition: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that vanishes; one that is too long
+    to print is described.
     """
     points_deg: list[dict[str, float]]
-    """Points of it, in degrees by angle: all of them when `complete`, examples otherwise."""
+    """Points on the locus, in degrees by angle: all of them when `complete`, examples otherwise."""
     complete: bool
-    """Whether the condition is on a single angle, and these are certainly all its values."""
+    """True if the condition is on a single angle and `points_deg` certainly holds all its values."""
     rank_profile: list[int]
-    """The rank profile at a general point of the locus."""
+    """Rank profile at a general point of the locus."""
     changes: list[Difference]
-    """The unknowns whose verdict changes there."""
+    """Unknowns whose verdict changes on the locus."""
 
 
 class Formula(Record):
-    """One formula."""
+    """Formula of Z or of one of its derivatives."""
 
     __slots__ = ()
 
     position: str | None
-    """The label of the station; null for formulas that hold at every one."""
+    """Label of the station; null for formulas that hold at every station."""
     left: str
-    """Left side, such as `Z1'`."""
+    """Left side of the formula, such as `Z1'`."""
     right: str
-    """Right side."""
+    """Right side of the formula."""
 
 Frame = Literal["n", "platform"]
-"""The axes in which Z is printed. n: Local geographic axes, as in the paper: `Z1` and `Z3` (`Z2` is zero). platform: Platform axes:
-`Zx`, `Zy`, `Zz`.
+"""Axes in which Z is printed in solutions. n: Local geographic axes, as in the paper: `Z1` and `Z3` (`Z2` is zero). platform: Platform
+axes: `Zx`, `Zy`, `Zz`.
 """
 
 
 class BeyondLimits(Record):
-    """A position written with angles beyond a gimbal limit."""
+    """Position written with angles beyond a gimbal limit."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position."""
+    """Name of the position in the scheme."""
     angles: str
-    """Its Euler angles as written, in degrees."""
+    """Euler angles as written, in degrees."""
     within: str
     """Euler angles of the same attitude within the limits, in degrees."""
 
 
 class GimbalStop(Record):
-    """Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to
-    turn more than a hundred times as fast as the platform.
+    """Obstacle of a turn about one axis: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and gamma would have to turn
+    more than a hundred times as fast as the platform.
     """
 
     __slots__ = ()
 
     gimbal: str | None
-    """The gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees."""
+    """Gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees."""
     at_deg: float
-    """The limit in degrees; without a gimbal beta in degrees."""
+    """Limit that is reached, in degrees; without a gimbal, beta in degrees."""
     after_deg: float
-    """Angle that the platform has turned by, in degrees."""
+    """Angle that the platform has turned by when it stops, in degrees."""
 
 
 class GimbalTurn(Record):
-    """A turn of the platform, followed from gimbal angles within the limits."""
+    """Turn of the platform, followed from gimbal angles within the limits."""
 
     __slots__ = ()
 
     position: str
-    """Name of the position that it leads to, or whose rotation it is."""
+    """Name of the position that the turn leads to, or whose rotation it is."""
     rotation: bool
     """True for the rotation of a segment."""
     by_gimbals: bool
     """True if the scheme states that the platform turns gimbal by gimbal."""
     turn: Turn | None
-    """The turn about one axis; null where the attitude stays, and gimbal by gimbal."""
+    """Turn about one axis; null if the attitude stays the same, or gimbal by gimbal."""
     stays: bool
-    """True if all gimbal angles stay within their limits on the way; gimbal by gimbal, of the angles as they are written."""
+    """True if all gimbal angles stay within their limits during the turn; gimbal by gimbal, judged by the angles as written."""
     stop: GimbalStop | None
-    """Where the turn about one axis cannot go on; null where it stays within the limits, and gimbal by gimbal."""
+    """Obstacle of the turn about one axis; null if it stays within the limits, and gimbal by gimbal."""
     ends_deg: tuple[float, float, float] | None
-    """Gimbal angles at the end of the turn in degrees (alpha, beta, gamma), where they are others of the same attitude than those
-    listed.
-    """
+    """Gimbal angles at the end of the turn in degrees (alpha, beta, gamma); null if it stops, or ends at the angles listed."""
     gimbals_deg: tuple[float, float, float] | None
-    """Change of alpha, beta and gamma in degrees of the way gimbal by gimbal (`path = 'gimbals'`) between angles within the limits,
-    which stays within them; null for a rotation.
+    """Changes of alpha, beta and gamma, in degrees, of the slew path gimbal by gimbal (`path = 'gimbals'`) between angles within the
+    limits, which stays within them; null for a rotation.
     """
 
 
 class GimbalReport(Record):
-    """Gimbal limits and a scheme: which angles and which turns lie beyond."""
+    """Gimbal limits of a scheme, with the angles and turns that exceed them."""
 
     __slots__ = ()
 
     limits: str
-    """The limits in words, in degrees."""
+    """Gimbal limits in words, in degrees."""
     beyond: list[BeyondLimits]
-    """Positions whose angles, as they are written, lie beyond a limit, with angles of the same attitude that do not."""
+    """Positions written with angles beyond a limit, each with angles of the same attitude within the limits."""
     turns: list[GimbalTurn]
-    """The turn to every position but the first, and the rotation of every segment that turns; none for generic angles."""
+    """Turns to every position but the first, and rotations of segments; empty for generic angles."""
 
 
 class Certainty(Record):
-    """How certain the verdicts are."""
+    """Certainty of the verdicts: method, error bound, primes and seed."""
 
     __slots__ = ()
 
     method: str
-    """The method, in words."""
+    """Method of the verdicts, in words."""
     error_bound: float
     """Bound on the probability that any verdict is wrong."""
     primes: tuple[str, str]
-    """The two primes, as text (61 bits)."""
+    """Random primes of the two prime fields, as text (61 bits)."""
     seed: int
-    """The seed of all random choices."""
+    """Seed of all random choices."""
 
 
 class Analysis(Shape):
-    """The answer for one scheme."""
+    """Analysis of one scheme: verdicts, solutions and remedies."""
 
     schema: str
-    """`obsdeg.analysis/1`."""
+    """Layout of this answer: `obsdeg.analysis/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     carry: Carry
-    """What is carried between positions."""
+    """Carry: quantity that continues from one position to the next."""
     latitude_deg: float | None
     """Latitude in degrees; null when generic."""
     geometry: Geometry
-    """How the gyros are mounted."""
+    """Mounting of the gyros and accelerometers."""
     terms: str
     """Unknown terms of the gyro model, or `drift`."""
     measured_azimuth: bool
-    """Whether psi_y^n is measured."""
+    """True if psi_y^n is measured."""
     positions: list[PositionReport]
-    """The positions."""
+    """Positions of the scheme, in order of time."""
     stations: list[StationLabel]
-    """Where the terms of solutions are taken: the positions, and attitudes of rotations."""
+    """Stations: points at which the derivatives in solutions are taken, that is the positions and attitudes during rotations."""
     rank_profile: list[int]
-    """`dim V_0, dim V_1, ...`."""
+    """Rank profile: dim V_0, dim V_1, ..., the rank of the derivatives of Z up to each order."""
     rank: int
-    """The final rank."""
+    """Rank of all derivatives of Z up to the last order."""
     unknowns: list[str]
-    """The unknowns in model order."""
+    """Names of the unknowns, in model order."""
     has_accuracy_orders: bool
-    """Whether accuracy orders were computed: none are for rotating segments, and notes say why else."""
+    """True if accuracy orders were computed. They are not for rotating segments; notes give other reasons."""
     quantities: list[Quantity]
-    """The verdicts, best first."""
+    """Verdicts on the unknowns, best first."""
     combinations: list[CombinationReport]
     """Observable combinations beyond single unknowns, by degree, and those asked for."""
     null_space: list[list[Component]]
-    """Basis of the directions that Z does not see (unknowns that are not excited left out)."""
+    """Basis of the directions that Z does not observe, without unknowns that are not excited."""
     carries: list[CarryReport]
-    """The verdicts under the other carries, where they differ."""
+    """Verdicts under the other carries, where they differ."""
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     degenerate_loci: list[Locus] | None
-    """Conditions on generic angles under which the verdict changes."""
+    """Conditions on generic angles under which a verdict changes; null if they were not computed."""
     formulas: list[Formula] | None
-    """Formulas of Z and its derivatives, position by position."""
+    """Formulas of Z and its derivatives, position by position; null if not asked for."""
     frame: Frame
-    """Axes of Z in solutions."""
+    """Axes in which Z is printed in solutions."""
     gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
+    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
     certainty: Certainty
-    """How certain all this is."""
+    """Certainty of the verdicts: method, error bound, primes and seed."""
     notes: list[str]
-    """What could not be said, and why."""
+    """Limitations of this answer, each with its reason."""
 
 
 class NumberOfSolutionsCounted(Record):
-    """So many, complex ones counted: by elimination at a random point modulo each prime."""
+    """Number of solutions, complex ones included, by elimination at a random point modulo each prime."""
 
     __slots__ = ()
 
@@ -534,183 +535,186 @@ class NumberOfSolutionsCounted(Record):
 
 
 class NumberOfSolutionsUndecided(Record):
-    """Locally unique. Why the number of solutions is not decided."""
+    """Locally unique. The text is the reason why the number of solutions is not decided."""
 
     __slots__ = ()
 
     undecided: str
 
 NumberOfSolutions = Union[Literal["one_by_expression"], NumberOfSolutionsCounted, NumberOfSolutionsUndecided]
-"""How many values an unknown takes among all points with the same outputs. one_by_expression: One: its solving expression rests on
-outputs, inputs, constants and unknowns that have one solution.
+"""Number of values of an unknown among all points with the same outputs. one_by_expression: Single value: the solving expression depends
+on outputs, inputs, constants and unknowns that have one solution.
 """
 
 
 class SystemQuantity(Record):
-    """One unknown."""
+    """Verdict on one unknown of a system."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, as in the model."""
     kind: str
-    """state, parameter or input."""
+    """Kind of the unknown: state, parameter or input."""
     unit: str
-    """Its unit, as the file says."""
+    """Unit of the unknown, as in the model file."""
     description: str
-    """What it is, as the file says."""
+    """Description of the unknown, as in the model file."""
     status: Status
-    """The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
-    seen up to the bound on the order.
+    """Verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
+    resolved up to the bound on the order.
     """
     degree: int | None
-    """The smallest order of derivatives that solves it."""
+    """Observable degree: the smallest order of derivatives that determines the unknown; null if it is not observable."""
     partners: list[str]
-    """Unknowns that it cannot be told from: those that share with it a direction that changes no output and that holds no shorter one."""
+    """Unknowns indistinguishable from it: those in a common unobservable direction of minimal support."""
     solution: str | None
-    """What it is in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher degree, where it
-    enters linearly; verified in both fields.
+    """Expression of the unknown in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher
+    degree, in which it is linear; verified in both fields. Null if none was found.
     """
     number_of_solutions: NumberOfSolutions | None
-    """How many solutions it has; null where it is not observable, or where they were not sought."""
+    """Number of solutions for the unknown; null if it is not observable, or if solutions were not sought."""
 
 
 class SystemCombination(Record):
-    """A combination."""
+    """Combination of unknowns, with its verdict."""
 
     __slots__ = ()
 
     expression: str
-    """As written, or `b*x1`."""
+    """Combination as written in the model, or `b*x1`."""
     degree: int | None
-    """Its degree; null when it is not observable."""
+    """Observable degree of the combination; null if it is not observable."""
 
 
 class SymmetryReport(Record):
-    """A symmetry in words."""
+    """Symmetry of the system, in words."""
 
     __slots__ = ()
 
     words: str
-    """What changes no output, for every `c` (every positive one where something is multiplied or divided): `multiply alpha by c; divide
-    gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
+    """Change that leaves every output as it is, for every `c` (every positive one where something is multiplied or divided): `multiply
+    alpha by c; divide gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
     """
     unknowns: list[str]
-    """The unknowns that it moves."""
+    """Unknowns that the symmetry changes."""
 
 
 class DigitsReport(Record):
-    """How clear ranks were that real numbers of many digits decided, at two random points."""
+    """Margin of rank decisions in real numbers of many digits, at two random points."""
 
     __slots__ = ()
 
     digits: tuple[int, int]
-    """Decimal digits at the first point and at the second."""
+    """Number of decimal digits at the first and at the second point."""
     nonzero_log10: float
-    """Decimal logarithm of the smallest number, relative to its row, that counts as different from zero; it is proven to be."""
+    """Decimal logarithm (dimensionless) of the smallest number, relative to its row, that is proven to differ from zero."""
     zero_log10: float | None
-    """Decimal logarithm of the widest error bound, relative to its row, of a number that counts as zero; null where all were exact."""
+    """Decimal logarithm (dimensionless) of the widest error bound, relative to its row, of a number that counts as zero; null if all
+    were exact.
+    """
 
 
 class SystemAnalysis(Shape):
-    """The answer for one system."""
+    """Analysis of one system: verdicts, combinations, symmetries and remedies."""
 
     schema: str
-    """`obsdeg.system/1`."""
+    """Layout of this answer: `obsdeg.system/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     name: str
-    """The system."""
+    """Name of the system, as in its file."""
     description: str
-    """What it is, as its file says."""
+    """Description of the system, as in its file."""
     equations: list[str]
-    """The equations, `x' = ...` and `y = ...`, as written."""
+    """Equations, `x' = ...` and `y = ...`, as written."""
     rank_profile: list[int]
-    """`dim V_0, dim V_1, ...`."""
+    """Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order."""
     rank: int
-    """The final rank."""
+    """Rank of all output derivatives up to the last order."""
     unknowns: int
-    """The number of unknowns."""
+    """Number of unknowns that are judged."""
     quantities: list[SystemQuantity]
-    """The verdicts in model order."""
+    """Verdicts on the unknowns, in model order."""
     known: list[str]
-    """States whose start is known."""
+    """States with a known initial value."""
     time: str | None
-    """Time at which the first segment was judged, where the equations hold it: a number, or `generic` (almost every time, as in all
-    later segments); null where they do not.
+    """Time at which the first segment was judged: a number, or `generic` (almost every time, as in all later segments); null if the
+    equations do not depend on time.
     """
     constraints: list[str]
     """Equations that hold at the start; their differentials count as rows of order 0."""
     combinations: list[SystemCombination]
-    """Combinations that were asked for."""
+    """Combinations of unknowns that the model asks for."""
     unobservable_directions: int
-    """The number of independent directions that no output sees."""
+    """Number of independent directions that change no output."""
     symmetries: list[SymmetryReport]
-    """Scalings, translations and polynomials among them, exactly."""
+    """Scalings, translations and polynomials among the unobservable directions, exactly."""
     other_directions: list[list[str]]
-    """What is moved by each direction that is none of these: at a generic point, no polynomial that was found describes it."""
+    """Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was found describes it."""
     invariants: list[SystemCombination]
-    """Combinations of unobservable unknowns that are observable."""
+    """Observable combinations of unobservable unknowns."""
     last_order: int
-    """The highest order that was looked at."""
+    """Highest order of derivatives that was examined."""
     bound: int
-    """Orders end at this bound."""
+    """Order of derivatives at which the search ends at the latest."""
     closed: bool
-    """The end is proven: an order that adds nothing is the last. Otherwise what is not observable rests on the bound."""
+    """True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts hold up to the bound on the
+    order only.
+    """
     rests_on_bound: bool
-    """Whether a verdict rests on the bound."""
+    """True if a verdict holds up to the bound on the order only."""
     branches: list[str]
-    """Functions of unknowns that have branches (abs, sign, roots, asin, acos): the verdicts are those of the branch that points near one
-    lie in, or where the model is not defined there, of the first that was found.
+    """Functions of unknowns that have branches (abs, sign, roots, asin, acos). The verdicts hold on the branch of points near one, or
+    where the model is undefined there, on the first branch that was found.
     """
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     note: str | None
-    """Why there are no solving expressions, if there are none."""
+    """Reason why there are no solving expressions; null if there are."""
     counting_order: int | None
-    """The order of the derivatives with which solutions were counted by elimination; null when none were."""
+    """Order of the derivatives with which solutions were counted by elimination; null if none were."""
     independent_functions: int | None
-    """Functions that take part whose values are proven to be independent of each other at a generic point (Ax 1971,
-    doi:10.2307/1970774), so that random values in prime fields stand for them; 0 for a rational model, null where functions were
-    evaluated truly, in real numbers.
+    """Number of functions whose values are proven to be independent of each other at a generic point (Ax 1971, doi:10.2307/1970774), so
+    that random values in prime fields replace them; 0 for a rational model, null if functions were evaluated in real numbers.
     """
     primes: tuple[str, str] | None
-    """Of a model judged in prime fields: the two random primes, as text (61 bits)."""
+    """Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers."""
     error_bound: float | None
-    """Of a model judged in prime fields: bound on the probability that a verdict is wrong."""
+    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None
-    """Of a model judged in real numbers: how clear its ranks were."""
+    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
     seed: int
     """Seed of all random choices."""
 
 
 class AccelerometerBias(Record):
-    """The bias instability of the accelerometers: a first-order Gauss-Markov process of each, which goes on in platform axes."""
+    """Bias instability of the accelerometers: a first-order Gauss-Markov process of each, which continues in platform axes."""
 
     __slots__ = ()
 
     instability_ug: float
-    """The coefficient B in ug; sigma of the process is 1.076 B."""
+    """Coefficient B of the bias instability, in ug; sigma of the process is 1.076 B."""
     correlation_time_s: float
-    """Its correlation time in s."""
+    """Correlation time of the process, in s."""
 
 PerGyro = tuple[float, float, float]
-"""A noise of each gyro: X, Y, Z; zero for none."""
+"""Noise of the X, Y and Z gyro, in the unit of the key; zero for none."""
 
 
 class GyroNoise(Record):
-    """The datasheet of the gyros X, Y, Z."""
+    """Noise of the gyros X, Y, Z by their datasheet."""
 
     __slots__ = ()
 
     angle_random_walk_deg_sqrt_h: PerGyro
-    """Angle random walk in deg/sqrt(h)."""
+    """Angle random walk of each gyro, in deg/sqrt(h)."""
     rate_random_walk_dph_sqrt_h: PerGyro
-    """Rate random walk in deg/h/sqrt(h)."""
+    """Rate random walk of each gyro, in deg/h/sqrt(h)."""
     bias_instability_dph: PerGyro
-    """Bias instability in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B."""
+    """Bias instability of each gyro, in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B."""
     correlation_time_s: float
-    """Correlation time in s of the Gauss-Markov process that stands for it."""
+    """Correlation time, in s, of the Gauss-Markov process that represents the bias instability."""
 
 
 class MeasurementReport(Record):
@@ -719,27 +723,27 @@ class MeasurementReport(Record):
     __slots__ = ()
 
     latitude_deg: float
-    """Latitude in degrees."""
+    """Latitude of the scheme, in degrees."""
     latitude_by_default: bool
-    """Whether the latitude was chosen by the program."""
+    """True if the program chose the latitude."""
     dwell_s: float
-    """Dwell of positions that do not say theirs, in s."""
+    """Dwell, in s, of positions that do not state their own."""
     step_s: float
     """Largest step between samples in s; a position is divided into equal steps."""
     accelerometer_noise_g: float
-    """Noise of the observation per sample and axis in g."""
+    """Noise of the observation per sample and axis, in g."""
     accelerometer_bias: AccelerometerBias | None
     """Bias instability of the accelerometers; left out where there is none."""
     azimuth_noise_deg: float | None
-    """Noise of the azimuth per sample in deg; null where it is not measured."""
+    """Noise of the azimuth per sample, in deg; null if it is not measured."""
     slew_rate_deg_s: float | None
-    """Rate of slews in deg/s where a position does not say its own; null: instantaneous."""
+    """Rate of slews in deg/s unless a position states its own; null for instantaneous slews."""
     drift_noise: str | None
-    """Random drift that is stated, with its unit; null: none counts."""
+    """Random drift that is stated, with its unit; null if none is."""
     gyro_noise: GyroNoise | None
-    """Datasheet of the gyros; left out where they have no noise of their own."""
+    """Noise of the gyros by their datasheet; left out where they have no noise of their own."""
     prior: str | None
-    """Priors that are stated, as 1 sigma in the units of the unknowns; null: none counts."""
+    """Priors that are stated, as 1 sigma in the units of the unknowns; null if none are."""
     by_default: list[str]
     """Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg.
@@ -747,586 +751,587 @@ class MeasurementReport(Record):
 
 
 class Slew(Record):
-    """A turn to a position."""
+    """Slew of finite duration to a position."""
 
     __slots__ = ()
 
     to: str
-    """The position."""
+    """Name of the position that the slew leads to."""
     turn: Turn
-    """How it turns."""
+    """Turn of the slew: its axis and angle."""
 
 
 class ComparisonQuantity(Record):
-    """One unknown of a scheme."""
+    """Verdict, sigma and requirement of one unknown of a scheme."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, as in the scheme's model."""
     unit: str
-    """Unit of sigma."""
+    """Unit of sigma, of the requirement and of `sigma_extended`."""
     status: Status
-    """The exact verdict."""
+    """Verdict: observable, inseparable or not excited."""
     degree: int | None
-    """The observable degree."""
+    """Observable degree; null if the unknown is not observable."""
     accuracy_order: int | None
-    """The accuracy order."""
+    """Accuracy order; null if no dwell makes the unknown observable, or if none were computed."""
     sigma: float | None
-    """Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when neither samples nor stated
-    priors bound it.
+    """Predicted standard deviation at the end of the scheme under the stated conditions, in the unit of `unit`; null if neither samples
+    nor stated priors bound it.
     """
     by_prior: bool
-    """True if the samples do not determine it, so that sigma rests on stated priors alone."""
+    """True if the samples do not determine the unknown, so that sigma depends on stated priors alone."""
     sigma_extended: float | None
-    """Standard deviation of a coefficient, where the small-angle model does not hold for the drifts that are stated, by a filter with
-    full attitudes at the end, with the prior.
+    """Standard deviation of a coefficient at the end by a filter with full attitudes, with the prior, in the unit of `unit`; null if the
+    small-angle model holds for the stated drifts, or none are stated.
     """
     requirement: float | None
-    """The largest sigma allowed."""
+    """Largest sigma allowed, in the unit of `unit`; null if none is required."""
     margin: float | None
-    """Requirement over sigma: above 1 is met."""
+    """Requirement over sigma, dimensionless: met from 1; null if there is no requirement or no sigma."""
     excitation: list[float]
-    """Per position: how it moves the drift there, as a product of components of g (1 for D_F); its root mean square over the arc of a
-    rotating segment; empty for psi.
+    """Factors by which the unknown enters the drift, position by position, dimensionless: products of components of g (1 for D_F), root
+    mean square over the arc of a rotating segment. Empty for psi.
     """
     carried_by: list[str]
-    """Positions without which it is not observable."""
+    """Positions without which the unknown is not observable."""
 
 
 class Worst(Record):
-    """The largest sigma of a drift coefficient."""
+    """Largest sigma of a drift coefficient."""
 
     __slots__ = ()
 
     name: str
-    """The coefficient."""
+    """Name of the coefficient with this sigma."""
     sigma_dph: float
-    """Its sigma in deg/h (per g, per g^2)."""
+    """Standard deviation of the coefficient, in deg/h (per g, per g^2)."""
 
 Basis = Literal["predicted", "predicted_with_prior", "run", "record"]
-"""Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the prediction alone; a run is one
-example of it, a record its confirmation. predicted: The information of all samples with the noise and the random drift that are
-stated, psi at the end of the scheme (under reset carry at the end of each position); nothing is known beforehand.
-predicted_with_prior: The same with the priors that are stated. run: The filter at the end of a simulated run, with its prior and its
-random drift, whether they are stated or chosen by the program. record: The estimates from a record.
+"""Source of the sigmas that are compared with requirements. The prediction alone decides whether a scheme meets its requirements; a run
+is an example, a record its confirmation. predicted: Information of all samples with the stated noise and random drift, psi at the end
+of the scheme (under reset carry at the end of each position); no prior knowledge. predicted_with_prior: Information of all samples as
+in `predicted`, with the stated priors. run: Filter at the end of a simulated run, with its prior and its random drift, whether they
+are stated or chosen by the program. record: Estimates of a calibration from a record.
 """
 
 
 class Margin(Record):
-    """A margin and whose it is."""
+    """Margin of a requirement, with its unknown."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown with this margin."""
     margin: float
-    """Required over found sigma: at least 1 is met."""
+    """Required over found sigma, dimensionless: met from 1."""
 
 Miss = Literal["too_large", "not_observable", "rests_on_prior", "inconsistent", "no_number"]
-"""Why a requirement is missed. too_large: Sigma is above it. not_observable: The unknown is not determined by the outputs.
-rests_on_prior: Sigma is hardly below the prior's: it says what the prior says. inconsistent: The filter is wrong about it: its error
-is beyond four sigma. no_number: Sigma or the estimate is no number.
+"""Reason why a requirement is missed. too_large: Sigma above the requirement. not_observable: Unknown that the outputs do not determine.
+rests_on_prior: Sigma hardly below the prior's: it repeats the prior. inconsistent: Error beyond four sigma: the filter is wrong.
+no_number: Sigma or estimate that is not a finite number.
 """
 
 
 class Missed(Record):
-    """An unknown that misses its requirement."""
+    """Unknown that misses its requirement."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown that misses."""
     why: Miss
-    """Why."""
+    """Reason why the requirement is missed."""
 
 
 class Requirements(Record):
-    """What became of all requirements."""
+    """Outcome of all requirements: those met, those missed and the smallest margin."""
 
     __slots__ = ()
 
     basis: Basis
-    """Under what this is decided."""
+    """Source of the sigmas that decide."""
     stated: int
-    """Unknowns with a requirement."""
+    """Number of unknowns with a requirement."""
     met: int
-    """How many of them meet it."""
+    """Number of unknowns that meet their requirement."""
     worst: Margin | None
-    """The smallest margin of those whose sigma counts."""
+    """Smallest margin among the sigmas that count; null if there is none."""
     missed: list[Missed]
-    """Those that miss theirs, in model order."""
+    """Unknowns that miss their requirement, in model order."""
     on_prior: list[str]
-    """Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated priors alone."""
+    """Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated priors alone."""
 
 
 class OtherCarry(Record):
-    """A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has,
-    are left out.
+    """Scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has, are
+    left out.
     """
 
     __slots__ = ()
 
     carry: Carry
-    """Carry: what of psi goes on between positions."""
+    """Carry: quantity that continues from one position to the next."""
     worst: Worst | None
-    """The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable, or where nothing was
-    judged.
-    """
+    """Largest sigma of a drift coefficient in deg/h (per g); null if a coefficient is not observable, or if nothing was judged."""
     without_slews: bool
     """True if the slews of the scheme are left out there, since only inertial carry has slews."""
     requirements: Requirements | None
-    """Outcome of the requirements; null where nothing was judged."""
+    """Outcome of the requirements; null if nothing was judged."""
     not_judged: str | None
-    """The reason why nothing was judged; left out where it was."""
+    """Reason why nothing was judged; left out where something was."""
 
 
 class Validity(Record):
-    """Whether the small-angle model holds for the drifts of a run."""
+    """Validity of the small-angle model at the drifts of a run."""
 
     __slots__ = ()
 
     largest_psi_deg: float
-    """Largest `|psi|`, in deg."""
+    """Largest platform error `|psi|`, in deg."""
     neglected_g: float
-    """Largest `|psi|^2/2`, in g: what the observation model (6) leaves out."""
+    """Largest `|psi|^2/2`, in g: the term that the observation model (6) neglects."""
     accelerometer_noise_g: float
-    """Noise of the observation, in g."""
+    """Noise of the observation per sample, in g."""
     neglected_dph: float
-    """Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: what the drift model (3) leaves out."""
+    """Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: the term that the drift model (3) neglects."""
     smallest_requirement_dph: float | None
-    """The smallest sigma required of a drift coefficient, in deg/h (per g)."""
+    """Smallest sigma required of a drift coefficient, in deg/h (per g); null if none is required."""
     holds: bool
-    """Whether both are small."""
+    """True if `neglected_g` is at most the noise and `neglected_dph` at most the smallest requirement."""
 
 
 class DropOne(Record):
-    """A scheme without one of its positions."""
+    """Scheme without one of its positions."""
 
     __slots__ = ()
 
     position: str
-    """The position left out."""
+    """Name of the position that is left out."""
     lost: list[str]
-    """Unknowns that are not observable without it."""
+    """Unknowns that are not observable without the position."""
     worst: Worst | None
-    """The worst sigma without it."""
+    """Worst sigma without the position; null if a coefficient is not observable."""
     requirements: Requirements
-    """Outcome of the requirements without it."""
+    """Outcome of the requirements without the position."""
 
 
 class Sensitivity(Record):
-    """The worst sigma under another condition."""
+    """Worst sigma of the scheme under another condition."""
 
     __slots__ = ()
 
     condition: str
-    """The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` where the scheme has slews, which only
-    inertial carry knows.
+    """Condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` for a scheme with slews, which only inertial
+    carry has.
     """
     rank: tuple[int, int]
-    """The rank with dwell and the number of unknowns there."""
+    """Rank with dwell, then the number of unknowns, under the condition."""
     worst: Worst | None
-    """The worst sigma there."""
+    """Worst sigma under the condition; null if a coefficient is not observable."""
     worst_determined: Worst | None
-    """The worst sigma there of the coefficients that the scheme itself makes observable; null when one is not."""
+    """Worst sigma, under the condition, of the coefficients that are observable in the scheme itself; null if one is not."""
 
 Reached = Literal["at_the_shortest", "within", "still_falls"]
-"""Where a sigma is within 5 % of the least. at_the_shortest: At the shortest dwell looked at already: shorter ones may do as well, or
-better. within: Within the dwells looked at. still_falls: Beyond a quarter of the longest dwell: sigma still falls.
+"""Range of dwells in which a sigma comes within 5 % of the least. at_the_shortest: Shortest dwell examined: shorter ones may give the
+same or a smaller sigma. within: Dwell between the shortest and a quarter of the longest examined. still_falls: Dwell beyond a quarter
+of the longest examined: sigma still falls.
 """
 
 
 class CoefficientFloor(Record):
-    """The floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of the run."""
+    """Noise floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of the run."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the coefficient, as in the model."""
     unit: str
-    """The unit of its sigmas."""
+    """Unit of the sigmas of the coefficient."""
     sigma: float | None
-    """Sigma with the dwells of the scheme, without prior; null when samples do not determine it."""
+    """Sigma with the dwells of the scheme, without prior, in the unit of `unit`; null if samples do not determine it."""
     least_sigma: float | None
-    """The least sigma over all dwells looked at; null when samples do not determine it."""
+    """Least sigma over all dwells examined, in the unit of `unit`; null if samples do not determine it."""
     reached: Reached | None
-    """Where it is reached; null when samples do not determine it."""
+    """Range of dwells in which the least sigma is reached; null if samples do not determine it."""
     dwell_s: float | None
-    """The shortest dwell (mean of the positions) in s at which sigma is within 5 % of the least, where this lies within the dwells
-    looked at.
+    """Shortest dwell, in s (mean of the positions), at which sigma is within 5 % of the least; null unless it lies within the dwells
+    examined.
     """
 
 
 class NoiseFloor(Record):
-    """How well coefficients can be known under random drift, however long the dwells."""
+    """Noise floor: the least sigmas of coefficients under random drift, however long the dwells."""
 
     __slots__ = ()
 
     drift_noise_deg_sqrt_h: float
-    """Density of the random drift besides what the gyros have, in deg/sqrt(h)."""
+    """Density of the random drift besides the noise of the gyros, in deg/sqrt(h)."""
     gyro_noise: GyroNoise
-    """The gyros."""
+    """Noise of the gyros by their datasheet."""
     dwells_s: tuple[float, float]
-    """The shortest and the longest dwell looked at, in s: the mean of the positions, all in proportion."""
+    """Shortest and longest dwell that were examined, in s: the mean of the positions, all in proportion."""
     coefficients: list[CoefficientFloor]
-    """Per coefficient."""
+    """Noise floor of each coefficient, in model order."""
 
 
 class Review(Record):
-    """One scheme."""
+    """Scheme of a comparison, with its predicted sigmas."""
 
     __slots__ = ()
 
     name: str
-    """Its name: the file's."""
+    """Name of the scheme: that of its file."""
     carry: Carry
-    """What is carried between positions."""
+    """Carry: quantity that continues from one position to the next."""
     conditions: MeasurementReport
-    """What its sigmas rest on."""
+    """Conditions of the predicted sigmas."""
     positions: list[str]
-    """Its positions."""
+    """Names of the positions, in order of time."""
     slews: list[Slew]
-    """The turns between them that take time, with the position that each leads to."""
+    """Slews of finite duration, each with the position that it leads to."""
     total_s: float
-    """Total time with slews, in s."""
+    """Total time of the scheme with slews, in s."""
     rank: tuple[int, int]
-    """The rank with dwell (by derivatives where accuracy orders are not computed), and the number of unknowns."""
+    """Rank with dwell (by derivatives if accuracy orders are not computed), then the number of unknowns."""
     quantities: list[ComparisonQuantity]
-    """Per unknown."""
+    """Verdict, sigma and requirement of each unknown."""
     worst: Worst | None
-    """The largest sigma of a coefficient; null when one is not observable."""
+    """Largest sigma of a coefficient; null if one is not observable."""
     meets_requirements: bool
     """True if requirements are stated and every one is met."""
     requirements: Requirements
     """Outcome of the requirements by the predicted sigmas."""
     other_carries: list[OtherCarry]
-    """The same scheme under the other carries."""
+    """Outcome of the same scheme under the other carries."""
     has_accuracy_orders: bool
-    """Whether accuracy orders are computed: none are for rotating segments."""
+    """True if accuracy orders are computed. They are not for rotating segments."""
     validity: Validity | None
     """Validity of the small-angle model at the drifts that are stated; null where none are (`values`), or for very many steps."""
     drop_one: list[DropOne]
-    """What happens without each of the positions."""
+    """Schemes with one position left out, for each position."""
     sensitivity: list[Sensitivity]
-    """The worst sigma under other conditions."""
+    """Worst sigmas under other conditions."""
     noise_floor: NoiseFloor | None
-    """How well coefficients can be known under random drift, however long the dwells; left out where the gyros have no noise of their
-    own.
-    """
+    """Noise floor: the least sigmas under random drift, however long the dwells; left out where the gyros have no noise of their own."""
     gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
+    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
 
 
 class Comparison(Shape):
-    """Several schemes, judged alike."""
+    """Comparison of several schemes under the same method."""
 
     schema: str
-    """`obsdeg.comparison/2`."""
+    """Layout of this answer: `obsdeg.comparison/2`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     schemes: list[Review]
-    """The schemes in the order given."""
+    """Schemes of the comparison, in the order given."""
     differ: list[str]
-    """What differs between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step."""
+    """Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step."""
     seed: int
     """Seed of all random choices."""
 
 
 class Minimum(Record):
-    """The fewest positions that make every required coefficient observable."""
+    """Smallest number of positions that makes every required coefficient observable."""
 
     __slots__ = ()
 
     positions: int | None
-    """Their number; null when all candidates together do not do, or when the sets are too many to be examined."""
+    """Number of positions; null if all candidates together are not enough, or if the sets are too many to be examined."""
     witness: list[str]
-    """A set that does."""
+    """Smallest candidate set that makes all required coefficients observable; empty if none was found."""
     counting_bound: int
-    """No fewer can do: the required coefficients over the rows of a position, rounded up (0 where torquer errors act in every turn)."""
+    """Number of positions below which no set is enough: the required coefficients over the rows of a position, rounded up (0 where
+    torquer errors act in every turn).
+    """
     rows_per_position: int
-    """The most independent rows on the unknowns that a candidate adds, under reset carry without those that its psi takes."""
+    """Largest number of independent rows on the unknowns that a candidate adds, under reset carry without those that its psi takes."""
     none_of: list[tuple[int, int]]
-    """`[size, number of sets]`: none of these does, by exhaustion."""
+    """Sets excluded by exhaustion: `[size, number of sets]`, none of which is enough."""
     never: list[str]
     """Coefficients that all candidates together leave unobservable."""
     proven: bool
-    """Whether `positions` is the fewest, or `never` is never, by more than rounding and chance: nothing smaller was left out, and the
+    """True if `positions` is proven minimal, or the coefficients in `never` proven unobservable: no smaller set was left out, and the
     bound on the probability of an error is below 1e-12.
     """
 
 
 class TiesReport(Record):
-    """Sequences that are as good as the best."""
+    """Number of sequences that are as good as the best."""
 
     __slots__ = ()
 
     sequences: int
-    """How many, the best and all their images under turns of the platform axes among them."""
+    """Number of sequences as good as the best, with the best and all images under turns of the platform axes."""
     within: float
-    """Two tie when their worst degrees are equal and their criteria, as double precision gives them, differ by less than this part."""
+    """Largest relative difference of two criteria, in double precision and dimensionless, that counts as equal; their worst degrees must
+    be equal too.
+    """
 
 
 class Weight(Record):
-    """A candidate and its weight."""
+    """Candidate attitude with its weight."""
 
     __slots__ = ()
 
     candidate: str
-    """The candidate."""
+    """Candidate attitude: its name, or its Euler angles in degrees."""
     weight: float
-    """Its part of all positions, before it is divided by the sum of all."""
+    """Weight of the candidate: its fraction of all positions, dimensionless, as it is before the division by the sum of all."""
 
 
 class Finer(Record):
-    """A scheme that rounding leaves out."""
+    """Better scheme that rounding of the angles excludes."""
 
     __slots__ = ()
 
     value: float
-    """Its criterion."""
+    """Criterion of the scheme, in the unit of `unit`."""
     angles: list[str]
-    """Euler angles of its positions in degrees."""
+    """Euler angles of its positions, in degrees."""
 
 
 class Rounded(Record):
-    """Free attitudes with rounded angles: every scheme is evaluated at the angles as they are rounded."""
+    """Rounding of the angles of free attitudes: every scheme is evaluated at the rounded angles."""
 
     __slots__ = ()
 
     step_deg: float
-    """Angles are multiples of so many degrees, but for the cardinal attitudes, which may be chosen too, and for what gimbal limits ask
-    for: the twin (alpha+180, 180-beta, gamma+180) of such angles, and at beta = +-90 another alpha.
+    """Step of the angles, in degrees. Exceptions: the cardinal attitudes, which may be chosen too, and angles that gimbal limits
+    require: the twin (alpha+180, 180-beta, gamma+180) of rounded angles, and at beta = +-90 another alpha.
     """
     finer: Finer | None
-    """A better scheme, by the same search with angles in hundredths of a degree; null where none was found."""
+    """Better scheme, by the same search with angles in hundredths of a degree; null if none was found."""
 
 
 class EverywhereReport(Record):
-    """How good the best scheme of any attitudes can be, whatever the candidates and the gimbals are; requirements on psi left out.
-    Attitudes are taken up where they add most; between the points of a net of 3 degrees what they add is bounded as a trigonometric
-    polynomial, and rounding with it, so that the bound holds for all.
+    """Bound on the criterion of the best scheme of any attitudes, whatever the candidates and the gimbals are, without requirements on
+    psi. Attitudes are added where they contribute most. Between the points of a net of 3 degrees their contribution is bounded as a
+    trigonometric polynomial, and rounding with it, so that the bound holds for all.
     """
 
     __slots__ = ()
 
     best_possible: float
-    """No scheme of so many attitudes, equal dwells, has a smaller criterion."""
+    """Lower bound on the criterion of schemes of the same number of any attitudes, equal dwells, in the unit of `unit`."""
     within_percent: float
-    """The criterion of the first scheme that is not refined is at most so much above, in percent of the bound."""
+    """Largest excess of the first unrefined scheme's criterion over the bound, in percent of the bound."""
     rounding: float | None
-    """What rounding may hide of that criterion, as a part of it: as above, that of the attitudes of the scheme with it."""
+    """Relative rounding tolerance of that criterion, dimensionless, with that of the attitudes of the scheme; null if it is unknown."""
     attained: float
-    """The criterion that the weights would have as a scheme: all of them, with angles to hundredths of a degree and weights as they are
-    rounded here.
+    """Criterion that the weights would have as a scheme, in the unit of `unit`: all of them, with angles to hundredths of a degree and
+    weights as they are rounded here.
     """
     weights: list[Weight]
-    """The ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others
-    above -180 and up to 180. Weights are parts of the sum of all, rounded to two digits, or to as many as lose no more than a
+    """Ten heaviest attitudes, each once, with their weights, heaviest first: Euler angles in degrees, beta up to 90, the others above
+    -180 and up to 180. Weights are fractions of the sum of all, rounded to two digits, or to as many as lose no more than a
     thousandth of the variance; those below 1e-7 are left out.
     """
     lighter: int
     """Number of lighter attitudes, which are not listed."""
     lighter_weight: float
-    """Sum of the weights of the lighter attitudes."""
+    """Sum of the weights of the lighter attitudes, dimensionless, 0 to 1."""
     rounded: Rounded | None
-    """Where attitudes were free: how their angles were rounded, and what that costs; null where candidates were given."""
+    """Rounding of the angles of free attitudes, and its cost; null if candidates were given."""
 
 
 class Certificate(Record):
-    """How good the best scheme of so many of these candidates can be: a bound from the optimal weights of the candidates (approximate
-    design theory). It holds for schemes of any worst degree, within the constraints or not, and allows for the rounding in its
-    evaluation; the information of each position is as double precision gives it, the same as in the search.
+    """Bound on the criterion of the best scheme of the same number of these candidates, from the optimal weights of the candidates
+    (approximate design theory). It holds for schemes of any worst degree, within the constraints or not, and allows for the rounding
+    in its evaluation; the information of each position is in double precision, the same as in the search.
     """
 
     __slots__ = ()
 
     best_possible: float
-    """No scheme of so many of these candidates, equal dwells, has a smaller criterion."""
+    """Lower bound on the criterion of schemes of the same number of these candidates, equal dwells, in the unit of `unit`."""
     within_percent: float
-    """The criterion of the first scheme that is not refined is at most so much above, in percent of the bound."""
+    """Largest excess of the first unrefined scheme's criterion over the bound, in percent of the bound."""
     efficiency: float
-    """The square of the bound over that criterion: how much of the information that the best could have it has at least (for D the
-    D-efficiency).
+    """Efficiency, dimensionless, 0 to 1: square of the bound over that criterion, the least fraction of the best possible information
+    (for D the D-efficiency).
     """
     rounding: float | None
-    """What rounding may hide of that criterion, as a part of it: it is added before the criterion is held against the bound. By the
-    residual of the inverse; null where what does not count is not determined, so that nothing is known of it and nothing added.
+    """Relative rounding tolerance of that criterion, dimensionless, by the residual of the inverse; it is added before the criterion is
+    compared with the bound. Null if the remaining unknowns are not determined: then it is unknown and nothing is added.
     """
     attained: float
-    """The criterion that the weights would have as a scheme, exactly as they are listed; the bound cannot be larger."""
+    """Criterion that the weights would have as a scheme, exactly as they are listed, in the unit of `unit`; the bound cannot be larger."""
     weights: list[Weight]
-    """How the weights divide the time among the candidates: parts of their sum, rounded to two digits, or to as many as lose no more
+    """Weights that divide the time among the candidates: fractions of their sum, rounded to two digits, or to as many as lose no more
     than a thousandth of the variance; those below 1e-7 are left out.
     """
     everywhere: EverywhereReport | None
-    """The same for all attitudes; null where it was not asked for."""
+    """Bound for any attitudes instead of the candidates; null if it was not asked for."""
     front: list[tuple[float, float]]
-    """`[total time in s, criterion]`: no scheme of these candidates, in equal dwells and one of the numbers of positions asked for, is
-    below at this time.
+    """Lower bound over time: `[total time in s, criterion in the unit of unit]`. No scheme of these candidates, in equal dwells and one
+    of the numbers of positions asked for, is below at this time.
     """
 
 
 class SearchReport(Record):
-    """What was searched, and how."""
+    """Search for the best schemes, with its conditions and coverage."""
 
     __slots__ = ()
 
     positions: int
-    """The number of positions."""
+    """Number of positions of every scheme."""
     conditions: MeasurementReport
-    """Conditions of every sigma: the information of all samples on psi and all coefficients, with the random drift and the priors that
-    are stated. Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
+    """Conditions of every sigma: the information of all samples on psi and all coefficients, with the stated random drift and priors.
+    Every position has the dwell, slews are about the eigenaxis, Z is not used meanwhile.
     """
     drift_noise: str | None
-    """Random drift that is stated: the search leaves it out, and the figures of all schemes that are listed count it; null: none."""
+    """Random drift that is stated: the search leaves it out, and the figures of all listed schemes include it; null for none."""
     prior: str | None
-    """Knowledge beforehand that sigmas and the bound count beside the samples: the priors that are stated; null: none. What is
-    observable is by the samples alone.
+    """Priors that are stated, which sigmas and the bound include beside the samples; null for none. The samples alone decide
+    observability.
     """
     criterion: str
-    """What makes a scheme better: worst, A, D, E or margin."""
+    """Criterion that orders schemes: worst, A, D, E or margin."""
     unit: str | None
-    """Its unit: deg/h (per g), ug (per g), ppm or arcsec; null for margin, and for D of coefficients in several units, each in its own."""
+    """Unit of the criterion: deg/h (per g), ug (per g), ppm or arcsec; null for margin, and for D of coefficients in several units, each
+    in its own.
+    """
     examined: int
-    """Sequences whose sigma was computed."""
+    """Number of sequences whose sigma was computed."""
     lost: int
-    """Of these, sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not determine every
-    required coefficient as far as double precision tells: they count as worse than all others.
+    """Number of examined sequences that the exact verdict, of repositioning at once, calls observable, but whose samples do not
+    determine every required coefficient in double precision. They rank below all others.
     """
     sequences: int | None
-    """Number of sequences, up to turns of the platform axes, that a search of all would go through where not all were searched (`within`
-    0); null where all were, and where they are too many to be held or counted.
+    """Number of sequences, up to turns of the platform axes, in an exhaustive search if the search was not exhaustive (`within` 0); null
+    if it was, and if they are too many to be held or counted.
     """
     excluded: int
-    """Sequences, observable or not, that were not examined because a bound leaves no doubt: as far as double precision tells their
-    criterion is larger than that of all listed.
+    """Number of sequences, observable or not, that a bound excluded from examination: in double precision their criterion is larger than
+    that of all listed.
     """
     proven: bool
-    """Whether no sequence of candidates within the constraints is better than the first, by exhaustion, or because a bound excludes the
-    rest: none has a smaller worst degree, or the same and a smaller criterion.
+    """True if no sequence of candidates within the constraints is better than the first, by exhaustion or by a bound: none has a smaller
+    worst degree, or the same and a smaller criterion.
     """
     ties: TiesReport | None
-    """How many sequences are as good as the first; null where not all were searched."""
+    """Number of sequences as good as the first; null if the search was not exhaustive."""
     order_matters: bool
-    """Whether orders of the same positions count as different schemes."""
+    """True if orders of the same positions count as different schemes."""
     interrupted: bool
-    """Whether the search was interrupted; if the first is proven nevertheless, before the front was complete."""
+    """True if the search was interrupted; if the first is proven nevertheless, before the front was complete."""
     degree_floor: int | None
-    """The smallest worst degree that all candidates together allow; null where torquer errors act on the way, so that sets have no
-    degree.
-    """
+    """Smallest worst degree that all candidates together allow; null if torquer errors act during slews, so that sets have no degree."""
     constraints: list[str]
-    """The constraints in words."""
+    """Constraints of the search, in words."""
     certificate: Certificate | None
-    """How good the best can be; null where no such bound is known: under platform and inertial carry, and where the noise of Z is
-    correlated, information is no sum over positions.
+    """Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial carry, and where the noise
+    of Z is correlated, information is no sum over positions.
     """
 
 
 class HalfTurn(Record):
-    """Half a turn to a position."""
+    """Half turn to a position, with its direction."""
 
     __slots__ = ()
 
     to: int
-    """Which position it leads to, counted from 1."""
+    """Index, from 1, of the position that the half turn leads to."""
     about: tuple[float, float, float]
-    """The axis, about which it is right-handed: a unit vector (North, Up, East)."""
+    """Axis of the half turn, right-handed: a unit vector (North, Up, East), dimensionless."""
 
 
 class Found(Record):
-    """A scheme that was found."""
+    """Scheme that the search found, with its figures."""
 
     __slots__ = ()
 
     positions: list[str]
-    """Its positions in order."""
+    """Candidates of the scheme, in order of time."""
     image_of: int | None
-    """Which of those listed before it, counted from 1, a turn of the platform axes turns into it (coefficients renamed): the same scheme
-    in other axes; null: none.
+    """Index, from 1, of the scheme listed before that a turn of the platform axes turns into this one (coefficients renamed): the same
+    scheme in other axes; null for none.
     """
     angles: list[str]
-    """Their gimbal angles alpha,beta,gamma in degrees: within the gimbal limits, each with the shortest gimbal way from the position
-    before (without limits as the candidates have them, in (-180, 180]).
+    """Gimbal angles alpha,beta,gamma of the positions, in degrees: within the gimbal limits, each with the shortest gimbal path from the
+    position before (without limits as the candidates have them, in (-180, 180]).
     """
     half_turns: list[HalfTurn]
-    """The half turns between them, each with its direction: the other one is another scheme."""
+    """Half turns between the positions, each with its direction; the other direction makes another scheme."""
     refined: bool
-    """Its angles were refined continuously."""
+    """True if its angles were refined continuously."""
     dwell_s: float
-    """Dwell of each position, in s; the mean where they have dwells of their own."""
+    """Dwell of each position, in s; the mean if the dwells differ."""
     dwells_s: list[float]
-    """Where the total time was divided among the positions: the dwell of each, in s; empty where they are equal. Moving a two hundred
-    and fifty-sixth of an equal dwell (at least the time between samples) from one position to another makes none of them better.
+    """Dwell of each position, in s, if the total time was divided among the positions; empty if the dwells are equal. Moving 1/256 of an
+    equal dwell (at least the time between samples) from one position to another makes none of them better.
     """
     total_s: float
     """Total time with turns, in s."""
     value: float
-    """The criterion: a sigma in its unit, or for margin the largest sigma over its requirement, psi's too where it counts."""
+    """Criterion of the scheme, in the unit of `unit`; for margin the largest sigma over its requirement, psi included where it counts."""
     worst_sigma_dph: float | None
-    """The largest sigma of a required drift coefficient in deg/h (per g): information of all samples, prior if one is stated, no drift
-    noise; null when none is required.
+    """Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if one is stated, no drift
+    noise; null if none is required.
     """
     worst: str | None
-    """The coefficient that has it."""
+    """Coefficient with the largest sigma; null if none is required."""
     requirements: Requirements
-    """What became of the requirements on what must be observable, and on psi (of the start, under reset carry of every position) when
-    that is every coefficient.
+    """Outcome of the requirements on the required coefficients, and on psi (of the start, under reset carry of every position) if every
+    coefficient is required.
     """
     worst_degree: int
-    """Its largest degree of a required coefficient."""
+    """Largest observable degree of a required coefficient."""
     worst_accuracy_order: int | None
-    """Its largest accuracy order of a required coefficient."""
+    """Largest accuracy order of a required coefficient; null if it was not computed."""
     rank: tuple[int, int]
-    """Its exact rank by derivatives, and the number of unknowns."""
+    """Rank by derivatives, exact, then the number of unknowns."""
 
 
 class Design(Shape):
-    """The result of a search."""
+    """Search for the best schemes of candidate attitudes."""
 
     schema: str
-    """`obsdeg.design/2`."""
+    """Layout of this answer: `obsdeg.design/2`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     carry: Carry
-    """What is carried between positions."""
+    """Carry: quantity that continues from one position to the next."""
     latitude_deg: float
-    """Latitude in degrees."""
+    """Latitude of the scheme, in degrees."""
     latitude_by_default: bool
-    """Whether the latitude was chosen by the program."""
+    """True if the program chose the latitude."""
     geometry: Geometry
-    """Axes of the gyros."""
+    """Mounting of the gyros and accelerometers."""
     terms: str
-    """Unknown besides psi; all of them are estimated."""
+    """Terms of the error model that are unknown besides psi; all of them are estimated."""
     candidates: list[str]
-    """The attitudes to choose from."""
+    """Candidate attitudes of the search."""
     beyond_gimbals: list[str]
     """Attitudes that the gimbals do not reach."""
     symmetry: int
-    """Rotations of the platform axes that turn schemes into equally good ones (1: the identity)."""
+    """Number of rotations of the platform axes that turn schemes into equally good ones (1: the identity)."""
     required: list[str]
-    """Coefficients that must be observable, and that the criterion is about."""
+    """Coefficients that must be observable; the criterion is computed from their sigmas."""
     minimum: Minimum
-    """The fewest positions."""
+    """Smallest number of positions that makes every required coefficient observable."""
     search: SearchReport | None
-    """What was searched; null when only the minimum was asked for."""
+    """Search that was done, with its conditions; null when only the minimum was asked for."""
     found: list[Found]
-    """The best schemes, best first."""
+    """Best schemes that were found, best first."""
     front: list[Found]
-    """Schemes that none found beats in both total time and criterion, by total time."""
+    """Schemes that no scheme found beats in both total time and criterion, by total time."""
     not_judged: list[str]
     """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
     other_carries: list[OtherCarry]
-    """The first scheme under the other carries; empty where none was searched."""
+    """Outcome of the first scheme under the other carries; empty if no scheme was searched."""
     gimbals: GimbalReport | None
     """Turns of the first scheme beyond the gimbal limits, and positions of the file of candidates whose angles lie beyond. Left out
     where no limits are stated.
     """
     primes: int
-    """How many independent random 61-bit primes every set is judged by: it counts as observable when one of them says so."""
+    """Number of independent random 61-bit primes by which every set is judged: it counts as observable when one of them says so."""
     error_bound: float
-    """Bound on the probability that an observable set was overlooked, or a degree taken too large; nothing is called proven unless it is
+    """Bound on the probability that an observable set was overlooked, or a degree taken too large. Nothing is called proven unless it is
     below 1e-12.
     """
     seed: int
@@ -1334,202 +1339,204 @@ class Design(Shape):
 
 
 class Walks(Shape):
-    """The fewest positions of a walk."""
+    """Shortest slew sequence that makes every required coefficient observable."""
 
     schema: str
-    """`obsdeg.walks/1`."""
+    """Layout of this answer: `obsdeg.walks/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     terms: str
-    """Unknown besides psi."""
+    """Terms of the error model that are unknown besides psi."""
     candidates: list[str]
-    """The attitudes to choose from."""
+    """Candidate attitudes of the search."""
     most_turn_deg: float
-    """The largest turn from one position to the next, in degrees: by one axis, the shortest way."""
+    """Largest turn from one position to the next, in degrees, about one axis by the shortest path."""
     turns: int
-    """Turns between candidates that are not larger."""
+    """Number of turns between candidates up to this size."""
     required: list[str]
     """Coefficients that must be observable."""
     positions: int | None
-    """The fewest positions that were found; null when no walk does."""
+    """Number of positions of the shortest slew sequence that was found; null if none was."""
     walk: list[str]
-    """A walk that does."""
+    """Slew sequence that makes all required coefficients observable: its candidates, in order; empty if none was found."""
     angles: list[str]
-    """Its Euler angles in degrees."""
+    """Euler angles of its positions, in degrees."""
     rank: tuple[int, int]
-    """Its rank, and the number of unknowns."""
+    """Rank of the slew sequence, then the number of unknowns."""
     latitude_deg: float | None
-    """The latitude in degrees; null when generic."""
+    """Latitude of the scheme in degrees; null when generic."""
     never: list[str]
-    """Coefficients that even the tour of all turns leaves unobservable; no walk is sought then."""
+    """Coefficients that even the tour of all turns leaves unobservable; then no slew sequence is searched."""
     counting_bound: int
-    """No fewer can do: the required coefficients over the rows of a position, rounded up."""
+    """Number of positions below which no slew sequence is enough: the required coefficients over the rows of a position, rounded up."""
     rows_per_position: int
-    """The most independent rows that a position adds."""
+    """Largest number of independent rows that a position adds."""
     none_of: list[tuple[int, int]]
-    """`[positions, walks]`: none of these does, by exhaustion."""
+    """Slew sequences excluded by exhaustion: `[positions, number of sequences]`, none of which is enough."""
     proven: bool
-    """Whether `positions` is the fewest of these candidates and turns: nothing smaller was left out, and the bound on the probability of
-    an error is below 1e-12.
+    """True if `positions` is proven minimal for these candidates and turns: no shorter sequence was left out, and the bound on the
+    probability of an error is below 1e-12.
     """
     interrupted: bool
-    """Whether the search was interrupted."""
+    """True if the search was interrupted."""
     error_bound: float
-    """Bound on the probability that a walk that does was overlooked."""
+    """Bound on the probability that a sufficient slew sequence was overlooked."""
     seed: int
     """Seed of all random choices."""
 
 
 class Worth(Record):
-    """What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion."""
+    """Score of a sequence, better first: constraints kept, then a small worst degree, then a small criterion."""
 
     __slots__ = ()
 
     violation: float
-    """How far time limits, requirements and degree caps are missed; 0 when kept."""
+    """Violation of time limits, requirements and degree caps, dimensionless; 0 when kept."""
     degree: int
-    """The largest degree of a required coefficient."""
+    """Largest observable degree of a required coefficient."""
     value: float
-    """The criterion."""
+    """Criterion of the sequence, in the unit of the criterion asked for."""
 
 
 class Stop(Record):
-    """A position of a sequence: which candidate, and which way there."""
+    """Position of a sequence: the candidate, and the slew path to it."""
 
     __slots__ = ()
 
     candidate: int
-    """The candidate."""
+    """Index of the candidate, from 0."""
     reversed: bool
-    """A half turn to it goes the other way round than `Slew::to` says."""
+    """True if a half turn to the position goes the other way round than by default: about the axis whose first non-zero component is
+    negative.
+    """
 
 
 class Scored(Record):
-    """A sequence with its worth."""
+    """Sequence of candidates with its score."""
 
     __slots__ = ()
 
     worth: Worth
-    """What it is worth."""
+    """Score: constraints, worst degree and criterion."""
     seconds: float
-    """Dwells and turns, in s."""
+    """Total time of dwells and turns, in s."""
     sequence: list[Stop]
-    """The candidates in order, with the ways there."""
+    """Candidates of the sequence, in order, with the slew paths to them."""
 
 
 class Ties(Record):
-    """The sequences near the best so far: how many there are of each criterion."""
+    """Sequences near the best so far, counted by criterion."""
 
     __slots__ = ()
 
     degree: int
-    """The smallest worst degree."""
+    """Smallest worst degree of the sequences."""
     counts: list[tuple[float, int, int]]
-    """Criterion, searched images of a sequence, how many there are."""
+    """Criterion (in the unit of the criterion asked for), number of searched images of a sequence, number of sequences."""
 
 
 class Best(Record):
-    """The best sequences, best first, and the front of time against the criterion."""
+    """Best sequences, best first, and the front of time against the criterion."""
 
     __slots__ = ()
 
     found: list[Scored]
-    """At most as many as are kept."""
+    """Best sequences that were found, best first, up to the number to keep."""
     front: list[Scored]
     """Sequences of the smallest worst degree that none of these beats in both time and criterion, by time."""
     ties: Ties
-    """Those that are as good as the best."""
+    """Number of sequences as good as the best, by criterion."""
     complete: bool
-    """Whether everything was searched."""
+    """True if the search was complete."""
     examined: int
-    """Sequences whose sigma was computed."""
+    """Number of sequences whose sigma was computed."""
     excluded: int
-    """Sequences, observable or not, that a bound left out: they are worse than those kept."""
+    """Number of sequences, observable or not, that a bound excluded: they are worse than those kept."""
     lost: int
-    """Of those examined, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what is
-    required, as far as double precision tells.
+    """Number of examined sequences that are observable (by the exact verdict, of repositioning at once) but whose samples do not
+    determine the required coefficients in double precision.
     """
 
 
 class Level(Record):
-    """What was found among the sequences of one worst degree."""
+    """Sequences found with one worst degree."""
 
     __slots__ = ()
 
     next: int
-    """The first start that is not yet searched."""
+    """Index of the first start that is not yet searched."""
     best: Best
-    """What was examined, found, and the front."""
+    """Best sequences, the front and the counts at this worst degree."""
 
 
 class Part(Shape):
-    """One part of an exhaustive search, done or interrupted."""
+    """Part of an exhaustive search, done or interrupted."""
 
     schema: str
-    """`obsdeg.part/1`."""
+    """Layout of this answer: `obsdeg.part/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     digest: str
     """SHA-256 of all inputs: the parts of one search have the same."""
     inputs: dict[str, str]
-    """The inputs by name, as the library writes them: which differ, where digests do."""
+    """Inputs of the search by name, as the library writes them; they show the difference if digests differ."""
     asked: str | None
-    """Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null where no
+    """Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null if no
     command did.
     """
     part: tuple[int, int]
-    """Which part, counted from 1, of how many."""
+    """Index of the part, from 1, then the number of parts."""
     starts: tuple[int, int, int]
-    """The starts that are its own, counted from 0: the first, the one behind the last, and how many there are in all."""
+    """Starts of the part: index of the first, index behind the last (both from 0), and the number of all starts."""
     levels: list[Level]
-    """What was found, by worst degree, smallest first (under reset carry all degrees together)."""
+    """Sequences found, by worst degree, smallest first (under reset carry all degrees together)."""
     complete: bool
-    """Whether all of its starts were searched, at as many worst degrees as the whole may need."""
+    """True if all of its starts were searched, at as many worst degrees as the whole may need."""
 
 Truth = Literal["linear", "exact"]
-"""How the truth is generated. linear: By the linear model of the filter: (2), (6). exact: By direction cosines: the drift turns the true
-attitude, the specific force is taken in the true platform frame.
+"""Model that generates the truth of a simulated run. linear: Linear model of the filter: (2), (6). exact: Direction cosines: the drift
+turns the true attitude, the specific force is taken in the true platform frame.
 """
 
 Propagation = Literal["exponential", "rk4"]
-"""How the filter gets its transition matrix. exponential: The matrix exponential of the linear model. rk4: Runge-Kutta of order four, as
-the paper.
+"""Computation of the filter's transition matrix. exponential: Matrix exponential of the linear model. rk4: Runge-Kutta integration of
+order four, as in the paper.
 """
 
 
 class ConditionsReport(Record):
-    """The conditions of a run with their units."""
+    """Conditions of a run with their units."""
 
     __slots__ = ()
 
     truth: Truth
-    """How the truth is generated."""
+    """Model that generates the truth: linear or exact."""
     latitude_deg: float
-    """Latitude in degrees."""
+    """Latitude of the run, in degrees."""
     latitude_by_default: bool
-    """Whether the latitude was chosen by the program."""
+    """True if the program chose the latitude."""
     step_s: float
-    """Largest step in s."""
+    """Largest step between samples, in s."""
     slew_rate_deg_s: float | None
-    """Rate of slews in deg/s where a position does not say its own; null: instantaneous."""
+    """Rate of slews in deg/s unless a position states its own; null for instantaneous slews."""
     accelerometer_noise_g: float
-    """Noise of the observation per sample in g."""
+    """Noise of the observation per sample, in g."""
     accelerometer_bias: AccelerometerBias | None
     """Bias instability of the accelerometers, states of the filter and of the truth; left out where there is none."""
     drift_noise: str
     """Random drift with its unit."""
     drift_noise_density_deg_sqrt_h: tuple[float, float]
-    """Its density in deg/sqrt(h) in the shortest and in the longest step of the timeline."""
+    """Density of the random drift, in deg/sqrt(h), in the shortest and in the longest step of the timeline."""
     drift_noise_step_s: float | None
-    """The step in s for which a bias of one step was given; null for a density."""
+    """Step, in s, for which a bias of one step was given; null for a density."""
     drift_noise_differs: bool
-    """Whether the density is another than with that step, by more than 1 %."""
+    """True if the density differs by more than 1 % from that with the given step."""
     gyro_noise: GyroNoise | None
-    """What the datasheet of the gyros says besides, states of the filter and of the truth; left out where there is none."""
+    """Noise of the gyros by their datasheet, states of the filter and of the truth; left out where there is none."""
     propagation: Propagation
-    """Propagation of the filter."""
+    """Propagation of the filter: exponential or rk4."""
     drift_scale: float
-    """Factor on true drifts and their priors."""
+    """Factor on the true drifts and their priors, dimensionless."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg, drift_noise, values, priors.
@@ -1537,31 +1544,31 @@ class ConditionsReport(Record):
 
 
 class TimelineReport(Record):
-    """A position or slew of the timeline."""
+    """Position or slew of the timeline."""
 
     __slots__ = ()
 
     position: str
-    """The position, or the one a slew goes to."""
+    """Name of the position, or of the one that a slew leads to."""
     slew: bool
-    """Whether it is a slew."""
+    """True if this is a slew, false for a position."""
     start_s: float
-    """Start in s."""
+    """Start of the position or slew, in s."""
     end_s: float
-    """End in s."""
+    """End of the position or slew, in s."""
     turn: Turn | None
-    """How a slew turns; null at a position."""
+    """Turn of the slew: its axis and angle; null for a position."""
 
 
 class LinearEstimate(Record):
-    """What the linear filter says at the end of the run."""
+    """Estimate of the linear filter at the end of the run."""
 
     __slots__ = ()
 
     error: float
-    """Estimate minus truth."""
+    """Estimate minus true value, in the unit of the unknown."""
     sigma: float
-    """What it believes of the error."""
+    """Standard deviation of the error by the linear filter, in the unit of the unknown."""
 
 Outcome = Literal[
     "reached",
@@ -1573,167 +1580,173 @@ Outcome = Literal[
     "inconsistent",
     "no_number",
 ]
-"""What a run says of one unknown. reached: Sigma is at or below what is required. converging: Sigma fell, but not to what is required.
-determined: Sigma fell; nothing is required of it. rests_on_prior: The samples determine it, but sigma is (nearly) that of the prior.
-prior_only: The samples do not determine it: whatever sigma says, it comes of the prior. large_angles_only: The verdict, which is
-about small angles, has it undetermined; a filter with full attitudes learns of it through large ones. inconsistent: The error is
-beyond four sigma: the filter is wrong about it. no_number: The error or sigma is no number.
+"""Outcome of a run for one unknown or combination. reached: Reached: sigma is at or below the requirement. converging: Converging: sigma
+fell, but not to the requirement. determined: Determined: sigma fell; nothing is required of it. rests_on_prior: Determined by the
+samples, but sigma is (nearly) that of the prior. prior_only: Not determined by the samples: sigma comes from the prior alone.
+large_angles_only: Not determined for small angles; a filter with full attitudes learns of it through large ones. inconsistent:
+Inconsistent: the error is beyond four sigma, so the filter is wrong. no_number: Error or sigma that is not a finite number.
 """
 
 
 class Estimate(Record):
-    """The estimate of one unknown or combination at the end of the run."""
+    """Estimate of one unknown or combination at the end of the run."""
 
     __slots__ = ()
 
     name: str
-    """The unknown or combination."""
+    """Name of the unknown, or the combination."""
     unit: str
-    """Unit of all its numbers."""
+    """Unit of the truth, the estimates and the sigmas."""
     status: Status
-    """The exact verdict."""
+    """Verdict: observable, inseparable or not excited."""
     degree: int | None
-    """The observable degree."""
+    """Observable degree; null if not observable."""
     accuracy_order: int | None
-    """The accuracy order."""
+    """Accuracy order; null if no dwell makes it observable, or if none were computed."""
     truth: float
-    """The truth."""
+    """True value, in the unit of `unit`."""
     estimate: float
-    """The estimate."""
+    """Estimate at the end of the run, in the unit of `unit`."""
     error: float
-    """Estimate minus truth."""
+    """Estimate minus true value, in the unit of `unit`."""
     sigma: float
-    """What the filter believes of the error."""
+    """Standard deviation of the error by the filter, in the unit of `unit`."""
     predicted_sigma: float | None
-    """Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound it."""
+    """Predicted sigma under the stated conditions, in the unit of `unit`; null if neither samples nor stated priors bound it."""
     error_over_sigma: float
-    """Error over sigma."""
+    """Error over sigma, dimensionless; about -3 to 3 for a consistent filter."""
     linear: LinearEstimate | None
-    """What the linear filter makes of the same measurements; null where it is the filter."""
+    """Estimate of the linear filter from the same measurements; null if the run's filter is linear."""
     prior_sigma: float
-    """Sigma at the start."""
+    """Standard deviation at the start of the run, in the unit of `unit`."""
     required_sigma: float | None
-    """The sigma to be reached."""
+    """Largest sigma allowed, in the unit of `unit`; null if none is required."""
     time_to_requirement_s: float | None
-    """When it was reached first, in s; null for what the samples do not determine."""
+    """Time, in s, from which sigma meets the requirement to the end; null if it does not, or if the samples do not determine the
+    unknown.
+    """
     outcome: Outcome
-    """What came out."""
+    """Outcome of the run for this unknown or combination."""
     prior_of: list[str]
-    """On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only."""
+    """Indistinguishable unknowns whose priors the estimate relies on besides its own. Empty unless it is known from the prior only."""
 
 
 class SigmaRatio(Record):
-    """The ratio of a run's sigma to the predicted one."""
+    """Ratio of a run's sigma to the predicted one."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown with this ratio."""
     ratio: float
     """Sigma of the run over the predicted sigma, dimensionless."""
 
 RunDiffers = Literal["random_drift", "prior", "full_attitudes"]
-"""Reason why the sigmas of a run may differ from the predicted ones. random_drift: The random drift of the program: none is stated.
-prior: Priors of the program: not every unknown has a stated one. full_attitudes: A filter with full attitudes: the prediction is that
-of small angles.
+"""Reason why the sigmas of a run may differ from the predicted ones. random_drift: Random drift of the program, since none is stated.
+prior: Priors of the program, since not every unknown has a stated one. full_attitudes: Filter with full attitudes, while the
+prediction is for small angles.
 """
 
 
 class RunRequirements(Record):
-    """A run's sigmas against the requirements, beside the prediction."""
+    """Requirements by the sigmas of a run, beside the prediction."""
 
     __slots__ = ()
 
     requirements: Requirements
     """Outcome of the requirements in the run."""
     largest_ratio: SigmaRatio | None
-    """The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null where none has."""
+    """Largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null if none has."""
     smallest_ratio: SigmaRatio | None
-    """The smallest such ratio; null where no unknown has both."""
+    """Smallest ratio of a sigma of the run to the predicted one; null if no unknown has both."""
     differs: list[RunDiffers]
     """Reasons why the sigmas of the run may differ from the predicted ones."""
 
 Doubt = Literal["no_number", "nis", "nees", "error", "correlated"]
-"""What speaks against a run. no_number: A statistic, an estimate or a sigma is no number. nis: The mean NIS is outside its band of 99.9
-%. nees: The NEES is above the band of 99.9 %. error: An error is beyond four sigma. correlated: The innovations are not white.
+"""Statistical evidence against a run. no_number: Statistic, estimate or sigma that is not a finite number. nis: Mean NIS outside its
+acceptance band of 99.9 %. nees: NEES above its acceptance band of 99.9 %. error: Error beyond four sigma of the filter. correlated:
+Innovations that are not white.
 """
 
 
 class Consistency(Record):
-    """Statistics of one run."""
+    """Consistency statistics of one run: NIS, NEES, whiteness and errors."""
 
     __slots__ = ()
 
     nis: float
-    """Mean normalised innovation squared; its expectation is the number of outputs."""
+    """Mean normalised innovation squared (NIS), dimensionless; its expectation is the number of outputs."""
     nis_band: tuple[float, float]
-    """The band of the mean NIS, 95 %."""
+    """Band of 95 % of the mean NIS, dimensionless."""
     nis_wide_band: tuple[float, float]
-    """The band of 99.9 %, in which it must be."""
+    """Acceptance band of 99.9 % of the mean NIS, dimensionless."""
     nees: float
-    """Normalised estimation error squared at the end; its expectation is the number of states: unknowns, and the biases of the gyros
-    where these are states, but for the directions that are left out.
+    """Normalised estimation error squared (NEES) at the end, dimensionless. Its expectation is the number of states (unknowns, and gyro
+    biases that are states) without the directions left out.
     """
     unresolved_directions: int
-    """Directions that the NEES leaves out: known more than a million times better than the unknowns themselves, which a filter
-    linearised at its estimates believes but cannot know. None where the model is linear.
+    """Number of directions that the NEES leaves out: a filter linearised at its estimates claims to know them more than a million times
+    better than the unknowns themselves. 0 for a linear model.
     """
     nees_band: tuple[float, float]
-    """Its band, 95 %."""
+    """Band of 95 % of the NEES, dimensionless."""
     nees_limit: float
-    """The upper end of its band of 99.9 %, which it must not exceed. A small one says nothing: true values are given, not drawn."""
+    """Upper end of the acceptance band of 99.9 % of the NEES, dimensionless. A small NEES is no evidence: true values are given, not
+    drawn.
+    """
     whiteness_probability: float
     """Probability that white noise has autocorrelations as large as the innovations', smallest over outputs."""
     beyond: list[str]
-    """Unknowns whose error is beyond four sigma."""
+    """Unknowns with an error beyond four sigma."""
     doubts: list[Doubt]
-    """What speaks against the run."""
+    """Evidence against the run; empty if there is none."""
     consistent: bool
-    """Whether nothing does."""
+    """True if NIS, NEES, whiteness and errors all pass."""
 
 FilterKind = Literal["linear", "extended", "iterated"]
-"""Which filter estimates. linear: Of the linear model, with gains that are known beforehand: small psi. extended: With full attitudes,
-its Jacobians at the estimate of the moment. iterated: The same, linearised again along the whole run until that settles.
+"""Filter that estimates the unknowns. linear: Linear model with gains that are known beforehand: small psi. extended: Extended filter:
+full attitudes, Jacobians at the current estimate. iterated: Iterated filter: full attitudes, relinearised along the whole run until
+it converges.
 """
 
 FilterReason = Literal["given", "linear_truth", "valid", "not_valid"]
-"""Why a filter was chosen. given: It was asked for. linear_truth: The truth is that of the linear model. valid: The small-angle model
-holds for the truth. not_valid: It does not.
+"""Reason for the choice of a filter. given: Choice by a file or an option. linear_truth: Truth of the linear model. valid: Validity of
+the small-angle model at the truth. not_valid: Invalidity of the small-angle model at the truth.
 """
 
 
 class FilterReport(Record):
-    """Which filter ran."""
+    """Filter of the run, and the reason for it."""
 
     __slots__ = ()
 
     kind: FilterKind
-    """The filter."""
+    """Filter of the run: linear, extended or iterated."""
     reason: FilterReason
-    """Why this one."""
+    """Reason for the choice of this filter."""
     passes: int
-    """Linearisations of the whole run: 1 but for the iterated filter."""
+    """Number of linearisations of the whole run: 1 except for the iterated filter."""
     converged: bool
-    """Whether they settled."""
+    """True if the linearisations converged."""
 
 
 class Simulation(Shape):
-    """One run of the filter against a simulated truth."""
+    """Run of the filter against a simulated truth."""
 
     schema: str
-    """`obsdeg.simulation/2`."""
+    """Layout of this answer: `obsdeg.simulation/2`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     carry: Carry
-    """What is carried between positions."""
+    """Carry: quantity that continues from one position to the next."""
     conditions: ConditionsReport
-    """Under which conditions."""
+    """Conditions of the run, with their units."""
     timeline: list[TimelineReport]
-    """The timeline."""
+    """Positions and slews of the run, in order of time."""
     quantities: list[Estimate]
-    """The unknowns in model order: at the end of the run."""
+    """Estimates of the unknowns at the end of the run, in model order."""
     combinations: list[Estimate]
-    """Observable combinations of unknowns that are not observable alone."""
+    """Estimates of observable combinations of unknowns that are not observable alone."""
     requirements: Requirements
     """Outcome of the requirements by prediction, as in every other command: the information of all samples with the noise, the random
     drift and the priors that are stated.
@@ -1741,147 +1754,152 @@ class Simulation(Shape):
     run: RunRequirements
     """Outcome of the requirements in this run, by the sigmas of its filter at the end."""
     other_carries: list[OtherCarry]
-    """The same scheme under the other carries."""
+    """Outcome of the same scheme under the other carries."""
     consistency: Consistency
-    """Whether errors and innovations are what the filter believes."""
+    """Consistency of errors and innovations with the filter's covariances."""
     filter: FilterReport
-    """Which filter it is, and why."""
+    """Filter of the run, and the reason for it."""
     validity: Validity
-    """Whether the linear model holds for these drifts."""
+    """Validity of the small-angle model at these drifts."""
     noise_floor: NoiseFloor | None
-    """How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own."""
+    """Noise floor: the least sigmas of coefficients, however long the dwells; left out where the gyros have no noise of their own."""
     gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits that the scheme states; left out where it states none."""
+    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
     seed: int
-    """Seed of the noise."""
+    """Seed of the noise and of all random choices."""
 
 
 class SystemEstimate(Record):
-    """The estimate of one unknown at the end."""
+    """Estimate of one unknown at the end of the run."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, as in the model."""
     unit: str
-    """Its unit, as the file says."""
+    """Unit of the unknown, as in the model file."""
     status: Status | None
-    """The exact verdict; null for a state whose start is known."""
+    """Verdict on the unknown; null for a state with a known initial value."""
     degree: int | None
-    """The degree."""
+    """Observable degree; null if the unknown is not observable."""
     truth: float
-    """The truth."""
+    """True value of the unknown, in its unit."""
     estimate: float
-    """The estimate."""
+    """Estimate of the unknown, in its unit."""
     error: float
-    """Estimate minus truth."""
+    """Estimate minus true value, in the unit of the unknown."""
     sigma: float
-    """What the filter believes of the error."""
+    """Standard deviation of the error by the filter, in the unit of the unknown."""
     error_over_sigma: float
-    """Error over sigma."""
+    """Error over sigma, dimensionless; about -3 to 3 for a consistent filter."""
     prior_sigma: float
-    """Sigma at the start."""
+    """Standard deviation at the start of the run, in the unit of the unknown."""
     outcome: Outcome
-    """What came out; nothing is required."""
+    """Outcome for the unknown; requirements do not exist here."""
 
 
 class SystemRun(Shape):
-    """A run of a system."""
+    """Simulated run of a system with an extended Kalman filter."""
 
     schema: str
-    """`obsdeg.system-run/1`."""
+    """Layout of this answer: `obsdeg.system-run/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     name: str
-    """The system."""
+    """Name of the system, as in its file."""
     quantities: list[SystemEstimate]
-    """Estimates at the end."""
+    """Estimates of the unknowns at the end of the run."""
     consistency: Consistency
-    """Whether errors and innovations are what the filter believes."""
+    """Consistency of errors and innovations with the filter's covariances."""
+    time: float | None
+    """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
+    known inputs hold the time.
+    """
     duration: float
-    """How long every experiment ran, in the unit of the model."""
+    """Duration of every experiment, in the unit of `t` in the model."""
     step: float
-    """Between two samples."""
+    """Time between two samples, in the unit of `t` in the model."""
     noise: list[tuple[str, float]]
-    """Standard deviation of the noise of a sample, by output."""
+    """Standard deviation of the noise of a sample, by output, in its unit."""
     error_bound: float | None
-    """Of a model judged in prime fields: bound on the probability that a verdict is wrong."""
+    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None
-    """Of a model judged in real numbers: how clear its ranks were."""
+    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
     seed: int
     """Seed of the noise and of the initial errors."""
 
 
 class Counts(Record):
-    """How many checks came out how."""
+    """Number of checks by outcome."""
 
     __slots__ = ()
 
     agree: int
-    """Agree."""
+    """Number of checks that agree with the verdicts."""
     disagree: int
-    """Disagree."""
+    """Number of checks that disagree with the verdicts."""
     not_resolvable: int
-    """Are not resolvable."""
+    """Number of checks that are not resolvable."""
     not_tested: int
-    """Were not made."""
+    """Number of checks that were skipped."""
 
 Agreement = Literal["agrees", "disagrees", "not_resolvable", "not_tested"]
-"""What evidence makes of a verdict. agrees: What was measured is what the verdict says. disagrees: It is not. not_resolvable: Something
-was measured, but neither for nor against the verdict, by a test that the answer states. not_tested: Nothing was measured.
+"""Outcome of a check of a verdict. agrees: Agreement: the measurement confirms the verdict. disagrees: Disagreement: the measurement
+contradicts the verdict. not_resolvable: Measurement that neither supports nor contradicts the verdict, by a test that the answer
+states. not_tested: Check that was skipped: nothing was measured.
 """
 
 
 class SpaceCheck(Record):
-    """Something that is no number, predicted and measured."""
+    """Property that is no number, predicted and measured."""
 
     __slots__ = ()
 
     what: str
-    """What is held against the samples."""
+    """Property that is compared with the samples."""
     predicted: str
-    """By the exact verdicts."""
+    """Value by the exact verdicts."""
     measured: str
-    """By the samples; empty when nothing was measured."""
+    """Value by the samples; empty if nothing was measured."""
     outcome: Agreement
-    """Whether they agree."""
+    """Outcome of the comparison of both values."""
 
 
 class Measured(Record):
-    """How many of the orders that the verdicts say were measured by a slope."""
+    """Coverage of the predicted orders by measured slopes."""
 
     __slots__ = ()
 
     measured: int
-    """Slopes that were measured."""
+    """Number of orders that were measured by a slope."""
     of: int
-    """Unknowns and combinations that have an order."""
+    """Number of unknowns and combinations that have an order."""
 
 
 class Check(Record):
-    """A predicted and a measured number."""
+    """Number that was predicted and measured."""
 
     __slots__ = ()
 
     predicted: float
-    """What the exact verdict says."""
+    """Predicted number by the exact verdict: a slope, factor, part or correlation, dimensionless."""
     measured: float | None
-    """What the filter shows; null when it could not be measured."""
+    """Measured number by the filter, dimensionless; null if it could not be measured."""
     outcome: Agreement
-    """Whether they agree."""
+    """Outcome of the comparison of both numbers."""
 
 
 class Partners(Record):
-    """Unknowns that share with one a direction that Z does not see and that holds no shorter one."""
+    """Unknowns indistinguishable from one: those in a common direction of minimal support that Z does not observe."""
 
     __slots__ = ()
 
     predicted: list[str]
-    """By the exact verdicts."""
+    """Partners by the exact verdicts."""
     measured: list[str] | None
-    """Those of the directions that the samples do not show; null when they were not measured."""
+    """Partners by the directions that the samples do not show; null if they were not measured."""
     outcome: Agreement
-    """Whether they are the same."""
+    """Outcome of the comparison of both lists."""
 
 
 class QuantityEvidence(Record):
@@ -1890,31 +1908,33 @@ class QuantityEvidence(Record):
     __slots__ = ()
 
     name: str
-    """The unknown or combination."""
+    """Name of the unknown, or the combination."""
     status: Status
-    """The exact verdict."""
+    """Verdict: observable, inseparable or not excited."""
     degree: int | None
-    """The observable degree."""
+    """Observable degree; null if not observable."""
     accuracy_order: int | None
-    """The accuracy order."""
+    """Accuracy order; null if no dwell makes it observable, or if none were computed."""
     modelled: bool
-    """Whether the filter has it: one that was made wrong may lack an unknown, and nothing is measured then."""
+    """True if the filter contains the unknown. A filter with a deliberate error may lack it; then nothing is measured."""
     degree_slope: Check
-    """a: log-log slope of sigma against the dwell, psi handed on between positions as it was at the start of each: -(degree + 1/2); 0
-    when nothing is learnt.
+    """Evidence a: log-log slope of sigma against the dwell, with psi of the start of each position handed on to the next. Predicted
+    -(degree + 1/2); 0 if nothing is learnt.
     """
     status_measured: Status | None
-    """a: whether its column of that information is zero, and whether it is in the span; null when it was not measured."""
+    """Evidence a: status by the same information, from the column of the unknown and the span of the rows; null if it was not measured."""
     status_outcome: Agreement
-    """Whether that is the verdict."""
+    """Outcome of the comparison with the verdict."""
     partners: Partners | None
-    """Unknowns that derivatives do not tell it from; null for a combination."""
+    """Unknowns indistinguishable from it by derivatives; null for a combination."""
     slope: Check
-    """a: log-log slope of sigma (psi: of the start) against the dwell: -(accuracy order + 1/2); 0 when nothing is learnt."""
+    """Evidence a: log-log slope of sigma (psi: of the start) against the dwell. Predicted -(accuracy order + 1/2); 0 if nothing is
+    learnt.
+    """
     slope_at_end: Check
-    """The same with psi of the end, which is what a filter shows."""
+    """Log-log slope of sigma with psi of the end, as in a filter."""
     inflation: Check
-    """b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100."""
+    """Evidence b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100."""
 
 
 class NullEvidence(Record):
@@ -1923,62 +1943,62 @@ class NullEvidence(Record):
     __slots__ = ()
 
     direction: str
-    """`psi_y = 1, D_FZ = 6.4e-5` in SI units."""
+    """Null vector, as in `psi_y = 1, D_FZ = 6.4e-5`, in SI units."""
     seen: Check
-    """How much of it Z sees, relative to the best seen direction: predicted 0."""
+    """Effect of the null vector on Z, relative to the most observable direction: predicted 0."""
     correlation: Check | None
-    """Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1; null when other null vectors
-    share its unknowns, or when it has only one.
+    """Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1; null if other null vectors
+    share its unknowns, or if it has only one.
     """
 
 
 class Count(Record):
-    """A predicted and a measured count."""
+    """Count that was predicted and measured."""
 
     __slots__ = ()
 
     predicted: int
-    """By the exact verdicts."""
+    """Number that the exact verdicts predict."""
     measured: int
-    """By the samples."""
+    """Number that the samples show."""
     outcome: Agreement
-    """Whether they agree."""
+    """Outcome of the comparison of both numbers."""
 
 
 class CrossCheckDifference(Record):
-    """The largest difference of two covariances."""
+    """Largest difference of two covariances."""
 
     __slots__ = ()
 
     name: str
-    """What is compared."""
+    """Covariances or models that are compared."""
     difference: float
-    """`max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`."""
+    """Largest relative difference, dimensionless: `max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`."""
     limit: float
-    """The limit."""
+    """Largest difference allowed, dimensionless."""
     outcome: Agreement
-    """Whether it is kept; not resolvable where rounding may make a tenth of it: the largest variance of the prior, beside the smallest
-    at the end, times the steps times 2e-16.
+    """Outcome: agreement within the limit. Not resolvable if rounding may reach a tenth of the limit: largest variance of the prior,
+    over the smallest at the end, times steps times 2e-16.
     """
 
 
 class Statistic(Record):
-    """A statistic with its bands."""
+    """Averaged statistic with its acceptance bands."""
 
     __slots__ = ()
 
     name: str
-    """What is averaged."""
+    """Name of the averaged statistic."""
     expected: float
-    """Its expectation."""
+    """Expectation of the average, dimensionless."""
     measured: float
-    """The average."""
+    """Average over runs and samples, dimensionless."""
     band: tuple[float, float]
-    """The band of 95 %."""
+    """Band of 95 % of the average, dimensionless."""
     wide_band: tuple[float, float]
-    """The band of 99.9 %, in which it must be."""
+    """Acceptance band of 99.9 % of the average, dimensionless."""
     pass_: bool
-    """Whether it is."""
+    """True if `measured` lies inside its acceptance band."""
 
 
 class HistoryPoint(Record):
@@ -1987,141 +2007,143 @@ class HistoryPoint(Record):
     __slots__ = ()
 
     t_s: float
-    """Time in s."""
+    """Time since the start of the run, in s."""
     nees: float
-    """ANEES of all unknowns."""
+    """Average NEES of all unknowns, dimensionless."""
     nis: float
-    """Mean NIS since the point before."""
+    """Mean NIS since the point before, dimensionless."""
     samples: int
-    """Number of samples in it, all runs together."""
+    """Number of samples in the mean NIS, all runs together."""
 
 
 class MonteCarlo(Record):
-    """Monte Carlo evidence."""
+    """Evidence d: statistics of Monte Carlo runs."""
 
     __slots__ = ()
 
     filter: FilterKind
-    """Which filter."""
+    """Filter of the runs: linear, extended or iterated."""
     about_the_truth: bool
-    """Whether all runs have the scheme's own truth, with initial estimates drawn about it from the prior; otherwise truths are drawn
-    about the initial estimate.
+    """True if all runs have the scheme's own truth and draw initial estimates about it from the prior. If false, truths are drawn about
+    the initial estimate.
     """
     runs: int
-    """Number of runs."""
+    """Number of runs, each with its own noise."""
     unsettled: int
-    """Runs whose linearisations did not settle."""
+    """Number of runs whose linearisations did not converge."""
     statistics: list[Statistic]
-    """ANEES and NIS."""
+    """Average NEES and NIS, with their bands."""
     whiteness_probability: float
     """Probability that white innovations have autocorrelations as large."""
     white: bool
-    """Whether that is above 0.001."""
+    """True if `whiteness_probability` is above 0.001."""
     history: list[HistoryPoint]
-    """ANEES and mean NIS over time."""
+    """Average NEES and mean NIS over time."""
 
 
 class Ranking(Record):
-    """Agreement of the order of all unknowns."""
+    """Rank correlation of all unknowns by predicted and measured orders."""
 
     __slots__ = ()
 
     kendall_tau: float | None
-    """Kendall's tau-b of predicted and measured accuracy orders; null when all are tied."""
+    """Kendall's tau-b of predicted and measured accuracy orders, dimensionless, -1 to 1; null if all are tied."""
     pass_: bool
-    """Whether it is 1 (or all are tied on both sides)."""
+    """True if `kendall_tau` is 1 (or all orders are tied on both sides)."""
     errors: float | None
-    """Of runs with full attitudes: Kendall's tau-b of the predicted orders at the end and the errors there, root mean square in sigmas
-    of the prior; null where the filter is linear. It decides nothing: orders are of short dwells, errors of those of the scheme.
+    """Kendall's tau-b, dimensionless, of the predicted orders at the end and the errors of runs with full attitudes, root mean square in
+    sigmas of the prior; null for a linear filter. It decides nothing: orders hold for short dwells, errors for those of the scheme.
     """
 
 
 class Control(Record):
-    """A filter that is wrong on purpose, and must be found out."""
+    """Filter with a deliberate model error, which the checks must detect."""
 
     __slots__ = ()
 
     name: str
-    """What is wrong with it."""
+    """Deliberate error of the filter's model."""
     failed: int
-    """How many checks of a and b fail with it."""
+    """Number of checks of evidence a and b that fail with the filter."""
     checks: int
-    """Out of how many."""
+    """Number of checks of evidence a and b performed."""
     nis: float
-    """Its mean NIS."""
+    """Mean NIS of the filter, dimensionless."""
     band: tuple[float, float]
-    """The band in which a right filter's would be (99.9 %)."""
+    """Band of 99.9 % of the mean NIS of a right filter, dimensionless."""
     off_deg: float
-    """By how many degrees its latitude or an attitude is off."""
+    """Angle in degrees by which the filter's latitude or attitude is wrong."""
     outcome: Agreement
-    """Whether it was found out; not resolvable where it was not, and need not be."""
+    """Outcome: agreement if the error was detected. Not resolvable if it was not, and need not be."""
 
 
 class SlopeCurve(Record):
-    """Sigma against the dwell."""
+    """Sigma against the dwell, for one unknown or combination."""
 
     __slots__ = ()
 
     name: str
-    """The unknown or combination."""
+    """Name of the unknown, or the combination."""
     unit: str
-    """Unit of sigma."""
+    """Unit of the sigmas in `points`."""
     accuracy_order: int | None
-    """The accuracy order."""
+    """Accuracy order; null if no dwell makes it observable."""
     points: list[tuple[float, float]]
-    """`(dwell in s, sigma)`."""
+    """Points of the curve: `(dwell in s, sigma)`, sigma in the unit of `unit`."""
 
 
 class Correlation(Record):
-    """A correlation matrix."""
+    """Correlation matrix of the estimates."""
 
     __slots__ = ()
 
     names: list[str]
-    """The unknowns."""
+    """Names of the unknowns, in the order of rows and columns."""
     values: list[list[float]]
-    """Row by row."""
+    """Rows of the matrix: correlations, dimensionless, -1 to 1."""
 
 
 class CrossCheck(Shape):
-    """The cross-check of one scheme."""
+    """Cross-check of the verdicts on one scheme against filters and samples."""
 
     schema: str
-    """`obsdeg.crosscheck/1`."""
+    """Layout of this answer: `obsdeg.crosscheck/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     carry: Carry
-    """What is carried between positions."""
+    """Carry: quantity that continues from one position to the next."""
     filter: str | None
-    """How the filter was made to differ from the truth; null for a right one."""
+    """Deliberate error of the filter's model; null for the right filter."""
     conditions: ConditionsReport
-    """Under which conditions."""
+    """Conditions of the runs, with their units."""
     timeline: list[TimelineReport]
-    """The timeline."""
+    """Positions and slews of the run, in order of time."""
     passed: bool
-    """Whether everything agrees."""
+    """True if no check disagrees, evidence a to f."""
     verdicts_agree: bool
-    """Whether all but d agrees: d holds the filter against drawn truths, which fails where the small-angle model does, too."""
+    """True if no check but evidence d disagrees. Evidence d compares the filter with drawn truths and also fails if the small-angle
+    model does not hold.
+    """
     disagreements: list[str]
-    """What disagrees, in words."""
+    """Disagreements of the checks, in words."""
     unresolved: list[str]
     """Reasons why checks are not resolvable, one for each such check."""
     counts: Counts
-    """How many checks agree, disagree, are not resolvable, were not made."""
+    """Number of checks by outcome."""
     method: list[str]
-    """How slopes are measured, and when something is not resolvable."""
+    """Method of measuring slopes, and criteria for a check that is not resolvable."""
     not_tested: list[str]
-    """What an analysis says and nothing here is held against."""
+    """Statements of an analysis that no evidence checks."""
     spaces: list[SpaceCheck]
-    """a: ranks, null space and combinations against the samples."""
+    """Evidence a: ranks, null space and combinations against the samples."""
     orders: Measured
-    """How many accuracy orders were measured."""
+    """Coverage of the accuracy orders by measured slopes."""
     quantities: list[QuantityEvidence]
-    """Evidence a and b per unknown and combination."""
+    """Evidence a and b on each unknown and combination."""
     null_space: list[NullEvidence]
-    """Directions that Z does not see."""
+    """Evidence on each direction that Z does not observe."""
     defect: Count
-    """Number of directions that Z does not see."""
+    """Number of independent directions that Z does not observe."""
     covariance: list[CrossCheckDifference]
     """Evidence c: covariance of the filter against the inverse information."""
     monte_carlo: MonteCarlo
@@ -2129,128 +2151,137 @@ class CrossCheck(Shape):
     ranking: Ranking
     """Evidence e: rank correlation of predicted and measured orders."""
     controls: list[Control]
-    """Evidence f: filters that are wrong on purpose."""
+    """Evidence f: filters with a deliberate model error."""
     validity: Validity
-    """Whether the small-angle model holds for the true values."""
+    """Validity of the small-angle model at the true values."""
     slopes: list[SlopeCurve]
     """Sigma against dwell, for the plot."""
     correlation: Correlation
-    """Correlation of the estimate under a diffuse prior."""
+    """Correlation matrix of the estimates under a diffuse prior."""
     seed: int
-    """Seed of the noise."""
+    """Seed of the noise and of all random choices."""
     error_bound: float
     """Bound on the probability that a prediction is wrong."""
 
 
 class SystemQuantityEvidence(Record):
-    """What the information says of one unknown."""
+    """Evidence on one unknown of a system, by the information of the samples."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown, as in the model."""
     status: Status
-    """The exact verdict."""
+    """Verdict on the unknown by the exact analysis."""
     degree: int | None
-    """The degree."""
+    """Observable degree; null if the unknown is not observable."""
     slope: Check
-    """Log-log slope of sigma against the horizon: -(degree + 1/2); measured null where it does not settle above rounding."""
+    """Log-log slope of sigma against the horizon: predicted -(degree + 1/2); measured null if it does not settle above rounding."""
     inflation: Check
-    """Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 where not observable."""
+    """Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 for an unobservable unknown."""
 
 
 class SymmetryEvidence(Record):
-    """A symmetry against the information."""
+    """Evidence on one symmetry, by the information of the samples."""
 
     __slots__ = ()
 
     words: str
-    """In words."""
+    """Symmetry in words, as in the analysis."""
     seen: Check
-    """The information along it."""
+    """Information along the symmetry, relative to the largest: predicted 0."""
 
 
 class SystemEvidence(Shape):
-    """The evidence for one system."""
+    """Cross-check of the verdicts on one system against the information of simulated samples."""
 
     schema: str
-    """`obsdeg.system-evidence/1`."""
+    """Layout of this answer: `obsdeg.system-evidence/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     name: str
-    """The system."""
+    """Name of the system, as in its file."""
     quantities: list[SystemQuantityEvidence]
-    """Per unknown."""
+    """Evidence on each unknown, in model order."""
     symmetries: list[SymmetryEvidence]
     """Symmetries: the information along each, relative to the largest."""
     defect: Count
-    """Unobservable directions: exact, and singular values that vanish."""
+    """Number of unobservable directions: exact, and singular values that vanish."""
     failures: int
-    """Checks that failed."""
+    """Number of checks that failed."""
     orders: Measured
-    """How many degrees were measured."""
+    """Coverage of the degrees by measured slopes."""
     checks: int
-    """Checks that were made: what could not be measured, or not be resolved, is none."""
+    """Number of checks that agree or disagree, without those that are not resolvable or were skipped."""
     not_resolvable: int
-    """What was measured and is neither for nor against a verdict: an unknown that moves no output by more than rounding, or less than a
-    hundredth of its diffuse prior is learnt of it; singular values between what is seen and what is not.
+    """Number of checks that neither support nor contradict a verdict: an unknown that affects the outputs by no more than rounding, or
+    whose diffuse prior shrinks by less than a hundredth; singular values between observable and unobservable.
     """
     passed: bool
-    """Whether none failed."""
+    """True if no check of the model failed."""
+    time: float | None
+    """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
+    known inputs hold the time.
+    """
     duration: float
-    """The longest horizon, of every experiment, in the unit of the model."""
+    """Longest horizon, of every experiment, in the unit of `t` in the model."""
     error_bound: float | None
-    """Of a model judged in prime fields: bound on the probability that a verdict is wrong."""
+    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None
-    """Of a model judged in real numbers: how clear its ranks were."""
+    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
     seed: int
     """Seed of all random choices."""
 
 
 class ForceLength(Record):
-    """How long the specific force is at a position."""
+    """Length of the specific force at a position."""
 
     __slots__ = ()
 
     position: str
-    """The position."""
+    """Name of the position with this length."""
     length_g: float
-    """In g."""
+    """Length of the specific force, in g."""
 
 ForceError = Literal["scale", "zero"]
-"""What an axis is off in. scale: Its scale. zero: Its zero."""
+"""Kind of error of one axis. scale: Scale error, a fraction of the output. zero: Zero error, in g of the output."""
 
 
 class ForceCause(Record):
-    """What one axis may be off by, so that the specific force is not one g long."""
+    """Error of one axis that explains why the specific force is not one g long."""
 
     __slots__ = ()
 
     error: ForceError
-    """What it is an error of."""
+    """Kind of the error: scale or zero."""
     axis: str
-    """The output of the accelerometer: fx, fy, fz."""
+    """Output of the accelerometer: fx, fy, fz."""
     by: float
-    """What is recorded is larger by this: as a part (scale), or in g (zero)."""
+    """Error of the axis: scale as a fraction (dimensionless) or zero in g, by which the recorded output is larger."""
     sigma: float
-    """Its standard deviation."""
+    """Standard deviation of the error, as `by`: dimensionless (scale) or in g (zero)."""
     besides: float | None
-    """The part by which the force is longer besides, at all positions alike."""
+    """Fraction by which the force is longer besides, at all positions alike, dimensionless; null for none."""
+
+CellKind = Literal["code", "stuck"]
+"""Kind of cells that hold one value again and again. code: Code of missing values: far from its neighbours. stuck: Stuck output: equal
+to the rows before it to the last digit.
+"""
 
 
 class ClockByEarth(Record):
-    """A clock by the rate of the earth."""
+    """Rate error of a clock by the rate of the earth."""
 
     __slots__ = ()
 
     fast: float
-    """The part by which it is fast."""
+    """Fraction by which the clock is fast, dimensionless."""
     sigma: float
-    """Its standard deviation: a part that is not much larger does not show."""
+    """Standard deviation of `fast`, dimensionless: a fraction not much larger is not significant."""
 
 
 class FindingInterrupted(Record):
-    """The iteration was interrupted: the estimates are where it was then."""
+    """Interrupted iteration: the estimates are where it was then."""
 
     __slots__ = ()
 
@@ -2258,7 +2289,7 @@ class FindingInterrupted(Record):
 
 
 class FindingNotSettled(Record):
-    """The iteration did not settle."""
+    """Iteration that did not converge."""
 
     __slots__ = ()
 
@@ -2266,109 +2297,129 @@ class FindingNotSettled(Record):
 
 
 class FindingForce(Record):
-    """The specific force is not one g long, and no unknown explains that."""
+    """Specific force that is not one g long, with no unknown that explains it."""
 
     __slots__ = ()
 
     kind: Literal["force"]
     record: str
-    """The record."""
+    """Name of the record with this finding."""
     length_g: float
-    """Its mean length, in g."""
+    """Mean length of the specific force in the record, in g."""
     alike: bool
-    """Whether it is as long at all positions."""
+    """True if the length is the same at all positions."""
     least: ForceLength
-    """Where it is shortest."""
+    """Position with the shortest specific force."""
     most: ForceLength
-    """Where it is longest."""
+    """Position with the longest specific force."""
     causes: list[ForceCause]
-    """Each of these alone makes it one g long: none where several axes are off, or all alike."""
+    """Errors of one axis, each of which alone makes the force one g long; empty if several axes are wrong, or all alike."""
+
+
+class FindingCells(Record):
+    """Cells of a column that hold one value again and again, far from their neighbours or many times in a row; they were left out."""
+
+    __slots__ = ()
+
+    kind: Literal["cells"]
+    record: str
+    """Name of the record with this finding."""
+    column: str
+    """Column of these cells, as in the header of the record."""
+    kind_of_cells: CellKind
+    """Kind of these cells: a code of missing values, or a stuck output."""
+    value: float
+    """Value of these cells, in the unit of the column."""
+    count: int
+    """Number of cells that hold the value."""
+    lines: tuple[int, int]
+    """First and last line number of these cells in the record."""
 
 
 class FindingClock(Record):
-    """The clock of a record does not go as fast as that of the scheme, or as the earth turns."""
+    """Clock of a record that does not run as fast as that of the scheme, or as the earth turns."""
 
     __slots__ = ()
 
     kind: Literal["clock"]
     record: str
-    """The record."""
+    """Name of the record with this finding."""
     by_durations: float | None
-    """By which part it is fast, as positions begin and end."""
+    """Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless; null if they show none."""
     by_earth: ClockByEarth | None
-    """The same by the rate of the earth, where that is beyond chance."""
+    """Fraction by which the clock is fast by the rate of the earth; null if that is within chance."""
 
 
 class FindingPosition(Record):
-    """A position fits worse than its measurements allow."""
+    """Position that fits worse than its measurements allow."""
 
     __slots__ = ()
 
     kind: Literal["position"]
     record: str
-    """The record."""
+    """Name of the record with this finding."""
     position: str
-    """The position."""
+    """Name of the position with this finding."""
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     factor: float
-    """How many times too small the sigmas are there: its root."""
+    """Factor by which the sigmas are too small there, dimensionless: the root of `chi_square`."""
 
 
 class FindingNoise(Record):
-    """All positions fit alike, and not as their sigmas say."""
+    """Positions that all fit alike, and not as their sigmas say."""
 
     __slots__ = ()
 
     kind: Literal["noise"]
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     factor: float
-    """What the sigmas are to be multiplied by."""
+    """Factor to multiply the sigmas by, dimensionless."""
 
 
 class FindingChannel(Record):
-    """A component of Z fits not as its sigma says."""
+    """Component of Z that does not fit as its sigma says."""
 
     __slots__ = ()
 
     kind: Literal["channel"]
     channel: str
-    """The component."""
+    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     factor: float
-    """What its sigma is to be multiplied by."""
+    """Factor to multiply its sigma by, dimensionless."""
 
 
 class FindingCorrelated(Record):
-    """The residuals of a component are not independent of each other."""
+    """Residuals of a component that are not independent of each other."""
 
     __slots__ = ()
 
     kind: Literal["correlated"]
     record: str
-    """The record."""
+    """Name of the record with this finding."""
     channel: str
-    """The component."""
+    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
     probability: float
-    """Probability that independent ones are correlated so."""
+    """Probability that independent residuals are as correlated as these."""
 
 
 class FindingTemperature(Record):
-    """The residuals of a component go with the temperature."""
+    """Residuals of a component that follow the temperature."""
 
     __slots__ = ()
 
     kind: Literal["temperature"]
     record: str
-    """The record."""
+    """Name of the record with this finding."""
     channel: str
-    """The component."""
+    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
     correlation: float
-    """The coefficient of correlation."""
+    """Coefficient of correlation of residuals and temperature, dimensionless, -1 to 1."""
     probability: float
-    """Probability of that by chance."""
+    """Probability that chance alone gives such a correlation."""
 
 
 class FindingOutliers(Record):
@@ -2378,44 +2429,45 @@ class FindingOutliers(Record):
 
     kind: Literal["outliers"]
     count: int
-    """How many."""
+    """Number of measurements that lie far off."""
     of: int
-    """Of so many."""
+    """Total number of measurements."""
 
 
 class FindingRepeatability(Record):
-    """The records do not agree on the coefficients."""
+    """Records that do not agree on the coefficients."""
 
     __slots__ = ()
 
     kind: Literal["repeatability"]
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
 
 
 class FindingSecondPath(Record):
-    """Filter and least squares do not agree."""
+    """Filter and least squares that do not agree."""
 
     __slots__ = ()
 
     kind: Literal["second_path"]
     difference: float
-    """The largest difference, in sigma."""
+    """Largest difference of both, in sigma, dimensionless."""
 
 
 class FindingKnown(Record):
-    """What was known before does not agree with the records."""
+    """Prior knowledge that does not agree with the records."""
 
     __slots__ = ()
 
     kind: Literal["known"]
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
 
 Finding = Union[
     FindingInterrupted,
     FindingNotSettled,
     FindingForce,
+    FindingCells,
     FindingClock,
     FindingPosition,
     FindingNoise,
@@ -2427,271 +2479,319 @@ Finding = Union[
     FindingSecondPath,
     FindingKnown,
 ]
-"""What speaks against the model or its sigmas."""
+"""Evidence against the model or its sigmas."""
 
 
 class Estimated(Record):
-    """An unknown or a combination."""
+    """Estimate of an unknown or a combination."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, or the combination."""
     unit: str
-    """Its unit: deg, deg/h, deg/h/g, ..."""
+    """Unit of the estimate: deg, deg/h, deg/h/g, ..."""
     status: Status
-    """The exact verdict of the scheme."""
+    """Verdict of the scheme on the unknown or combination."""
     degree: int | None
-    """The observable degree."""
+    """Observable degree; null if not observable."""
     determined: bool
-    """Whether scheme and records determine it; otherwise there is no estimate."""
+    """True if scheme and records determine it. If false, there is no estimate."""
     estimate: float | None
-    """The estimate."""
+    """Estimate in the unit of `unit`; null if not determined."""
     sigma: float | None
-    """Its standard deviation, by the noise that was assumed."""
+    """Standard deviation of the estimate by the assumed noise, in the unit of `unit`; null if not determined."""
     sigma_rescaled: float | None
-    """The same with errors of the records times the root of chi-square per degree of freedom, where that is above one; what was known
-    before stays as it is.
+    """Standard deviation, in the unit of `unit`, with errors of the records times the root of chi-square per degree of freedom, where
+    that is above one; prior knowledge stays as it is. Null if not determined.
     """
     predicted_sigma: float | None
-    """What the linear model has at the times and with the noise of the records (and what was known before), where the platform is at the
-    attitudes of the scheme.
+    """Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with the times and the noise of the
+    records (and prior knowledge); null if not determined.
     """
     held_factor: float | None
-    """What sigma is times that with all known that nothing determines: above one where the nonlinear model bends what is held within its
-    prior into the estimate.
+    """Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model couples an unknown
+    constrained by its prior to the estimate. Null if not determined.
     """
     prior_shift: float | None
-    """How far the prior of the scheme would move the estimate, in sigma."""
+    """Shift of the estimate by the prior of the scheme, in sigma (dimensionless); null if not determined."""
     prior_factor: float | None
-    """What it would make of sigma: 1 where it does not matter."""
+    """Factor on sigma by the prior of the scheme, dimensionless: 1 where it does not matter; null if not determined."""
 
 
 class CovarianceTable(Record):
-    """Estimates with their covariance."""
+    """Estimates with the covariance of their errors."""
 
     __slots__ = ()
 
     names: list[str]
     """Names, in the order of rows and columns."""
     units: list[str]
-    """Their units."""
+    """Units of the estimates, in the same order."""
     estimates: list[float]
-    """Their estimates."""
+    """Estimates in the same order, each in its unit."""
     covariance: list[list[float]]
-    """The covariance of their errors, by the noise that was assumed."""
+    """Covariance of the errors by the assumed noise, in products of the units of row and column."""
     rescaled: list[list[float]]
-    """The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known
-    before stays as it is.
+    """Covariance, in products of the units of row and column, with errors of the data times the root of chi-square per degree of
+    freedom, where that is above one; prior knowledge stays as it is.
     """
 
 
 class Fit(Record):
-    """How well everything fits."""
+    """Quality of the whole fit: chi-square, its band and its factor."""
 
     __slots__ = ()
 
     chi_square: float
-    """The sum of squares of all residuals, in sigma."""
+    """Chi-square: the sum of squares of all residuals in sigma, dimensionless."""
     degrees_of_freedom: float
-    """Its degrees of freedom."""
+    """Number of degrees of freedom of chi-square; fractions occur."""
     band: tuple[float, float]
-    """Where chi-square per degree of freedom lies with a probability of 99.9 %."""
+    """Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless."""
     factor: float
-    """The root of chi-square per degree of freedom: what sigmas are to be multiplied by."""
+    """Factor to multiply sigmas by: the root of chi-square per degree of freedom, dimensionless."""
     passes: int
-    """Linearisations."""
+    """Number of linearisations until convergence."""
 
 
 class Moved(Record):
-    """An unknown that moves."""
+    """Change of an unknown or combination without one position."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, or the combination."""
     sigmas: float
-    """By how much, in standard deviations."""
+    """Change over its standard deviation, dimensionless."""
 
 
 class PositionFit(Record):
-    """How well a position fits."""
+    """Quality of the fit at one position of a record."""
 
     __slots__ = ()
 
     record: str
-    """The record."""
+    """Name of the record with this position."""
     position: str
-    """The position."""
+    """Name of the position in the scheme."""
     start_s: float
-    """From when, in s of the record's timeline."""
+    """Start of the position, in s of the record's timeline."""
     end_s: float
-    """To when."""
+    """End of the position, in s of the record's timeline."""
     force_g: float | None
-    """How long the specific force is there, in g, where the record has it: a median, which single samples do not move."""
+    """Length of the specific force at the position, in g: a median, which single samples do not affect; null if the record has no
+    forces.
+    """
     measurements: int
-    """Measurements: components of Z of bins."""
+    """Number of measurements: components of Z of bins."""
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     degrees_of_freedom: float
-    """The degrees of freedom."""
+    """Number of degrees of freedom of chi-square; fractions occur."""
     moves: Moved | None
-    """Without it: the unknown that moves most, in standard deviations of the move."""
+    """Unknown that changes most without the position; null if there is none."""
     loses: list[str]
-    """Without it these are not determined."""
+    """Unknowns and combinations that are not determined without the position."""
 
 
 class Warmth(Record):
-    """How residuals go with the temperature, position by position."""
+    """Correlation of residuals and temperature, position by position."""
 
     __slots__ = ()
 
     correlation: float
-    """The coefficient of correlation at the position where it is strongest."""
+    """Coefficient of correlation at the position where it is strongest, dimensionless, -1 to 1."""
     probability: float
-    """Probability that residuals that do not depend on it are correlated so, all positions together (R. A. Fisher, Metron 1, 1921)."""
+    """Probability that residuals independent of the temperature are as correlated, all positions together (R. A. Fisher, Metron 1,
+    1921).
+    """
 
 
 class ChannelFit(Record):
-    """How well a component of Z fits."""
+    """Quality of the fit of one component of Z."""
 
     __slots__ = ()
 
     channel: str
-    """`Z1`, `Z2`, `Z3` or `Za`."""
+    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
     unit: str
-    """Unit of its sigmas."""
+    """Unit of `sigma` and `scatter`: g or rad."""
     sigma: float
-    """Of a sample, as it was used."""
+    """Standard deviation of a sample as assumed, in the unit of `unit`."""
     scatter: float | None
-    """Of a sample, by the scatter of the samples of a bin about a line; null where bins have too few."""
+    """Standard deviation of a sample, in the unit of `unit`, by the scatter of the samples of a bin about a line; null if bins have too
+    few.
+    """
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     degrees_of_freedom: float
-    """The degrees of freedom."""
+    """Number of degrees of freedom of chi-square; fractions occur."""
     whiteness_probability: float | None
-    """Smallest probability over the records that independent residuals are correlated as these are; null for few."""
+    """Smallest probability over the records that independent residuals are as correlated as these; null for few."""
     temperature: Warmth | None
-    """How residuals go with the temperature, in the record where that is least likely by chance; null without one, and for few."""
+    """Correlation of residuals and temperature in the record where chance is least likely; null without temperature, and for few."""
 
 
 class Outlier(Record):
-    """A measurement that was left out."""
+    """Measurement that was left out as an outlier."""
 
     __slots__ = ()
 
     record: str
-    """The record."""
+    """Name of the record with the outlier."""
     lines: tuple[int, int]
-    """Its lines, from and to."""
+    """First and last line number of the measurement in the record."""
     t_s: float
-    """When, in s of the record's timeline."""
+    """Time of the measurement, in s of the record's timeline."""
     channel: str
-    """The component."""
+    """Component of Z (`Z1`, `Z2`, `Z3` or `Za`) or, for a single cell, the column of the record."""
     sigmas: float
-    """How far it is off, in standard deviations."""
+    """Distance from the expected value, in standard deviations (dimensionless)."""
 
 
 class SecondPath(Record):
-    """The filter against least squares, with one wide prior for both."""
+    """Filter against least squares, with one wide prior for both."""
 
     __slots__ = ()
 
     difference: float
-    """The largest difference of the estimates at the end of a record, in sigma."""
+    """Largest difference of the estimates at the end of a record, in sigma (dimensionless)."""
     sigma_difference: float
-    """The largest difference of sigmas there, as a part."""
+    """Largest relative difference of sigmas there, dimensionless."""
 
 
 class Repeatability(Record):
-    """Several records, one platform."""
+    """Agreement of several records of one platform."""
 
     __slots__ = ()
 
     chi_square: float
-    """What the coefficients of the records differ by, as chi-square per degree of freedom."""
+    """Chi-square per degree of freedom of the differences between the records' coefficients, dimensionless."""
     degrees_of_freedom: float
-    """The degrees of freedom."""
+    """Number of degrees of freedom of chi-square; fractions occur."""
     band: tuple[float, float]
-    """Where it lies with a probability of 99.9 %."""
+    """Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless."""
+
+
+class Gap(Record):
+    """Gap in a record: an interval without rows."""
+
+    __slots__ = ()
+
+    from_s: float
+    """Time of the row before the gap, in s as in the record."""
+    to_s: float
+    """Time of the row after the gap, in s as in the record."""
+    line: int
+    """Line number of the row after the gap."""
+    place: str
+    """Position of the rows before and after the gap, or both positions if they differ."""
+
+
+class EmptyCells(Record):
+    """Number of empty cells in a column of a record."""
+
+    __slots__ = ()
+
+    column: str
+    """Column of the cells, as in the header of the record."""
+    count: int
+    """Number of cells that are empty or NaN, in rows at positions."""
 
 PositionsBy = Literal["labels", "timeline", "both", "static"]
-"""What says where a sample was taken. labels: A column of labels: a position ends with its last sample, and the next begins when the
-slew is over. timeline: The timeline of the scheme. both: A column of labels that agrees with the timeline of the scheme, which says
-when a position begins and ends. static: Intervals at rest that were found, as many as the scheme has positions: turns are in the
-middle of what is between them.
+"""Source of the position of each sample. labels: Column of labels: a position ends with its last sample, and the next begins when the
+slew is over. timeline: Timeline of the scheme, by the times of the samples. both: Column of labels that agrees with the timeline of
+the scheme, which sets the start and end of a position. static: Intervals at rest that were found, as many as the scheme has
+positions; slews lie in the middle between them.
 """
 
 
 class Clock(Record):
-    """How right the clock of a record is."""
+    """Offset and rate error of the clock of a record."""
 
     __slots__ = ()
 
+    offset_s: float | None
+    """Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in the scheme, so that rows
+    alone say when each begins.
+    """
+    offset_sigma_s: float | None
+    """Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree with it."""
     by_durations: float | None
-    """By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme
-    that was run so.
+    """Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all times stretched by it: a
+    clock, or a scheme run so; null if not.
     """
     by_earth: ClockByEarth | None
-    """By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part. Nothing where
-    sigma would be above a third.
+    """Fraction by which the clock is fast by the rate of the earth when all unknowns follow; drifts are too small by the same fraction.
+    Null if its sigma would be above a third.
     """
 
 
 class RecordReport(Record):
-    """A record that was read."""
+    """Record that was read, with its clock and columns."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the record, as it was given."""
     samples: int
-    """Its samples."""
+    """Number of samples in the record."""
+    interval_s: float
+    """Usual interval between rows, in s."""
+    gaps: list[Gap]
+    """Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between; at most 1000."""
+    empty_cells: list[EmptyCells]
+    """Number of empty cells at positions, by column that is read; columns without are left out."""
+    psi_at_s: float
+    """Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the first row at it where only
+    rows say when positions begin.
+    """
     unused: int
-    """Samples at no position of the scheme."""
+    """Number of samples at no position of the scheme."""
     bins: int
-    """Bins."""
+    """Number of bins of the samples."""
     span_s: tuple[float, float]
-    """First and last time, in s as they are in the record."""
+    """First and last time of the record, in s."""
     positions_by: PositionsBy
-    """What says where each sample was taken."""
+    """Source of the position of each sample."""
     ignored: list[str]
-    """Columns that nothing was made of."""
+    """Columns that are not used."""
     force_g: float | None
-    """The mean length of the specific force, in g, where the record has it."""
+    """Mean length of the specific force, in g; null if the record has no forces."""
     gimbals_deg: float | None
-    """How far the gimbals are from the attitudes of the scheme at most, in deg, where the record has their angles."""
+    """Largest distance of the gimbals from the attitudes of the scheme, in deg; null if the record has no gimbal angles."""
     clock: Clock
-    """Its clock."""
+    """Rate error of the clock of the record."""
 
 
 class Assumed(Record):
-    """What was assumed."""
+    """Assumptions of the estimates: conditions, noise, priors and gate."""
 
     __slots__ = ()
 
     latitude_deg: float
-    """In deg."""
+    """Latitude of the calibration, in deg."""
     latitude_by_default: bool
-    """Whether the scheme names no latitude."""
+    """True if the scheme states no latitude."""
     gravity_m_s2: float
-    """What one g is."""
+    """Acceleration of one g, in m/s^2."""
     bin_s: float
-    """Samples within so many s are taken together."""
+    """Width of a bin, in s: samples within it are taken together."""
     accelerometer_noise_g: float
-    """White noise of Z per sample and axis in g, as it was given."""
+    """White noise of Z per sample and axis as given, in g."""
     noise_estimated: bool
-    """Whether the noise was estimated from the records."""
+    """True if the noise was estimated from the records."""
     drift_noise_deg_sqrt_h: float
-    """White drift."""
+    """Density of the white drift, in deg/sqrt(h)."""
     gate: float
     """Probability that no measurement of a right record is left out."""
     known: list[str]
-    """Names taken from a calibration before."""
+    """Names of the unknowns and combinations taken from a calibration before."""
     known_differs: list[str]
-    """What is different in the scheme of that."""
+    """Differences of the scheme of that calibration."""
     held: list[tuple[str, float, str]]
-    """What nothing determines, unknown by unknown: the standard deviation within which it is held, in its unit."""
+    """Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, drift_noise."""
     seed: int
@@ -2699,107 +2799,107 @@ class Assumed(Record):
 
 
 class Setup(Record):
-    """What of a scheme says what its coefficients mean, and which records are of its runs."""
+    """Setup of a scheme: the meaning of its coefficients, and the identity of records of its runs."""
 
     __slots__ = ()
 
     terms: str
-    """The terms, as in `--terms`."""
+    """Terms of the error model, as in `--terms`."""
     geometry: Geometry
-    """How gyros and accelerometers are mounted."""
+    """Mounting of the gyros and accelerometers."""
     carry: Carry
-    """What is carried between positions."""
+    """Carry: quantity that continues from one position to the next."""
     latitude_deg: float
-    """In deg, by default that of the paper."""
+    """Latitude in deg; 28.2 if the scheme states none."""
     measured_azimuth: bool
-    """Whether psi_y is measured."""
+    """True if psi_y is measured."""
     positions: list[tuple[str, str]]
     """Names and Euler angles in deg of the positions."""
 
 
 class Basis2(Record):
-    """A record that estimates rest on."""
+    """Record that estimates rest on."""
 
     __slots__ = ()
 
     record: str
-    """What it was called."""
+    """Name of the record, as it was given."""
     digest: str
-    """The digest of its numbers."""
+    """Digest of the numbers of the record."""
 
 
 class ResidualSeries(Record):
-    """What is left of a component of a record, in the order of time."""
+    """Residuals of a component in a record, in order of time."""
 
     __slots__ = ()
 
     record: str
-    """The record."""
+    """Name of the record with these residuals."""
     channel: str
-    """The component."""
+    """Component of Z: `Z1`, `Z2`, `Z3` or `Za`."""
     unit: str
-    """The unit of residuals."""
+    """Unit of the residuals: g or rad."""
     points: list[tuple[float, float, float]]
-    """Time in s, residual and its sigma by the noise that was assumed: at most a thousand, evenly picked."""
+    """Time in s, residual and its sigma by the assumed noise in the unit of `unit`: at most a thousand points, evenly picked."""
     autocorrelation: list[float]
-    """Their correlation with those one, two, ... measurements later."""
+    """Correlation of the residuals with those one, two, ... measurements later, dimensionless."""
     count: int
-    """How many there are."""
+    """Number of residuals, listed here or not."""
     allan: list[tuple[float, float, float]]
-    """Cluster time in s, the overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of white ones of the
-    assumed sigma; turns between positions take no time here.
+    """Cluster time in s, overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of white residuals of the
+    assumed sigma, both in the unit of `unit`; slews take no time here.
     """
 
 
 class Calibration(Shape):
-    """A calibration from records."""
+    """Calibration of a scheme from one or several records."""
 
     schema: str
-    """`obsdeg.calibration/1`."""
+    """Layout of this answer: `obsdeg.calibration/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     consistent: bool
-    """Whether the model and its sigmas explain the records."""
+    """True if the model and its sigmas explain the records."""
     findings: list[Finding]
-    """What speaks against that, the gravest first; empty when nothing does."""
+    """Evidence against the model or its sigmas, the gravest first; empty if there is none."""
     quantities: list[Estimated]
-    """Every unknown, psi of the start of each record."""
+    """Estimates of the unknowns, psi of the start of each record."""
     requirements: Requirements | None
-    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null where none is
-    stated. Those on psi are not judged: a calibration estimates psi of the start of a record.
+    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null if none is
+    stated. Requirements on psi are not judged: a calibration estimates psi of the start of a record.
     """
     combinations: list[Estimated]
-    """Combinations of what is not told apart one by one, and those asked for."""
+    """Estimates of combinations of unknowns that are not determined alone, and of those asked for."""
     covariance: CovarianceTable
-    """Of all that has an estimate."""
+    """Covariance of all estimates that do not follow from others."""
     fit: Fit
-    """The whole fit."""
+    """Quality of the whole fit: chi-square, its band and its factor."""
     positions: list[PositionFit]
-    """By record and position."""
+    """Quality of the fit by record and position."""
     channels: list[ChannelFit]
-    """By component of Z."""
+    """Quality of the fit by component of Z."""
     outliers: list[Outlier]
-    """Measurements that were left out."""
+    """Measurements that were left out as outliers."""
     outlier_count: int
-    """How many samples were left out in all."""
+    """Number of measurements that were left out as outliers."""
     second_path: SecondPath
-    """The second path to the estimate."""
+    """Second path to the estimate: the filter against least squares."""
     repeatability: Repeatability | None
-    """How far the coefficients of several records agree."""
+    """Agreement of the coefficients of several records; null for one record."""
     records: list[RecordReport]
-    """What was read."""
+    """Records that were read, with their clocks and columns."""
     assumed: Assumed
-    """What was assumed."""
+    """Assumptions of the estimates: conditions, noise, priors and gate."""
     setup: Setup
-    """What it is of."""
+    """Scheme, geometry and carry that were calibrated."""
     rests_on: list[Basis2]
-    """The records that it rests on, those of the calibration before too."""
+    """Records that the estimates rest on, including those of the calibration before."""
     series: list[ResidualSeries]
-    """What is left over time, by record and component."""
+    """Residuals over time, by record and component."""
 
 
 class SystemFindingInterrupted(Record):
-    """Interrupted: the estimates are where the best iteration was then."""
+    """Interrupted iteration: the estimates are where the best one was then."""
 
     __slots__ = ()
 
@@ -2807,7 +2907,7 @@ class SystemFindingInterrupted(Record):
 
 
 class SystemFindingNotSettled(Record):
-    """No start settled."""
+    """Iteration that did not converge from any start."""
 
     __slots__ = ()
 
@@ -2815,41 +2915,41 @@ class SystemFindingNotSettled(Record):
 
 
 class SystemFindingNoise(Record):
-    """Chi-square is outside its band."""
+    """Chi-square that is outside its acceptance band."""
 
     __slots__ = ()
 
     kind: Literal["noise"]
     chi_square: float
-    """Per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     factor: float
-    """What sigmas are to be multiplied by."""
+    """Factor to multiply the sigmas by, dimensionless."""
 
 
 class SystemFindingCorrelated(Record):
-    """The residuals of an output are not independent of each other."""
+    """Residuals of an output that are not independent of each other."""
 
     __slots__ = ()
 
     kind: Literal["correlated"]
     output: str
-    """The output."""
+    """Name of the output with this finding."""
     probability: float
-    """Probability that independent ones are correlated so."""
+    """Probability that independent residuals are as correlated as these."""
 
 
 class SystemFindingOutlier(Record):
-    """A measurement is far off."""
+    """Measurement that is far from its expected value."""
 
     __slots__ = ()
 
     kind: Literal["outlier"]
     output: str
-    """The output."""
+    """Name of the output with this finding."""
     line: int
-    """Its line in the record."""
+    """Line number of the measurement in the record."""
     sigmas: float
-    """By how much the others leave it off, in sigma as these have it (at least as it was given)."""
+    """Residual in sigma by the other measurements (at least the given sigma), dimensionless."""
 
 SystemFinding = Union[
     SystemFindingInterrupted,
@@ -2858,181 +2958,190 @@ SystemFinding = Union[
     SystemFindingCorrelated,
     SystemFindingOutlier,
 ]
-"""What speaks against model or noise."""
+"""Evidence against the model or the noise."""
 
 
 class SystemEstimated(Record):
-    """An unknown or a combination."""
+    """Estimate of an unknown or a combination."""
 
     __slots__ = ()
 
     name: str
-    """Its name."""
+    """Name of the unknown, or the combination."""
     unit: str
-    """Its unit, as the file says."""
+    """Unit of the estimate, as in the model file."""
     status: Status | None
-    """The exact verdict; null for what is known."""
+    """Verdict on the unknown or combination; null if it is known."""
     degree: int | None
-    """The degree."""
+    """Observable degree; null if not observable."""
     determined: bool
-    """Whether model and data determine it."""
+    """True if model and data determine it."""
     estimate: float | None
-    """The estimate."""
+    """Estimate in the unit of `unit`; null if not determined."""
     sigma: float | None
-    """Its standard deviation by the noise."""
+    """Standard deviation of the estimate by the noise, in the unit of `unit`; null if not determined."""
     sigma_rescaled: float | None
-    """The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known
-    before stays as it is.
+    """Standard deviation, in the unit of `unit`, with errors of the data times the root of chi-square per degree of freedom, where that
+    is above one; prior knowledge stays as it is. Null if not determined.
     """
 
 
 class OutputFit(Record):
-    """How well an output fits."""
+    """Quality of the fit of one output."""
 
     __slots__ = ()
 
     output: str
-    """The output."""
+    """Name of the output in the model."""
     measurements: int
-    """Its measurements."""
+    """Number of measurements of the output."""
     sigma: float | None
-    """The noise of a measurement; null where every row has its own."""
+    """Standard deviation of the noise of a measurement, in the unit of the output; null if rows have different ones."""
     estimated: bool
-    """Whether it was estimated from what is left."""
+    """True if the noise was estimated from the residuals."""
     chi_square: float
-    """Chi-square per degree of freedom."""
+    """Chi-square per degree of freedom, dimensionless; 1 is expected."""
     rms: float
-    """Root of the mean square of what is left, in the unit of the output."""
+    """Root mean square of the residuals, in the unit of the output."""
     expected_rms: float
-    """The same of what sigmas let expect."""
+    """Root mean square of the residuals that the sigmas predict, in the unit of the output."""
     degrees_of_freedom: float
-    """Measurements minus what they determine."""
+    """Number of degrees of freedom: measurements minus the unknowns that they determine; fractions occur."""
     outlier_gate: float | None
-    """Further off than this, in sigma as the others have it, a measurement is named; null where too few others are left to say."""
+    """Residual in sigma by the other measurements (dimensionless) above which a measurement is an outlier; null if there are too few
+    others.
+    """
     whiteness_probability: float | None
-    """Probability that independent residuals are correlated as these are; null for few."""
+    """Probability that independent residuals are as correlated as these; null for few."""
 
 
 class OtherSolution(Record):
-    """Another solution."""
+    """Other solution that fits nearly as well."""
 
     __slots__ = ()
 
     chi_square: float
-    """Its sum of squares."""
+    """Sum of squares of all residuals in sigma, dimensionless."""
     starts: int
-    """How many starts led there."""
+    """Number of starts that led to this solution."""
     values: list[float]
-    """Values of the unknowns, in their order."""
+    """Values of the unknowns, in their order and units."""
 
 
 class Profile(Record):
-    """What the data say of one unknown when all others follow."""
+    """Profile of one unknown: the fit as a function of its value when all others follow."""
 
     __slots__ = ()
 
     name: str
-    """The unknown."""
+    """Name of the unknown that is fixed."""
     points: list[tuple[float, float]]
-    """Its values, and by how much the sum of squares is larger there than at the solution."""
+    """Value of the unknown, in its unit, and the sum of squares there minus that at the solution, dimensionless."""
     flat: bool
-    """Whether it is flat: no value changes the sum of squares by more than a hundredth of one."""
+    """True if the profile is flat: no value changes the sum of squares by more than 0.01."""
 
 
 class SystemCalibrationBasis(Record):
-    """A record that estimates rest on."""
+    """Record that estimates rest on."""
 
     __slots__ = ()
 
     record: str
-    """What it was called."""
+    """Name of the record, as it was given."""
     digest: str
-    """The digest of its numbers."""
+    """Digest of the numbers of the record."""
 
 
 class SystemCalibration(Shape):
-    """A calibration of a system."""
+    """Calibration of a system from one record."""
 
     schema: str
-    """`obsdeg.system-calibration/1`."""
+    """Layout of this answer: `obsdeg.system-calibration/1`."""
     version: str
-    """Version of the program."""
+    """Version of the program that wrote it."""
     name: str
-    """The system."""
+    """Name of the system, as in its file."""
     consistent: bool | None
-    """Whether model and noise explain the data; null where the noise was estimated from what is left, which then decides nothing."""
+    """True if model and noise explain the data; null if the noise was estimated from the residuals, which then decide nothing."""
     findings: list[SystemFinding]
-    """What speaks against it."""
+    """Evidence against the model or the noise; empty if there is none."""
     quantities: list[SystemEstimated]
-    """States at the start of every experiment, parameters, and what is unknown of inputs."""
+    """Estimates of states at the start of every experiment, parameters, and unknowns of inputs."""
     combinations: list[SystemEstimated]
-    """The combinations that the model asks for, and products and sums of what is not determined alone that it determines."""
+    """Estimates of combinations that the model asks for, and of products and sums that are determined though their unknowns alone are
+    not.
+    """
     covariance: CovarianceTable
-    """Of all unknowns that are determined."""
+    """Covariance of all unknowns that are determined."""
     chi_square: float
-    """The sum of squares of all residuals, in sigma."""
+    """Chi-square: the sum of squares of all residuals in sigma, dimensionless."""
     degrees_of_freedom: int
-    """Measurements minus what they determine."""
+    """Number of degrees of freedom: measurements minus determined unknowns."""
     band: tuple[float, float]
-    """Where chi-square per degree of freedom lies with a probability of 99.9 %."""
+    """Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless."""
     factor: float
-    """The root of chi-square per degree of freedom."""
+    """Root of chi-square per degree of freedom, dimensionless; 1 is expected."""
     outputs: list[OutputFit]
-    """By output."""
+    """Quality of the fit of each output."""
     others: list[OtherSolution]
     """Other solutions that fit nearly as well, the best first: the values of the unknowns."""
     starts: tuple[int, int]
-    """Starts that were tried, and how many led to the solution."""
+    """Number of starts that were tried, then the number that led to the solution."""
     starts_at_most: int
-    """How many would have been tried at most: fewer are enough when no other solution is to be expected."""
+    """Largest number of starts; fewer are enough when no other solution is to be expected."""
     profiles: list[Profile]
-    """Profiles that were asked for."""
+    """Profiles of the unknowns that were asked for."""
     samples: int
-    """Rows of the record."""
+    """Number of rows of the record."""
     intervals: int | None
-    """Intervals at rest, where the file says how they are found."""
+    """Number of intervals at rest; null if the file does not ask for them."""
+    begins: float | None
+    """Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than 100 times its own
+    length after 0 starts with its first row.
+    """
     rows: int
-    """Rows that the model is held against: those of the record, or the intervals and what is between them."""
+    """Number of rows that the model is fitted to: those of the record, or the intervals and the runs between them."""
     ignored: list[str]
-    """Columns that nothing was made of."""
+    """Columns that are not used."""
     model: str
-    """The digest of the model."""
+    """Digest of the model, to recognise it."""
     rests_on: list[SystemCalibrationBasis]
-    """The records that the estimates rest on, those of the calibration before too."""
+    """Records that the estimates rest on, including those of the calibration before."""
     shared: bool
-    """Whether the calibration before rests on the same record, by another model."""
+    """True if the calibration before rests on the same record, by another model."""
     substeps: int
-    """Steps of integration between two rows, at most."""
+    """Largest number of integration steps between two rows."""
     seed: int
     """Seed of starts and verdicts."""
 
 AuditFinding = Literal["agree", "conditional", "disagree", "not_covered"]
-"""Whether the paper is right. agree: It holds as printed. conditional: It holds under a condition that the paper does not state; the
-reason does. disagree: It does not. not_covered: It was not judged; the reason says why.
+"""Outcome of checking an equation or claim of the paper. agree: True as printed in the paper. conditional: True under a condition that
+the paper does not state; the reason states it. disagree: False as printed in the paper. not_covered: Not judged; the reason gives the
+cause.
 """
 
 
 class Line(Record):
-    """One equation or claim."""
+    """Equation or claim of the paper, with its outcome."""
 
     __slots__ = ()
 
     place: str
-    """Where in the paper, such as `(21)` or `conclusion 2`."""
+    """Place in the paper, such as `(21)` or `conclusion 2`."""
     claim: str
-    """What it says."""
+    """Equation or claim, in words."""
     finding: AuditFinding
-    """Whether it holds."""
+    """Outcome: agree, conditional, disagree or not covered."""
     reason: str
-    """Why: what was computed, for a slip the correction, and for what is not covered why it is not."""
+    """Reason of the outcome: the computation, for a slip the correction, and for a line that is not covered the cause."""
 
 
 class Audit(Shape):
-    """The whole audit."""
+    """Audit of the paper, equation by equation and claim by claim."""
 
     schema: str
-    """`obsdeg.audit/1`."""
+    """Layout of this answer: `obsdeg.audit/1`."""
     seed: int
     """Seed of all random points and of the noise."""
     lines: list[Line]
-    """The equations by number, then the claims in the order of the paper, then what is not covered."""
+    """Equations by number, then claims in the order of the paper, then everything that is not covered."""

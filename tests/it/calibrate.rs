@@ -5,8 +5,9 @@ use std::io::Write;
 use std::process::Stdio;
 use std::sync::Arc;
 
-use parquet::basic::{Repetition, Type as Physical};
+use parquet::basic::{Compression, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
+use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use serde_json::Value;
@@ -457,6 +458,11 @@ fn crate_root(path: &str) -> std::path::PathBuf {
 
 /// A record in CSV as Parquet: numbers and labels.
 fn parquet(text: &str) -> Vec<u8> {
+    compressed(text, Compression::UNCOMPRESSED)
+}
+
+/// The same by a codec.
+fn compressed(text: &str, codec: Compression) -> Vec<u8> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let headers: Vec<String> = reader.headers().expect("a header").iter().map(String::from).collect();
     let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.expect("a row")).collect();
@@ -467,8 +473,9 @@ fn parquet(text: &str) -> Vec<u8> {
         Arc::new(builder.with_logical_type(logical).build().expect("a field"))
     };
     let fields = headers.iter().map(field).collect();
+    let properties = Arc::new(WriterProperties::builder().set_compression(codec).build());
     let schema = Arc::new(Type::group_type_builder("record").with_fields(fields).build().expect("a schema"));
-    let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::default()).expect("a writer");
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).expect("a writer");
     let mut group = writer.next_row_group().expect("a group");
     for (i, name) in headers.iter().enumerate() {
         let mut column = group.next_column().expect("a column").expect("a column");
@@ -483,6 +490,107 @@ fn parquet(text: &str) -> Vec<u8> {
     }
     group.close().expect("closed");
     writer.into_inner().expect("closed")
+}
+
+/// How a record is read is shown before anything is estimated, also where an estimate would not be.
+#[test]
+fn how_a_record_is_read() {
+    let found = json(&["calibrate", SCHEME, RECORD, "--dry-run", "--format", "json"]);
+    assert_eq!((found["schema"].as_str(), found.get("quantities")), (Some("obsdeg.records/1"), None));
+    let read = &found["records"][0];
+    assert_eq!(
+        (&read["samples"], &read["positions_by"], &read["origin_s"]),
+        (&963.into(), &"both".into(), &0.0.into())
+    );
+    assert_eq!(
+        (&read["interval_s"], &read["gaps"], &read["left_out"]),
+        (&4.0.into(), &Value::Array(vec![]), &Value::Array(vec![]))
+    );
+    let columns: Vec<&str> =
+        read["columns"].as_array().expect("columns").iter().filter_map(|c| c["column"].as_str()).collect();
+    assert_eq!(columns, ["t [s]", "fx [g]", "fy [g]", "fz [g]"]);
+    let names: Vec<&str> = read["positions"]
+        .as_array()
+        .expect("positions")
+        .iter()
+        .filter_map(|p| p["position"].as_str())
+        .collect();
+    assert_eq!(names, ["p1", "p2", "p3", "p4", "p5", "p6"]);
+    // in German, late, with a gap, a code and an empty cell
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("record.csv");
+    let text = fs::read_to_string(crate_root(RECORD)).expect("the record");
+    let mut spoiled = String::new();
+    for (k, line) in text.lines().enumerate() {
+        let mut cells: Vec<String> = line.split(',').map(String::from).collect();
+        if let Ok(t) = cells[0].parse::<f64>() {
+            cells[0] = (t + 1000.0).to_string();
+        }
+        match k {
+            20..40 => continue,
+            60 => cells[2].clear(),
+            70 | 71 => cells[3] = "-9999".into(),
+            _ => {}
+        }
+        spoiled += &(cells.join(";").replace('.', ",") + "\n");
+    }
+    fs::write(&path, spoiled).expect("written");
+    let output = run(&["calibrate", SCHEME, &path.display().to_string(), "--dry-run"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let said = stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in [
+        "nothing was estimated",
+        "columns are separated by semicolons, decimals by commas",
+        "the scheme begins between",
+        "rows are missing for 84 s from 1084 s on (p1, before line 21)",
+        "empty cells at positions: 1 of `fx [g]`",
+        "51 fy [g] -9999 code",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let output =
+        run(&["calibrate", "examples/influenza/model.toml", "examples/influenza/data.csv", "--dry-run"]);
+    assert!(
+        output.status.code() == Some(2) && stderr(&output).contains("--dry-run is about schemes"),
+        "{}",
+        stderr(&output)
+    );
+}
+
+/// Every codec but one is read, and that one is named; of a pipe of Parquet only so much is taken.
+#[test]
+fn codecs_of_parquet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("record.csv");
+    let text = fs::read_to_string(crate_root(RECORD)).expect("the record");
+    let of = |bytes: &[u8]| {
+        fs::write(&path, bytes).expect("written");
+        run(&["calibrate", SCHEME, &path.display().to_string()])
+    };
+    let right = stdout(&of(text.as_bytes()));
+    for codec in [
+        Compression::SNAPPY,
+        Compression::GZIP(Default::default()),
+        Compression::BROTLI(Default::default()),
+        Compression::LZ4_RAW,
+        Compression::LZ4,
+    ] {
+        let bytes = compressed(&text, codec);
+        assert!(bytes.len() != parquet(&text).len(), "{codec:?}");
+        assert_eq!(stdout(&of(&bytes)), right, "{codec:?}");
+    }
+    // the codec of a column follows its name in the footer: field 4, an integer, gzip 2 and zstd 6 (zigzag)
+    let mut bytes = compressed(&text, Compression::GZIP(Default::default()));
+    let mark = [b"fx [g]".as_slice(), &[0x15, 0x04]].concat();
+    let at = bytes.windows(mark.len()).rposition(|w| w == mark).expect("a column") + mark.len() - 1;
+    bytes[at] = 0x0c;
+    let output = of(&bytes);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains("it is compressed by zstd, which is not read; expected gzip"),
+        "{}",
+        stderr(&output)
+    );
 }
 
 /// Files in the place of others are told by name, with the command in the right order.

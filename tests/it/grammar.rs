@@ -80,6 +80,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
         "symbolic-limit" => &["0", "1", "1000", "18446744073709551615", "-1"],
+        "engine-wait" => &["0", "1", "86401", "-1", "x"],
         "format" => &["table", "json", "markdown", "csv", "latex", "html", "pdf", "xml"],
         "dwell" => &["100", "300", "0.001", "1e6", "0", "-5", "nan", "inf", "1e300", "1e-300"],
         "step" => &[
@@ -161,7 +162,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "figures" => &["pictures", ".", "s.toml"],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "require-met"
-        | "force" | "quiet" | "help" | "estimate-noise" | "ascii" => {
+        | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" => {
             return None;
         }
         _ => number,
@@ -254,9 +255,10 @@ fn record() -> String {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 11] = [
+    const TAKEN: [&str; 12] = [
         "ascii",
         "count-limit",
+        "engine-wait",
         "force",
         "format",
         "order",

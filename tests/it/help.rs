@@ -7,7 +7,7 @@ const COMMANDS: [(&str, usize); 11] = [
     ("analyze", 45),
     ("simulate", 62),
     ("crosscheck", 67),
-    ("calibrate", 47),
+    ("calibrate", 48),
     ("compare", 46),
     ("design", 68),
     ("report", 59),

@@ -7,32 +7,34 @@ use serde_json::Value;
 
 use crate::program::{json, run, stdout};
 
+/// The kinds of `obsdeg schema`.
+const KINDS: [&str; 15] = [
+    "analysis",
+    "audit",
+    "calibration",
+    "comparison",
+    "crosscheck",
+    "design",
+    "model",
+    "part",
+    "scheme",
+    "simulation",
+    "system",
+    "system-calibration",
+    "system-evidence",
+    "system-run",
+    "walks",
+];
+
 /// The schemas by the names that answers give themselves.
 fn validators() -> BTreeMap<String, Validator> {
-    let kinds = [
-        "analysis",
-        "audit",
-        "calibration",
-        "comparison",
-        "crosscheck",
-        "design",
-        "model",
-        "part",
-        "scheme",
-        "simulation",
-        "system",
-        "system-calibration",
-        "system-evidence",
-        "system-run",
-        "walks",
-    ];
     let of = |kind: &str| {
         let schema = json(&["schema", kind]);
         let version = if ["comparison", "design", "simulation"].contains(&kind) { 2 } else { 1 };
         assert_eq!(schema["$id"], format!("urn:obsdeg:{kind}:{version}"));
         (format!("obsdeg.{kind}/{version}"), jsonschema::validator_for(&schema).expect("a schema"))
     };
-    kinds.map(of).into()
+    KINDS.map(of).into()
 }
 
 fn check(validators: &BTreeMap<String, Validator>, name: &str, value: &Value, what: &str) {
@@ -118,4 +120,180 @@ fn files_and_answers_are_as_their_schemas_say() {
     assert!(!validators["obsdeg.analysis/1"].is_valid(&wrong));
     wrong.as_object_mut().expect("an object").remove("rank");
     assert!(!validators["obsdeg.analysis/1"].is_valid(&wrong));
+}
+
+/// Descriptions, read as someone does who sees one of them alone in an editor's hint.
+mod descriptions {
+    use serde_json::{Map, Value};
+
+    use super::KINDS;
+    use crate::program::{json, run, stdout};
+
+    /// A description has at least as many characters.
+    const SHORTEST: usize = 26;
+
+    /// First words that point at something instead of naming it.
+    const POINTING: [&str; 18] = [
+        "What", "Whether", "How", "Which", "To", "Of", "Those", "That", "By", "When", "Where", "Why", "As",
+        "It", "Its", "Their", "Under", "So",
+    ];
+
+    /// Units, as they follow `in`.
+    const UNITS: [&str; 11] = [
+        "s",
+        "deg",
+        "degrees",
+        "deg/s",
+        "deg/h",
+        "deg/sqrt(h)",
+        "deg/h/sqrt(h)",
+        "g",
+        "ug",
+        "m/s^2",
+        "percent",
+    ];
+
+    /// Words for units that another field or file states.
+    const STATED: [&str; 4] = ["unit of", "units of", "in its unit", "order and units"];
+
+    /// Words for numbers without a unit.
+    const WITHOUT: [&str; 7] =
+        ["dimensionless", "number of", "number that", "line number", "index", "seed of", "probability"];
+
+    /// Words for whole numbers without a unit.
+    const COUNTED: [&str; 4] = ["rank", "order", "observable degree", "worst degree"];
+
+    /// Numbers in a value.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    enum Numbers {
+        None,
+        Whole,
+        Real,
+    }
+
+    /// Numbers in a value of this schema, those of its lists and tables too. Types by name have their own
+    /// descriptions.
+    fn numbers(schema: &Value) -> Numbers {
+        let types = match &schema["type"] {
+            Value::Array(all) => all.iter().filter_map(Value::as_str).collect(),
+            one => one.as_str().into_iter().collect::<Vec<_>>(),
+        };
+        let own = match (types.contains(&"number"), types.contains(&"integer")) {
+            (true, _) => Numbers::Real,
+            (false, true) => Numbers::Whole,
+            (false, false) => Numbers::None,
+        };
+        let lists = ["prefixItems", "anyOf"].iter().filter_map(|key| schema[key].as_array()).flatten();
+        let inner = ["items", "additionalProperties"].iter().filter_map(|key| schema.get(key));
+        lists.chain(inner).map(numbers).max().map_or(own, |most| most.max(own))
+    }
+
+    /// Faults of a description.
+    fn faults(text: &str, numbers: Numbers) -> Vec<&'static str> {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let plain = words.join(" ").to_lowercase();
+        let says = |of: &[&str]| of.iter().any(|w| plain.contains(w));
+        let is_unit = |word: &str| UNITS.contains(&word.trim_end_matches([',', ';', ':', '.', ']']));
+        let has_unit =
+            words.windows(2).any(|w| w[0] == "in" && is_unit(w[1])) || says(&STATED) || says(&WITHOUT);
+        let mut out = Vec::new();
+        if text.chars().count() < SHORTEST {
+            out.push("is short");
+        }
+        if words.first().is_none_or(|w| POINTING.contains(w)) {
+            out.push("begins with a word that points");
+        }
+        if numbers == Numbers::Real && !has_unit || numbers == Numbers::Whole && !has_unit && !says(&COUNTED)
+        {
+            out.push("is of a number and has no unit");
+        }
+        out
+    }
+
+    /// Adds the faults of all descriptions of a schema to `out`, with the place of each.
+    fn look(schema: &Value, place: &str, described: bool, out: &mut Vec<String>) {
+        let none = Map::new();
+        let table = |key: &str| schema[key].as_object().unwrap_or(&none);
+        match schema["description"].as_str() {
+            Some(text) => {
+                let found = faults(text, numbers(schema));
+                out.extend(found.iter().map(|fault| format!("{place}: {text:?} {fault}")));
+            }
+            None if described => out.push(format!("{place} has no description")),
+            None => {}
+        }
+        for (name, of) in table("properties") {
+            // the variant's description covers its tag, and the only key of a variant that is a table
+            let tag = of.get("const").is_some();
+            let only = schema.get("additionalProperties") == Some(&Value::Bool(false))
+                && table("properties").len() == 1
+                && place.contains('|');
+            look(of, &format!("{place}/{name}"), !tag && !only, out);
+        }
+        for (name, of) in table("$defs") {
+            look(of, name, true, out);
+        }
+        for key in ["oneOf", "anyOf"] {
+            for (i, of) in schema[key].as_array().into_iter().flatten().enumerate() {
+                let variant = of.get("const").is_some() || of.get("properties").is_some();
+                look(of, &format!("{place}|{i}"), variant, out);
+            }
+        }
+        if let Some(items) = schema.get("items") {
+            look(items, &format!("{place}[]"), false, out);
+        }
+    }
+
+    /// Every description stands alone: it names the thing, and the unit of a number.
+    #[test]
+    fn stand_alone() {
+        let help = stdout(&run(&["schema", "--help"]));
+        let kinds = help.lines().filter_map(|line| line.trim_start().strip_prefix("- ")?.split(':').next());
+        let mut kinds: Vec<&str> = kinds.collect();
+        kinds.sort_unstable();
+        assert_eq!(kinds, KINDS);
+        let mut out = Vec::new();
+        for kind in KINDS {
+            look(&json(&["schema", kind]), kind, true, &mut out);
+        }
+        out.sort();
+        out.dedup();
+        assert!(out.is_empty(), "{} faults:\n{}", out.len(), out.join("\n"));
+    }
+
+    /// Descriptions that say nothing are refused, and so are keys and types without one.
+    #[test]
+    fn that_point_are_refused() {
+        let (short, points, unit) =
+            ("is short", "begins with a word that points", "is of a number and has no unit");
+        for (text, numbers, expected) in [
+            ("Whether it is.", Numbers::None, vec![short, points]),
+            ("To when.", Numbers::Real, vec![short, points, unit]),
+            ("Of so many.", Numbers::Whole, vec![short, points, unit]),
+            ("A set that does.", Numbers::None, vec![short]),
+            ("The criterion.", Numbers::Real, vec![short, unit]),
+            ("What sigmas are to be multiplied by.", Numbers::Real, vec![points, unit]),
+            ("Required over found sigma: at least 1 is met.", Numbers::Real, vec![unit]),
+            ("Unknowns with a requirement.", Numbers::Whole, vec![unit]),
+            ("Order that this number is in.", Numbers::Real, vec![unit]),
+            ("End of the position, in strides.", Numbers::Real, vec![unit]),
+            ("End of the position, in s.", Numbers::Real, vec![]),
+            ("Factor to multiply the sigmas by, dimensionless.", Numbers::Real, vec![]),
+            ("Highest order of derivatives that was examined.", Numbers::Whole, vec![]),
+            ("Number of unknowns with a requirement.", Numbers::Whole, vec![]),
+        ] {
+            assert_eq!(faults(text, numbers), expected, "{text}");
+        }
+        let number = serde_json::json!({ "type": ["array", "null"], "items": { "type": "number" } });
+        assert_eq!(numbers(&number), Numbers::Real);
+        let schema = serde_json::json!({
+            "description": "Schema with a key that nothing describes.",
+            "properties": { "key": number },
+            "$defs": { "Type": { "oneOf": [{ "const": "value" }] } },
+        });
+        let mut out = Vec::new();
+        look(&schema, "schema", true, &mut out);
+        let none = |place: &str| format!("{place} has no description");
+        assert_eq!(out, ["schema/key", "Type", "Type|0"].map(none));
+    }
 }

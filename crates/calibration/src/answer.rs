@@ -11,51 +11,51 @@ use crate::setup::{Basis, Setup};
 /// Name and version of the JSON layout.
 pub(crate) const SCHEMA: &str = "obsdeg.calibration/1";
 
-/// A calibration from records.
+/// Calibration of a scheme from one or several records.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Calibration {
-    /// `obsdeg.calibration/1`.
+    /// Layout of this answer: `obsdeg.calibration/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// Whether the model and its sigmas explain the records.
+    /// True if the model and its sigmas explain the records.
     pub consistent: bool,
-    /// What speaks against that, the gravest first; empty when nothing does.
+    /// Evidence against the model or its sigmas, the gravest first; empty if there is none.
     pub findings: Vec<Finding>,
-    /// Every unknown, psi of the start of each record.
+    /// Estimates of the unknowns, psi of the start of each record.
     pub quantities: Vec<Estimated>,
     /// Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are
-    /// too small; null where none is stated. Those on psi are not judged: a calibration estimates psi of the
-    /// start of a record.
+    /// too small; null if none is stated. Requirements on psi are not judged: a calibration estimates psi of
+    /// the start of a record.
     #[serde(default)]
     pub requirements: Option<Requirements>,
-    /// Combinations of what is not told apart one by one, and those asked for.
+    /// Estimates of combinations of unknowns that are not determined alone, and of those asked for.
     pub combinations: Vec<Estimated>,
-    /// Of all that has an estimate.
+    /// Covariance of all estimates that do not follow from others.
     pub covariance: CovarianceTable,
-    /// The whole fit.
+    /// Quality of the whole fit: chi-square, its band and its factor.
     pub fit: Fit,
-    /// By record and position.
+    /// Quality of the fit by record and position.
     pub positions: Vec<PositionFit>,
-    /// By component of Z.
+    /// Quality of the fit by component of Z.
     pub channels: Vec<ChannelFit>,
-    /// Measurements that were left out.
+    /// Measurements that were left out as outliers.
     pub outliers: Vec<Outlier>,
-    /// How many samples were left out in all.
+    /// Number of measurements that were left out as outliers.
     pub outlier_count: usize,
-    /// The second path to the estimate.
+    /// Second path to the estimate: the filter against least squares.
     pub second_path: SecondPath,
-    /// How far the coefficients of several records agree.
+    /// Agreement of the coefficients of several records; null for one record.
     pub repeatability: Option<Repeatability>,
-    /// What was read.
+    /// Records that were read, with their clocks and columns.
     pub records: Vec<RecordReport>,
-    /// What was assumed.
+    /// Assumptions of the estimates: conditions, noise, priors and gate.
     pub assumed: Assumed,
-    /// What it is of.
+    /// Scheme, geometry and carry that were calibrated.
     pub setup: Setup,
-    /// The records that it rests on, those of the calibration before too.
+    /// Records that the estimates rest on, including those of the calibration before.
     pub rests_on: Vec<Basis>,
-    /// What is left over time, by record and component.
+    /// Residuals over time, by record and component.
     pub series: Vec<ResidualSeries>,
     /// Every measurement and what the estimate leaves of it.
     #[serde(skip)]
@@ -74,184 +74,219 @@ impl Calibration {
     }
 }
 
-/// What speaks against the model or its sigmas.
+/// Evidence against the model or its sigmas.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Finding {
-    /// The iteration was interrupted: the estimates are where it was then.
+    /// Interrupted iteration: the estimates are where it was then.
     Interrupted,
-    /// The iteration did not settle.
+    /// Iteration that did not converge.
     NotSettled,
-    /// The specific force is not one g long, and no unknown explains that.
+    /// Specific force that is not one g long, with no unknown that explains it.
     Force {
-        /// The record.
+        /// Name of the record with this finding.
         record: String,
-        /// Its mean length, in g.
+        /// Mean length of the specific force in the record, in g.
         length_g: f64,
-        /// Whether it is as long at all positions.
+        /// True if the length is the same at all positions.
         alike: bool,
-        /// Where it is shortest.
+        /// Position with the shortest specific force.
         least: ForceLength,
-        /// Where it is longest.
+        /// Position with the longest specific force.
         most: ForceLength,
-        /// Each of these alone makes it one g long: none where several axes are off, or all alike.
+        /// Errors of one axis, each of which alone makes the force one g long; empty if several axes are
+        /// wrong, or all alike.
         causes: Vec<ForceCause>,
     },
-    /// The clock of a record does not go as fast as that of the scheme, or as the earth turns.
-    Clock {
-        /// The record.
+    /// Cells of a column that hold one value again and again, far from their neighbours or many times in a
+    /// row; they were left out.
+    Cells {
+        /// Name of the record with this finding.
         record: String,
-        /// By which part it is fast, as positions begin and end.
+        /// Column of these cells, as in the header of the record.
+        column: String,
+        /// Kind of these cells: a code of missing values, or a stuck output.
+        kind_of_cells: CellKind,
+        /// Value of these cells, in the unit of the column.
+        value: f64,
+        /// Number of cells that hold the value.
+        count: usize,
+        /// First and last line number of these cells in the record.
+        lines: (u64, u64),
+    },
+    /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
+    Clock {
+        /// Name of the record with this finding.
+        record: String,
+        /// Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless;
+        /// null if they show none.
         by_durations: Option<f64>,
-        /// The same by the rate of the earth, where that is beyond chance.
+        /// Fraction by which the clock is fast by the rate of the earth; null if that is within chance.
         by_earth: Option<ClockByEarth>,
     },
-    /// A position fits worse than its measurements allow.
+    /// Position that fits worse than its measurements allow.
     Position {
-        /// The record.
+        /// Name of the record with this finding.
         record: String,
-        /// The position.
+        /// Name of the position with this finding.
         position: String,
-        /// Chi-square per degree of freedom.
+        /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
-        /// How many times too small the sigmas are there: its root.
+        /// Factor by which the sigmas are too small there, dimensionless: the root of `chi_square`.
         factor: f64,
     },
-    /// All positions fit alike, and not as their sigmas say.
+    /// Positions that all fit alike, and not as their sigmas say.
     Noise {
-        /// Chi-square per degree of freedom.
+        /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
-        /// What the sigmas are to be multiplied by.
+        /// Factor to multiply the sigmas by, dimensionless.
         factor: f64,
     },
-    /// A component of Z fits not as its sigma says.
+    /// Component of Z that does not fit as its sigma says.
     Channel {
-        /// The component.
+        /// Component of Z: `Z1`, `Z2`, `Z3` or `Za`.
         channel: String,
-        /// Chi-square per degree of freedom.
+        /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
-        /// What its sigma is to be multiplied by.
+        /// Factor to multiply its sigma by, dimensionless.
         factor: f64,
     },
-    /// The residuals of a component are not independent of each other.
+    /// Residuals of a component that are not independent of each other.
     Correlated {
-        /// The record.
+        /// Name of the record with this finding.
         record: String,
-        /// The component.
+        /// Component of Z: `Z1`, `Z2`, `Z3` or `Za`.
         channel: String,
-        /// Probability that independent ones are correlated so.
+        /// Probability that independent residuals are as correlated as these.
         probability: f64,
     },
-    /// The residuals of a component go with the temperature.
+    /// Residuals of a component that follow the temperature.
     Temperature {
-        /// The record.
+        /// Name of the record with this finding.
         record: String,
-        /// The component.
+        /// Component of Z: `Z1`, `Z2`, `Z3` or `Za`.
         channel: String,
-        /// The coefficient of correlation.
+        /// Coefficient of correlation of residuals and temperature, dimensionless, -1 to 1.
         correlation: f64,
-        /// Probability of that by chance.
+        /// Probability that chance alone gives such a correlation.
         probability: f64,
     },
     /// Too many measurements lie far off for all of them to be outliers; none of these was left out.
     Outliers {
-        /// How many.
+        /// Number of measurements that lie far off.
         count: usize,
-        /// Of so many.
+        /// Total number of measurements.
         of: usize,
     },
-    /// The records do not agree on the coefficients.
+    /// Records that do not agree on the coefficients.
     Repeatability {
-        /// Chi-square per degree of freedom.
+        /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
     },
-    /// Filter and least squares do not agree.
+    /// Filter and least squares that do not agree.
     SecondPath {
-        /// The largest difference, in sigma.
+        /// Largest difference of both, in sigma, dimensionless.
         difference: f64,
     },
-    /// What was known before does not agree with the records.
+    /// Prior knowledge that does not agree with the records.
     Known {
-        /// Chi-square per degree of freedom.
+        /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
     },
 }
 
-/// How long the specific force is at a position.
+/// Kind of cells that hold one value again and again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellKind {
+    /// Code of missing values: far from its neighbours.
+    Code,
+    /// Stuck output: equal to the rows before it to the last digit.
+    Stuck,
+}
+
+/// Length of the specific force at a position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ForceLength {
-    /// The position.
+    /// Name of the position with this length.
     pub position: String,
-    /// In g.
+    /// Length of the specific force, in g.
     pub length_g: f64,
 }
 
-/// What one axis may be off by, so that the specific force is not one g long.
+/// Error of one axis that explains why the specific force is not one g long.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ForceCause {
-    /// What it is an error of.
+    /// Kind of the error: scale or zero.
     pub error: ForceError,
-    /// The output of the accelerometer: fx, fy, fz.
+    /// Output of the accelerometer: fx, fy, fz.
     pub axis: String,
-    /// What is recorded is larger by this: as a part (scale), or in g (zero).
+    /// Error of the axis: scale as a fraction (dimensionless) or zero in g, by which the recorded output is
+    /// larger.
     pub by: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the error, as `by`: dimensionless (scale) or in g (zero).
     pub sigma: f64,
-    /// The part by which the force is longer besides, at all positions alike.
+    /// Fraction by which the force is longer besides, at all positions alike, dimensionless; null for none.
     pub besides: Option<f64>,
 }
 
-/// What an axis is off in.
+/// Kind of error of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ForceError {
-    /// Its scale.
+    /// Scale error, a fraction of the output.
     Scale,
-    /// Its zero.
+    /// Zero error, in g of the output.
     Zero,
 }
 
-/// An unknown or a combination.
+/// Estimate of an unknown or a combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimated {
-    /// Its name.
+    /// Name of the unknown, or the combination.
     pub name: String,
-    /// Its unit: deg, deg/h, deg/h/g, ...
+    /// Unit of the estimate: deg, deg/h, deg/h/g, ...
     pub unit: String,
-    /// The exact verdict of the scheme.
+    /// Verdict of the scheme on the unknown or combination.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree; null if not observable.
     pub degree: Option<usize>,
-    /// Whether scheme and records determine it; otherwise there is no estimate.
+    /// True if scheme and records determine it. If false, there is no estimate.
     pub determined: bool,
-    /// The estimate.
+    /// Estimate in the unit of `unit`; null if not determined.
     pub estimate: Option<f64>,
-    /// Its standard deviation, by the noise that was assumed.
+    /// Standard deviation of the estimate by the assumed noise, in the unit of `unit`; null if not
+    /// determined.
     pub sigma: Option<f64>,
-    /// The same with errors of the records times the root of chi-square per degree of freedom, where that is above one; what was known before stays as it is.
+    /// Standard deviation, in the unit of `unit`, with errors of the records times the root of chi-square per
+    /// degree of freedom, where that is above one; prior knowledge stays as it is. Null if not determined.
     pub sigma_rescaled: Option<f64>,
-    /// What the linear model has at the times and with the noise of the records (and what was known before), where the platform is at the attitudes of the scheme.
+    /// Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with
+    /// the times and the noise of the records (and prior knowledge); null if not determined.
     pub predicted_sigma: Option<f64>,
-    /// What sigma is times that with all known that nothing determines: above one where the nonlinear model bends what is held within its prior into the estimate.
+    /// Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model
+    /// couples an unknown constrained by its prior to the estimate. Null if not determined.
     pub held_factor: Option<f64>,
-    /// How far the prior of the scheme would move the estimate, in sigma.
+    /// Shift of the estimate by the prior of the scheme, in sigma (dimensionless); null if not determined.
     pub prior_shift: Option<f64>,
-    /// What it would make of sigma: 1 where it does not matter.
+    /// Factor on sigma by the prior of the scheme, dimensionless: 1 where it does not matter; null if not
+    /// determined.
     pub prior_factor: Option<f64>,
 }
 
-/// Estimates with their covariance.
+/// Estimates with the covariance of their errors.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct CovarianceTable {
     /// Names, in the order of rows and columns.
     pub names: Vec<String>,
-    /// Their units.
+    /// Units of the estimates, in the same order.
     pub units: Vec<String>,
-    /// Their estimates.
+    /// Estimates in the same order, each in its unit.
     pub estimates: Vec<f64>,
-    /// The covariance of their errors, by the noise that was assumed.
+    /// Covariance of the errors by the assumed noise, in products of the units of row and column.
     pub covariance: Vec<Vec<f64>>,
-    /// The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known before stays as it is.
+    /// Covariance, in products of the units of row and column, with errors of the data times the root of
+    /// chi-square per degree of freedom, where that is above one; prior knowledge stays as it is.
     pub rescaled: Vec<Vec<f64>>,
 }
 
@@ -266,201 +301,255 @@ pub struct Before<S> {
     pub of: S,
 }
 
-/// How well everything fits.
+/// Quality of the whole fit: chi-square, its band and its factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
-    /// The sum of squares of all residuals, in sigma.
+    /// Chi-square: the sum of squares of all residuals in sigma, dimensionless.
     pub chi_square: f64,
-    /// Its degrees of freedom.
+    /// Number of degrees of freedom of chi-square; fractions occur.
     pub degrees_of_freedom: f64,
-    /// Where chi-square per degree of freedom lies with a probability of 99.9 %.
+    /// Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless.
     pub band: (f64, f64),
-    /// The root of chi-square per degree of freedom: what sigmas are to be multiplied by.
+    /// Factor to multiply sigmas by: the root of chi-square per degree of freedom, dimensionless.
     pub factor: f64,
-    /// Linearisations.
+    /// Number of linearisations until convergence.
     pub passes: usize,
 }
 
-/// How well a position fits.
+/// Quality of the fit at one position of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PositionFit {
-    /// The record.
+    /// Name of the record with this position.
     pub record: String,
-    /// The position.
+    /// Name of the position in the scheme.
     pub position: String,
-    /// From when, in s of the record's timeline.
+    /// Start of the position, in s of the record's timeline.
     pub start_s: f64,
-    /// To when.
+    /// End of the position, in s of the record's timeline.
     pub end_s: f64,
-    /// How long the specific force is there, in g, where the record has it: a median, which single samples do not move.
+    /// Length of the specific force at the position, in g: a median, which single samples do not affect; null
+    /// if the record has no forces.
     pub force_g: Option<f64>,
-    /// Measurements: components of Z of bins.
+    /// Number of measurements: components of Z of bins.
     pub measurements: usize,
-    /// Chi-square per degree of freedom.
+    /// Chi-square per degree of freedom, dimensionless; 1 is expected.
     pub chi_square: f64,
-    /// The degrees of freedom.
+    /// Number of degrees of freedom of chi-square; fractions occur.
     pub degrees_of_freedom: f64,
-    /// Without it: the unknown that moves most, in standard deviations of the move.
+    /// Unknown that changes most without the position; null if there is none.
     pub moves: Option<Moved>,
-    /// Without it these are not determined.
+    /// Unknowns and combinations that are not determined without the position.
     pub loses: Vec<String>,
 }
 
-/// An unknown that moves.
+/// Change of an unknown or combination without one position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Moved {
-    /// Its name.
+    /// Name of the unknown, or the combination.
     pub name: String,
-    /// By how much, in standard deviations.
+    /// Change over its standard deviation, dimensionless.
     pub sigmas: f64,
 }
 
-/// How well a component of Z fits.
+/// Quality of the fit of one component of Z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChannelFit {
-    /// `Z1`, `Z2`, `Z3` or `Za`.
+    /// Component of Z: `Z1`, `Z2`, `Z3` or `Za`.
     pub channel: String,
-    /// Unit of its sigmas.
+    /// Unit of `sigma` and `scatter`: g or rad.
     pub unit: String,
-    /// Of a sample, as it was used.
+    /// Standard deviation of a sample as assumed, in the unit of `unit`.
     pub sigma: f64,
-    /// Of a sample, by the scatter of the samples of a bin about a line; null where bins have too few.
+    /// Standard deviation of a sample, in the unit of `unit`, by the scatter of the samples of a bin about a
+    /// line; null if bins have too few.
     pub scatter: Option<f64>,
-    /// Chi-square per degree of freedom.
+    /// Chi-square per degree of freedom, dimensionless; 1 is expected.
     pub chi_square: f64,
-    /// The degrees of freedom.
+    /// Number of degrees of freedom of chi-square; fractions occur.
     pub degrees_of_freedom: f64,
-    /// Smallest probability over the records that independent residuals are correlated as these are; null for few.
+    /// Smallest probability over the records that independent residuals are as correlated as these; null for
+    /// few.
     pub whiteness_probability: Option<f64>,
-    /// How residuals go with the temperature, in the record where that is least likely by chance; null without one, and for few.
+    /// Correlation of residuals and temperature in the record where chance is least likely; null without
+    /// temperature, and for few.
     pub temperature: Option<Warmth>,
 }
 
-/// How residuals go with the temperature, position by position.
+/// Correlation of residuals and temperature, position by position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warmth {
-    /// The coefficient of correlation at the position where it is strongest.
+    /// Coefficient of correlation at the position where it is strongest, dimensionless, -1 to 1.
     pub correlation: f64,
-    /// Probability that residuals that do not depend on it are correlated so, all positions together (R. A. Fisher, Metron 1, 1921).
+    /// Probability that residuals independent of the temperature are as correlated, all positions together
+    /// (R. A. Fisher, Metron 1, 1921).
     pub probability: f64,
 }
 
-/// A measurement that was left out.
+/// Measurement that was left out as an outlier.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Outlier {
-    /// The record.
+    /// Name of the record with the outlier.
     pub record: String,
-    /// Its lines, from and to.
+    /// First and last line number of the measurement in the record.
     pub lines: (u64, u64),
-    /// When, in s of the record's timeline.
+    /// Time of the measurement, in s of the record's timeline.
     pub t_s: f64,
-    /// The component.
+    /// Component of Z (`Z1`, `Z2`, `Z3` or `Za`) or, for a single cell, the column of the record.
     pub channel: String,
-    /// How far it is off, in standard deviations.
+    /// Distance from the expected value, in standard deviations (dimensionless).
     pub sigmas: f64,
 }
 
-/// The filter against least squares, with one wide prior for both.
+/// Filter against least squares, with one wide prior for both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SecondPath {
-    /// The largest difference of the estimates at the end of a record, in sigma.
+    /// Largest difference of the estimates at the end of a record, in sigma (dimensionless).
     pub difference: f64,
-    /// The largest difference of sigmas there, as a part.
+    /// Largest relative difference of sigmas there, dimensionless.
     pub sigma_difference: f64,
 }
 
-/// Several records, one platform.
+/// Agreement of several records of one platform.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Repeatability {
-    /// What the coefficients of the records differ by, as chi-square per degree of freedom.
+    /// Chi-square per degree of freedom of the differences between the records' coefficients, dimensionless.
     pub chi_square: f64,
-    /// The degrees of freedom.
+    /// Number of degrees of freedom of chi-square; fractions occur.
     pub degrees_of_freedom: f64,
-    /// Where it lies with a probability of 99.9 %.
+    /// Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless.
     pub band: (f64, f64),
 }
 
-/// A record that was read.
+/// Record that was read, with its clock and columns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordReport {
-    /// Its name.
+    /// Name of the record, as it was given.
     pub name: String,
-    /// Its samples.
+    /// Number of samples in the record.
     pub samples: usize,
-    /// Samples at no position of the scheme.
+    /// Usual interval between rows, in s.
+    #[serde(default)]
+    pub interval_s: f64,
+    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies
+    /// between; at most 1000.
+    #[serde(default)]
+    pub gaps: Vec<Gap>,
+    /// Number of empty cells at positions, by column that is read; columns without are left out.
+    #[serde(default)]
+    pub empty_cells: Vec<EmptyCells>,
+    /// Time of the record, in s, at which psi is estimated: the start of the scheme's first position, or the
+    /// first row at it where only rows say when positions begin.
+    #[serde(default)]
+    pub psi_at_s: f64,
+    /// Number of samples at no position of the scheme.
     pub unused: usize,
-    /// Bins.
+    /// Number of bins of the samples.
     pub bins: usize,
-    /// First and last time, in s as they are in the record.
+    /// First and last time of the record, in s.
     pub span_s: (f64, f64),
-    /// What says where each sample was taken.
+    /// Source of the position of each sample.
     pub positions_by: PositionsBy,
-    /// Columns that nothing was made of.
+    /// Columns that are not used.
     pub ignored: Vec<String>,
-    /// The mean length of the specific force, in g, where the record has it.
+    /// Mean length of the specific force, in g; null if the record has no forces.
     pub force_g: Option<f64>,
-    /// How far the gimbals are from the attitudes of the scheme at most, in deg, where the record has their angles.
+    /// Largest distance of the gimbals from the attitudes of the scheme, in deg; null if the record has no
+    /// gimbal angles.
     pub gimbals_deg: Option<f64>,
-    /// Its clock.
+    /// Rate error of the clock of the record.
     pub clock: Clock,
 }
 
-/// How right the clock of a record is.
+/// Number of empty cells in a column of a record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EmptyCells {
+    /// Column of the cells, as in the header of the record.
+    pub column: String,
+    /// Number of cells that are empty or NaN, in rows at positions.
+    pub count: usize,
+}
+
+/// Gap in a record: an interval without rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gap {
+    /// Time of the row before the gap, in s as in the record.
+    pub from_s: f64,
+    /// Time of the row after the gap, in s as in the record.
+    pub to_s: f64,
+    /// Line number of the row after the gap.
+    pub line: u64,
+    /// Position of the rows before and after the gap, or both positions if they differ.
+    pub place: String,
+}
+
+/// Offset and rate error of the clock of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Clock {
-    /// By which part it is fast, where positions begin and end as in a scheme whose times are so many times as long: a clock, or a scheme that was run so.
+    /// Time of the record, in s, at which the scheme begins; null where positions are held otherwise than in
+    /// the scheme, so that rows alone say when each begins.
+    #[serde(default)]
+    pub offset_s: Option<f64>,
+    /// Standard deviation of that time, in s; null where it was not estimated: the labels of the rows agree
+    /// with it.
+    #[serde(default)]
+    pub offset_sigma_s: Option<f64>,
+    /// Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all
+    /// times stretched by it: a clock, or a scheme run so; null if not.
     pub by_durations: Option<f64>,
-    /// By which part it is fast by the rate of the earth when all unknowns follow; drifts are too small by the same part. Nothing where sigma would be above a third.
+    /// Fraction by which the clock is fast by the rate of the earth when all unknowns follow; drifts are too
+    /// small by the same fraction. Null if its sigma would be above a third.
     pub by_earth: Option<ClockByEarth>,
 }
 
-/// A clock by the rate of the earth.
+/// Rate error of a clock by the rate of the earth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ClockByEarth {
-    /// The part by which it is fast.
+    /// Fraction by which the clock is fast, dimensionless.
     pub fast: f64,
-    /// Its standard deviation: a part that is not much larger does not show.
+    /// Standard deviation of `fast`, dimensionless: a fraction not much larger is not significant.
     pub sigma: f64,
 }
 
-/// What says where a sample was taken.
+/// Source of the position of each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionsBy {
-    /// A column of labels: a position ends with its last sample, and the next begins when the slew is over.
+    /// Column of labels: a position ends with its last sample, and the next begins when the slew is over.
     Labels,
-    /// The timeline of the scheme.
+    /// Timeline of the scheme, by the times of the samples.
     Timeline,
-    /// A column of labels that agrees with the timeline of the scheme, which says when a position begins and ends.
+    /// Column of labels that agrees with the timeline of the scheme, which sets the start and end of a
+    /// position.
     Both,
-    /// Intervals at rest that were found, as many as the scheme has positions: turns are in the middle of what is between them.
+    /// Intervals at rest that were found, as many as the scheme has positions; slews lie in the middle
+    /// between them.
     Static,
 }
 
-/// What was assumed.
+/// Assumptions of the estimates: conditions, noise, priors and gate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Assumed {
-    /// In deg.
+    /// Latitude of the calibration, in deg.
     pub latitude_deg: f64,
-    /// Whether the scheme names no latitude.
+    /// True if the scheme states no latitude.
     pub latitude_by_default: bool,
-    /// What one g is.
+    /// Acceleration of one g, in m/s^2.
     pub gravity_m_s2: f64,
-    /// Samples within so many s are taken together.
+    /// Width of a bin, in s: samples within it are taken together.
     pub bin_s: f64,
-    /// White noise of Z per sample and axis in g, as it was given.
+    /// White noise of Z per sample and axis as given, in g.
     pub accelerometer_noise_g: f64,
-    /// Whether the noise was estimated from the records.
+    /// True if the noise was estimated from the records.
     pub noise_estimated: bool,
-    /// White drift.
+    /// Density of the white drift, in deg/sqrt(h).
     pub drift_noise_deg_sqrt_h: f64,
     /// Probability that no measurement of a right record is left out.
     pub gate: f64,
-    /// Names taken from a calibration before.
+    /// Names of the unknowns and combinations taken from a calibration before.
     pub known: Vec<String>,
-    /// What is different in the scheme of that.
+    /// Differences of the scheme of that calibration.
     pub known_differs: Vec<String>,
-    /// What nothing determines, unknown by unknown: the standard deviation within which it is held, in its unit.
+    /// Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit.
     pub held: Vec<(String, f64, String)>,
     /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, drift_noise.
@@ -470,23 +559,24 @@ pub struct Assumed {
     pub seed: u64,
 }
 
-/// What is left of a component of a record, in the order of time.
+/// Residuals of a component in a record, in order of time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ResidualSeries {
-    /// The record.
+    /// Name of the record with these residuals.
     pub record: String,
-    /// The component.
+    /// Component of Z: `Z1`, `Z2`, `Z3` or `Za`.
     pub channel: String,
-    /// The unit of residuals.
+    /// Unit of the residuals: g or rad.
     pub unit: String,
-    /// Time in s, residual and its sigma by the noise that was assumed: at most a thousand, evenly picked.
+    /// Time in s, residual and its sigma by the assumed noise in the unit of `unit`: at most a thousand
+    /// points, evenly picked.
     pub points: Vec<(f64, f64, f64)>,
-    /// Their correlation with those one, two, ... measurements later.
+    /// Correlation of the residuals with those one, two, ... measurements later, dimensionless.
     pub autocorrelation: Vec<f64>,
-    /// How many there are.
+    /// Number of residuals, listed here or not.
     pub count: usize,
-    /// Cluster time in s, the overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of white ones of the assumed sigma; turns
-    /// between positions take no time here.
+    /// Cluster time in s, overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of
+    /// white residuals of the assumed sigma, both in the unit of `unit`; slews take no time here.
     pub allan: Vec<(f64, f64, f64)>,
 }
 

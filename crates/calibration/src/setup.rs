@@ -5,18 +5,18 @@ use obsdeg_evidence::simulation::latitude_of;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What of a scheme says what its coefficients mean, and which records are of its runs.
+/// Setup of a scheme: the meaning of its coefficients, and the identity of records of its runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setup {
-    /// The terms, as in `--terms`.
+    /// Terms of the error model, as in `--terms`.
     pub terms: String,
-    /// How gyros and accelerometers are mounted.
+    /// Mounting of the gyros and accelerometers.
     pub geometry: Geometry,
-    /// What is carried between positions.
+    /// Carry: quantity that continues from one position to the next.
     pub carry: Carry,
-    /// In deg, by default that of the paper.
+    /// Latitude in deg; 28.2 if the scheme states none.
     pub latitude_deg: f64,
-    /// Whether psi_y is measured.
+    /// True if psi_y is measured.
     pub measured_azimuth: bool,
     /// Names and Euler angles in deg of the positions.
     pub positions: Vec<(String, String)>,
@@ -65,12 +65,12 @@ impl Setup {
     }
 }
 
-/// A record that estimates rest on.
+/// Record that estimates rest on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Basis {
-    /// What it was called.
+    /// Name of the record, as it was given.
     pub record: String,
-    /// The digest of its numbers.
+    /// Digest of the numbers of the record.
     pub digest: String,
 }
 

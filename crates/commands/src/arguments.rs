@@ -20,7 +20,7 @@ use crate::text;
 pub(crate) const SEED: u64 = 1;
 
 /// Options that concern a model as well as a scheme.
-const OF_BOTH: [&str; 17] = [
+const OF_BOTH: [&str; 18] = [
     "files",
     "scheme",
     "model",
@@ -28,6 +28,7 @@ const OF_BOTH: [&str; 17] = [
     "calibration",
     "solutions",
     "symbolic_limit",
+    "engine_wait",
     "monte_carlo",
     "seed",
     "format",

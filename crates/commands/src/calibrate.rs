@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use clap::Args;
 use obsdeg_calibration::answer::{CovarianceTable, Finding};
-use obsdeg_calibration::platform::STANDARD_GRAVITY;
+use obsdeg_calibration::platform::{RecordsRead, STANDARD_GRAVITY, read_records};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::system::SystemFinding;
 use obsdeg_calibration::{
@@ -98,6 +98,11 @@ pub struct Calibrate {
     #[arg(long, value_name = "P", default_value_t = GATE, value_parser = number_within(PROBABILITY))]
     pub gate: f64,
 
+    /// Show how the records are read (columns, positions, times, gaps, cells left out), and estimate nothing
+    #[arg(long)]
+    #[serde(skip)]
+    pub dry_run: bool,
+
     /// Which options were given
     #[arg(skip)]
     #[serde(skip)]
@@ -120,6 +125,7 @@ impl Default for Calibrate {
             gyro_noise: GyroNoiseOptions::default(),
             gravity: STANDARD_GRAVITY,
             gate: GATE,
+            dry_run: false,
             given: Given::default(),
         }
     }
@@ -143,6 +149,8 @@ pub enum Calibrated {
     Platform(Box<Calibration>),
     /// Of a model.
     Model(Box<SystemCalibration>),
+    /// How records are read: nothing was estimated.
+    Read(Box<RecordsRead>),
 }
 
 impl Answer for Calibrated {
@@ -150,6 +158,7 @@ impl Answer for Calibrated {
         match self {
             Self::Platform(a) => a.document(),
             Self::Model(a) => a.document(),
+            Self::Read(a) => a.document(),
         }
     }
 
@@ -157,6 +166,7 @@ impl Answer for Calibrated {
         match self {
             Self::Platform(a) => a.tables(),
             Self::Model(a) => a.tables(),
+            Self::Read(a) => a.tables(),
         }
     }
 
@@ -164,6 +174,7 @@ impl Answer for Calibrated {
         match self {
             Self::Platform(a) => a.main_table(),
             Self::Model(a) => a.main_table(),
+            Self::Read(a) => a.main_table(),
         }
     }
 }
@@ -173,7 +184,7 @@ impl Calibrated {
     pub fn requirements(&self) -> Option<&Requirements> {
         match self {
             Self::Platform(c) => c.requirements.as_ref(),
-            Self::Model(_) => None,
+            Self::Model(_) | Self::Read(_) => None,
         }
     }
 
@@ -182,6 +193,7 @@ impl Calibrated {
         match self {
             Self::Platform(c) => c.consistent,
             Self::Model(c) => c.consistent != Some(false),
+            Self::Read(_) => true,
         }
     }
 
@@ -190,6 +202,7 @@ impl Calibrated {
         match self {
             Self::Platform(c) => c.findings.contains(&Finding::Interrupted),
             Self::Model(c) => c.findings.contains(&SystemFinding::Interrupted),
+            Self::Read(_) => false,
         }
     }
 
@@ -202,6 +215,7 @@ impl Calibrated {
         let (covariance, residuals) = match self {
             Self::Platform(c) => (&c.covariance, residuals_csv(c)?),
             Self::Model(c) => (&c.covariance, system_residuals_csv(c)?),
+            Self::Read(_) => return Ok(Vec::new()),
         };
         let mut files = vec![
             File { name: "coefficients.csv".into(), bytes: coefficients.into_bytes() },
@@ -211,6 +225,7 @@ impl Calibrated {
         files.extend(match self {
             Self::Platform(c) => calibration_figures(c)?,
             Self::Model(c) => system_calibration_figures(c)?,
+            Self::Read(_) => Vec::new(),
         });
         Ok(files)
     }
@@ -238,6 +253,11 @@ pub fn calibrate(
     a.given.concern([&named])?;
     let mut scheme = match named.1 {
         Input::Scheme(scheme) => scheme,
+        Input::Model(_) if a.dry_run => {
+            return Err(Problem::input(
+                "--dry-run shows how the records of a scheme are read; expected a scheme, found a model",
+            ));
+        }
         Input::Model(file) => return of_model(a, &file, records, before, &going),
     };
     a.assumptions.apply(&mut scheme);
@@ -248,6 +268,10 @@ pub fn calibrate(
         prior: before.map(|p| prior(p, "obsdeg.calibration", "scheme")).transpose()?,
         seed: a.seed,
     };
+    if a.dry_run {
+        let read = read_records(&scheme, &a.conditions(&scheme), records, &options, &going)?;
+        return Ok(Calibrated::Read(Box::new(read)));
+    }
     let found = obsdeg_calibration::calibrate(&scheme, &a.conditions(&scheme), records, &options, &going)?;
     Ok(Calibrated::Platform(Box::new(found)))
 }

@@ -29,10 +29,10 @@ pub struct Remedies {
     pub verdicts: usize,
 }
 
-/// One change, or two changes that are needed together.
+/// Change of the scheme or model, or two changes that are needed together.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Remedy {
-    /// The changes.
+    /// Changes that resolve the unknowns, one or two.
     pub changes: Vec<Change>,
     /// Unknowns that are observable with the changes and not without them, in model order; without those
     /// whose value is given.
@@ -41,40 +41,40 @@ pub struct Remedy {
     pub loses: Vec<String>,
 }
 
-/// An unknown that a remedy makes observable.
+/// Unknown that a remedy makes observable.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Resolved {
-    /// Name of the unknown.
+    /// Name of the resolved unknown.
     pub name: String,
     /// Observable degree of the unknown after the change.
     pub degree: usize,
 }
 
-/// A change of a scheme or model.
+/// Change of a scheme or model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Change {
-    /// The value of an unknown is known: of a parameter, of psi or a coefficient, of a state at the start of
-    /// every experiment, of an input at all times.
+    /// Known value of an unknown: of a parameter, of psi or a coefficient, of a state at the start of every
+    /// experiment, of an input at all times.
     Known {
-        /// Name of the unknown.
+        /// Name of the unknown whose value is given.
         name: String,
     },
-    /// A state is one more output of the model.
+    /// State that becomes one more output of the model.
     Output {
-        /// Name of the state.
+        /// Name of the state that becomes an output.
         state: String,
     },
-    /// One more position at the end of the scheme.
+    /// Position that is added at the end of the scheme.
     Attitude {
-        /// Name of the new position.
+        /// Name of the position that is added.
         position: String,
-        /// Cardinal attitude: where X_p, Y_p and Z_p point.
+        /// Cardinal attitude: directions of X_p, Y_p and Z_p.
         attitude: String,
     },
-    /// Another carry between positions.
+    /// Carry between positions that replaces the scheme's own.
     Carry {
-        /// The carry.
+        /// Carry of the changed scheme.
         carry: Carry,
     },
 }

@@ -36,80 +36,80 @@ impl Claim<'_> {
     }
 }
 
-/// Why a requirement is missed.
+/// Reason why a requirement is missed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Miss {
-    /// Sigma is above it.
+    /// Sigma above the requirement.
     TooLarge,
-    /// The unknown is not determined by the outputs.
+    /// Unknown that the outputs do not determine.
     NotObservable,
-    /// Sigma is hardly below the prior's: it says what the prior says.
+    /// Sigma hardly below the prior's: it repeats the prior.
     RestsOnPrior,
-    /// The filter is wrong about it: its error is beyond four sigma.
+    /// Error beyond four sigma: the filter is wrong.
     Inconsistent,
-    /// Sigma or the estimate is no number.
+    /// Sigma or estimate that is not a finite number.
     NoNumber,
 }
 
-/// An unknown that misses its requirement.
+/// Unknown that misses its requirement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Missed {
-    /// The unknown.
+    /// Name of the unknown that misses.
     pub name: String,
-    /// Why.
+    /// Reason why the requirement is missed.
     pub why: Miss,
 }
 
-/// A margin and whose it is.
+/// Margin of a requirement, with its unknown.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Margin {
-    /// The unknown.
+    /// Name of the unknown with this margin.
     pub name: String,
-    /// Required over found sigma: at least 1 is met.
+    /// Required over found sigma, dimensionless: met from 1.
     pub margin: f64,
 }
 
-/// The largest sigma of a drift coefficient.
+/// Largest sigma of a drift coefficient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Worst {
-    /// The coefficient.
+    /// Name of the coefficient with this sigma.
     pub name: String,
-    /// Its sigma in deg/h (per g, per g^2).
+    /// Standard deviation of the coefficient, in deg/h (per g, per g^2).
     pub sigma_dph: f64,
 }
 
-/// Sigmas that are held against requirements. Whether a scheme meets its requirements is decided by the
-/// prediction alone; a run is one example of it, a record its confirmation.
+/// Source of the sigmas that are compared with requirements. The prediction alone decides whether a scheme
+/// meets its requirements; a run is an example, a record its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
-    /// The information of all samples with the noise and the random drift that are stated, psi at the end of
-    /// the scheme (under reset carry at the end of each position); nothing is known beforehand.
+    /// Information of all samples with the stated noise and random drift, psi at the end of the scheme (under
+    /// reset carry at the end of each position); no prior knowledge.
     Predicted,
-    /// The same with the priors that are stated.
+    /// Information of all samples as in `predicted`, with the stated priors.
     PredictedWithPrior,
-    /// The filter at the end of a simulated run, with its prior and its random drift, whether they are stated
-    /// or chosen by the program.
+    /// Filter at the end of a simulated run, with its prior and its random drift, whether they are stated or
+    /// chosen by the program.
     Run,
-    /// The estimates from a record.
+    /// Estimates of a calibration from a record.
     Record,
 }
 
-/// What became of all requirements.
+/// Outcome of all requirements: those met, those missed and the smallest margin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Requirements {
-    /// Under what this is decided.
+    /// Source of the sigmas that decide.
     pub basis: Basis,
-    /// Unknowns with a requirement.
+    /// Number of unknowns with a requirement.
     pub stated: usize,
-    /// How many of them meet it.
+    /// Number of unknowns that meet their requirement.
     pub met: usize,
-    /// The smallest margin of those whose sigma counts.
+    /// Smallest margin among the sigmas that count; null if there is none.
     pub worst: Option<Margin>,
-    /// Those that miss theirs, in model order.
+    /// Unknowns that miss their requirement, in model order.
     pub missed: Vec<Missed>,
-    /// Unknowns with a requirement that the samples do not determine, so that their sigma rests on stated
+    /// Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated
     /// priors alone.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub on_prior: Vec<String>,

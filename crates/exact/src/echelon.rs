@@ -1,6 +1,6 @@
 //! The incremental reduced row-echelon basis of a row space.
 
-use crate::Field;
+use crate::{Field, interrupt};
 
 const NO_PIVOT: u32 = u32::MAX;
 
@@ -109,6 +109,7 @@ impl Echelon {
     /// the space. With pivot entries `d_i` and `D` their product over the basis rows that `row` needs,
     /// `out = D row - sum_i row[pivot_i] (D / d_i) basis_i`.
     fn reduce_into(&self, row: &[u64], out: &mut [u64], workspace: &mut Workspace) {
+        interrupt::check();
         let f = self.field;
         let Workspace { live, sums } = workspace;
         live.clear();

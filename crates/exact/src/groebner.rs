@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 
 use crate::multivariate::{Monomial, Polynomial};
-use crate::{Field, SplitMix64};
+use crate::{Field, SplitMix64, interrupt};
 
 /// What may be done: products of coefficients, counted down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,7 @@ impl Work {
     /// # Errors
     /// [`OverLimit`] when less is left.
     pub fn take(&mut self, amount: u64) -> Result<(), OverLimit> {
+        interrupt::check();
         self.left = self.left.checked_sub(amount).ok_or(OverLimit)?;
         Ok(())
     }

@@ -15,7 +15,8 @@
 //! - [`radical`]: numbers of `Q(sqrt 2, sqrt 3)` recovered from their images;
 //! - [`polynomial`]: roots of small polynomials in the field;
 //! - [`multivariate`], [`groebner`]: polynomials in several variables, and bases of their ideals;
-//! - [`certainty`]: the bound on the error probability.
+//! - [`certainty`]: the bound on the error probability;
+//! - [`interrupt`]: the end of work for which nobody waits any longer.
 //!
 //! Transcendental functions have no image in a prime field. Where they take part, the same algorithms run over real
 //! numbers of many digits with error bounds:
@@ -30,6 +31,7 @@ mod elementary;
 pub mod field;
 mod gcd;
 pub mod groebner;
+pub mod interrupt;
 pub mod multivariate;
 pub mod polynomial;
 pub mod prime;

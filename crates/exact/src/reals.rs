@@ -6,7 +6,7 @@
 
 use std::cell::Cell;
 
-use crate::{Ball, BallSum, RowSpace, Scalars};
+use crate::{Ball, BallSum, RowSpace, Scalars, interrupt};
 
 /// Largest numerator and denominator that [`Scalars::rational`] believes in.
 const SMALL: i64 = 1 << 20;
@@ -175,6 +175,7 @@ impl<const N: usize> RealSpace<N> {
 
     /// The row minus what the basis explains of it, and the numbers that take it from the given rows.
     fn reduced(&self, row: &[Ball<N>]) -> (Vec<Ball<N>>, Vec<Ball<N>>) {
+        interrupt::check();
         let factors = self.pivots.iter().map(|&p| row[p].midpoint().neg());
         let taken = combined(factors, &self.weights, self.weights.len());
         let taken: Vec<Ball<N>> = taken.iter().map(|x| x.ball().midpoint()).collect();

@@ -1,20 +1,24 @@
 //! The extension module of the Python package `obsdeg`: commands by name, options as JSON. Everything else is Python.
 
+use std::cell::RefCell;
 use std::fs::File;
 use std::hint::black_box;
 use std::io::Cursor;
-use std::sync::Mutex;
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use obsdeg_calibration::record::Record;
 use obsdeg_commands::{Answered, Host, Kind, Now, Problem, call, call_calibrate};
+use obsdeg_exact::interrupt;
 use obsdeg_report::Format;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 create_exception!(
     obsdeg._obsdeg,
@@ -115,70 +119,170 @@ fn seconds(py: Python<'_>, command: &str, request: &str, times: u32, written: bo
 /// Between two times that Python hears of progress, or is asked whether a key was pressed.
 const INTERVAL: Duration = Duration::from_millis(100);
 
-/// Commands that take as long as they are asked to, and can be ended.
-const LONG: [&str; 4] = ["crosscheck", "calibrate", "design", "report"];
+/// Commands that work on several threads. Those with `true` end by themselves, with the best so far.
+const PARALLEL: [(&str, bool); 6] = [
+    ("calibrate", true),
+    ("compare", false),
+    ("crosscheck", true),
+    ("design", true),
+    ("report", true),
+    ("simulate", false),
+];
 
-/// Works without the lock of the interpreter. What takes long has a thread of its own; this one, which may be the only one that hears of keys, tells
-/// whoever called how far it is, and may end it.
+/// The threads of parallel work, and the process that they belong to: of work that is cut short, and of work that ends
+/// by itself, which must not run beside it on one thread.
+static THREADS: [Mutex<Option<(u32, &'static ThreadPool)>>; 2] = [const { Mutex::new(None) }; 2];
+
+/// The threads of this process. A process that began as a copy of another (`fork`) has none of its threads, and
+/// waits for ever for what they are given; it has new ones here. This needs the lock of the interpreter, under which
+/// Python forks: no copy is made while the mutex is held.
+fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
+    let failed = |why: String| PyRuntimeError::new_err(format!("no threads: {why}"));
+    let mut threads = THREADS[usize::from(ends)].lock().map_err(|e| failed(e.to_string()))?;
+    let process = std::process::id();
+    match *threads {
+        Some((owner, pool)) if owner == process => Ok(pool),
+        _ => {
+            let pool = ThreadPoolBuilder::new().build().map_err(|e| failed(e.to_string()))?;
+            // for the life of the process; that of the process before cannot be ended here
+            let pool: &'static ThreadPool = Box::leak(Box::new(pool));
+            *threads = Some((process, pool));
+            Ok(pool)
+        }
+    }
+}
+
+/// Works without the lock of the interpreter. Ten times a second whoever called hears how far it is, and is asked
+/// whether a key was pressed and the work goes on.
 fn heard(
     py: Python<'_>,
     command: &str,
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&mut Host<'_>) -> Result<Answered, Problem> + Send,
 ) -> PyResult<Answer> {
-    if !LONG.contains(&command) {
-        return py.detach(|| work(&mut Host::silent())).map(Answer).map_err(raised);
+    match PARALLEL.iter().find(|c| c.0 == command) {
+        Some(&(_, ends)) => in_threads(py, progress, ends, work),
+        None => in_this_thread(py, command, progress, work),
     }
-    let goes_on = AtomicBool::new(true);
+}
+
+/// Asks Python: a key pressed is an error, a `progress` that says False is false.
+fn goes_on(progress: Option<&Py<PyAny>>, now: Option<Now>) -> PyResult<bool> {
+    Python::attach(|py| {
+        py.check_signals()?;
+        let (Some(progress), Some(now)) = (progress, now) else { return Ok(true) };
+        let said = progress.call1(py, (now.what, now.done, now.total, now.examined, now.best))?;
+        Ok(!said.extract::<bool>(py).is_ok_and(|goes_on| !goes_on))
+    })
+}
+
+/// Work that was ended and has no answer.
+fn interrupted() -> PyErr {
+    PyKeyboardInterrupt::new_err("interrupted; there is no answer")
+}
+
+/// Short work, which no other thread is begun for: it asks Python itself.
+fn in_this_thread(
+    py: Python<'_>,
+    command: &str,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&mut Host<'_>) -> Result<Answered, Problem> + Send,
+) -> PyResult<Answer> {
+    let what = format!("{command}, tenths of a second");
+    let (done, inside) = py.detach(move || {
+        let inside: Rc<RefCell<Option<PyErr>>> = Rc::default();
+        let said = inside.clone();
+        let mut asked = 0;
+        let ask = move || {
+            asked += 1;
+            let now = Now { what: what.clone(), done: asked, total: None, examined: None, best: None };
+            goes_on(progress.as_ref(), Some(now)).unwrap_or_else(|e| {
+                said.replace(Some(e));
+                false
+            })
+        };
+        (interrupt::hearing(INTERVAL, ask, || work(&mut Host::silent())), inside.take())
+    });
+    match (done, inside) {
+        (_, Some(e)) => Err(e),
+        (None, None) => Err(interrupted()),
+        (Some(done), None) => done.map(Answer).map_err(raised),
+    }
+}
+
+/// Work on all threads; this one, which may be the only one that hears of keys, asks Python. Where the work `ends` by
+/// itself it is told so, and gives what it has; else it is cut short.
+fn in_threads(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    ends: bool,
+    work: impl FnOnce(&mut Host<'_>) -> Result<Answered, Problem> + Send,
+) -> PyResult<Answer> {
+    let pool = threads(py, ends)?;
+    let wanted = Arc::new(AtomicBool::new(true));
     let last: Mutex<Option<Now>> = Mutex::new(None);
     let going = |now: Now| {
         // of several at once one is enough
         if let Ok(mut last) = last.try_lock() {
             *last = Some(now);
         }
-        goes_on.load(Ordering::Relaxed)
+        wanted.load(Ordering::Relaxed)
     };
-    let ask = || -> PyResult<bool> {
-        let now = last.lock().ok().and_then(|mut last| last.take());
-        Python::attach(|py| {
-            py.check_signals()?;
-            let (Some(progress), Some(now)) = (&progress, now) else { return Ok(true) };
-            let said = progress.call1(py, (now.what, now.done, now.total, now.examined, now.best))?;
-            Ok(!said.extract::<bool>(py).is_ok_and(|goes_on| !goes_on))
-        })
+    let answered = || {
+        let mut host = Host { worker: None, going: &going };
+        if ends {
+            return Some(work(&mut host));
+        }
+        interrupt::while_wanted(wanted.clone(), || work(&mut host))
     };
     let (done, inside) = py.detach(|| {
         std::thread::scope(|scope| {
             let (send, receive) = channel();
-            let going = &going;
             scope.spawn(move || {
                 // nobody listens only if this function has ended
-                let _ = send.send(work(&mut Host { worker: None, going }));
+                let _ = send.send(pool.install(answered));
             });
             let mut inside = None;
+            let mut asked = 0;
             loop {
                 match receive.recv_timeout(INTERVAL) {
                     Ok(done) => return (Some(done), inside),
                     Err(RecvTimeoutError::Disconnected) => return (None, inside),
                     Err(RecvTimeoutError::Timeout) if inside.is_some() => {}
-                    Err(RecvTimeoutError::Timeout) => match ask() {
-                        Ok(said) => goes_on.store(said && goes_on.load(Ordering::Relaxed), Ordering::Relaxed),
-                        Err(e) => {
-                            goes_on.store(false, Ordering::Relaxed);
-                            inside = Some(e);
+                    Err(RecvTimeoutError::Timeout) => {
+                        asked += 1;
+                        let silent = Now {
+                            what: "tenths of a second".into(),
+                            done: asked,
+                            total: None,
+                            examined: None,
+                            best: None,
+                        };
+                        let now =
+                            last.lock().ok().and_then(|mut last| last.take()).or((!ends).then_some(silent));
+                        match goes_on(progress.as_ref(), now) {
+                            Ok(true) => {}
+                            Ok(false) => wanted.store(false, Ordering::Relaxed),
+                            Err(e) => {
+                                wanted.store(false, Ordering::Relaxed);
+                                inside = Some(e);
+                            }
                         }
-                    },
+                    }
                 }
             }
         })
     });
     match (done, inside) {
         (None, _) => Err(PyRuntimeError::new_err("the work ended without an answer")),
-        (Some(Ok(answer)), None) => Ok(Answer(answer)),
+        (Some(Some(Ok(answer))), None) => Ok(Answer(answer)),
         // the best so far
-        (Some(Ok(answer)), Some(e)) if e.is_instance_of::<PyKeyboardInterrupt>(py) => Ok(Answer(answer)),
+        (Some(Some(Ok(answer))), Some(e)) if e.is_instance_of::<PyKeyboardInterrupt>(py) => {
+            Ok(Answer(answer))
+        }
         (Some(_), Some(e)) => Err(e),
-        (Some(Err(problem)), None) => Err(raised(problem)),
+        (Some(None), None) => Err(interrupted()),
+        (Some(Some(Err(problem))), None) => Err(raised(problem)),
     }
 }
 

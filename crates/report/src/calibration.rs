@@ -2,8 +2,8 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Assumed, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, PositionFit,
-    PositionsBy, RecordReport, ResidualSeries,
+    Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
+    PositionFit, PositionsBy, RecordReport, ResidualSeries,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -64,6 +64,20 @@ pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth
 
 /// What is known of the clock of a record.
 fn clock(c: &Clock) -> String {
+    let begins = match (c.offset_s, c.offset_sigma_s) {
+        (Some(at), Some(sigma)) => format!(
+            "; the scheme begins at {} s of its clock (estimated, sigma {} s; labels leave it open)",
+            estimate(Some(at), Some(sigma)),
+            number(sigma)
+        ),
+        (Some(at), None) if at.abs() >= 5e-4 => format!("; the scheme begins at {at:.3} s of its clock"),
+        _ => String::new(),
+    };
+    format!("{begins}{}", rates(c))
+}
+
+/// What is known of the rate of the clock of a record.
+fn rates(c: &Clock) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
         format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
     });
@@ -110,6 +124,18 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             let each: Vec<String> = causes.iter().map(cause).collect();
             let told = if causes.len() > 1 { " (these positions do not tell which)" } else { "" };
             format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
+        }
+        Finding::Cells { record, column, kind_of_cells, value, count, lines } => {
+            let (cells, hold) = if *count == 1 { ("cell", "holds") } else { ("cells", "hold") };
+            let place = format!("column `{column}`{}, lines {} to {}", of(record, records), lines.0, lines.1);
+            match kind_of_cells {
+                CellKind::Code => format!(
+                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and were left out; if that is a code of missing values, state `missing = [{value}]` under [record]"
+                ),
+                CellKind::Stuck => format!(
+                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, and were left out; check whether the output is stuck"
+                ),
+            }
         }
         Finding::Clock { record, by_durations, by_earth } => {
             let of = of(record, records);
@@ -236,6 +262,51 @@ fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> 
     out
 }
 
+/// Most gaps that are listed.
+const GAPS: usize = 5;
+
+/// Where rows are missing, the longest first, in the order of time.
+pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
+    let mut all: Vec<&Gap> = of.iter().collect();
+    let length = |g: &Gap| g.to_s - g.from_s;
+    all.sort_by(|a, b| length(b).total_cmp(&length(a)));
+    let more = match all.len().saturating_sub(GAPS) {
+        0 => String::new(),
+        n => format!(", and {n} shorter gaps"),
+    };
+    all.truncate(GAPS);
+    all.sort_by_key(|g| g.line);
+    let each: Vec<String> = all
+        .iter()
+        .map(|g| {
+            format!(
+                "{} s from {} s on ({}, before line {})",
+                tenths(length(g)),
+                tenths(g.from_s),
+                g.place,
+                g.line
+            )
+        })
+        .collect();
+    (!each.is_empty()).then(|| format!("rows are missing for {}{more}", each.join(", ")))
+}
+
+/// What says where samples were taken.
+pub(crate) fn by_what(by: PositionsBy) -> &'static str {
+    match by {
+        PositionsBy::Labels => {
+            "the column `position`: one ends with its last sample, the next begins when the slew is over"
+        }
+        PositionsBy::Timeline => "the timeline of the scheme",
+        PositionsBy::Both => {
+            "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end"
+        }
+        PositionsBy::Static => {
+            "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two"
+        }
+    }
+}
+
 /// What was read, a sentence for each record.
 fn records(c: &Calibration) -> Vec<String> {
     let of = |r: &RecordReport| {
@@ -246,17 +317,14 @@ fn records(c: &Calibration) -> Vec<String> {
             tenths(r.span_s.0),
             tenths(r.span_s.1),
             r.bins,
-            match r.positions_by {
-                PositionsBy::Labels => {
-                    "the column `position`: one ends with its last sample, the next begins when the slew is over"
-                }
-                PositionsBy::Timeline => "the timeline of the scheme",
-                PositionsBy::Both =>
-                    "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end",
-                PositionsBy::Static =>
-                    "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two",
-            }
+            by_what(r.positions_by)
         );
+        out += &gaps(&r.gaps).map_or_else(String::new, |gaps| format!("; {gaps}"));
+        let empty: Vec<String> =
+            r.empty_cells.iter().map(|e| format!("{} of `{}`", e.count, e.column)).collect();
+        if !empty.is_empty() {
+            out += &format!("; empty cells that were skipped: {}", empty.join(", "));
+        }
         if r.unused > 0 {
             out += &format!("; {} samples at no position were not used", r.unused);
         }
@@ -296,7 +364,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
         format!("white drift {} deg/sqrt(h)", number(a.drift_noise_deg_sqrt_h)),
         format!("samples within {} s are one measurement: the value of a line at their middle", a.bin_s),
         format!("one g is {} m/s^2", a.gravity_m_s2),
-        format!("psi is that of the start of a record; full attitudes; seed {}", a.seed),
+        format!("psi is that of {}; full attitudes; seed {}", moment(&c.records), a.seed),
     ];
     if !a.known.is_empty() {
         out.push(format!("known from a calibration before: {}", a.known.join(", ")));
@@ -308,6 +376,18 @@ fn assumed(c: &Calibration) -> Vec<String> {
         }
     }
     out
+}
+
+/// The moment whose psi is estimated.
+fn moment(records: &[RecordReport]) -> String {
+    let by_rows = |r: &RecordReport| matches!(r.positions_by, PositionsBy::Labels | PositionsBy::Static);
+    let start = "the start of the scheme's first position";
+    let first = "the first row at the first position";
+    match (records.iter().any(by_rows), records.iter().all(by_rows)) {
+        (false, _) => start.into(),
+        (true, true) => first.into(),
+        _ => format!("{start} ({first} where rows alone say when positions begin)"),
+    }
 }
 
 /// What nothing determines, and which sigmas that is in.
@@ -352,7 +432,7 @@ fn is_whole(x: f64) -> bool {
 }
 
 /// With a tenth where there is one.
-fn tenths(x: f64) -> String {
+pub(crate) fn tenths(x: f64) -> String {
     if is_whole(x) { format!("{x:.0}") } else { format!("{x:.1}") }
 }
 

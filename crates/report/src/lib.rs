@@ -30,6 +30,7 @@ mod markdown;
 #[cfg(feature = "pdf")]
 mod pdf;
 mod poses;
+mod records_read;
 mod resolve;
 mod review;
 mod rows;

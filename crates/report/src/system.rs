@@ -225,6 +225,13 @@ impl Answer for SystemAnalysis {
     }
 }
 
+/// When the run of a model that holds the time begins.
+fn begins_at(time: f64) -> String {
+    format!(
+        "the equations or known inputs hold the time: the run begins at t = {time} (1 where the file says \"generic\")"
+    )
+}
+
 /// One run of the filter.
 impl Answer for SystemRun {
     fn document(&self) -> Document {
@@ -249,8 +256,9 @@ impl Answer for SystemRun {
             self.quantities.iter().map(row),
         );
         let mut consistency = words::consistency(&self.consistency);
-        let beyond =
-            |e: &&SystemEstimate| e.status != Some(Status::Observable) && e.error_over_sigma.abs() > 4.0;
+        // a state whose start is known has no verdict
+        let unobservable = |e: &SystemEstimate| e.status.is_some_and(|s| s != Status::Observable);
+        let beyond = |e: &&SystemEstimate| unobservable(e) && e.error_over_sigma.abs() > 4.0;
         let beyond: Vec<&str> = self.quantities.iter().filter(beyond).map(|e| e.name.as_str()).collect();
         if !beyond.is_empty() {
             consistency.push(format!(
@@ -259,7 +267,7 @@ impl Answer for SystemRun {
         ));
         }
         let noise: Vec<String> = self.noise.iter().map(|(name, sigma)| format!("{name} {sigma}")).collect();
-        let assumed = vec![
+        let mut assumed = vec![
             format!(
                 "truth by the equations of the model, for {} in steps of {}",
                 number(self.duration),
@@ -269,6 +277,7 @@ impl Answer for SystemRun {
             "the initial estimate is the truth plus an error drawn from the prior".into(),
             certainty(self.error_bound, self.digits, self.seed),
         ];
+        assumed.extend(self.time.map(begins_at));
         Document {
             title: format!("Simulation: {}", self.name),
             lead: Vec::new(),
@@ -338,9 +347,7 @@ impl Answer for SystemEvidence {
             said(self.defect.outcome)
         ));
         blocks.push(Block::list("Directions that no output sees", null));
-        blocks.push(Block::list(
-        "How",
-        vec![
+        let mut how = vec![
             format!(
                 "slope: of log sigma against the log of a short horizon, -(degree + 1/2) at a fixed sampling rate; - where jumps or rounding hide it, or where it still changes with the horizon (up to {} long)",
                 number(self.duration)
@@ -348,8 +355,9 @@ impl Answer for SystemEvidence {
             "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is observable, 10 for what is not".into(),
             "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is observable and leaves more than a hundredth of its diffuse prior, and directions seen with less than 1e-9 of the best and more than 1e-12".into(),
             certainty(self.error_bound, self.digits, self.seed),
-        ],
-    ));
+        ];
+        how.extend(self.time.map(begins_at));
+        blocks.push(Block::list("How", how));
         let open = self.orders.measured < self.orders.of || self.not_resolvable > 0;
         let verdict = match (self.passed, open) {
             (false, _) => "filter and exact verdicts DISAGREE",

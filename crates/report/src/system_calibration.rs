@@ -174,6 +174,11 @@ impl Answer for SystemCalibration {
             "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} times the usual steps of integration; seed {}",
             self.rows, self.substeps, self.seed
         ));
+        if let Some(t) = self.begins {
+            read.push(format!(
+                "the record begins at t = {t}, more than 100 times its length after 0: the model starts with its first row"
+            ));
+        }
         if !self.ignored.is_empty() {
             read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
         }

@@ -11,6 +11,7 @@ fn main() {
         program: program.into(),
         arguments: vec!["symbolic-worker".into()],
         limit: 1,
+        wait: std::time::Duration::from_secs(600),
         waiting: || println!("waiting for another process of this user"),
     });
     let rows = [["c_a", "0"], ["0", "r_2"]].map(|row| row.map(String::from).to_vec());

@@ -24,6 +24,8 @@ pub struct WorkerConfig {
     pub arguments: Vec<String>,
     /// How many [`UNIT`](crate::protocol::UNIT)s of work one answer may take.
     pub limit: u64,
+    /// Longest time, over all requests, that other processes of this user may keep the worker from its turn.
+    pub wait: Duration,
     /// Called once when the worker has waited a second for its turn.
     pub waiting: fn(),
 }
@@ -36,6 +38,12 @@ pub enum WorkerError {
     Lock {
         /// The file, and what is wrong with it.
         reason: String,
+    },
+    /// Others held the engine for the whole of [`WorkerConfig::wait`].
+    #[error("another process of this user held the symbolic engine for more than {seconds} s")]
+    Busy {
+        /// Seconds waited.
+        seconds: u64,
     },
     /// The process did not start.
     #[error("cannot start the symbolic worker {program}: {reason}")]
@@ -99,6 +107,8 @@ impl Drop for Running {
 /// repeats the reason.
 pub struct Worker {
     config: WorkerConfig,
+    /// Time that may still be spent on waiting for others.
+    patience: Duration,
     running: Option<Running>,
     failure: Option<WorkerError>,
     banner: Vec<String>,
@@ -107,7 +117,7 @@ pub struct Worker {
 impl Worker {
     /// A worker that is not started yet.
     pub fn new(config: WorkerConfig) -> Self {
-        Self { config, running: None, failure: None, banner: Vec::new() }
+        Self { patience: config.wait, config, running: None, failure: None, banner: Vec::new() }
     }
 
     /// What the engine printed besides its answers.
@@ -171,17 +181,28 @@ impl Worker {
         }
     }
 
-    /// Waits until the worker holds the lock, and says so once when that takes long.
+    /// Waits until the worker holds the lock; says so once after [`PATIENCE`]; gives up after
+    /// [`WorkerConfig::wait`].
     fn take_turn(&mut self) -> Result<(), WorkerError> {
-        let mut patience = None;
+        let mut since: Option<Instant> = None;
+        let mut said = false;
         loop {
-            match self.response(patience)? {
-                None => {
-                    (self.config.waiting)();
-                    patience = None;
+            let left = since.map(|since| self.patience.saturating_sub(since.elapsed()));
+            match self.response(left.map(|left| if said { left } else { left.min(PATIENCE) }))? {
+                None if since.is_some_and(|since| since.elapsed() >= self.patience) => {
+                    return Err(WorkerError::Busy { seconds: self.config.wait.as_secs() });
                 }
-                Some(Response::Waiting) => patience = Some(PATIENCE),
-                Some(Response::Ready) => return Ok(()),
+                None if !said => {
+                    (self.config.waiting)();
+                    said = true;
+                }
+                None => {}
+                Some(Response::Waiting) => since = Some(Instant::now()),
+                Some(Response::Ready) => {
+                    let waited = since.map_or(Duration::ZERO, |since| since.elapsed());
+                    self.patience = self.patience.saturating_sub(waited);
+                    return Ok(());
+                }
                 Some(Response::Unusable { reason }) => return Err(WorkerError::Lock { reason }),
                 Some(other) => return Err(garbled(format!("{other:?} before it was asked"))),
             }
@@ -276,6 +297,7 @@ mod tests {
             program: "/bin/sh".into(),
             arguments: vec!["-c".into(), script.into()],
             limit: u64::MAX,
+            wait: Duration::from_secs(60),
             waiting: || {},
         })
     }
@@ -351,6 +373,24 @@ mod tests {
         };
         wait("1.5");
         assert_eq!(SAID.load(std::sync::atomic::Ordering::Relaxed), 1);
+    }
+
+    /// The time for waiting is that of all requests together; then nobody waits again, and nothing starts.
+    #[test]
+    fn a_wait_ends() {
+        let mut worker = scripted("echo 'obsdeg:\"waiting\"'; exec sleep 60");
+        (worker.config.wait, worker.patience) = (Duration::from_secs(1), Duration::from_secs(1));
+        let start = Instant::now();
+        for _ in 0..2 {
+            assert_eq!(worker.ask(&request()), Err(WorkerError::Busy { seconds: 1 }));
+        }
+        assert!(start.elapsed() >= Duration::from_secs(1) && start.elapsed() < Duration::from_secs(30));
+        // what was waited for the first turn is gone for the second
+        let turn = "echo 'obsdeg:\"waiting\"'; sleep 1; echo 'obsdeg:\"ready\"'; read line; echo 'obsdeg:\"over_limit\"'";
+        let mut worker = scripted(turn);
+        (worker.config.wait, worker.patience) = (Duration::from_secs(1000), Duration::from_secs(1000));
+        assert!(matches!(worker.ask(&request()), Err(WorkerError::OverLimit { .. })));
+        assert!(worker.patience <= Duration::from_secs(999), "{:?}", worker.patience);
     }
 
     #[test]

@@ -8,6 +8,8 @@
 //! solution. This is the only crate that names Symbolica, and no thread but the worker's touches it.
 //!
 //! ```
+//! use std::time::Duration;
+//!
 //! use obsdeg_symbolic::{Dynamics, Job, Request, Worker, WorkerConfig, WorkerError};
 //!
 //! let oscillator = Dynamics {
@@ -18,7 +20,7 @@
 //! let job = Job::Derive { dynamics: oscillator, order: 2 };
 //! let request = Request { symbols: vec!["w".into()], generators: vec![], angles: vec![], job };
 //! // a program that is not there costs an answer, nothing else
-//! let config = WorkerConfig { program: "no/such/program".into(), arguments: vec![], limit: 1, waiting: || {} };
+//! let config = WorkerConfig { program: "no/such/program".into(), arguments: vec![], limit: 1, wait: Duration::ZERO, waiting: || {} };
 //! assert!(matches!(Worker::new(config).ask(&request), Err(WorkerError::Start { .. })));
 //! ```
 

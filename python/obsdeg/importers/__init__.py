@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._files import TEXT, read_text
 from .problem import ImportProblem
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def load(path: str | Path, **options: Any) -> Imported:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8", errors="replace").lstrip("\ufeff")
+        text = _text(path)
     except IsADirectoryError:
         raise ImportProblem("a folder", "a file, as problem.yaml", file=str(path)) from None
     source, module = _kind(text, path)
@@ -66,6 +67,9 @@ def load(path: str | Path, **options: Any) -> Imported:
     reader = _needed(module, source)
     try:
         system = reader.load(path, **options)
+    except (RecursionError, MemoryError) as error:
+        construct = f"more than this machine can take on ({type(error).__name__})"
+        raise ImportProblem(construct, "a smaller model", file=str(path)) from None
     except TypeError as error:
         if "keyword argument" not in str(error):
             raise
@@ -74,6 +78,17 @@ def load(path: str | Path, **options: Any) -> Imported:
         return Imported(_needed("system", source).to_toml(system), "model", source, tuple(system.notes))
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
+    except RecursionError:
+        construct = "formulas with too many operations in each other"
+        raise ImportProblem(construct, "a simpler model", file=str(path)) from None
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text(path, errors="replace").lstrip("\ufeff")
+    except ValueError:
+        expected = f"a text of at most {TEXT}"
+        raise ImportProblem(f"more than {TEXT} characters", expected, file=str(path)) from None
 
 
 def _own(text: str, path: Path) -> None:

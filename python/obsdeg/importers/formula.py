@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import ast
 import itertools
 import re
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
+from functools import reduce
+from operator import mul
 from typing import Any, TypeAlias
 
 import sympy  # type: ignore[import-untyped]
 
-from .problem import ImportProblem
+from .limits import DEPTH, FORMULA, LITERAL, WRITTEN, bounded_exp, bounded_power, hold, measured
+from .problem import ImportProblem, OverLimit
 
 #: A SymPy expression (SymPy has no types of its own).
 Expr: TypeAlias = Any
@@ -39,20 +41,26 @@ DERIVED: dict[str, Callable[..., Expr]] = {
     "ln": sympy.log,
     "log10": lambda x: sympy.log(x) / sympy.log(10),
     "log2": lambda x: sympy.log(x) / sympy.log(2),
-    "sinh": lambda x: (sympy.exp(x) - sympy.exp(-x)) / 2,
-    "cosh": lambda x: (sympy.exp(x) + sympy.exp(-x)) / 2,
+    "sinh": lambda x: (bounded_exp(x) - bounded_exp(-x)) / 2,
+    "cosh": lambda x: (bounded_exp(x) + bounded_exp(-x)) / 2,
     "sec": lambda x: 1 / sympy.cos(x),
     "csc": lambda x: 1 / sympy.sin(x),
     "cot": lambda x: 1 / sympy.tan(x),
     "atan2": sympy.atan2,
     "min": sympy.Min,
     "max": sympy.Max,
-    "power": sympy.Pow,
-    "pow": sympy.Pow,
+    "power": bounded_power,
+    "pow": bounded_power,
 }
+_READ = {**FUNCTIONS, **DERIVED, "exp": bounded_exp}
 _PRINTED = {f: name for name, f in FUNCTIONS.items() if name != "sqrt"} | {sympy.atan2: "atan2"}
 
-_TOKEN = re.compile(r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d][\w!]*)")
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    r"|(?P<name>[^\W\d][\w!]*)|(?P<sign>\*\*|//|[-+*/^(),]))"
+)
+#: Factors above which a product is made at once.
+LONG = 64
 _SUM, _PRODUCT, _POWER, _ATOM = 1, 2, 3, 4
 
 
@@ -63,6 +71,10 @@ def exact(number: float | str) -> Expr:
         ImportProblem: it is infinite or no number.
     """
     text = repr(float(number)) if isinstance(number, float) else str(number)
+    exponent = re.search(r"[eE]([+-]?\d+)\s*$", text[-LITERAL:])
+    if len(text) > LITERAL or (exponent and abs(int(exponent.group(1))) > LITERAL):
+        expected = f"at most {LITERAL} digits, and exponents of at most {LITERAL}"
+        raise OverLimit(f"the number `{shortened(text)}`", expected)
     try:
         return sympy.Rational(text.strip())
     except (TypeError, ValueError):
@@ -88,9 +100,17 @@ def names_in(*expressions: Expr) -> set[str]:
 
 
 def put(expression: Expr, values: Mapping[str, Expr]) -> Expr:
-    """Replaces names, all at once and once each."""
+    """Replaces names, all at once and once each.
+
+    Raises:
+        ImportProblem: a formula of too many operations would come of it.
+    """
     swaps = {s: values[s.name] for s in expression.free_symbols if s != TIME and s.name in values}
-    return expression.xreplace(swaps) if swaps else expression
+    if not swaps:
+        return expression
+    sizes = {s: measured(e) for s, e in swaps.items()}
+    hold(measured(expression, sizes.get), "a formula, with what it names put in,")
+    return expression.xreplace(swaps)
 
 
 def expand(expression: Expr, values: Mapping[str, Expr], what: str) -> Expr:
@@ -115,53 +135,108 @@ def parse(text: str, *, calls: Mapping[str, Callable[..., Expr]] | None = None) 
         calls: Functions beside the usual ones, by name.
 
     Raises:
-        ImportProblem: it is no such formula; the construct is named.
+        ImportProblem: it is no such formula, or takes too much work; the construct is named.
     """
-    known: dict[str, Callable[..., Expr]] = {**FUNCTIONS, **DERIVED, **(calls or {})}
-    tokens: list[Expr | str] = []
+    if len(text) > FORMULA:
+        raise OverLimit(f"a formula of {len(text)} characters", f"at most {FORMULA}")
+    return _Reader(text, {**_READ, **(calls or {})}).whole()
 
-    def token(match: re.Match[str]) -> str:
-        number = match.group("number")
-        tokens.append(exact(number) if number else match.group("name"))
-        return f" _{len(tokens) - 1}_ "
 
-    plain = _TOKEN.sub(token, text).replace("^", "**").replace("//", "/")
-    try:
-        tree = ast.parse(" ".join(plain.split()), mode="eval").body
-    except (SyntaxError, RecursionError, MemoryError):
-        raise ImportProblem(f"`{shortened(text)}`", "a formula of + - * / ^, brackets, numbers, names and functions") from None
-    operations: dict[type, Callable[[Expr, Expr], Expr]] = {
-        ast.Add: lambda a, b: a + b,
-        ast.Sub: lambda a, b: a - b,
-        ast.Mult: lambda a, b: a * b,
-        ast.Div: lambda a, b: a / b,
-        ast.Pow: lambda a, b: a**b,
-    }
+class _Reader:
+    """A formula from its tokens: numbers as expressions, all others as texts."""
 
-    def value(node: ast.expr) -> Expr:
-        match node:
-            case ast.Name(id=label):
-                found = tokens[int(label.strip("_"))]
-                if isinstance(found, str):
-                    return sympy.pi if found == "pi" else sympy.Symbol(found)
-                return found
-            case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return -value(inner)
-            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                return value(inner)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in operations:
-                return operations[type(op)](value(left), value(right))
-            case ast.Call(func=ast.Name(id=label), args=arguments, keywords=[]):
-                name = tokens[int(label.strip("_"))]
-                if isinstance(name, str) and name in known:
-                    try:
-                        return known[name](*map(value, arguments))
-                    except TypeError:
-                        raise ImportProblem(f"`{name}` of {len(arguments)} arguments", "as many as it takes") from None
-                raise ImportProblem(f"the function `{name}`", "one of " + ", ".join(sorted(known)))
-        raise ImportProblem(f"`{shortened(text)}`", "a formula of + - * / ^, brackets, numbers, names and functions")
+    def __init__(self, text: str, known: Mapping[str, Callable[..., Expr]]) -> None:
+        self.text, self.known = text, known
+        self.tokens: list[Expr | str] = []
+        self.at = place = 0
+        for match in _TOKEN.finditer(text):
+            if match.start() != place:
+                raise self.refused()
+            place = match.end()
+            number = match.group("number")
+            self.tokens.append(exact(number) if number else match.group("name") or match.group("sign"))
+        if text[place:].strip():
+            raise self.refused()
 
-    return value(tree)
+    def refused(self) -> ImportProblem:
+        expected = "a formula of + - * / ^, brackets, numbers, names and functions"
+        return ImportProblem(f"`{shortened(self.text)}`", expected)
+
+    def hold(self, depth: int, what: str) -> None:
+        if depth > DEPTH:
+            construct = f"`{shortened(self.text)}` with more than {DEPTH} {what} in each other"
+            raise OverLimit(construct, f"at most {DEPTH}")
+
+    def take(self, *signs: str) -> str | None:
+        """The next token if it is one of these."""
+        found = self.tokens[self.at] if self.at < len(self.tokens) else None
+        if not isinstance(found, str) or found not in signs:
+            return None
+        self.at += 1
+        return found
+
+    def whole(self) -> Expr:
+        found = self.sum(0)
+        if self.at < len(self.tokens):
+            raise self.refused()
+        return found
+
+    def sum(self, depth: int) -> Expr:
+        self.hold(depth, "brackets")
+        terms = []
+        sign: str | None = "+"
+        while sign:
+            factors = [self.factor(depth)]
+            while by := self.take("*", "/", "//"):
+                factor = self.factor(depth)
+                factors.append(factor if by == "*" else 1 / factor)
+            # SymPy multiplies a number into a sum of two factors alone; long products are made at once
+            product = sympy.Mul(*factors) if len(factors) > LONG else reduce(mul, factors)
+            terms.append(-product if sign == "-" else product)
+            sign = self.take("+", "-")
+        return terms[0] if len(terms) == 1 else sympy.Add(*terms)
+
+    def factor(self, depth: int) -> Expr:
+        minus = False
+        while sign := self.take("+", "-"):
+            minus ^= sign == "-"
+        value = self.atom(depth)
+        if self.take("^", "**"):
+            self.hold(depth + 1, "powers")
+            value = bounded_power(value, self.factor(depth + 1))
+        return -value if minus else value
+
+    def atom(self, depth: int) -> Expr:
+        if self.take("("):
+            value = self.sum(depth + 1)
+            if not self.take(")"):
+                raise self.refused()
+            return value
+        if self.at == len(self.tokens):
+            raise self.refused()
+        token = self.tokens[self.at]
+        self.at += 1
+        if not isinstance(token, str):
+            if self.take("("):
+                raise ImportProblem(f"the function `{token}`", "one of " + ", ".join(sorted(self.known)))
+            return token
+        if not (token[0].isalpha() or token[0] == "_"):
+            raise self.refused()
+        if not self.take("("):
+            return sympy.pi if token == "pi" else sympy.Symbol(token)
+        arguments = []
+        if not self.take(")"):
+            arguments.append(self.sum(depth + 1))
+            while self.take(","):
+                arguments.append(self.sum(depth + 1))
+            if not self.take(")"):
+                raise self.refused()
+        if token not in self.known:
+            raise ImportProblem(f"the function `{token}`", "one of " + ", ".join(sorted(self.known)))
+        try:
+            return self.known[token](*arguments)
+        except TypeError:
+            raise ImportProblem(f"`{token}` of {len(arguments)} arguments", "as many as it takes") from None
 
 
 def shortened(text: str) -> str:
@@ -206,6 +281,8 @@ def text_of(expression: Expr, names: Mapping[str, str] | None = None, *, power: 
         ImportProblem: a function or condition that obsdeg does not know.
     """
     names = names or {}
+    hold(measured(expression), "a formula")
+    written = 0
 
     def wrap(e: Expr, level: int) -> str:
         text, own = write(e)
@@ -222,6 +299,12 @@ def text_of(expression: Expr, names: Mapping[str, str] | None = None, *, power: 
         return "*".join(above), below[0] if len(below) == 1 else f"({'*'.join(below)})" if below else ""
 
     def write(e: Expr) -> tuple[str, int]:
+        nonlocal written
+        written += 1
+        if written > WRITTEN:
+            # max and min have their arguments twice
+            construct = f"a formula of more than {WRITTEN} operations as obsdeg reads it"
+            raise OverLimit(construct, f"at most {WRITTEN}")
         if e == TIME:
             return time, _ATOM
         if e.is_Symbol:

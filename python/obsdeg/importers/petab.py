@@ -19,9 +19,10 @@ from petab import v1  # type: ignore[import-untyped]
 from petab.v1.math import sympify_petab  # type: ignore[import-untyped]
 
 from .copies import unrolled
-from .formula import TIME, Expr, exact, exactly, expand, names_in, put, symbol
+from .formula import TIME, Expr, exact, exactly, expand, names_in, parse, put, symbol
 from .generic import loosened
-from .problem import ImportProblem
+from .limits import TABLE, hold_brackets, hold_xml, text_of_file
+from .problem import ImportProblem, OverLimit
 from .roots import roots_as_unknowns
 from .sbml import Kinetics, kinetics
 from .steady import SteadyState
@@ -67,14 +68,16 @@ def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", unt
     if numbers not in ("exact", "generic") or starts not in ("given", "unknown"):
         raise ImportProblem(f"numbers=`{numbers}`, starts=`{starts}`", "`exact` or `generic`, `given` or `unknown`", file=file)
     try:
-        with open(file, encoding="utf-8") as text:
-            layout = yaml.safe_load(text)
+        layout = _layout(file)
         for part in layout.get("problems", []):
             part.pop("visualization_files", None)  # nothing of the mathematics
+        _hold_files(layout, Path(file).parent)
         with warnings.catch_warnings():
             # of the library's own dependencies
             warnings.filterwarnings("ignore", module="petab")
             problem = v1.Problem.from_yaml(layout, base_path=str(Path(file).parent))
+    except ImportProblem as found:
+        raise found.located(file=file) from None
     except (ValueError, KeyError, OSError, TypeError, AttributeError, yaml.YAMLError) as error:
         raise ImportProblem(f"a problem that the petab library refuses: {error}", "PEtab of version 1", file=file) from error
     document = getattr(problem.model, "sbml_document", None)
@@ -88,6 +91,46 @@ def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", unt
         return unrolled(out) if out.experiments > MAX_EXPERIMENTS else out
     except ImportProblem as found:
         raise found.located(file=file) from None
+
+
+def _layout(file: str) -> Any:
+    """What the YAML file says."""
+    text = text_of_file(file)
+    hold_brackets(text)
+    if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
+        # what stands for others many times over grows without bound
+        raise ImportProblem("an alias (`*name`)", "YAML without aliases")
+    return yaml.safe_load(text)
+
+
+def _hold_files(layout: Any, folder: Path) -> None:
+    """Holds that the files of a problem are files, and not too long."""
+    stack = [layout]
+    while stack:
+        found = stack.pop()
+        if isinstance(found, dict):
+            stack += found.values()
+        elif isinstance(found, list):
+            stack += found
+        elif isinstance(found, str) and (path := folder / found).exists():
+            if not path.is_file():
+                raise ImportProblem(f"`{found}`, which is no file", "files")
+            if path.stat().st_size > TABLE:
+                raise OverLimit(f"`{found}` of {path.stat().st_size} bytes", f"at most {TABLE}")
+            if path.suffix in (".xml", ".sbml"):
+                hold_xml(path)
+
+
+def _formula(text: Any) -> Expr:
+    """A formula of PEtab."""
+    try:
+        # by our own grammar, which counts before it works; PEtab has more
+        parse(str(text))
+    except OverLimit:
+        raise
+    except ImportProblem:
+        hold_brackets(str(text))
+    return sympify_petab(text)
 
 
 def _cell(value: Any) -> Expr | None:
@@ -127,8 +170,8 @@ class _Problem:
         noise: set[str] = set()
         transformed: set[str] = set()
         for name in table.index:
-            formulas[str(name)] = self._petab(sympify_petab(table.loc[name, "observableFormula"]))
-            noise |= names_in(exactly(sympify_petab(table.loc[name, "noiseFormula"])))
+            formulas[str(name)] = self._petab(_formula(table.loc[name, "observableFormula"]))
+            noise |= names_in(exactly(_formula(table.loc[name, "noiseFormula"])))
             if "observableTransformation" in table and table.loc[name, "observableTransformation"] in ("log", "log10"):
                 transformed.add(str(name))
         if transformed:

@@ -33,5 +33,9 @@ class ImportProblem(ValueError):
         return (_again, (self.construct, self.expected, self.place, self.hint, self.file))
 
 
+class OverLimit(ImportProblem):
+    """A construct that would take too much work or memory."""
+
+
 def _again(construct: str, expected: str, place: str, hint: str, file: str) -> ImportProblem:
     return ImportProblem(construct, expected, place=place, hint=hint, file=file)

@@ -14,6 +14,7 @@ import libsbml  # type: ignore[import-untyped]
 import sympy  # type: ignore[import-untyped]
 
 from .formula import TIME, Expr, exact, expand, names_in, parse, put, symbol
+from .limits import hold_xml
 from .problem import ImportProblem
 from .sbml_math import formula, lambdas
 from .system import State, System
@@ -66,6 +67,7 @@ def read(path: str | Path) -> Kinetics:
     Raises:
         ImportProblem: it is no SBML, or has a construct without a counterpart.
     """
+    hold_xml(path)
     document = libsbml.readSBMLFromFile(str(path))
     return kinetics(document, str(path))
 

@@ -11,6 +11,7 @@ import libsbml  # type: ignore[import-untyped]
 import sympy  # type: ignore[import-untyped]
 
 from .formula import DERIVED, FUNCTIONS, TIME, Expr, exact, put, shortened, symbol
+from .limits import DEPTH, bounded_exp, bounded_power, hold, measured
 from .problem import ImportProblem
 
 
@@ -30,7 +31,7 @@ def _log(*args: Expr) -> Expr:
 
 def _root(*args: Expr) -> Expr:
     degree, x = args if len(args) == 2 else (sympy.Integer(2), args[0])
-    return x ** (1 / degree)
+    return bounded_power(x, 1 / degree)
 
 
 def _chain(relation: Callable[[Expr, Expr], Expr]) -> Callable[..., Expr]:
@@ -47,12 +48,12 @@ _OPERATIONS: dict[int, Callable[..., Expr]] = {
     L.AST_TIMES: lambda *a: sympy.Mul(*a),
     L.AST_MINUS: _minus,
     L.AST_DIVIDE: lambda a, b: a / b,
-    L.AST_POWER: lambda a, b: a**b,
-    L.AST_FUNCTION_POWER: lambda a, b: a**b,
+    L.AST_POWER: bounded_power,
+    L.AST_FUNCTION_POWER: bounded_power,
     L.AST_FUNCTION_ROOT: _root,
     L.AST_FUNCTION_LOG: _log,
     L.AST_FUNCTION_LN: sympy.log,
-    L.AST_FUNCTION_EXP: FUNCTIONS["exp"],
+    L.AST_FUNCTION_EXP: bounded_exp,
     L.AST_FUNCTION_ABS: FUNCTIONS["abs"],
     L.AST_FUNCTION_SIN: FUNCTIONS["sin"],
     L.AST_FUNCTION_COS: FUNCTIONS["cos"],
@@ -90,6 +91,10 @@ _CONSTANTS: dict[int, Expr] = {
 }
 
 
+#: Elements in each other above which the depth of their expression is measured; it grows to this at most before.
+MEASURED = DEPTH // 3
+
+
 def formula(node: Any, functions: Mapping[str, Lambda], place: str) -> Expr:
     """The formula of a MathML tree.
 
@@ -99,45 +104,65 @@ def formula(node: Any, functions: Mapping[str, Lambda], place: str) -> Expr:
         place: What it is the formula of.
 
     Raises:
-        ImportProblem: a construct that has no counterpart.
+        ImportProblem: a construct that has no counterpart, or a formula that takes too much work.
     """
     if node is None:
         raise ImportProblem("no formula", "one", place=place)
+    # without recursion, which would end at a thousand elements in each other; SymPy makes less of sums of sums
+    stack: list[tuple[Any, bool]] = [(node, False)]
+    values: list[tuple[Expr, int]] = []
+    while stack:
+        here, visited = stack.pop()
+        count = here.getNumChildren()
+        if not visited and count:
+            stack.append((here, True))
+            stack.extend((here.getChild(i), False) for i in reversed(range(count)))
+            continue
+        parts = values[len(values) - count :]
+        del values[len(values) - count :]
+        height = 1 + max((p[1] for p in parts), default=0)
+        try:
+            value = _applied(here, [p[0] for p in parts], functions)
+            if height > MEASURED or not stack:
+                hold(size := measured(value), "a formula")
+                height = size[1]
+        except ImportProblem as problem:
+            raise problem.located(place=place) from None
+        values.append((value, height))
+    return values[0][0]
+
+
+def _applied(node: Any, parts: list[Expr], functions: Mapping[str, Lambda]) -> Expr:
+    """A node with the expressions of its children."""
     kind = node.getType()
-    parts = [node.getChild(i) for i in range(node.getNumChildren())]
     if node.isNumber():
         if kind == L.AST_INTEGER:
             return sympy.Integer(node.getInteger())
         if kind == L.AST_RATIONAL:
             return sympy.Rational(node.getNumerator(), node.getDenominator())
-        try:
-            return exact(float(node.getReal()))
-        except ImportProblem as problem:
-            raise problem.located(place=place) from None
+        return exact(float(node.getReal()))
     if kind in _CONSTANTS:
         return _CONSTANTS[kind]
     if kind == L.AST_NAME:
         return symbol(node.getName())
     if kind == L.AST_FUNCTION_PIECEWISE:
-        values = [formula(p, functions, place) for p in parts]
-        pairs = list(zip(values[0::2], values[1::2], strict=False))
-        if len(values) % 2 == 0:
-            raise ImportProblem("a piecewise function without `otherwise`", "a value at all times", place=place)
-        return sympy.Piecewise(*pairs, (values[-1], True))
+        if len(parts) % 2 == 0:
+            raise ImportProblem("a piecewise function without `otherwise`", "a value at all times")
+        return sympy.Piecewise(*zip(parts[0::2], parts[1::2], strict=False), (parts[-1], True))
     if kind == L.AST_FUNCTION:
         name = node.getName()
         if name not in functions:
-            raise ImportProblem(f"the function `{name}`", "one that the model defines", place=place)
+            raise ImportProblem(f"the function `{name}`", "one that the model defines")
         function = functions[name]
         if len(parts) != len(function.arguments):
-            construct = f"`{name}` of {len(parts)} arguments"
-            raise ImportProblem(construct, f"{len(function.arguments)} of them, as it is defined", place=place)
-        return put(function.body, dict(zip(function.arguments, (formula(p, functions, place) for p in parts), strict=True)))
+            expected = f"{len(function.arguments)} of them, as it is defined"
+            raise ImportProblem(f"`{name}` of {len(parts)} arguments", expected)
+        return put(function.body, dict(zip(function.arguments, parts, strict=True)))
     if kind in _OPERATIONS:
-        return _OPERATIONS[kind](*(formula(p, functions, place) for p in parts))
+        return _OPERATIONS[kind](*parts)
     construct = f"`{shortened(L.formulaToL3String(node) or '?')}`"
     names = {L.AST_FUNCTION_DELAY: "the delay ", L.AST_FUNCTION_RATE_OF: "the rate "}
-    raise ImportProblem(names.get(kind, "") + construct, "arithmetic, the usual functions, piecewise and time", place=place)
+    raise ImportProblem(names.get(kind, "") + construct, "arithmetic, the usual functions, piecewise and time")
 
 
 def lambdas(model: Any) -> dict[str, Lambda]:

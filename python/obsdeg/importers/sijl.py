@@ -9,14 +9,15 @@ import re
 from pathlib import Path
 
 from .formula import Expr, names_in, parse
+from .limits import text_of_file
 from .problem import ImportProblem
 from .system import State, System
 
 _MACRO = re.compile(r"@ODEmodel\s*\(")
 _LEFT = re.compile(r"\s*([^\W\d][\w!]*)\s*('?)\s*\(\s*t\s*\)\s*$")
 _OF_TIME = re.compile(r"([^\W\d][\w!]*)\s*\(\s*t\s*\)")
-# 2x, 3(a + b): a number in front multiplies
-_COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?=[^\W\d]|\()")
+# 2x, 3(a + b): a number in front multiplies; in 1e5*x it is all of 1e5
+_COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)(?=[^\W\d]|\()")
 
 
 def load(path: str | Path, *, model: int = 1) -> System:
@@ -26,7 +27,7 @@ def load(path: str | Path, *, model: int = 1) -> System:
         ImportProblem: it is no such model.
     """
     try:
-        return read(Path(path).read_text(encoding="utf-8"), model=model, name=Path(path).stem)
+        return read(text_of_file(path), model=model, name=Path(path).stem)
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import sympy  # type: ignore[import-untyped]
 
 from .formula import Expr, expand, names_in, parse, put, symbol
-from .problem import ImportProblem
+from .limits import FORMULA, entries, hold_brackets, text_of_file
+from .problem import ImportProblem, OverLimit
 from .system import State, System
 
 #: A value: a formula, or the entries of a vector.
@@ -54,7 +55,7 @@ def load(
         ImportProblem: a statement that is not read, or no model.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
+        text = text_of_file(path, errors="replace")
         return read(text, model=model, known_inputs=known_inputs, unknown_inputs=unknown_inputs, starts=starts)
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
@@ -165,6 +166,9 @@ def _saved(text: str) -> list[tuple[str, dict[str, Value]]]:
 
 def _value(text: str, values: dict[str, Value]) -> Value:
     text = text.strip()
+    if len(text) > FORMULA:
+        raise OverLimit(f"a statement of {len(text)} characters", f"at most {FORMULA}")
+    hold_brackets(text)
     while _TRANSPOSE.search(text) and not text.startswith("'"):
         text = _TRANSPOSE.sub("", text).strip()
     if found := re.fullmatch(r"transpose\s*\((.*)\)", text, re.DOTALL):
@@ -180,9 +184,9 @@ def _value(text: str, values: dict[str, Value]) -> Value:
     if text in values:
         return values[text]
     if found := _FILLED.fullmatch(text):
-        return [sympy.Integer(found.group(1) == "ones")] * (int(found.group(2)) * int(found.group(3)))
+        return [sympy.Integer(found.group(1) == "ones")] * entries(found.group(2), found.group(3))
     if found := _NUMBERED.fullmatch(text):
-        return [symbol(f"{found.group(1)}{i + 1}") for i in range(int(found.group(2)) * int(found.group(3)))]
+        return [symbol(f"{found.group(1)}{i + 1}") for i in range(entries(found.group(2), found.group(3)))]
     if (found := _CHOSEN.fullmatch(text)) and isinstance(vector := values.get(found.group(1)), list):
         return [_entry(vector, sympy.Integer(i), found.group(1)) for i in re.findall(r"\d+", found.group(2))]
     if "[" in text:

@@ -12,10 +12,13 @@ from typing import Any
 
 import sympy  # type: ignore[import-untyped]
 
-from .formula import TIME, Expr, exactly, names_in, parse, symbol
+from .formula import TIME, Expr, exactly, names_in, parse, shortened, symbol
+from .limits import hold_brackets, text_of_file
 from .problem import ImportProblem
 from .system import State, System
 
+#: Functions beside those of formulas.
+_CALLS = {"Rational": lambda p, q=sympy.S.One: p / q, "Abs": sympy.Abs}
 #: What a text may give.
 KEYS = ("name", "rates", "outputs", "starts", "parameters", "known_inputs", "unknown_inputs", "constants", "definitions")
 
@@ -34,7 +37,8 @@ def system(
     """A system of SymPy objects.
 
     Arguments:
-        rates: The derivative of every state, by symbol or function `x(t)`; or equations `Eq(x(t).diff(t), ...)`.
+        rates: The derivative of every state, by symbol or function `x(t)`, as an expression or the text of a
+            formula; or equations `Eq(x(t).diff(t), ...)`.
         outputs: What is measured, by name.
         starts: Known values at the start, by state; `"known"` for one of any value.
         parameters: The unknown constants; all other symbols when left out.
@@ -46,12 +50,12 @@ def system(
         ImportProblem: equations that are not solved for a derivative, names without a meaning.
     """
     pairs = dict(rates.items()) if isinstance(rates, Mapping) else dict(_equation(e) for e in rates)
-    time = {a for key in pairs for a in getattr(sympy.sympify(key), "args", ()) if a.is_Symbol}
+    time = {a for key in pairs if not isinstance(key, str) for a in _expression(key).args if a.is_Symbol}
     if len(time) > 1:
         raise ImportProblem("functions of " + ", ".join(sorted(map(str, time))), "functions of one time")
 
     def plain(value: Any) -> Expr:
-        expression = sympy.sympify(value)
+        expression = _expression(value)
         functions = {f: symbol(f.func.__name__) for f in expression.atoms(sympy.core.function.AppliedUndef)}
         if expression.has(sympy.Derivative):
             raise ImportProblem(f"`{expression}`", "an equation without derivatives on the right")
@@ -84,8 +88,23 @@ def system(
     return out
 
 
+def _expression(value: Any) -> Expr:
+    """An expression of SymPy as it is, a text by the grammar of formulas: SymPy would run it as Python.
+
+    Raises:
+        ImportProblem: it is neither.
+    """
+    if isinstance(value, str):
+        return parse(value, calls=_CALLS)
+    try:
+        return sympy.sympify(value, strict=True)
+    except sympy.SympifyError:
+        construct = f"{type(value).__name__} `{shortened(repr(value))}`"
+        raise ImportProblem(construct, "an expression of SymPy, a number or the text of a formula") from None
+
+
 def _label(key: Any) -> str:
-    found = sympy.sympify(key) if not isinstance(key, str) else symbol(key)
+    found = symbol(key) if isinstance(key, str) else _expression(key)
     return str(found.func.__name__ if isinstance(found, sympy.core.function.AppliedUndef) else found)
 
 
@@ -103,17 +122,21 @@ def load(path: str | Path) -> System:
         ImportProblem: it says something else.
     """
     try:
-        return read(Path(path).read_text(encoding="utf-8"), name=Path(path).stem)
+        return read(text_of_file(path), name=Path(path).stem)
     except ImportProblem as problem:
         raise problem.located(file=str(path)) from None
 
 
 def read(text: str, *, name: str = "system") -> System:
     """The system of a text; as `load`."""
+    hold_brackets(text)
     try:
         tree = ast.parse(text)
     except SyntaxError as error:
         raise ImportProblem(f"`{error.msg}`", "Python", place=f"line {error.lineno}") from None
+    except (RecursionError, MemoryError, ValueError):
+        expected = "assignments of dictionaries and lists of formulas"
+        raise ImportProblem("a text that Python cannot read", expected) from None
     given: dict[str, Any] = {}
     for statement in tree.body:
         match statement:
@@ -163,7 +186,7 @@ def _literal(node: ast.expr, text: str) -> Any:
         case ast.Constant(value=str(words)):
             return words
     try:
-        return parse(ast.get_source_segment(text, node) or "", calls={"Rational": lambda p, q=sympy.S.One: p / q, "Abs": sympy.Abs})
+        return parse(ast.get_source_segment(text, node) or "", calls=_CALLS)
     except ImportProblem as problem:
         raise problem.located(place=f"line {node.lineno}") from None
 

@@ -147,6 +147,20 @@ fn wrong_verdicts(count: usize, scheme: impl Fn(u64) -> Scheme) {
 #[test]
 fn schemes_at_the_edge_agree() {
     right_verdicts(0..16);
+    // the filter shows what many digits say of its own samples, at their times
+    for seed in [218, 329] {
+        let c = checked(seed, &borderline(seed));
+        assert!(c.verdicts_agree, "{seed}: {:?}", c.disagreements);
+        for why in c.unresolved.iter().filter(|w| w.contains("too narrow to show")) {
+            let after = |label: &str| {
+                let number = why.split(label).nth(1)?.split([':', ' ']).next()?;
+                number.parse::<f64>().ok()
+            };
+            let measured = after("inflation ").or_else(|| after("correlation ")).expect("a number");
+            let exact = after("many digits ").expect("a number");
+            assert!((measured - exact).abs() < 1e-3 * exact.abs(), "{seed}: {why}");
+        }
+    }
     // an ordinary readout of gimbals, and separations to both sides of the prior's width
     for (angle, open) in [("180.001", 1), ("0.001", 6), ("179.99999", 5)] {
         let c = checked(1, &crate::schemes::scheme(&["0,0,0", &format!("{angle},0,0")], Carry::Platform));

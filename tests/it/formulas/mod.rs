@@ -507,6 +507,7 @@ fn formulas_of_the_engine_give_the_truth() {
         program: env!("CARGO_BIN_EXE_obsdeg").into(),
         arguments: vec!["symbolic-worker".into()],
         limit: 60,
+        wait: std::time::Duration::from_secs(600),
         waiting: || {},
     });
     let mut seen = Seen::default();

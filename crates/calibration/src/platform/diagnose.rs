@@ -13,12 +13,14 @@ use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
+use super::gross::Why;
 use super::observe::{By, channel_name};
+use super::offset::Offset;
 use super::run::Key;
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
-    PositionsBy, RecordReport, Repeatability, SCHEMA, SecondPath,
+    RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -171,6 +173,8 @@ pub(crate) struct Parts<'a> {
     pub problem: &'a Problem<'a>,
     pub estimate: &'a Estimate,
     pub found: &'a Diagnosed,
+    /// By run: the moment at which the scheme begins, where it was estimated.
+    pub offsets: &'a [Option<Offset>],
     pub too_many: Option<usize>,
     pub known: Vec<String>,
     pub rests_on: Vec<setup::Basis>,
@@ -460,20 +464,21 @@ impl Parts<'_> {
     fn records(&self) -> Vec<RecordReport> {
         let of = |(r, run): (usize, &super::run::Run)| RecordReport {
             clock: Clock {
+                offset_s: matches!(run.reading.by, By::Timeline | By::Both).then_some(run.reading.origin),
+                offset_sigma_s: self.offsets[r].as_ref().map(|o| o.sigma),
                 by_durations: run.reading.by_durations(self.planned),
                 by_earth: self.clock(r).ok().flatten(),
             },
             name: run.reading.name.clone(),
             samples: run.reading.samples,
+            interval_s: run.reading.interval,
+            gaps: run.reading.gaps(self.scheme),
+            empty_cells: run.reading.empty_cells(),
+            psi_at_s: run.reading.origin,
             unused: run.reading.unused,
             bins: run.len(),
             span_s: run.reading.span,
-            positions_by: match run.reading.by {
-                By::Label => PositionsBy::Labels,
-                By::Timeline => PositionsBy::Timeline,
-                By::Both => PositionsBy::Both,
-                By::Static => PositionsBy::Static,
-            },
+            positions_by: run.reading.by.into(),
             gimbals_deg: run.reading.gimbals,
             ignored: run.reading.ignored.clone(),
             force_g: run.reading.force,
@@ -500,6 +505,15 @@ impl Parts<'_> {
         let mut out = Vec::new();
         let channel = |c: usize| channel_name(self.planned.components[c]);
         for run in self.problem.runs {
+            for (cell, column) in run.reading.cells.iter().filter(|(c, _)| c.why == Why::Far) {
+                out.push(Outlier {
+                    record: run.reading.name.clone(),
+                    lines: cell.lines,
+                    t_s: run.reading.origin + cell.t,
+                    channel: column.clone(),
+                    sigmas: cell.sigmas,
+                });
+            }
             for s in &run.reading.spikes {
                 out.push(Outlier {
                     record: run.reading.name.clone(),

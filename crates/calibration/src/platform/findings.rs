@@ -4,9 +4,10 @@ use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
 use super::STRICT;
 use super::diagnose::{MapBoth, Parts};
+use super::gross::Why;
 use super::length::wrong;
 use super::run::Run;
-use crate::answer::{Calibration, Finding, ForceLength, PositionFit, RecordReport};
+use crate::answer::{Calibration, CellKind, Finding, ForceLength, PositionFit, RecordReport};
 
 /// The paths agree to this, in sigma.
 const AGREE: f64 = 1e-6;
@@ -25,6 +26,7 @@ impl Parts<'_> {
         if !self.planned.platform.observed().accelerometers {
             out.extend(self.problem.runs.iter().filter_map(|run| self.force(run)));
         }
+        out.extend(self.problem.runs.iter().flat_map(cells));
         out.extend(c.records.iter().filter_map(|record| clock(record, c)));
         out.extend(self.fits(c));
         for (r, record) in c.records.iter().enumerate() {
@@ -134,6 +136,41 @@ impl Parts<'_> {
         let chi = left.norm_squared() / dof;
         (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
     }
+}
+
+/// Values that cells of a column hold again and again.
+fn cells(run: &Run) -> Vec<Finding> {
+    let mut out: Vec<Finding> = Vec::new();
+    for (cell, own) in &run.reading.cells {
+        let kind = match cell.why {
+            Why::Far => continue,
+            Why::Code => CellKind::Code,
+            Why::Stuck => CellKind::Stuck,
+        };
+        let same = out.iter_mut().find_map(|f| match f {
+            Finding::Cells { column, kind_of_cells, value, count, lines, .. }
+                if column == own && *kind_of_cells == kind && *value == cell.value =>
+            {
+                Some((count, lines))
+            }
+            _ => None,
+        });
+        match same {
+            Some((count, lines)) => {
+                *count += 1;
+                *lines = (lines.0.min(cell.lines.0), lines.1.max(cell.lines.1));
+            }
+            None => out.push(Finding::Cells {
+                record: run.reading.name.clone(),
+                column: own.clone(),
+                kind_of_cells: kind,
+                value: cell.value,
+                count: 1,
+                lines: cell.lines,
+            }),
+        }
+    }
+    out
 }
 
 /// What is wrong with the clock of a record: the rate of the earth says so where it is beyond chance, sigmas as the fit has them. Where it says that the clock is

@@ -9,8 +9,15 @@ use super::clock;
 use super::length::Length;
 use super::mistaken::Mistaken;
 
-/// The specific force of a position of the scheme is no further from the vertical than this, in deg.
+/// The specific force of a position is no further than this from the vertical or, where psi goes on in n,
+/// from where the position before left it, in deg.
 const TILT_DEG: f64 = 20.0;
+/// From one position to the next drift moves the vertical by less than this, in deg, beside so many times
+/// what it moves it from half to half of the positions about the slew.
+const JUMP_DEG: f64 = 3.0;
+const MOVES: f64 = 2.0;
+/// Another position fits better where it is nearer by this factor.
+const NEARER: f64 = 3.0;
 /// The force is within this of one g where its units are right.
 const UNIT: f64 = 0.1;
 /// With the right unit it is within this.
@@ -148,6 +155,11 @@ impl Forces {
         });
     }
 
+    /// Leaves out the piece of a position that is of these lines.
+    pub(crate) fn leave_out(&mut self, position: usize, lines: (u64, u64)) {
+        self.pieces[position].retain(|piece| piece.lines != lines);
+    }
+
     /// By position: how long the force is, whatever single samples are. Its standard deviation is that of a median, by what is known of the samples and by how its
     /// pieces scatter, whichever is greater.
     pub(crate) fn lengths(&self) -> Vec<Option<Length>> {
@@ -241,26 +253,48 @@ impl Forces {
         length(&off) <= within && (length(force) - 1.0).abs() <= CLOSE
     }
 
-    /// Refuses positions whose force is far from where the scheme has it.
+    /// Refuses positions whose force is not that of the scheme's attitude. A platform that drifts by degrees
+    /// tilts further and further, but not at once: where psi goes on in n (`inertial`), the vertical of a
+    /// position begins where that of the one before ended.
     pub(crate) fn check_attitudes(
         &self,
         record: &str,
         names: &[&str],
         attitudes: &[Matrix3<f64>],
+        inertial: bool,
     ) -> Result<(), CalibrationError> {
-        for (p, line, force) in self.usual() {
-            let off = tilt(&attitudes[p], &force);
-            if off <= TILT_DEG {
+        const UP: [f64; 3] = [0.0, 1.0, 0.0];
+        // of the position before: the vertical of its second half in n, and by how much it moved from the
+        // first
+        let mut before: Option<([f64; 3], f64)> = None;
+        for (p, line, _) in self.usual() {
+            // medians, which rows at the wrong position do not move
+            let pieces = &self.pieces[p];
+            let half = pieces.len().div_ceil(2);
+            let usual = |of: &[Piece]| std::array::from_fn(|i| median(of.iter().map(|x| x.force[i])));
+            let (first, last) = (usual(&pieces[..half]), usual(&pieces[pieces.len() - half..]));
+            let moved = angle(&first, &last);
+            let off = |q: usize| {
+                let vertical = apply(&attitudes[q], &first);
+                let jump = before.map_or(f64::INFINITY, |(v, _)| angle(&vertical, &v));
+                jump.min(angle(&vertical, &UP))
+            };
+            let (own, held) =
+                (off(p), before.map_or(f64::INFINITY, |(_, by)| JUMP_DEG + MOVES * (by + moved)));
+            let nearest = (0..names.len()).map(off).fold(f64::INFINITY, f64::min);
+            let wrong = own > TILT_DEG || (own > held && own > NEARER * nearest);
+            if !wrong {
+                before = inertial.then(|| (apply(&attitudes[p], &last), moved));
                 continue;
             }
-            let near = |q: &usize| tilt(&attitudes[*q], &force) <= TILT_DEG;
+            let near = |q: &usize| off(*q) <= TILT_DEG.min((NEARER * nearest).max(JUMP_DEG));
             let like: Vec<&str> = (0..names.len()).filter(near).map(|q| names[q]).collect();
             let like = if like.is_empty() { "no position of the scheme".into() } else { like.join(" or ") };
             return Err(CalibrationError::Attitude {
                 record: record.into(),
                 line,
                 position: names[p].into(),
-                off_deg: format!("{off:.1}"),
+                off_deg: format!("{own:.1}"),
                 like: format!("{like}{}", self.other_axes(attitudes).unwrap_or_default()),
             });
         }
@@ -279,6 +313,9 @@ impl Forces {
                 all.iter().all(|(p, force)| tilt(&attitudes[*p], &turned(force)) <= TILT_DEG)
             });
         let (order, signs) = ways.next().filter(|_| ways.next().is_none())?;
+        if (*order, signs) == ([0, 1, 2], 0) {
+            return None;
+        }
         let name = |i: usize| {
             format!("{}{}", if (signs >> i) & 1 == 1 { "-" } else { "" }, ["fx", "fy", "fz"][order[i]])
         };

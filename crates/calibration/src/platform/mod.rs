@@ -6,11 +6,15 @@ mod earth;
 mod estimate;
 mod findings;
 mod force;
+mod gross;
 mod length;
 mod mistaken;
 mod observe;
+mod offset;
+mod reading;
 mod residuals;
 mod run;
+mod timeline;
 
 use std::cell::Cell;
 
@@ -29,9 +33,12 @@ use crate::record::{Record, RecordError};
 use crate::setup::{Basis, Setup};
 use diagnose::Diagnosed;
 use estimate::{Problem, Unknowns};
+use observe::Reading;
+use offset::Offset;
 use run::Run;
 
 pub use mistaken::Mistaken;
+pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
 
 /// Why a scheme cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -298,6 +305,8 @@ pub fn calibrate(
     let mut x: Vec<PlatformState> =
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
     let (mut round, mut passes, mut too_many) = (0, 0, None);
+    let lay = |reading: Reading| Run::new(reading, scheme, &planned, &own);
+    let (mut beginnings, mut elsewhere, mut offsets) = (0, false, vec![None; runs.len()]);
     loop {
         round += 1;
         let problem = Problem {
@@ -310,7 +319,23 @@ pub fn calibrate(
             passes: Cell::new(passes),
             stopped: Cell::new(false),
         };
-        let estimate = problem.estimate(x, round == 1)?;
+        let mut estimate = problem.estimate(x, round == 1)?;
+        if beginnings < ROUNDS && !problem.stopped.get() {
+            beginnings += 1;
+            offsets = problem.open(&estimate, &lay)?;
+            passes = problem.passes.get();
+            if offsets.iter().flatten().any(|o: &Offset| o.by.abs() > offset::SETTLED * o.sigma) {
+                for (run, o) in runs.iter_mut().zip(&offsets) {
+                    if let Some(o) = o {
+                        let counts = std::mem::take(&mut run.counts);
+                        *run = lay(run.reading.later(o.by))?;
+                        run.counts = counts;
+                    }
+                }
+                (x, round) = (estimate.at.x, 0);
+                continue;
+            }
+        }
         let found = Diagnosed::of(&problem, &estimate, &prediction)?;
         passes = problem.passes.get();
         let interrupted = problem.stopped.get();
@@ -324,7 +349,26 @@ pub fn calibrate(
             too_many = Some(off.len());
         }
         let leave_out = !off.is_empty() && !many;
+        if !last && settled && !leave_out && !elsewhere {
+            elsewhere = true;
+            let begins = |r: usize| problem.begins_elsewhere(&estimate, r, &lay);
+            let found = (0..runs.len()).map(begins).collect::<Result<Vec<bool>, _>>()?;
+            if found.contains(&true) {
+                for (run, found) in runs.iter_mut().zip(found) {
+                    let (at, interval) = (run.reading.origin, run.reading.interval);
+                    run.reading.open = found.then_some((at - interval, at + interval)).or(run.reading.open);
+                }
+                (x, beginnings) = (estimate.at.x, 0);
+                continue;
+            }
+        }
         if last || (settled && !leave_out) {
+            for o in offsets.iter().flatten() {
+                let root = &mut estimate.solution.inverse_root;
+                let columns = root.ncols();
+                *root = std::mem::take(root).insert_column(columns, 0.0);
+                root.set_column(columns, &(&o.direction * o.sigma));
+            }
             let parts = diagnose::Parts {
                 scheme,
                 conditions,
@@ -334,6 +378,7 @@ pub fn calibrate(
                 problem: &problem,
                 estimate: &estimate,
                 found: &found,
+                offsets: &offsets,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
                 rests_on,

@@ -1,16 +1,21 @@
 //! A record of a platform: which columns it has, at which position every sample was taken, and bins of them in n.
 
+use std::cmp::Ordering;
+
 use obsdeg_core::model::slew::apply;
-use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
+use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3, Scheme, elementary, product};
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
 use super::clock::{bounds, by_durations};
 use super::force::{ForceColumn, Forces};
+use super::gross;
 use super::length::Length;
 use super::mistaken::Mistaken;
+use super::timeline::{self, Gap, Intervals};
 use crate::Going;
-use crate::bins::{Bin, Binner, Sample, Spike};
+use crate::answer::{self, EmptyCells, PositionsBy};
+use crate::bins::{Bin, Binner, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{Detector, Told};
 
@@ -21,8 +26,12 @@ const FORCES: [(&str, Option<f64>); 4] =
 const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("um/s", 1e-6)];
 /// An interval so many times as long as the one before is a gap, in which increments may be lost.
 const GAP: f64 = 1.5;
-/// So many intervals between the first samples say how long one usually is.
-const FIRST: usize = 101;
+/// By this part of an interval the stamps of rows may differ from the timeline of the scheme, where the file
+/// states none.
+const TOLERANCE: f64 = 0.05;
+/// By this part of an interval a row may be late by rounding alone, where positions follow each other at
+/// once.
+const ROUNDED: f64 = 1e-3;
 const ANGLES: [(&str, f64); 4] = [
     ("rad", 1.0),
     ("mrad", 1e-3),
@@ -32,8 +41,10 @@ const ANGLES: [(&str, f64); 4] = [
 /// Units of a temperature, whose zero does not matter.
 const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
-pub(crate) const TIMES: [(&str, f64); 5] =
-    [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0), ("h", 3600.0)];
+pub(crate) const TIMES: [(&str, f64); 6] =
+    [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
+/// Number of samples of a dense bin from which its median is taken.
+const SOME: usize = 64;
 /// What the gimbals read is no further from the attitude of the scheme than this, in deg.
 const GIMBALS_DEG: f64 = 5.0;
 
@@ -73,9 +84,21 @@ pub(crate) struct Reading {
     pub bins: Vec<Vec<Bin>>,
     /// The time of the record, in s, that is 0 there.
     pub origin: f64,
+    /// Earliest and latest origin, in s, where labels leave it open and it is not that of the scheme's clock.
+    pub open: Option<(f64, f64)>,
+    /// The usual interval between rows, in s.
+    pub interval: f64,
+    /// Where rows are missing.
+    pub gaps: Vec<Gap>,
     /// First and last sample of every position, in s alike.
     pub stays: Vec<(f64, f64)>,
+    /// The row after the last of every position, in s alike; infinite for the last of the record.
+    pub after: Vec<f64>,
     pub spikes: Vec<Spike>,
+    /// Cells that do not count, with the text of their column.
+    pub cells: Vec<(gross::Cell, String)>,
+    /// By column that is read: its text, and how many of its cells are empty at positions.
+    pub missing: Vec<(String, usize)>,
     pub samples: usize,
     /// Samples at no position.
     pub unused: usize,
@@ -91,9 +114,56 @@ pub(crate) struct Reading {
     pub gimbals: Option<f64>,
     /// The digest of its numbers.
     pub digest: String,
+    /// The columns that are used, and what one of their numbers is in s, g, g s, rad or degC.
+    pub columns: Vec<(String, f64)>,
+    /// Separator and decimal mark; none where columns are separated by commas.
+    pub written: Option<String>,
+}
+
+impl From<By> for PositionsBy {
+    fn from(by: By) -> Self {
+        match by {
+            By::Label => Self::Labels,
+            By::Timeline => Self::Timeline,
+            By::Both => Self::Both,
+            By::Static => Self::Static,
+        }
+    }
 }
 
 impl Reading {
+    /// The same with the scheme beginning `by` s later by the clock of the record.
+    pub(crate) fn later(&self, by: f64) -> Self {
+        let mut out = self.clone();
+        out.origin += by;
+        out.bins.iter_mut().flatten().for_each(|b| b.t -= by);
+        out.spikes.iter_mut().for_each(|s| s.t -= by);
+        out.cells.iter_mut().for_each(|(c, _)| c.t -= by);
+        out.stays.iter_mut().for_each(|s| *s = (s.0 - by, s.1 - by));
+        out.after.iter_mut().for_each(|t| *t -= by);
+        out
+    }
+
+    /// Where rows are missing, by the names of positions.
+    pub(crate) fn gaps(&self, scheme: &Scheme) -> Vec<answer::Gap> {
+        let name = |p: usize| scheme.positions[p].name.clone();
+        let place = |between: [Option<usize>; 2]| match between {
+            [Some(p), Some(q)] if p == q => name(p),
+            [Some(p), Some(q)] => format!("{} to {}", name(p), name(q)),
+            [Some(p), None] => format!("after {}", name(p)),
+            [None, Some(q)] => format!("before {}", name(q)),
+            [None, None] => "between positions".into(),
+        };
+        let of = |g: &Gap| answer::Gap { from_s: g.from, to_s: g.to, line: g.line, place: place(g.between) };
+        self.gaps.iter().map(of).collect()
+    }
+
+    /// Number of empty cells at positions, by column.
+    pub(crate) fn empty_cells(&self) -> Vec<EmptyCells> {
+        let of = |(column, count): &(String, usize)| EmptyCells { column: column.clone(), count: *count };
+        self.missing.iter().map(of).collect()
+    }
+
     /// The part by which its clock is fast as positions begin and end, where the record says that.
     pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
         let used = self.samples.saturating_sub(self.unused).max(1) as f64;
@@ -120,6 +190,8 @@ struct Layout {
     temperature: Option<usize>,
     label: Option<usize>,
     ignored: Vec<String>,
+    /// Texts of the three columns that are observed.
+    columns: [String; 3],
 }
 
 /// Units of the force, or of increments of velocity, with what they are of g, or of g s.
@@ -168,6 +240,7 @@ impl Layout {
                 scale: own[i].1.scale,
             })
         });
+        let columns = std::array::from_fn(|i| record.columns()[own[i].1.column].text.clone());
         let time = (record.columns()[time].text.clone(), wanted[0].scale);
         let azimuth = plan.components.contains(&AZIMUTH);
         if azimuth {
@@ -218,7 +291,31 @@ impl Layout {
             temperature,
             label,
             ignored,
+            columns,
         })
+    }
+
+    /// Whether the record has the column `i` of the three that are observed: where it has none, the number is
+    /// that of the time.
+    fn own(&self, i: usize) -> bool {
+        self.wanted[i + 1].column != self.wanted[0].column
+    }
+
+    /// The columns that are used, in their order, with what one of their numbers is.
+    fn used(&self, record: &Record) -> Vec<(String, f64)> {
+        let mut all: Vec<&Wanted> = self.wanted.iter().collect();
+        all.sort_by_key(|w| w.column);
+        all.dedup_by_key(|w| w.column);
+        all.into_iter().map(|w| (record.columns()[w.column].text.clone(), w.scale)).collect()
+    }
+
+    /// The columns with empty cells, with their number.
+    fn missing(&self, columns: &[String], empty: &[usize]) -> Vec<(String, usize)> {
+        let mut out: Vec<(usize, usize)> =
+            self.wanted.iter().zip(empty).map(|(w, n)| (w.column, *n)).filter(|(_, n)| *n > 0).collect();
+        out.sort_unstable();
+        out.dedup();
+        out.into_iter().map(|(c, n)| (columns[c].clone(), n)).collect()
     }
 
     /// Makes mean forces of the increments of a row, those over `dt` s; nothing of them where it is not known over which time they are.
@@ -272,14 +369,17 @@ impl Layout {
     }
 }
 
-/// The position of a time of the scheme, while Z is observed.
-fn at_time(plan: &Plan, t: f64) -> Option<usize> {
-    let within = |s: &&obsdeg_evidence::simulation::Segment| {
-        t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + 1e-9
+/// The position of a time of the scheme, while Z is observed; a stamp may be late by `rounding` s where one
+/// position follows another at once.
+fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
+    let slew = |k: usize| plan.segments.get(k).is_none_or(|s| matches!(s.kind, SegmentKind::Slew(_)));
+    let within = |(k, s): &(usize, &obsdeg_evidence::simulation::Segment)| {
+        let late = if slew(*k) || slew(k + 1) { 0.0 } else { rounding };
+        t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + late.max(1e-9)
     };
     // the end of one position is rather that than the start of the next
-    let found = plan.segments.iter().find(within)?;
-    (!matches!(found.kind, SegmentKind::Slew(_))).then_some(found.position)
+    let (k, found) = plan.segments.iter().enumerate().find(within)?;
+    (!slew(k)).then_some(found.position)
 }
 
 /// A row that is kept: its line, its numbers, and how long before it the one before was.
@@ -295,8 +395,6 @@ struct Taking<'a> {
     /// The position of the bin, and the time of the first sample.
     now: Option<usize>,
     begin: f64,
-    /// Whether every label is what the timeline of the scheme has there.
-    agrees: bool,
     /// The forces, and the sum of their lengths with their number.
     forces: Forces,
     length: (f64, usize),
@@ -304,13 +402,19 @@ struct Taking<'a> {
     noise: f64,
     /// The time of the sample before, and how long before it the one before that was.
     before: Option<(f64, Option<f64>)>,
-    /// The first intervals between samples.
-    intervals: Vec<f64>,
+    /// Intervals between rows.
+    intervals: Intervals,
     /// Finds the positions, where the file says how.
     detector: Option<Detector<Kept>>,
     told: Vec<Told<Kept>>,
     /// First and last time of every interval at rest.
     rests: Vec<(f64, f64)>,
+    /// Line, time and values of the samples of the bin, then what the robust pass is to see of every
+    /// position.
+    samples: Vec<(u64, f64, [f64; 3])>,
+    rows: Vec<Vec<gross::Row>>,
+    /// By wanted number: how many cells are empty at positions.
+    empty: Vec<usize>,
     /// The position whose gimbals are furthest off, by how much in deg, and the line.
     gimbals: Option<(usize, f64, u64)>,
 }
@@ -323,10 +427,10 @@ impl Taking<'_> {
     }
 
     /// The position of a row.
-    fn position(&self, row: &Row<'_>, t: f64) -> Result<Option<usize>, CalibrationError> {
+    fn position(&self, row: &Row<'_>, t: f64, dt: Option<f64>) -> Result<Option<usize>, CalibrationError> {
         let positions = &self.plan.platform.scheme().positions;
         match self.out.by {
-            By::Timeline | By::Both | By::Static => Ok(at_time(self.plan, t)),
+            By::Timeline | By::Both | By::Static => Ok(at_time(self.plan, t, ROUNDED * dt.unwrap_or(0.0))),
             By::Label if row.label.is_empty() => Ok(None),
             By::Label => {
                 let found = positions.iter().position(|p| p.name == row.label);
@@ -362,6 +466,13 @@ impl Taking<'_> {
         self.out.span.1 = time;
         self.out.samples += 1;
         let mut numbers = row.numbers.to_vec();
+        // values that the file says are missing ones
+        let codes = &self.plan.platform.scheme().recording.missing;
+        if !codes.is_empty() {
+            for (number, w) in numbers.iter_mut().zip(&self.layout.wanted).skip(1) {
+                *number = number.filter(|x| codes.iter().all(|code| *x != code * w.scale));
+            }
+        }
         let dt = self.interval(time);
         if self.layout.increments {
             self.layout.divide(&mut numbers, dt);
@@ -379,7 +490,8 @@ impl Taking<'_> {
             self.detector = Some(detector);
             return Ok(());
         }
-        let found = self.position(row, time - if self.out.by == By::Label { self.begin } else { 0.0 })?;
+        let found = self.position(row, time, dt)?;
+        self.intervals.push(time, row.line, found);
         if self.layout.increments && found != self.now {
             // a part of it is of the way here
             self.layout.divide(&mut numbers, None);
@@ -392,9 +504,6 @@ impl Taking<'_> {
         let dt = self.before.map(|(t, _)| time - t);
         let regular =
             dt.filter(|dt| self.before.and_then(|(_, last)| last).is_none_or(|last| *dt <= GAP * last));
-        if let Some(dt) = dt.filter(|_| self.intervals.len() < FIRST) {
-            self.intervals.push(dt);
-        }
         self.before = Some((time, dt));
         regular
     }
@@ -409,7 +518,9 @@ impl Taking<'_> {
             self.rests[k].1 = time;
         }
         let positions = self.plan.attitudes.len();
-        self.put(&told.sample, time, told.interval.filter(|k| *k < positions))
+        let found = told.interval.filter(|k| *k < positions);
+        self.intervals.push(time, told.sample.0, found);
+        self.put(&told.sample, time, found)
     }
 
     /// Puts a sample where it was taken.
@@ -423,6 +534,9 @@ impl Taking<'_> {
         let own_time = matches!(self.out.by, By::Label | By::Static);
         if found != self.now {
             self.end();
+            if let Some(after) = self.now.and_then(|p| self.out.after.get_mut(p)) {
+                *after = time - if own_time { self.begin } else { 0.0 };
+            }
         }
         let Some(p) = found else {
             self.out.unused += 1;
@@ -432,12 +546,12 @@ impl Taking<'_> {
         if own_time && self.out.stays.is_empty() {
             self.begin = time;
         }
-        self.agrees &= at_time(self.plan, time) == Some(p);
         let t = time - if own_time { self.begin } else { 0.0 };
         if self.now != Some(p) {
             // the timeline may begin late, or leave positions out
             while self.out.stays.len() <= p {
                 self.out.stays.push((t, t));
+                self.out.after.push(f64::INFINITY);
             }
         }
         self.now = Some(p);
@@ -456,8 +570,12 @@ impl Taking<'_> {
             // the length is what goes up
             let up = self.layout.sigmas_in_n(numbers, c).and_then(|s| s[1]);
             self.forces.push(p, line, time, own, up.unwrap_or(self.noise));
-            self.length.0 += (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt();
-            self.length.1 += 1;
+            // codes of missing values have no length
+            let length = (f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt();
+            if (length - 1.0).abs() < 0.5 {
+                self.length.0 += length;
+                self.length.1 += 1;
+            }
         }
         let z = self.plan.components.iter().map(|&k| if k == AZIMUTH { in_n[3] } else { in_n[k - 1] });
         let z: Vec<Option<f64>> = z.collect();
@@ -478,16 +596,99 @@ impl Taking<'_> {
         let temperature = self.layout.temperature.and_then(|i| numbers[i]);
         // a mean is of the middle
         let t = t - dt.filter(|_| self.layout.increments).map_or(0.0, |dt| dt / 2.0);
+        let spikes = self.out.spikes.len();
         let bin = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
         if let Some(bin) = bin {
-            self.out.bins[p].push(bin);
+            self.put_bin(p, bin, spikes);
+        }
+        let values =
+            std::array::from_fn(|i| numbers[i + 1].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
+        self.samples.push((line, t, values));
+        for (count, number) in self.empty.iter_mut().zip(numbers) {
+            *count += usize::from(number.is_none());
         }
         Ok(())
     }
 
     fn end(&mut self) {
+        let spikes = self.out.spikes.len();
         if let (Some(bin), Some(p)) = (self.binner.end(&mut self.out.spikes), self.now) {
-            self.out.bins[p].push(bin);
+            self.put_bin(p, bin, spikes);
+        }
+    }
+
+    /// Takes a bin of a position, whose spikes are those from `spikes` on: of the samples of each the column
+    /// that is furthest off is named.
+    fn put_bin(&mut self, p: usize, bin: Bin, spikes: usize) {
+        let samples = std::mem::take(&mut self.samples);
+        let index = self.out.bins[p].len();
+        self.out.bins[p].push(bin);
+        let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return };
+        if samples.len() < FEWEST {
+            let row = |&(line, t, values): &(u64, f64, [f64; 3])| gross::Row {
+                lines: (line, line),
+                t,
+                values,
+                bin: index,
+            };
+            self.rows[p].extend(samples.iter().map(row));
+            return;
+        }
+        // some of many say what is usual
+        let some = samples.iter().step_by(samples.len().div_ceil(SOME));
+        let usual: [f64; 3] = std::array::from_fn(|i| {
+            gross::median(some.clone().map(|s| s.2[i]).filter(|x| x.is_finite()).collect())
+        });
+        self.rows[p].push(gross::Row { lines: (first.0, last.0), t: first.1, values: usual, bin: index });
+        let mut found: Vec<Spike> = self.out.spikes.drain(spikes..).collect();
+        found.sort_by(|a, b| {
+            (a.line, b.sigmas.abs()).partial_cmp(&(b.line, a.sigmas.abs())).unwrap_or(Ordering::Equal)
+        });
+        found.dedup_by_key(|s| s.line);
+        for spike in found {
+            let Some(s) = samples.iter().find(|s| s.0 == spike.line) else { continue };
+            let off = |i: usize| (s.2[i] - usual[i]).abs();
+            let axis = (0..3).filter(|&i| s.2[i].is_finite()).max_by(|a, b| off(*a).total_cmp(&off(*b)));
+            // a measured azimuth is no such column
+            let Some(axis) = axis.filter(|_| self.plan.components[spike.channel] != AZIMUTH) else {
+                self.out.spikes.push(spike);
+                continue;
+            };
+            self.cell(gross::Cell {
+                lines: (spike.line, spike.line),
+                t: spike.t,
+                axis,
+                value: s.2[axis],
+                sigmas: spike.sigmas,
+                why: gross::Why::Far,
+            });
+        }
+    }
+
+    /// Takes a cell that does not count, with its value as it is written.
+    fn cell(&mut self, mut cell: gross::Cell) {
+        cell.value /= self.layout.wanted[cell.axis + 1].scale;
+        self.out.cells.push((cell.clone(), self.layout.columns[cell.axis].clone()));
+    }
+
+    /// Leaves out what a robust pass over every position finds gross. What is a turn (one g long still, at
+    /// either end) is left to say so.
+    fn leave_out_gross(&mut self) {
+        let noise = self.noise;
+        for p in 0..self.rows.len() {
+            let rows = std::mem::take(&mut self.rows[p]);
+            let mut found = gross::cells(&rows, noise);
+            if self.layout.observed == Observed::Force {
+                gross::keep_turns(&rows, &mut found);
+            }
+            for cell in &found {
+                let lines = cell.lines;
+                if let Some(row) = rows.iter().find(|r| r.lines == lines) {
+                    self.out.bins[p][row.bin].channels.iter_mut().for_each(|c| *c = None);
+                }
+                self.forces.leave_out(p, lines);
+            }
+            found.into_iter().for_each(|cell| self.cell(cell));
         }
     }
 }
@@ -513,10 +714,19 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
     }
 }
 
-/// The median of some intervals; one second of none.
-fn median(of: &mut [f64]) -> f64 {
-    let middle = of.len() / 2;
-    if of.is_empty() { 1.0 } else { *of.select_nth_unstable_by(middle, f64::total_cmp).1 }
+/// Lays positions that are known by labels on the timeline of the scheme, which says when each begins and
+/// ends where rows only say what is between; where they lie inside no such timeline they were held otherwise,
+/// and end with their last rows.
+fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
+    let by_clock: Vec<(f64, f64)> =
+        reading.stays.iter().map(|(from, to)| (from + reading.origin, to + reading.origin)).collect();
+    match timeline::begin(&by_clock, plan, tolerance) {
+        Some(begin) => {
+            *reading = reading.later(begin.at - reading.origin);
+            (reading.by, reading.origin, reading.open) = (By::Both, begin.at, begin.open);
+        }
+        None => timeline::ends(&mut reading.stays, &reading.after, plan, reading.interval, tolerance),
+    }
 }
 
 /// The name of a component of Z.
@@ -550,8 +760,14 @@ pub(crate) fn observe(
         by,
         bins: vec![Vec::new(); positions],
         origin: 0.0,
+        open: None,
+        interval: 1.0,
+        gaps: Vec::new(),
         stays: Vec::new(),
+        after: Vec::new(),
         spikes: Vec::new(),
+        cells: Vec::new(),
+        missing: Vec::new(),
         samples: 0,
         unused: 0,
         span: (0.0, 0.0),
@@ -560,6 +776,8 @@ pub(crate) fn observe(
         lengths: vec![None; positions],
         gimbals: None,
         digest: String::new(),
+        columns: layout.used(&record),
+        written: record.written().map(Into::into),
     };
     let of_force = plan.components.iter().zip(&sigmas).find(|(k, _)| **k != AZIMUTH);
     let noise = of_force.map_or(0.0, |(_, sigma)| *sigma);
@@ -571,18 +789,21 @@ pub(crate) fn observe(
         out,
         now: None,
         begin: 0.0,
-        agrees: true,
         forces: Forces::new(positions, bin_s),
         length: (0.0, 0),
         noise,
         before: None,
-        intervals: Vec::new(),
+        intervals: Intervals::default(),
         detector: still.map(Detector::new),
         told: Vec::new(),
         rests: Vec::new(),
+        samples: Vec::new(),
+        rows: vec![Vec::new(); positions],
+        empty: vec![0; layout.wanted.len()],
         gimbals: None,
     };
     let (name, mut rows) = (record.name().to_string(), 0_usize);
+    let record_columns: Vec<String> = record.columns().iter().map(|c| c.text.clone()).collect();
     let digest = record.read(&layout.wanted, layout.label, false, |row| {
         rows += 1;
         if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
@@ -606,10 +827,12 @@ pub(crate) fn observe(
     }
     taking.end();
     taking.forces.end();
+    taking.out.missing = layout.missing(&record_columns, &taking.empty);
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
     // forces that are increments of velocity by what the header says, or the other way round
-    let between = median(&mut taking.intervals);
+    let (between, gaps) = std::mem::take(&mut taking.intervals).finish(plan);
+    (taking.out.interval, taking.out.gaps) = (between, gaps);
     let per =
         |(u, size): (&'static str, f64)| (u, size * between.powi(if layout.increments { 1 } else { -1 }));
     let others = units_of_force(!layout.increments, gravity).map(per);
@@ -621,7 +844,9 @@ pub(crate) fn observe(
         &units_of_force(layout.increments, gravity),
         &others,
     )?;
-    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes)?;
+    taking.leave_out_gross();
+    let inertial = plan.platform.scheme().carry == Carry::Inertial;
+    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes, inertial)?;
     if matches!(by, By::Label | By::Static) {
         check_times(&taking.out, plan, &layout.time)?;
     }
@@ -637,20 +862,16 @@ pub(crate) fn observe(
     }
     let (length, count) = taking.length;
     let force = (layout.observed == Observed::Force && count > 0).then(|| length / count as f64);
-    let (agrees, begin) = (taking.agrees, taking.begin);
+    let begin = taking.begin;
     let gimbals = taking.gimbals.map(|(_, off, _)| off);
     let lengths = force.map(|_| taking.forces.lengths());
     let mut out = taking.out;
     out.lengths = lengths.unwrap_or(out.lengths);
     (out.force, out.gimbals, out.digest) = (force, gimbals, digest);
     out.origin = if matches!(by, By::Label | By::Static) { begin } else { 0.0 };
-    if out.by == By::Label && agrees {
-        out.origin = 0.0;
-        // which says when each position begins and ends, where samples only say what is between
-        out.by = By::Both;
-        out.bins.iter_mut().flatten().for_each(|b| b.t += begin);
-        out.spikes.iter_mut().for_each(|s| s.t += begin);
-        out.stays.iter_mut().for_each(|s| *s = (s.0 + begin, s.1 + begin));
+    if out.by == By::Label && out.stays.len() == positions {
+        let part = plan.platform.scheme().recording.tolerance.unwrap_or(TOLERANCE);
+        lay(&mut out, plan, part * between);
     }
     if let Some(p) = out.bins.iter().position(|b| b.iter().all(|b| b.channels.iter().all(Option::is_none))) {
         let scheme = plan.platform.scheme();

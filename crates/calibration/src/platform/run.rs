@@ -9,6 +9,7 @@ use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Seg
 use super::CalibrationError;
 use super::clock::words;
 use super::observe::{By, Reading};
+use super::timeline::slews;
 use crate::bins::{Bin, Mean};
 use crate::least_squares::Linearised;
 
@@ -41,12 +42,13 @@ pub(crate) fn conditions(of: &Conditions) -> Conditions {
     Conditions { drift_noise: DriftNoise::RandomWalk(density), ..of.clone() }
 }
 
-/// Parts of a position that begins at `begin`: the steps to its bins, and what is left of it.
+/// Parts of a position that begins at `begin`: the steps to its bins, and what is left of it. Bins are inside
+/// it, whatever their stamps.
 fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
     let mut at = begin;
     let mut out: Vec<(usize, f64)> = Vec::with_capacity(bins.len() + 1);
     for bin in bins {
-        let dt = (bin.t - at).max(CLOSEST);
+        let dt = (bin.t.min(begin + length) - at).max(CLOSEST);
         out.push((1, dt));
         at += dt;
     }
@@ -71,10 +73,8 @@ impl Run {
         let mut own = scheme.clone();
         let mut begins = vec![0.0; own.positions.len()];
         let mut stays = reading.stays.clone();
-        let slew_s = |p: usize| -> f64 {
-            let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
-            planned.segments.iter().filter(slew).map(|s| s.dt * s.steps as f64).sum()
-        };
+        let slews = slews(planned);
+        let slew_s = |p: usize| slews[p];
         if reading.by == By::Static {
             // a window is no longer at rest before and behind a turn alike: the turn is in the middle of the gap
             for p in 1..stays.len() {

@@ -10,58 +10,64 @@ use crate::answer::CovarianceTable;
 use crate::record::{MOST, RecordError};
 use crate::setup::Basis;
 
-/// A calibration of a system.
+/// Calibration of a system from one record.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemCalibration {
-    /// `obsdeg.system-calibration/1`.
+    /// Layout of this answer: `obsdeg.system-calibration/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The system.
+    /// Name of the system, as in its file.
     pub name: String,
-    /// Whether model and noise explain the data; null where the noise was estimated from what is left, which then decides nothing.
+    /// True if model and noise explain the data; null if the noise was estimated from the residuals, which
+    /// then decide nothing.
     pub consistent: Option<bool>,
-    /// What speaks against it.
+    /// Evidence against the model or the noise; empty if there is none.
     pub findings: Vec<SystemFinding>,
-    /// States at the start of every experiment, parameters, and what is unknown of inputs.
+    /// Estimates of states at the start of every experiment, parameters, and unknowns of inputs.
     pub quantities: Vec<SystemEstimated>,
-    /// The combinations that the model asks for, and products and sums of what is not determined alone that it determines.
+    /// Estimates of combinations that the model asks for, and of products and sums that are determined though
+    /// their unknowns alone are not.
     pub combinations: Vec<SystemEstimated>,
-    /// Of all unknowns that are determined.
+    /// Covariance of all unknowns that are determined.
     pub covariance: CovarianceTable,
-    /// The sum of squares of all residuals, in sigma.
+    /// Chi-square: the sum of squares of all residuals in sigma, dimensionless.
     pub chi_square: f64,
-    /// Measurements minus what they determine.
+    /// Number of degrees of freedom: measurements minus determined unknowns.
     pub degrees_of_freedom: usize,
-    /// Where chi-square per degree of freedom lies with a probability of 99.9 %.
+    /// Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless.
     pub band: (f64, f64),
-    /// The root of chi-square per degree of freedom.
+    /// Root of chi-square per degree of freedom, dimensionless; 1 is expected.
     pub factor: f64,
-    /// By output.
+    /// Quality of the fit of each output.
     pub outputs: Vec<OutputFit>,
     /// Other solutions that fit nearly as well, the best first: the values of the unknowns.
     pub others: Vec<OtherSolution>,
-    /// Starts that were tried, and how many led to the solution.
+    /// Number of starts that were tried, then the number that led to the solution.
     pub starts: (usize, usize),
-    /// How many would have been tried at most: fewer are enough when no other solution is to be expected.
+    /// Largest number of starts; fewer are enough when no other solution is to be expected.
     pub starts_at_most: usize,
-    /// Profiles that were asked for.
+    /// Profiles of the unknowns that were asked for.
     pub profiles: Vec<Profile>,
-    /// Rows of the record.
+    /// Number of rows of the record.
     pub samples: usize,
-    /// Intervals at rest, where the file says how they are found.
+    /// Number of intervals at rest; null if the file does not ask for them.
     pub intervals: Option<usize>,
-    /// Rows that the model is held against: those of the record, or the intervals and what is between them.
+    /// Time of the record at which the model starts, in its unit; null where that is 0. A record that begins
+    /// more than 100 times its own length after 0 starts with its first row.
+    pub begins: Option<f64>,
+    /// Number of rows that the model is fitted to: those of the record, or the intervals and the runs between
+    /// them.
     pub rows: usize,
-    /// Columns that nothing was made of.
+    /// Columns that are not used.
     pub ignored: Vec<String>,
-    /// The digest of the model.
+    /// Digest of the model, to recognise it.
     pub model: String,
-    /// The records that the estimates rest on, those of the calibration before too.
+    /// Records that the estimates rest on, including those of the calibration before.
     pub rests_on: Vec<Basis>,
-    /// Whether the calibration before rests on the same record, by another model.
+    /// True if the calibration before rests on the same record, by another model.
     pub shared: bool,
-    /// Steps of integration between two rows, at most.
+    /// Largest number of integration steps between two rows.
     pub substeps: usize,
     /// Seed of starts and verdicts.
     pub seed: u64,
@@ -71,104 +77,108 @@ pub struct SystemCalibration {
     pub residuals: Vec<SystemResidual>,
 }
 
-/// What speaks against model or noise.
+/// Evidence against the model or the noise.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum SystemFinding {
-    /// Interrupted: the estimates are where the best iteration was then.
+    /// Interrupted iteration: the estimates are where the best one was then.
     Interrupted,
-    /// No start settled.
+    /// Iteration that did not converge from any start.
     NotSettled,
-    /// Chi-square is outside its band.
+    /// Chi-square that is outside its acceptance band.
     Noise {
-        /// Per degree of freedom.
+        /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
-        /// What sigmas are to be multiplied by.
+        /// Factor to multiply the sigmas by, dimensionless.
         factor: f64,
     },
-    /// The residuals of an output are not independent of each other.
+    /// Residuals of an output that are not independent of each other.
     Correlated {
-        /// The output.
+        /// Name of the output with this finding.
         output: String,
-        /// Probability that independent ones are correlated so.
+        /// Probability that independent residuals are as correlated as these.
         probability: f64,
     },
-    /// A measurement is far off.
+    /// Measurement that is far from its expected value.
     Outlier {
-        /// The output.
+        /// Name of the output with this finding.
         output: String,
-        /// Its line in the record.
+        /// Line number of the measurement in the record.
         line: u64,
-        /// By how much the others leave it off, in sigma as these have it (at least as it was given).
+        /// Residual in sigma by the other measurements (at least the given sigma), dimensionless.
         sigmas: f64,
     },
 }
 
-/// An unknown or a combination.
+/// Estimate of an unknown or a combination.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemEstimated {
-    /// Its name.
+    /// Name of the unknown, or the combination.
     pub name: String,
-    /// Its unit, as the file says.
+    /// Unit of the estimate, as in the model file.
     pub unit: String,
-    /// The exact verdict; null for what is known.
+    /// Verdict on the unknown or combination; null if it is known.
     pub status: Option<Status>,
-    /// The degree.
+    /// Observable degree; null if not observable.
     pub degree: Option<usize>,
-    /// Whether model and data determine it.
+    /// True if model and data determine it.
     pub determined: bool,
-    /// The estimate.
+    /// Estimate in the unit of `unit`; null if not determined.
     pub estimate: Option<f64>,
-    /// Its standard deviation by the noise.
+    /// Standard deviation of the estimate by the noise, in the unit of `unit`; null if not determined.
     pub sigma: Option<f64>,
-    /// The same with errors of the data times the root of chi-square per degree of freedom, where that is above one; what was known before stays as it is.
+    /// Standard deviation, in the unit of `unit`, with errors of the data times the root of chi-square per
+    /// degree of freedom, where that is above one; prior knowledge stays as it is. Null if not determined.
     pub sigma_rescaled: Option<f64>,
 }
 
-/// How well an output fits.
+/// Quality of the fit of one output.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OutputFit {
-    /// The output.
+    /// Name of the output in the model.
     pub output: String,
-    /// Its measurements.
+    /// Number of measurements of the output.
     pub measurements: usize,
-    /// The noise of a measurement; null where every row has its own.
+    /// Standard deviation of the noise of a measurement, in the unit of the output; null if rows have
+    /// different ones.
     pub sigma: Option<f64>,
-    /// Whether it was estimated from what is left.
+    /// True if the noise was estimated from the residuals.
     pub estimated: bool,
-    /// Chi-square per degree of freedom.
+    /// Chi-square per degree of freedom, dimensionless; 1 is expected.
     pub chi_square: f64,
-    /// Root of the mean square of what is left, in the unit of the output.
+    /// Root mean square of the residuals, in the unit of the output.
     pub rms: f64,
-    /// The same of what sigmas let expect.
+    /// Root mean square of the residuals that the sigmas predict, in the unit of the output.
     pub expected_rms: f64,
-    /// Measurements minus what they determine.
+    /// Number of degrees of freedom: measurements minus the unknowns that they determine; fractions occur.
     pub degrees_of_freedom: f64,
-    /// Further off than this, in sigma as the others have it, a measurement is named; null where too few others are left to say.
+    /// Residual in sigma by the other measurements (dimensionless) above which a measurement is an outlier;
+    /// null if there are too few others.
     pub outlier_gate: Option<f64>,
-    /// Probability that independent residuals are correlated as these are; null for few.
+    /// Probability that independent residuals are as correlated as these; null for few.
     pub whiteness_probability: Option<f64>,
 }
 
-/// Another solution.
+/// Other solution that fits nearly as well.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OtherSolution {
-    /// Its sum of squares.
+    /// Sum of squares of all residuals in sigma, dimensionless.
     pub chi_square: f64,
-    /// How many starts led there.
+    /// Number of starts that led to this solution.
     pub starts: usize,
-    /// Values of the unknowns, in their order.
+    /// Values of the unknowns, in their order and units.
     pub values: Vec<f64>,
 }
 
-/// What the data say of one unknown when all others follow.
+/// Profile of one unknown: the fit as a function of its value when all others follow.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Profile {
-    /// The unknown.
+    /// Name of the unknown that is fixed.
     pub name: String,
-    /// Its values, and by how much the sum of squares is larger there than at the solution.
+    /// Value of the unknown, in its unit, and the sum of squares there minus that at the solution,
+    /// dimensionless.
     pub points: Vec<(f64, f64)>,
-    /// Whether it is flat: no value changes the sum of squares by more than a hundredth of one.
+    /// True if the profile is flat: no value changes the sum of squares by more than 0.01.
     pub flat: bool,
 }
 
@@ -213,6 +223,22 @@ pub enum SystemCalibrationError {
     TooMany {
         /// How many.
         found: usize,
+    },
+    /// Times that take too long to follow.
+    #[error(
+        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
+    )]
+    TooLong {
+        /// The record.
+        record: String,
+        /// The last time.
+        last: f64,
+        /// How many steps they take.
+        found: f64,
+        /// The longest step.
+        longest: f64,
+        /// How many there may be.
+        most: f64,
     },
     /// Rows that the model cannot have.
     #[error("{record}: line {line}, column `{column}`: found {found}, expected {expected}")]

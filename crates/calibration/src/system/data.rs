@@ -42,6 +42,8 @@ pub(super) struct Read {
     pub(super) digest: String,
     pub(super) ignored: Vec<String>,
     pub(super) samples: usize,
+    /// The time of the record that is the start of the model, where it is not 0.
+    pub(super) begins: Option<f64>,
     /// Intervals at rest, where they are sought.
     pub(super) intervals: Option<usize>,
 }
@@ -238,7 +240,7 @@ pub(super) fn read(
         Ok(())
     };
     let digest = record.read(&columns.wanted, columns.label, true, take)?;
-    let (samples, mut intervals) = (rows.len(), None);
+    let (samples, mut intervals, mut begins) = (rows.len(), None, None);
     if let Some(still) = still {
         let place =
             |name: &String| columns.inputs.iter().position(|(k, _)| model.known_inputs[*k].0.name == *name);
@@ -256,9 +258,32 @@ pub(super) fn read(
     } else {
         // each experiment in one piece
         rows.sort_by_key(|r| r.experiment);
+        begins = from_first_rows(&mut rows);
     }
     let inputs = columns.inputs.iter().map(|(k, _)| *k).collect();
-    Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, intervals })
+    Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, begins, intervals })
+}
+
+/// A record that begins so many times its own length after 0 has times of another clock.
+const CLOCK: f64 = 100.0;
+
+/// Times from the first row of every experiment, where all of them begin by another clock than that of the
+/// model; gives the first such row's time.
+fn from_first_rows(rows: &mut [Data]) -> Option<f64> {
+    let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
+    let other = |of: &[Data]| {
+        let (first, last) = (of[0].t, of[of.len() - 1].t);
+        last > first && first > CLOCK * (last - first)
+    };
+    if rows.is_empty() || !all().all(other) {
+        return None;
+    }
+    let begins = rows[0].t;
+    for of in rows.chunk_by_mut(|a, b| a.experiment == b.experiment) {
+        let first = of[0].t;
+        of.iter_mut().for_each(|row| row.t -= first);
+    }
+    Some(begins)
 }
 
 /// The intervals at rest, by the inputs `by`.

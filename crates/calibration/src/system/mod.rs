@@ -38,6 +38,9 @@ const SCHEMA: &str = "obsdeg.system-calibration/1";
 const DETERMINED: f64 = 1.05;
 /// The probability with which right data are in their bands.
 const STRICT: f64 = 0.999;
+/// Most steps of integration over all rows, and for each row besides.
+const STEPS: f64 = 50_000.0;
+const STEPS_A_ROW: f64 = 50.0;
 /// Doublings of the steps of integration that are tried.
 const DOUBLINGS: usize = 6;
 /// Rounds in which the noise is estimated.
@@ -146,6 +149,17 @@ impl<'a> Calibrating<'a> {
         }
         let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
         let longest = nominal.step.unwrap_or(f64::INFINITY).min(if last > 0.0 { last / 50.0 } else { 1.0 });
+        // counted before anything begins
+        let mut found = 0.0;
+        for run in data.rows.chunk_by(|a, b| (a.experiment, a.run) == (b.experiment, b.run)) {
+            let steps = |from: f64, to: f64| ((to - from) / longest).ceil().max(1.0);
+            found += steps(0.0, run[0].t) + run.windows(2).map(|w| steps(w[0].t, w[1].t)).sum::<f64>();
+        }
+        let most = STEPS + STEPS_A_ROW * data.rows.len() as f64;
+        if !model.states.is_empty() && found > most {
+            let record = data.name.clone();
+            return Err(SystemCalibrationError::TooLong { record, last, found, longest, most });
+        }
         let known = (DMatrix::zeros(0, free.len()), DVector::zeros(0));
         let mut problem =
             Problem { numeric, data, free, noise, longest, known, going, passes: 0, stopped: false };
@@ -328,6 +342,7 @@ impl<'a> Calibrating<'a> {
             profiles,
             samples: self.data.samples,
             intervals: self.data.intervals,
+            begins: self.data.begins,
             rows: self.data.rows.len(),
             ignored: self.data.ignored.clone(),
             model: digest(self.model),

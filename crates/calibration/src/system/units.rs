@@ -8,7 +8,7 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 
 /// Units of one kind, and what each is of the first.
 const KINDS: [&[(&str, f64)]; 5] = [
-    &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0), ("h", 3600.0), ("d", 86400.0)],
+    &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0), ("d", 86400.0)],
     &[("rad", 1.0), ("mrad", 1e-3), ("deg", DEG), ("arcsec", DEG / 3600.0)],
     &[("rad/s", 1.0), ("deg/s", DEG), ("deg/h", DEG / 3600.0)],
     &[

@@ -2,9 +2,13 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod cells;
 mod constraints;
 mod faults;
+mod formats;
 mod handheld;
 mod models;
 mod round_trip;
 mod simulator;
+mod spoil;
+mod timeline;

@@ -263,3 +263,40 @@ fn experiments_have_segments_of_their_own() {
         "{e}"
     );
 }
+
+/// Times of another clock are the record's own business; work that would not end is refused before it begins.
+#[test]
+fn times_of_another_clock() {
+    const DECAY: &str = "states = { x = '-k*x' }\nparameters = ['k']\noutputs = { z = 'x' }\n[simulation]\nvalues = { x = 1, k = 1 }\nstep = 0.1\nnoise = { z = 0.001 }";
+    let rows = |head: &str, time: &dyn Fn(f64) -> String| {
+        let mut normal = normals(3);
+        let of = |i: u32| {
+            let t = 0.1 * f64::from(i);
+            format!("{},{}\n", time(t), 2.0 * (-0.5 * t).exp() + 1e-3 * normal())
+        };
+        (0..100).map(of).fold(format!("{head},z\n"), |all: String, row| all + row.as_str())
+    };
+    let own = calibrated(DECAY, &rows("t", &|t| t.to_string()), &options()).expect("calibrated");
+    let of =
+        |c: &SystemCalibration| ["k", "x"].map(|n| found(&c.quantities, n).estimate.expect("determined"));
+    let [k, x] = of(&own);
+    assert!((k - 0.5).abs() < 2e-3 && (x - 2.0).abs() < 2e-3 && own.begins.is_none(), "{k} {x}");
+    let date = |t: f64| format!("2026-11-23T09:00:{t:07.4}Z");
+    for (text, begins) in [
+        (rows("t", &|t| (t + 1e5).to_string()), 1e5),
+        (rows("t", &|t| format!("{:.4}", t + 1_795_424_400.0)), 1_795_424_400.0),
+        (rows("t", &date), 1_795_424_400.0),
+    ] {
+        let c = calibrated(DECAY, &text, &options()).expect("calibrated");
+        for (a, b) in of(&c).iter().zip([k, x]) {
+            assert!((a - b).abs() < 1e-5, "{a} {b}");
+        }
+        assert_eq!(c.begins, Some(begins));
+    }
+    // milliseconds where the model has seconds, and a start long before the record
+    for text in [rows("t", &|t| (1e3 * t).to_string()), rows("t", &|t| (t + 900.0).to_string())] {
+        let e = calibrated(&DECAY.replace("step = 0.1", "step = 0.001"), &text, &options());
+        let e = e.err().map(|e| e.to_string()).expect("refused");
+        assert!(e.contains("steps of integration of at most 0.001; expected at most 55000"), "{e}");
+    }
+}

@@ -59,7 +59,7 @@ pub(crate) fn six() -> Bench {
 }
 
 /// Name, error over sigma of every coefficient.
-fn errors(bench: &Bench, c: &Calibration) -> Vec<(String, f64)> {
+pub(crate) fn errors(bench: &Bench, c: &Calibration) -> Vec<(String, f64)> {
     let of = |name: &str| -> Option<f64> {
         let axis = "XYZ".find(name.chars().last()?)?;
         const ARCSEC: f64 = 648000.0 / std::f64::consts::PI;
@@ -354,7 +354,7 @@ fn quick(seed: u64) -> Bench {
     }
 }
 
-fn with_recording(
+pub(crate) fn with_recording(
     bench: &Bench,
     recording: Recording,
     text: String,

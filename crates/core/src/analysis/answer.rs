@@ -15,85 +15,86 @@ use crate::solution::print::{SolutionTerm, StationLabel};
 use crate::solution::solve::{FoundBy, Solved, Verification};
 use crate::solution::solver::Frame;
 
-/// The answer for one scheme.
+/// Analysis of one scheme: verdicts, solutions and remedies.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Analysis {
-    /// `obsdeg.analysis/1`.
+    /// Layout of this answer: `obsdeg.analysis/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// What is carried between positions.
+    /// Carry: quantity that continues from one position to the next.
     pub carry: Carry,
     /// Latitude in degrees; null when generic.
     pub latitude_deg: Option<f64>,
-    /// How the gyros are mounted.
+    /// Mounting of the gyros and accelerometers.
     pub geometry: Geometry,
     /// Unknown terms of the gyro model, or `drift`.
     pub terms: String,
-    /// Whether psi_y^n is measured.
+    /// True if psi_y^n is measured.
     pub measured_azimuth: bool,
-    /// The positions.
+    /// Positions of the scheme, in order of time.
     pub positions: Vec<PositionReport>,
-    /// Where the terms of solutions are taken: the positions, and attitudes of rotations.
+    /// Stations: points at which the derivatives in solutions are taken, that is the positions and attitudes
+    /// during rotations.
     pub stations: Vec<StationLabel>,
-    /// `dim V_0, dim V_1, ...`.
+    /// Rank profile: dim V_0, dim V_1, ..., the rank of the derivatives of Z up to each order.
     pub rank_profile: Vec<usize>,
-    /// The final rank.
+    /// Rank of all derivatives of Z up to the last order.
     pub rank: usize,
-    /// The unknowns in model order.
+    /// Names of the unknowns, in model order.
     pub unknowns: Vec<String>,
-    /// Whether accuracy orders were computed: none are for rotating segments, and notes say why else.
+    /// True if accuracy orders were computed. They are not for rotating segments; notes give other reasons.
     pub has_accuracy_orders: bool,
-    /// The verdicts, best first.
+    /// Verdicts on the unknowns, best first.
     pub quantities: Vec<Quantity>,
     /// Observable combinations beyond single unknowns, by degree, and those asked for.
     pub combinations: Vec<CombinationReport>,
-    /// Basis of the directions that Z does not see (unknowns that are not excited left out).
+    /// Basis of the directions that Z does not observe, without unknowns that are not excited.
     pub null_space: Vec<Vec<Component>>,
-    /// The verdicts under the other carries, where they differ.
+    /// Verdicts under the other carries, where they differ.
     pub carries: Vec<CarryReport>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
-    /// Conditions on generic angles under which the verdict changes.
+    /// Conditions on generic angles under which a verdict changes; null if they were not computed.
     pub degenerate_loci: Option<Vec<Locus>>,
-    /// Formulas of Z and its derivatives, position by position.
+    /// Formulas of Z and its derivatives, position by position; null if not asked for.
     pub formulas: Option<Vec<Formula>>,
-    /// Axes of Z in solutions.
+    /// Axes in which Z is printed in solutions.
     pub frame: Frame,
-    /// Angles and turns beyond the gimbal limits that the scheme states; left out where it states none.
+    /// Angles and turns beyond the gimbal limits of the scheme; left out where it states none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gimbals: Option<GimbalReport>,
-    /// How certain all this is.
+    /// Certainty of the verdicts: method, error bound, primes and seed.
     pub certainty: Certainty,
-    /// What could not be said, and why.
+    /// Limitations of this answer, each with its reason.
     pub notes: Vec<String>,
 }
 
-/// One position.
+/// Position of the scheme, with gravity in platform axes.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PositionReport {
-    /// Its name.
+    /// Name of the position in the scheme.
     pub name: String,
-    /// Euler angles alpha, beta, gamma in degrees, or names.
+    /// Euler angles alpha, beta, gamma in degrees, or names of generic angles.
     pub angles_deg: [AngleReport; 3],
-    /// Where X_p, Y_p, Z_p point, for a cardinal attitude.
+    /// Directions of X_p, Y_p, Z_p for a cardinal attitude, as in "NUE"; null for others.
     pub attitude: Option<String>,
-    /// The rotation that starts there, such as `X_p:360`.
+    /// Rotation that starts at the position, such as `X_p:360`; null for none.
     pub rotation: Option<String>,
-    /// The turns that lead there from the position before, where torquer errors act on them.
+    /// Turns from the position before to this one, where torquer errors act on them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub turns: Vec<Turn>,
     /// Gravity in platform axes (at the start of a rotation), in g; null for generic angles.
     pub g_c: Option<[f64; 3]>,
 }
 
-/// An angle.
+/// Angle in degrees, or name of a generic angle.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum AngleReport {
-    /// Degrees.
+    /// Value of the angle, in degrees.
     Degrees(f64),
-    /// A generic angle.
+    /// Name of a generic angle, of unknown value.
     Generic(String),
 }
 
@@ -106,52 +107,56 @@ impl std::fmt::Display for AngleReport {
     }
 }
 
-/// The verdict on one unknown.
+/// Verdict on one unknown of a scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Quantity {
-    /// Its name.
+    /// Name of the unknown, as in the model.
     pub name: String,
-    /// Its unit.
+    /// Unit of the unknown: deg, deg/h, deg/h/g, ...
     pub unit: String,
-    /// Whether it can be solved.
+    /// Verdict: observable, inseparable or not excited.
     pub status: Status,
-    /// The observable degree; null when it is not observable.
+    /// Observable degree: the smallest order of derivatives that determines the unknown; null if it is not
+    /// observable.
     pub degree: Option<usize>,
-    /// The accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null when no dwell
-    /// makes it observable.
+    /// Accuracy order: the best error falls with the dwell T as T^-(order + 1/2); null if no dwell makes it
+    /// observable.
     pub accuracy_order: Option<usize>,
-    /// Unknowns that it cannot be told from: those that share with it a direction that Z does not see and that holds no shorter one.
+    /// Unknowns indistinguishable from it: those in a common unobservable direction of minimal support.
     pub partners: Vec<String>,
-    /// How it is solved.
+    /// Solving expression of the unknown; null if there is none.
     pub solution: Option<Solution>,
-    /// Where it would be observable.
+    /// Degrees under conditions where the unknown is observable; null if it is observable, or under none of
+    /// them.
     pub elsewhere: Option<Elsewhere>,
 }
 
-/// Degrees of an unobservable unknown under other conditions; null where it stays unobservable or the
-/// condition is the given one.
+/// Observable degrees of an unobservable unknown under other conditions; each is null if the unknown stays
+/// unobservable or the condition is the given one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Elsewhere {
-    /// At other latitudes (the given one is special).
+    /// Observable degree at other latitudes; null unless the given one is special (equator, pole), or if
+    /// unobservable there too.
     pub other_latitudes: Option<usize>,
-    /// With the same number of positions at generic angles.
+    /// Observable degree with the same number of positions at generic angles; null if unobservable there too,
+    /// or if they were not judged.
     pub other_angles: Option<usize>,
 }
 
-/// A solving expression.
+/// Solving expression of an unknown or a combination.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Solution {
-    /// The expression in one line.
+    /// Solving expression in one line.
     pub text: String,
-    /// Its terms one by one.
+    /// Terms of the solving expression, one by one.
     pub terms: Vec<SolutionTerm>,
-    /// Whether derivatives in it are taken while the platform turns: at stations with a rate.
+    /// True if derivatives in it are taken while the platform turns: at stations with a rate.
     pub turning: bool,
-    /// How exact its coefficients are.
+    /// Form of its coefficients: exact, symbolic or decimal.
     pub form: Form,
-    /// Where its coefficients come from.
+    /// Source of its coefficients: prime fields, symbolic engine or floating point.
     pub found_by: FoundBy,
-    /// How it was checked.
+    /// Check that the expression passed before it was printed.
     pub verification: Verification,
     /// The same as computed, for formatting.
     #[serde(skip)]
@@ -159,54 +164,54 @@ pub struct Solution {
     pub solved: Solved,
 }
 
-/// An observable combination, or one that was asked for.
+/// Observable combination of unknowns, or one that was asked for.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CombinationReport {
-    /// The combination.
+    /// Combination of unknowns, as an expression.
     pub expression: String,
-    /// Whether it was asked for.
+    /// True if the combination was asked for.
     pub requested: bool,
-    /// Whether it can be solved.
+    /// Verdict: observable, inseparable or not excited.
     pub status: Status,
-    /// Its observable degree.
+    /// Observable degree of the combination; null if it is not observable.
     pub degree: Option<usize>,
-    /// Its accuracy order.
+    /// Accuracy order of the combination, as of an unknown; null if no dwell makes it observable.
     pub accuracy_order: Option<usize>,
-    /// How it is solved.
+    /// Solving expression of the combination; null if there is none.
     pub solution: Option<Solution>,
 }
 
-/// One component of a null vector.
+/// Component of a null vector.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Component {
-    /// The unknown.
+    /// Name of the unknown, as in the model.
     pub name: String,
-    /// Its coefficient; null when it was not computed.
+    /// Coefficient of the unknown in the null vector; null if it was not computed.
     pub coefficient: Option<String>,
 }
 
-/// What changes under another carry.
+/// Verdicts of the scheme under another carry.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CarryReport {
-    /// The carry.
+    /// Carry for which these verdicts hold.
     pub carry: Carry,
-    /// Its rank profile.
+    /// Rank profile under this carry: dim V_0, dim V_1, ...
     pub rank_profile: Vec<usize>,
-    /// Its number of unknowns.
+    /// Number of unknowns under this carry.
     pub unknowns: usize,
-    /// The unknowns of both carries whose verdict differs.
+    /// Unknowns of both carries whose verdict differs.
     pub differs: Vec<Difference>,
 }
 
-/// How certain the verdicts are.
+/// Certainty of the verdicts: method, error bound, primes and seed.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Certainty {
-    /// The method, in words.
+    /// Method of the verdicts, in words.
     pub method: String,
     /// Bound on the probability that any verdict is wrong.
     pub error_bound: f64,
-    /// The two primes, as text (61 bits).
+    /// Random primes of the two prime fields, as text (61 bits).
     pub primes: [String; 2],
-    /// The seed of all random choices.
+    /// Seed of all random choices.
     pub seed: u64,
 }

@@ -33,11 +33,11 @@ pub(crate) fn readable(coefficients: Vec<Coefficient>) -> Vec<Coefficient> {
     coefficients
 }
 
-/// How exact a printed coefficient is.
+/// Form of a printed coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
-    /// Rationals and square roots.
+    /// Rational numbers and square roots, exact.
     Exact,
     /// Sines and cosines of angles.
     Symbolic,

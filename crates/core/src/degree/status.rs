@@ -5,18 +5,18 @@ use serde::{Deserialize, Serialize};
 
 use super::staircase::Degrees;
 
-/// Whether an unknown can be solved.
+/// Verdict on an unknown or a combination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// It is in the span of the derivative rows.
+    /// Observable: the unknown is in the span of the derivative rows.
     Observable,
-    /// It moves Z, but only together with its partners.
+    /// Inseparable: it affects Z, but only together with its partners.
     Inseparable,
-    /// It does not move Z at all.
+    /// Not excited: it does not affect Z at all.
     NotExcited,
-    /// No order up to the last that was looked at solves it, and a higher one may: of systems with special starts, jumps or
-    /// arbitrary inputs.
+    /// Not resolved up to the bound on the order; a higher order may resolve it. For systems with special
+    /// starts, jumps or arbitrary inputs.
     NotSeen,
 }
 
@@ -42,12 +42,12 @@ impl std::fmt::Display for Status {
     }
 }
 
-/// Status and degree.
+/// Verdict on one unknown: status and degree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Verdict {
-    /// Whether it can be solved.
+    /// Status: observable, inseparable, not excited or not seen.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree of the unknown; null if it is not observable.
     pub degree: Option<usize>,
 }
 
@@ -59,14 +59,14 @@ impl Verdict {
     }
 }
 
-/// A verdict that depends on the carry.
+/// Verdict that depends on the carry.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Difference {
-    /// The unknown.
+    /// Name of the unknown whose verdict differs.
     pub name: String,
-    /// Under the carry of the scheme.
+    /// Verdict under the carry of the scheme, or at generic angles.
     pub here: Verdict,
-    /// Under the other one.
+    /// Verdict under the other carry, or at the special angles.
     pub there: Verdict,
 }
 

@@ -6,12 +6,12 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A signed platform axis such as `+x` or `-z`.
+/// Signed platform axis such as `+x` or `-z`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub struct SignedAxis {
-    /// 0, 1, 2 for x, y, z.
+    /// Index of the axis: 0, 1, 2 for x, y, z.
     pub axis: usize,
     /// True for the negative direction.
     pub negative: bool,
@@ -64,46 +64,46 @@ impl fmt::Display for SignedAxis {
     }
 }
 
-/// The axes of one gyro: input I, output O, spin S, as signed platform axes.
+/// Axes of one gyro: input I, output O, spin S, as signed platform axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case, reason = "the letters of IEEE Std 529")]
 pub struct GyroAxes {
-    /// Input axis.
+    /// Input axis of the gyro, a signed platform axis.
     pub I: SignedAxis,
-    /// Output axis.
+    /// Output axis of the gyro, a signed platform axis.
     pub O: SignedAxis,
-    /// Spin axis.
+    /// Spin axis of the gyro, a signed platform axis.
     pub S: SignedAxis,
 }
 
-/// The mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23),
-/// (27) and (28).
+/// Mounting of the X, Y and Z gyro. The default is the paper's, as it follows from its (22), (23), (27) and
+/// (28).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[allow(non_snake_case, reason = "the letters of the paper")]
 pub struct Geometry {
-    /// The gyro whose coefficients end in X.
+    /// Axes of the gyro whose coefficients end in X.
     pub X: GyroAxes,
-    /// The gyro whose coefficients end in Y.
+    /// Axes of the gyro whose coefficients end in Y.
     pub Y: GyroAxes,
-    /// The gyro whose coefficients end in Z.
+    /// Axes of the gyro whose coefficients end in Z.
     pub Z: GyroAxes,
-    /// The input axes of the accelerometers.
+    /// Input axes of the accelerometers; X_p, Y_p, Z_p when left out.
     #[serde(skip_serializing_if = "Accelerometers::is_default")]
     pub accelerometers: Accelerometers,
 }
 
-/// The input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default.
+/// Input axes of the accelerometers as signed platform axes; X_p, Y_p, Z_p by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case, reason = "the letters of the coefficients")]
 pub struct Accelerometers {
-    /// Of the accelerometer whose coefficients end in X, or have it first.
+    /// Input axis of accelerometer X, whose coefficients end in X or have it first.
     pub X: SignedAxis,
-    /// Of Y.
+    /// Input axis of accelerometer Y, a signed platform axis.
     pub Y: SignedAxis,
-    /// Of Z.
+    /// Input axis of accelerometer Z, a signed platform axis.
     pub Z: SignedAxis,
 }
 

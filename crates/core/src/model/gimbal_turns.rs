@@ -23,64 +23,61 @@ const LEAST_PART: f64 = 1e-5;
 /// A gimbal that turns so many times as fast as the platform cannot follow.
 const FASTEST: f64 = 100.0;
 
-/// Gimbal limits and a scheme: which angles and which turns lie beyond.
+/// Gimbal limits of a scheme, with the angles and turns that exceed them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GimbalReport {
-    /// The limits in words, in degrees.
+    /// Gimbal limits in words, in degrees.
     pub limits: String,
-    /// Positions whose angles, as they are written, lie beyond a limit, with angles of the same attitude that
-    /// do not.
+    /// Positions written with angles beyond a limit, each with angles of the same attitude within the limits.
     pub beyond: Vec<BeyondLimits>,
-    /// The turn to every position but the first, and the rotation of every segment that turns; none for
-    /// generic angles.
+    /// Turns to every position but the first, and rotations of segments; empty for generic angles.
     pub turns: Vec<GimbalTurn>,
 }
 
-/// A position written with angles beyond a gimbal limit.
+/// Position written with angles beyond a gimbal limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BeyondLimits {
-    /// Name of the position.
+    /// Name of the position in the scheme.
     pub position: String,
-    /// Its Euler angles as written, in degrees.
+    /// Euler angles as written, in degrees.
     pub angles: String,
     /// Euler angles of the same attitude within the limits, in degrees.
     pub within: String,
 }
 
-/// A turn of the platform, followed from gimbal angles within the limits.
+/// Turn of the platform, followed from gimbal angles within the limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GimbalTurn {
-    /// Name of the position that it leads to, or whose rotation it is.
+    /// Name of the position that the turn leads to, or whose rotation it is.
     pub position: String,
     /// True for the rotation of a segment.
     pub rotation: bool,
     /// True if the scheme states that the platform turns gimbal by gimbal.
     pub by_gimbals: bool,
-    /// The turn about one axis; null where the attitude stays, and gimbal by gimbal.
+    /// Turn about one axis; null if the attitude stays the same, or gimbal by gimbal.
     pub turn: Option<Turn>,
-    /// True if all gimbal angles stay within their limits on the way; gimbal by gimbal, of the angles as they
-    /// are written.
+    /// True if all gimbal angles stay within their limits during the turn; gimbal by gimbal, judged by the
+    /// angles as written.
     pub stays: bool,
-    /// Where the turn about one axis cannot go on; null where it stays within the limits, and gimbal by
-    /// gimbal.
+    /// Obstacle of the turn about one axis; null if it stays within the limits, and gimbal by gimbal.
     pub stop: Option<GimbalStop>,
-    /// Gimbal angles at the end of the turn in degrees (alpha, beta, gamma), where they are others of the
-    /// same attitude than those listed.
+    /// Gimbal angles at the end of the turn in degrees (alpha, beta, gamma); null if it stops, or ends at the
+    /// angles listed.
     pub ends_deg: Option<[f64; 3]>,
-    /// Change of alpha, beta and gamma in degrees of the way gimbal by gimbal (`path = "gimbals"`) between
-    /// angles within the limits, which stays within them; null for a rotation.
+    /// Changes of alpha, beta and gamma, in degrees, of the slew path gimbal by gimbal (`path = "gimbals"`)
+    /// between angles within the limits, which stays within them; null for a rotation.
     pub gimbals_deg: Option<[f64; 3]>,
 }
 
-/// Why a turn about one axis cannot go on: a gimbal reaches its limit, or near `beta = +-90` degrees alpha
-/// and gamma would have to turn more than a hundred times as fast as the platform.
+/// Obstacle of a turn about one axis: a gimbal reaches its limit, or near `beta = +-90` degrees alpha and
+/// gamma would have to turn more than a hundred times as fast as the platform.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GimbalStop {
-    /// The gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees.
+    /// Gimbal that reaches its limit: alpha, beta or gamma; null near `beta = +-90` degrees.
     pub gimbal: Option<String>,
-    /// The limit in degrees; without a gimbal beta in degrees.
+    /// Limit that is reached, in degrees; without a gimbal, beta in degrees.
     pub at_deg: f64,
-    /// Angle that the platform has turned by, in degrees.
+    /// Angle that the platform has turned by when it stops, in degrees.
     pub after_deg: f64,
 }
 

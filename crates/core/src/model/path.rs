@@ -18,13 +18,14 @@ use super::rotation::{Axis, SlewAxis};
 use super::scheme::Position;
 use super::slew::Slew;
 
-/// How the platform is turned from one position to the next.
+/// Slew path: turn of the platform from one position to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Path {
-    /// By one turn, the shortest (half turns about the axis in n whose first component that is not zero is positive).
+    /// Single turn about one axis, the shortest. Half turns go about the axis in n whose first non-zero
+    /// component is positive.
     OneAxis,
-    /// Gimbal by gimbal: alpha (outer, about N), beta (middle), gamma (inner, about Z_p), each by the
+    /// Turns gimbal by gimbal: alpha (outer, about N), beta (middle), gamma (inner, about Z_p), each by the
     /// difference of its Euler angles.
     Gimbals,
 }

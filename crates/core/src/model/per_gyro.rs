@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ranges::{self, RangeError};
 
-/// A noise of each gyro: X, Y, Z; zero for none.
+/// Noise of the X, Y and Z gyro, in the unit of the key; zero for none.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct PerGyro(pub [f64; 3]);
 

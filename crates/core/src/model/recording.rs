@@ -16,6 +16,11 @@ pub struct Recording {
     pub values: BTreeMap<String, f64>,
     /// How the intervals at rest are found from the data.
     pub still: Option<Still>,
+    /// By which part of the interval between rows their stamps may differ from the timeline of a scheme;
+    /// `None`: as the program has it.
+    pub tolerance: Option<f64>,
+    /// Values that stand for missing ones in the columns of a scheme's record, as they are written.
+    pub missing: Vec<f64>,
 }
 
 /// Intervals at rest are where the scatter within a window about each sample, all columns together, is within so many times that of the beginning of the
@@ -34,67 +39,80 @@ pub struct Still {
     pub shortest: f64,
 }
 
-/// How the records of `obsdeg calibrate` are read.
+/// Reading of the records of `obsdeg calibrate`: columns, units and intervals at rest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SchemeRecord {
-    /// What a column is called in the record, by its name here, as in `fx = "AccX"`.
+    /// Names of the columns in the record, by their names here, as in `fx = "AccX"`.
     #[serde(default)]
     columns: BTreeMap<String, String>,
-    /// The unit of a column whose header has none, or what one count of it is, by its name here: `fx = "2.44e-5 g"`; of pulses of an accelerometer the increment of
-    /// velocity that each is: `fx = "1e-5 m/s"`.
+    /// Units of columns without a unit in the header, or sizes of one count, by name here:
+    /// `fx = "2.44e-5 g"`. For pulses of an accelerometer, the velocity increment of one pulse:
+    /// `fx = "1e-5 m/s"`.
     #[serde(default)]
     units: BTreeMap<String, String>,
-    /// Positions are intervals at rest, found by the scatter of the forces, where no column `position` says what is where.
+    /// Detection of the positions as intervals at rest, by the scatter of the forces; used if no column
+    /// `position` labels the samples.
     #[serde(default, rename = "static")]
     still: Option<SchemeStill>,
+    /// Fraction of the interval between rows, dimensionless, 0 to 0.5, by which their times may differ from
+    /// the timeline of the scheme; 0.05 when left out.
+    #[serde(default)]
+    tolerance: Option<f64>,
+    /// Codes of missing values, in the unit of their column: `missing = [-9999, 0]`.
+    #[serde(default)]
+    missing: Vec<f64>,
 }
 
-/// At rest is what scatters, within a window about each sample, by at most so many times the variance of the beginning.
+/// Detection of intervals at rest: the variance within a window about each sample is at most `factor` times
+/// the variance of the initial rest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SchemeStill {
-    /// How long the record is at rest at first, in s.
+    /// Duration of the initial rest of the record, in s; at least the window.
     initial: f64,
-    /// The window, in s.
+    /// Width of the window about each sample, in s, above 0.
     window: f64,
-    /// So many times the variance of the beginning; 6 when left out.
+    /// Largest variance at rest over that of the initial rest, dimensionless, above 1; 6 when left out.
     #[serde(default = "six")]
     factor: f64,
-    /// Shorter intervals, in s, are none.
+    /// Shortest interval at rest, in s; shorter intervals are discarded.
     shortest: f64,
 }
 
-/// How the record of `obsdeg calibrate --model` is read.
+/// Reading of the record of `obsdeg calibrate --model`: columns, known values and intervals at rest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ModelRecord {
-    /// What a column is called in the record, by its name in the model.
+    /// Names of the columns in the record, by their names in the model.
     #[serde(default)]
     columns: BTreeMap<String, String>,
-    /// What an output is known to be in every row, where it is no column, as in `g = 9.81`; of a vector all entries, or each.
+    /// Values of outputs without a column, equal in every row, as in `g = 9.81`, in the units of the outputs;
+    /// for a vector all entries, or each.
     #[serde(default)]
     values: BTreeMap<String, f64>,
-    /// Every interval at rest is a row of its means, each with its standard deviation; of a model with states the samples on the way from each to the next
-    /// are a run of their own, `NAME_before` is a known input's mean before the way, and outputs are measured at its end.
+    /// Reduction of the record to intervals at rest: each becomes a row of means, each with its standard
+    /// deviation. In a model with states, the samples between two intervals are a run of their own.
+    /// `NAME_before` is the mean of a known input before that run, and outputs are measured at its end.
     #[serde(default, rename = "static")]
     still: Option<ModelStill>,
 }
 
-/// At rest is what scatters, within a window about each sample, by at most so many times the variance of the beginning. Times are in the unit of `t`.
+/// Detection of intervals at rest: the variance within a window about each sample is at most `factor` times
+/// the variance of the initial rest. Times are in the unit of `t`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ModelStill {
-    /// The known inputs whose scatter decides, all together.
+    /// Known inputs of the model whose scatter decides, all together.
     by: Vec<String>,
-    /// How long the record is at rest at first.
+    /// Duration of the initial rest of the record, in the unit of `t`; at least the window.
     initial: f64,
-    /// The window.
+    /// Width of the window about each sample, in the unit of `t`, above 0.
     window: f64,
-    /// So many times the variance of the beginning; 6 when left out.
+    /// Largest variance at rest over that of the initial rest, dimensionless, above 1; 6 when left out.
     #[serde(default = "six")]
     factor: f64,
-    /// Shorter intervals are none.
+    /// Shortest interval at rest, in the unit of `t`; shorter intervals are discarded.
     shortest: f64,
 }
 
@@ -107,7 +125,14 @@ impl From<SchemeRecord> for Recording {
             factor,
             shortest,
         });
-        Self { columns: r.columns, units: r.units, values: BTreeMap::new(), still }
+        Self {
+            columns: r.columns,
+            units: r.units,
+            values: BTreeMap::new(),
+            still,
+            tolerance: r.tolerance,
+            missing: r.missing,
+        }
     }
 }
 
@@ -120,7 +145,14 @@ impl From<ModelRecord> for Recording {
             factor,
             shortest,
         });
-        Self { columns: r.columns, units: BTreeMap::new(), values: r.values, still }
+        Self {
+            columns: r.columns,
+            units: BTreeMap::new(),
+            values: r.values,
+            still,
+            tolerance: None,
+            missing: Vec::new(),
+        }
     }
 }
 
@@ -157,6 +189,12 @@ impl Recording {
                     s.initial, s.window
                 ));
             }
+        }
+        if let Some(x) = self.tolerance.filter(|x| !(0.0..=0.5).contains(x)) {
+            return Err(format!("tolerance is {x}; expected a part of the sample interval, 0 to 0.5"));
+        }
+        if let Some(x) = self.missing.iter().find(|x| !x.is_finite()) {
+            return Err(format!("missing has {x}; expected finite numbers"));
         }
         let bad = self.values.iter().find(|(_, x)| !x.is_finite());
         bad.map_or(Ok(()), |(name, x)| Err(format!("values.{name} is {x}; expected a finite number")))

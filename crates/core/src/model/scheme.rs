@@ -23,16 +23,16 @@ use crate::model::ranges::{self, RangeError};
 use crate::model::settings;
 use crate::model::settings::Settings;
 
-/// What is carried from one position to the next (the paper does not say).
+/// Carry: quantity that continues from one position to the next (the paper does not state it).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Carry {
-    /// `psi^c` is carried: what the paper's simulation did.
+    /// Platform carry: `psi^c` continues, as in the paper's simulation.
     #[default]
     Platform,
-    /// `psi^n` is carried: right for real torqued slews.
+    /// Inertial carry: `psi^n` continues, as in real torqued slews.
     Inertial,
-    /// `psi` is a new unknown at each position.
+    /// Reset carry: `psi` is a new unknown at each position.
     Reset,
 }
 

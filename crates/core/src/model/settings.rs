@@ -11,27 +11,27 @@ use super::expression::{among, nearest};
 use super::ranges::{self, Range, RangeError};
 use super::{PerGyro, Platform};
 
-/// How the truth is generated.
+/// Model that generates the truth of a simulated run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Truth {
-    /// By the linear model of the filter: (2), (6).
+    /// Linear model of the filter: (2), (6).
     #[default]
     Linear,
-    /// By direction cosines: the drift turns the true attitude, the specific force is taken in the true
-    /// platform frame.
+    /// Direction cosines: the drift turns the true attitude, the specific force is taken in the true platform
+    /// frame.
     Exact,
 }
 
-/// Which filter estimates.
+/// Filter that estimates the unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FilterKind {
-    /// Of the linear model, with gains that are known beforehand: small psi.
+    /// Linear model with gains that are known beforehand: small psi.
     Linear,
-    /// With full attitudes, its Jacobians at the estimate of the moment.
+    /// Extended filter: full attitudes, Jacobians at the current estimate.
     Extended,
-    /// The same, linearised again along the whole run until that settles.
+    /// Iterated filter: full attitudes, relinearised along the whole run until it converges.
     Iterated,
 }
 
@@ -49,14 +49,14 @@ impl FilterKind {
     }
 }
 
-/// How the filter gets its transition matrix.
+/// Computation of the filter's transition matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Propagation {
-    /// The matrix exponential of the linear model.
+    /// Matrix exponential of the linear model.
     #[default]
     Exponential,
-    /// Runge-Kutta of order four, as the paper.
+    /// Runge-Kutta integration of order four, as in the paper.
     Rk4,
 }
 
@@ -65,7 +65,7 @@ pub enum Propagation {
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub enum DriftNoise {
-    /// A bias in deg/h, drawn anew for every step and held over it.
+    /// Bias in deg/h, drawn anew for every step and constant within it.
     OneStep(f64),
     /// White drift: angle random walk in deg/sqrt(h).
     RandomWalk(f64),
@@ -172,12 +172,12 @@ impl fmt::Display for DriftNoise {
     }
 }
 
-/// A number for one unknown (`D_FX`, `psi_x`) or a family (`psi`, `D_F`, `D_I`, ..., `D`).
+/// Value for one unknown (`D_FX`, `psi_x`) or a family (`psi`, `D_F`, `D_I`, ..., `D`).
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Assignment {
-    /// The unknown or family.
+    /// Name of the unknown or family.
     pub name: String,
-    /// In the unit of the unknown: deg, deg/h, deg/h/g, deg/h/g^2, ppm, arcsec, ug, ug/g^2, ug/g^3.
+    /// Value in the unit of the unknown: deg, deg/h, deg/h/g, deg/h/g^2, ppm, arcsec, ug, ug/g^2, ug/g^3.
     pub value: f64,
 }
 

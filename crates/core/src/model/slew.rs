@@ -10,12 +10,12 @@ use super::rotation::{Axis, Rotation, SlewAxis, SlewTo};
 /// The earth rate in rad/s.
 pub const W_IE: f64 = 7.292115e-5;
 
-/// A turn about a fixed axis.
+/// Turn of the platform about a fixed axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Turn {
-    /// The axis: a unit vector (North, Up, East).
+    /// Axis of the turn: a unit vector (North, Up, East), dimensionless.
     pub about: [f64; 3],
-    /// The angle in degrees, right-handed about the axis, above 0.
+    /// Angle of the turn in degrees, right-handed about the axis, above 0.
     pub angle_deg: f64,
 }
 

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::geometry::{GYROS, Geometry, GyroAxes, SignedAxis};
 
-/// A term of the error model: of the gyros the drift `D_F`, the g-sensitive `D_I D_O D_S`, the g^2-sensitive rest, the scale factor and the
-/// misalignment of their torquing (IEEE Std 517 and 529); of the accelerometers bias, scale factor, misalignment and what is not linear
-/// (IEEE Std 1293).
+/// Term of the error model. Gyros: drift `D_F`, g-sensitive `D_I D_O D_S`, g^2-sensitive terms, scale factor
+/// and misalignment of their torquing (IEEE Std 517 and 529). Accelerometers: bias, scale factor,
+/// misalignment and nonlinear terms (IEEE Std 1293).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[allow(missing_docs, reason = "the letters say it: products of the components of g along I, O, S")]
 pub enum Term {
@@ -28,21 +28,21 @@ pub enum Term {
     GS,
     /// Misalignment of the input axes: the torqued rate along the input axes of the other two gyros.
     GM,
-    /// The lower triangle of GM: the gyros define the platform axes.
+    /// Lower triangle of GM: the gyros define the platform axes.
     GM3,
-    /// Accelerometer bias.
+    /// Bias of the accelerometer.
     K0,
     /// Accelerometer scale factor: the specific force along the input axis.
     K1,
     /// Misalignment of the input axes: the specific force along the input axes of the other two accelerometers.
     M6,
-    /// The lower triangle of M6: the accelerometers define the platform axes.
+    /// Lower triangle of M6: the accelerometers define the platform axes.
     M3,
-    /// The square of the specific force along the input axis.
+    /// Square of the specific force along the input axis.
     K2,
-    /// Its third power.
+    /// Third power of the specific force along the input axis.
     K3,
-    /// The specific force along the input axis times that along each of the other two.
+    /// Product of the specific force along the input axis with that along each of the other two.
     Kx,
 }
 
@@ -276,16 +276,16 @@ impl Term {
     }
 }
 
-/// Which sensors define the platform axes, and so which misalignments are unknown.
+/// Sensors that define the platform axes, and so the misalignments that are unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum DefinedBy {
-    /// The input axes of the accelerometers: GM and M3.
+    /// Accelerometers: their input axes define the platform axes; unknown are GM and M3.
     #[default]
     Accelerometers,
-    /// The input axes of the gyros: GM3 and M6.
+    /// Gyros: their input axes define the platform axes; unknown are GM3 and M6.
     Gyros,
-    /// Neither: GM and M6, of which a rotation of all axes is not observable.
+    /// Body axes: unknown are GM and M6, of which a rotation of all axes is not observable.
     Body,
 }
 

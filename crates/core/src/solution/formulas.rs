@@ -12,14 +12,14 @@ use crate::model::platform::{AZIMUTH, LOCAL_NAMES, PSI_EPS, local_output};
 use crate::model::ring::{Ring, Text};
 use crate::model::{Platform, Source};
 
-/// One formula.
+/// Formula of Z or of one of its derivatives.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Formula {
-    /// The label of the station; null for formulas that hold at every one.
+    /// Label of the station; null for formulas that hold at every station.
     pub position: Option<String>,
-    /// Left side, such as `Z1'`.
+    /// Left side of the formula, such as `Z1'`.
     pub left: String,
-    /// Right side.
+    /// Right side of the formula.
     pub right: String,
 }
 

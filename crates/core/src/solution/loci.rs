@@ -20,19 +20,19 @@ use crate::model::platform::{Point, RandomValues};
 use crate::model::ring::{Ring, Text};
 use crate::model::scheme::Station;
 
-/// A condition and what it does.
+/// Condition on generic angles, and its effect on the verdicts.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Locus {
-    /// Where: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that vanishes; one that is too long to
-    /// be read is described.
+    /// Condition: `alpha = 0, 180 deg`, `alpha = -beta`, or a polynomial in tangents of half angles that
+    /// vanishes; one that is too long to print is described.
     pub condition: String,
-    /// Points of it, in degrees by angle: all of them when `complete`, examples otherwise.
+    /// Points on the locus, in degrees by angle: all of them when `complete`, examples otherwise.
     pub points_deg: Vec<BTreeMap<String, f64>>,
-    /// Whether the condition is on a single angle, and these are certainly all its values.
+    /// True if the condition is on a single angle and `points_deg` certainly holds all its values.
     pub complete: bool,
-    /// The rank profile at a general point of the locus.
+    /// Rank profile at a general point of the locus.
     pub rank_profile: Vec<usize>,
-    /// The unknowns whose verdict changes there.
+    /// Unknowns whose verdict changes on the locus.
     pub changes: Vec<Difference>,
 }
 

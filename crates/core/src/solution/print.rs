@@ -10,19 +10,20 @@ use super::solver::Frame;
 use crate::degree::coefficient::{Coefficient, product};
 use crate::model::Scheme;
 
-/// Where derivatives of Z are taken, as formulas name it.
+/// Label, in formulas, of a station: a point at which derivatives of Z are taken.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct StationLabel {
-    /// As in formulas: `p1`, `"about X"`, `p1[45 deg]`.
+    /// Label in formulas: `p1`, `"about X"`, `p1[45 deg]`.
     pub label: String,
-    /// The name of the position or rotation.
+    /// Name of the position or rotation.
     pub position: String,
-    /// How far the rotation has come, in degrees, right-handed; null for a position that stands. Derivatives of Z at such a
-    /// station are those of a platform that is turning, not of one that stopped there.
+    /// Angle of the rotation at this station, in degrees, right-handed; null for a position at rest.
+    /// Derivatives of Z at such a station are those of a turning platform, not of one that stopped there.
     pub turned_deg: Option<f64>,
-    /// What it turns about: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`.
+    /// Axis of the rotation: `X_p`, `Y_p`, `Z_p`, `N`, `U` or `E`; null for a position at rest.
     pub about: Option<String>,
-    /// The rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s.
+    /// Rate of turning in formulas, such as `w@p1`: the derivative of that angle by time, in rad/s; null for
+    /// a position at rest.
     pub rate: Option<String>,
 }
 
@@ -145,14 +146,14 @@ pub(crate) fn z_name(term: &Term, frame: Frame, stations: &[StationLabel]) -> St
     format!("{}@{}", observed(term, frame), stations[term.station].label)
 }
 
-/// One term of a solution, for programs.
+/// Term of a solution, machine-readable.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SolutionTerm {
-    /// The coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits.
+    /// Coefficient with its sign, such as `-wU*w@p1/(2*wN)`; decimals with all their digits.
     pub coefficient: String,
-    /// The derivative of the observation, such as `Z1'`.
+    /// Derivative of the observation, such as `Z1'`.
     pub observation: String,
-    /// Where it is taken: a label of the stations.
+    /// Label of the station at which the derivative is taken.
     pub station: String,
 }
 

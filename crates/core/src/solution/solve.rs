@@ -20,7 +20,7 @@ const OTHER_RATES: (f64, f64, f64) = (0.8, 0.5, 1.3);
 /// How far the sum of terms with decimals may be from its target, relative to the sum of their magnitudes.
 const RESIDUAL: f64 = 1e-9;
 
-/// Where the coefficients of a solution come from.
+/// Source of the coefficients of a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FoundBy {
@@ -28,19 +28,19 @@ pub enum FoundBy {
     PrimeFields,
     /// Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are the same.
     SymbolicEngine,
-    /// Decimals.
+    /// Decimals from floating-point arithmetic.
     FloatingPoint,
 }
 
-/// How a solution was checked before it was printed.
+/// Check that a solution passed before it was printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verification {
-    /// By exact substitution of the derivatives of Z, and by substitution in two prime fields.
+    /// Exact substitution of the derivatives of Z, and substitution in two prime fields.
     Symbolic,
-    /// By substitution in two prime fields.
+    /// Substitution in two prime fields.
     Modular,
-    /// By substitution in floating point: residual below 1e-9 of the sum of magnitudes.
+    /// Substitution in floating point: residual below 1e-9 of the sum of magnitudes.
     Numeric,
 }
 

@@ -30,7 +30,7 @@ pub(super) const PRINTABLE: usize = 1000;
 /// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
 const FLOAT_RATES: (f64, f64) = (1.0, 1.0);
 
-/// The axes in which Z is printed.
+/// Axes in which Z is printed in solutions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Frame {

@@ -9,6 +9,8 @@
 
 use std::cell::RefCell;
 
+use obsdeg_exact::interrupt;
+
 use super::dag::{Dag, Op};
 use super::taylor::{Initial, Signal, Taylor};
 use super::values::Values;
@@ -172,6 +174,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         }
         for i in (0..=last).rev() {
             let Some(w) = left[i].take() else { continue };
+            interrupt::check();
             if self.values.is_known(i) {
                 continue;
             }

@@ -24,140 +24,147 @@ pub const COUNT_LIMIT: u64 = 3;
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
 
-/// The answer for one system.
+/// Analysis of one system: verdicts, combinations, symmetries and remedies.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemAnalysis {
-    /// `obsdeg.system/1`.
+    /// Layout of this answer: `obsdeg.system/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The system.
+    /// Name of the system, as in its file.
     pub name: String,
-    /// What it is, as its file says.
+    /// Description of the system, as in its file.
     pub description: String,
-    /// The equations, `x' = ...` and `y = ...`, as written.
+    /// Equations, `x' = ...` and `y = ...`, as written.
     pub equations: Vec<String>,
-    /// `dim V_0, dim V_1, ...`.
+    /// Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order.
     pub rank_profile: Vec<usize>,
-    /// The final rank.
+    /// Rank of all output derivatives up to the last order.
     pub rank: usize,
-    /// The number of unknowns.
+    /// Number of unknowns that are judged.
     pub unknowns: usize,
-    /// The verdicts in model order.
+    /// Verdicts on the unknowns, in model order.
     pub quantities: Vec<SystemQuantity>,
-    /// States whose start is known.
+    /// States with a known initial value.
     pub known: Vec<String>,
-    /// Time at which the first segment was judged, where the equations hold it: a number, or `generic`
-    /// (almost every time, as in all later segments); null where they do not.
+    /// Time at which the first segment was judged: a number, or `generic` (almost every time, as in all later
+    /// segments); null if the equations do not depend on time.
     pub time: Option<String>,
     /// Equations that hold at the start; their differentials count as rows of order 0.
     pub constraints: Vec<String>,
-    /// Combinations that were asked for.
+    /// Combinations of unknowns that the model asks for.
     pub combinations: Vec<SystemCombination>,
-    /// The number of independent directions that no output sees.
+    /// Number of independent directions that change no output.
     pub unobservable_directions: usize,
-    /// Scalings, translations and polynomials among them, exactly.
+    /// Scalings, translations and polynomials among the unobservable directions, exactly.
     pub symmetries: Vec<SymmetryReport>,
-    /// What is moved by each direction that is none of these: at a generic point, no polynomial that was found describes it.
+    /// Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was
+    /// found describes it.
     pub other_directions: Vec<Vec<String>>,
-    /// Combinations of unobservable unknowns that are observable.
+    /// Observable combinations of unobservable unknowns.
     pub invariants: Vec<SystemCombination>,
-    /// The highest order that was looked at.
+    /// Highest order of derivatives that was examined.
     pub last_order: usize,
-    /// Orders end at this bound.
+    /// Order of derivatives at which the search ends at the latest.
     pub bound: usize,
-    /// The end is proven: an order that adds nothing is the last. Otherwise what is not observable rests on the bound.
+    /// True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts
+    /// hold up to the bound on the order only.
     pub closed: bool,
-    /// Whether a verdict rests on the bound.
+    /// True if a verdict holds up to the bound on the order only.
     pub rests_on_bound: bool,
-    /// Functions of unknowns that have branches (abs, sign, roots, asin, acos): the verdicts are those of the branch that points near one lie
-    /// in, or where the model is not defined there, of the first that was found.
+    /// Functions of unknowns that have branches (abs, sign, roots, asin, acos). The verdicts hold on the
+    /// branch of points near one, or where the model is undefined there, on the first branch that was found.
     pub branches: Vec<String>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
-    /// Why there are no solving expressions, if there are none.
+    /// Reason why there are no solving expressions; null if there are.
     pub note: Option<String>,
-    /// The order of the derivatives with which solutions were counted by elimination; null when none were.
+    /// Order of the derivatives with which solutions were counted by elimination; null if none were.
     pub counting_order: Option<usize>,
-    /// Functions that take part whose values are proven to be independent of each other at a generic point (Ax 1971,
-    /// doi:10.2307/1970774), so that random values in prime fields stand for them; 0 for a rational model, null where functions were
-    /// evaluated truly, in real numbers.
+    /// Number of functions whose values are proven to be independent of each other at a generic point (Ax
+    /// 1971, doi:10.2307/1970774), so that random values in prime fields replace them; 0 for a rational
+    /// model, null if functions were evaluated in real numbers.
     pub independent_functions: Option<usize>,
-    /// Of a model judged in prime fields: the two random primes, as text (61 bits).
+    /// Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers.
     pub primes: Option<[String; 2]>,
-    /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
+    /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
     pub error_bound: Option<f64>,
-    /// Of a model judged in real numbers: how clear its ranks were.
+    /// Margin of the rank decisions in real numbers; null for a model judged in prime fields.
     pub digits: Option<DigitsReport>,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// How clear ranks were that real numbers of many digits decided, at two random points.
+/// Margin of rank decisions in real numbers of many digits, at two random points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct DigitsReport {
-    /// Decimal digits at the first point and at the second.
+    /// Number of decimal digits at the first and at the second point.
     pub digits: [usize; 2],
-    /// Decimal logarithm of the smallest number, relative to its row, that counts as different from zero; it is proven to be.
+    /// Decimal logarithm (dimensionless) of the smallest number, relative to its row, that is proven to
+    /// differ from zero.
     pub nonzero_log10: f64,
-    /// Decimal logarithm of the widest error bound, relative to its row, of a number that counts as zero; null where all were exact.
+    /// Decimal logarithm (dimensionless) of the widest error bound, relative to its row, of a number that
+    /// counts as zero; null if all were exact.
     pub zero_log10: Option<f64>,
 }
 
-/// One unknown.
+/// Verdict on one unknown of a system.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemQuantity {
-    /// Its name.
+    /// Name of the unknown, as in the model.
     pub name: String,
-    /// state, parameter or input.
+    /// Kind of the unknown: state, parameter or input.
     pub kind: String,
-    /// Its unit, as the file says.
+    /// Unit of the unknown, as in the model file.
     pub unit: String,
-    /// What it is, as the file says.
+    /// Description of the unknown, as in the model file.
     pub description: String,
-    /// The verdict: locally observable (no other value nearby gives the same outputs), inseparable from its
-    /// partners, not excited, or not seen up to the bound on the order.
+    /// Verdict: locally observable (no other value nearby gives the same outputs), inseparable from its
+    /// partners, not excited, or not resolved up to the bound on the order.
     pub status: Status,
-    /// The smallest order of derivatives that solves it.
+    /// Observable degree: the smallest order of derivatives that determines the unknown; null if it is not
+    /// observable.
     pub degree: Option<usize>,
-    /// Unknowns that it cannot be told from: those that share with it a direction that changes no output and that holds no shorter one.
+    /// Unknowns indistinguishable from it: those in a common unobservable direction of minimal support.
     pub partners: Vec<String>,
-    /// What it is in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher degree,
-    /// where it enters linearly; verified in both fields.
+    /// Expression of the unknown in outputs, inputs, their derivatives (up to two orders beyond the degree)
+    /// and unknowns of no higher degree, in which it is linear; verified in both fields. Null if none was
+    /// found.
     pub solution: Option<String>,
-    /// How many solutions it has; null where it is not observable, or where they were not sought.
+    /// Number of solutions for the unknown; null if it is not observable, or if solutions were not sought.
     pub number_of_solutions: Option<NumberOfSolutions>,
 }
 
-/// How many values an unknown takes among all points with the same outputs.
+/// Number of values of an unknown among all points with the same outputs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NumberOfSolutions {
-    /// One: its solving expression rests on outputs, inputs, constants and unknowns that have one solution.
+    /// Single value: the solving expression depends on outputs, inputs, constants and unknowns that have one
+    /// solution.
     OneByExpression,
-    /// So many, complex ones counted: by elimination at a random point modulo each prime.
+    /// Number of solutions, complex ones included, by elimination at a random point modulo each prime.
     Counted(usize),
-    /// Locally unique. Why the number of solutions is not decided.
+    /// Locally unique. The text is the reason why the number of solutions is not decided.
     Undecided(String),
 }
 
-/// A combination.
+/// Combination of unknowns, with its verdict.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemCombination {
-    /// As written, or `b*x1`.
+    /// Combination as written in the model, or `b*x1`.
     pub expression: String,
-    /// Its degree; null when it is not observable.
+    /// Observable degree of the combination; null if it is not observable.
     pub degree: Option<usize>,
 }
 
-/// A symmetry in words.
+/// Symmetry of the system, in words.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SymmetryReport {
-    /// What changes no output, for every `c` (every positive one where something is multiplied or divided):
-    /// `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is multiplied or divided at c =
-    /// 0, nothing changes.
+    /// Change that leaves every output as it is, for every `c` (every positive one where something is
+    /// multiplied or divided): `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is
+    /// multiplied or divided at c = 0, nothing changes.
     pub words: String,
-    /// The unknowns that it moves.
+    /// Unknowns that the symmetry changes.
     pub unknowns: Vec<String>,
 }
 

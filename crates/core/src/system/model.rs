@@ -284,8 +284,8 @@ impl Compiled {
         &self.experiment(experiment).constants
     }
 
-    /// Whether a rate or an output holds the time itself.
-    pub(crate) fn uses_time(&self) -> bool {
+    /// True if a rate or an output holds the time itself.
+    pub fn uses_time(&self) -> bool {
         let mut seen = vec![false; self.dag.ops.len()];
         let parts = self.experiments.iter().flat_map(|e| e.rates.iter().chain(&e.outputs));
         let mut left: Vec<usize> = parts.copied().collect();

@@ -18,22 +18,23 @@ use crate::model::expression::{Node, Shape, Shapes, nearest, parse};
 use crate::model::file_error::explain;
 use crate::model::recording::ModelRecord;
 
-/// The layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact), `sin cos tan asin acos atan atan2 exp log sqrt tanh abs sign`, `pi`, `deg`
-/// and the names of the model; `t` is the time. A name such as `"p[3]"` declares a vector, `"C[3,3]"` a matrix: `p` stands for the whole
-/// and `p[1]`, `C[1,2]` for its entries, in expressions and in the answer. `[a, b]` makes a vector of scalars and a matrix of rows; `cross dot
-/// norm transpose skew`, of quaternions (w, x, y, z) `R qmul conj qdot`, and the turns `Rx Ry Rz` take them. Constants, definitions and outputs have the
-/// shape of their expression.
+/// Layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact),
+/// `sin cos tan asin acos atan atan2 exp log sqrt tanh abs sign`, `pi`, `deg` and the names of the model; `t`
+/// is the time. A name such as `"p[3]"` declares a vector, `"C[3,3]"` a matrix: `p` stands for the whole and
+/// `p[1]`, `C[1,2]` for its entries, in expressions and in the answer. `[a, b]` makes a vector of scalars and
+/// a matrix of rows. `cross dot norm transpose skew`, of quaternions (w, x, y, z) `R qmul conj qdot`, and the
+/// turns `Rx Ry Rz` take them. Constants, definitions and outputs have the shape of their expression.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelFile {
-    /// Name of the system.
+    /// Name of the system in answers and reports.
     #[schemars(required)]
     name: Option<String>,
-    /// What it is and where it comes from.
+    /// Purpose and source of the system, printed in reports.
     #[serde(default)]
     description: String,
-    /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value), unit, description. None: what is
-    /// observed depends on parameters and inputs alone.
+    /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value),
+    /// unit, description. If there are none, the outputs depend on parameters and inputs alone.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     states: BTreeMap<String, Spanned<Value>>,
@@ -60,14 +61,16 @@ pub struct ModelFile {
     /// Outputs: an expression, or a table with expression, unit, description.
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     outputs: BTreeMap<String, Spanned<Value>>,
-    /// Runs with starts of their own; parameters are shared.
+    /// Number of experiments: runs with their own initial states and shared parameters; when left out, the
+    /// number of `[[experiment]]` tables, or 1.
     #[serde(default)]
     #[schemars(with = "Option<usize>")]
     experiments: Option<Spanned<usize>>,
-    /// The experiments one by one, with what each has of its own.
+    /// Experiments one by one, with the constants and inputs that differ.
     #[serde(default, rename = "experiment")]
     own: Vec<ExperimentEntry>,
-    /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states that jump).
+    /// Segments of the timeline, reached at once: constants = { c = "-1" }, carry = { x = "-x" } (states
+    /// that jump).
     #[serde(default, rename = "segment")]
     segments: Vec<SegmentEntry>,
     /// Time t at which the run begins: a number (0 when left out), or "generic". Where equations or known
@@ -75,19 +78,19 @@ pub struct ModelFile {
     /// any later time. Later segments are judged at a generic time.
     #[schemars(with = "Option<serde_json::Value>")]
     time: Option<Spanned<Value>>,
-    /// Equations that hold at the start of every experiment (there must be a real point that meets them), as
-    /// `norm(q) = 1`: what is random otherwise lies on them, and their differentials are known.
+    /// Equations that hold at the start of every experiment, as `norm(q) = 1`. There must be a real point
+    /// that meets them. Random starts lie on them, and their differentials are known.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     constraints: Vec<Spanned<String>>,
-    /// Combinations to be judged.
+    /// Combinations of unknowns to be judged, as expressions.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     combinations: Vec<Spanned<String>>,
-    /// Numbers for `obsdeg simulate --model`.
+    /// Numbers for `obsdeg simulate --model`, in the units of the model.
     #[serde(default)]
     simulation: SimulationEntry,
-    /// How the record of `obsdeg calibrate --model` is read.
+    /// Reading of the record of `obsdeg calibrate --model`: columns, known values and intervals at rest.
     #[schemars(with = "Option<ModelRecord>")]
     record: Option<Spanned<ModelRecord>>,
 }
@@ -96,22 +99,24 @@ pub struct ModelFile {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulationEntry {
-    /// How long it runs.
+    /// Duration of every experiment, in the unit of `t`.
     #[schemars(with = "Option<f64>")]
     pub(super) duration: Option<Spanned<f64>>,
-    /// Between two samples.
+    /// Time between two samples, in the unit of `t`.
     #[schemars(with = "Option<f64>")]
     pub(super) step: Option<Spanned<f64>>,
-    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants; of a vector a list, or one
-    /// number for all entries; `x` in all experiments, or `"x@2"` in the second.
+    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants, in
+    /// their units; of a vector a list, or one number for all entries; `x` in all experiments, or `"x@2"` in
+    /// the second.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub(super) values: BTreeMap<String, Spanned<Value>>,
-    /// Standard deviations of the initial estimates; as large as the value when left out (1 for zero).
+    /// Standard deviations of the initial estimates, in the units of the unknowns; as large as the value when
+    /// left out (1 for zero).
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub(super) priors: BTreeMap<String, Spanned<Value>>,
-    /// Standard deviation of the noise of a sample, by output.
+    /// Standard deviation of the noise of a sample, by output, in its unit.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub(super) noise: BTreeMap<String, Spanned<Value>>,
@@ -121,29 +126,29 @@ pub struct SimulationEntry {
     pub(super) inputs: BTreeMap<String, Spanned<Value>>,
 }
 
-/// An experiment.
+/// Experiment with constants or known inputs of its own.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentEntry {
-    /// Constants that take another value.
+    /// Constants with another value in this experiment.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     constants: BTreeMap<String, Spanned<Value>>,
-    /// Known inputs of another kind.
+    /// Known inputs of another kind in this experiment.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     known_inputs: BTreeMap<String, Spanned<Value>>,
 }
 
-/// A segment of the timeline.
+/// Segment of the timeline, with its own constants and jumps.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentEntry {
-    /// Constants that take another value.
+    /// Constants with another value in this segment.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     constants: BTreeMap<String, Spanned<Value>>,
-    /// States behind the jump, in terms of those before.
+    /// States after the jump, as expressions of those before.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     carry: BTreeMap<String, Spanned<Value>>,

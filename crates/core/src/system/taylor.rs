@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use obsdeg_exact::SplitMix64;
+use obsdeg_exact::{SplitMix64, interrupt};
 
 use super::constraints::below;
 use super::dag::{Dag, Op};
@@ -500,6 +500,9 @@ impl<'a, S: Values> Taylor<'a, S> {
         let k = self.length;
         self.inverse(k);
         for i in 0..self.dag.ops.len() {
+            if i % 64 == 0 {
+                interrupt::check();
+            }
             if self.needed[i] && !self.constant[i] {
                 let x = self.next_value(i, k);
                 self.values[i].push(x);
@@ -507,6 +510,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
         for i in 0..if self.lanes == 0 { 0 } else { self.dag.ops.len() } {
             if self.differentiated[i] && !self.constant[i] && !self.known[i] {
+                interrupt::check();
                 self.next_dual(i, k);
             }
         }

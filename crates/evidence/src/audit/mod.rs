@@ -19,41 +19,42 @@ use crate::simulation::SimulationError;
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.audit/1";
 
-/// Whether the paper is right.
+/// Outcome of checking an equation or claim of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Finding {
-    /// It holds as printed.
+    /// True as printed in the paper.
     Agree,
-    /// It holds under a condition that the paper does not state; the reason does.
+    /// True under a condition that the paper does not state; the reason states it.
     Conditional,
-    /// It does not.
+    /// False as printed in the paper.
     Disagree,
-    /// It was not judged; the reason says why.
+    /// Not judged; the reason gives the cause.
     NotCovered,
 }
 
-/// One equation or claim.
+/// Equation or claim of the paper, with its outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Line {
-    /// Where in the paper, such as `(21)` or `conclusion 2`.
+    /// Place in the paper, such as `(21)` or `conclusion 2`.
     pub place: String,
-    /// What it says.
+    /// Equation or claim, in words.
     pub claim: String,
-    /// Whether it holds.
+    /// Outcome: agree, conditional, disagree or not covered.
     pub finding: Finding,
-    /// Why: what was computed, for a slip the correction, and for what is not covered why it is not.
+    /// Reason of the outcome: the computation, for a slip the correction, and for a line that is not covered
+    /// the cause.
     pub reason: String,
 }
 
-/// The whole audit.
+/// Audit of the paper, equation by equation and claim by claim.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Audit {
-    /// `obsdeg.audit/1`.
+    /// Layout of this answer: `obsdeg.audit/1`.
     pub schema: String,
     /// Seed of all random points and of the noise.
     pub seed: u64,
-    /// The equations by number, then the claims in the order of the paper, then what is not covered.
+    /// Equations by number, then claims in the order of the paper, then everything that is not covered.
     pub lines: Vec<Line>,
 }
 

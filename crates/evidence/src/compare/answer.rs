@@ -13,130 +13,133 @@ use crate::simulation::{NoiseFloor, OtherCarry};
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.comparison/2";
 
-/// Several schemes, judged alike.
+/// Comparison of several schemes under the same method.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
-    /// `obsdeg.comparison/2`.
+    /// Layout of this answer: `obsdeg.comparison/2`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The schemes in the order given.
+    /// Schemes of the comparison, in the order given.
     pub schemes: Vec<ComparedScheme>,
-    /// What differs between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step.
+    /// Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns,
+    /// requirements, noise, step.
     pub differ: Vec<String>,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// One scheme.
+/// Scheme of a comparison, with its predicted sigmas.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(rename = "Review")]
 pub struct ComparedScheme {
-    /// Its name: the file's.
+    /// Name of the scheme: that of its file.
     pub name: String,
-    /// What is carried between positions.
+    /// Carry: quantity that continues from one position to the next.
     pub carry: Carry,
-    /// What its sigmas rest on.
+    /// Conditions of the predicted sigmas.
     pub conditions: MeasurementReport,
-    /// Its positions.
+    /// Names of the positions, in order of time.
     pub positions: Vec<String>,
-    /// The turns between them that take time, with the position that each leads to.
+    /// Slews of finite duration, each with the position that it leads to.
     pub slews: Vec<Slew>,
-    /// Total time with slews, in s.
+    /// Total time of the scheme with slews, in s.
     pub total_s: f64,
-    /// The rank with dwell (by derivatives where accuracy orders are not computed), and the number of unknowns.
+    /// Rank with dwell (by derivatives if accuracy orders are not computed), then the number of unknowns.
     pub rank: [usize; 2],
-    /// Per unknown.
+    /// Verdict, sigma and requirement of each unknown.
     pub quantities: Vec<Quantity>,
-    /// The largest sigma of a coefficient; null when one is not observable.
+    /// Largest sigma of a coefficient; null if one is not observable.
     pub worst: Option<Worst>,
     /// True if requirements are stated and every one is met.
     pub meets_requirements: bool,
     /// Outcome of the requirements by the predicted sigmas.
     pub requirements: Requirements,
-    /// The same scheme under the other carries.
+    /// Outcome of the same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
-    /// Whether accuracy orders are computed: none are for rotating segments.
+    /// True if accuracy orders are computed. They are not for rotating segments.
     pub has_accuracy_orders: bool,
     /// Validity of the small-angle model at the drifts that are stated; null where none are (`values`), or
     /// for very many steps.
     pub validity: Option<Validity>,
-    /// What happens without each of the positions.
+    /// Schemes with one position left out, for each position.
     pub drop_one: Vec<DropOne>,
-    /// The worst sigma under other conditions.
+    /// Worst sigmas under other conditions.
     pub sensitivity: Vec<Sensitivity>,
-    /// How well coefficients can be known under random drift, however long the dwells; left out where the gyros have no noise of their own.
+    /// Noise floor: the least sigmas under random drift, however long the dwells; left out where the gyros
+    /// have no noise of their own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_floor: Option<NoiseFloor>,
-    /// Angles and turns beyond the gimbal limits that the scheme states; left out where it states none.
+    /// Angles and turns beyond the gimbal limits of the scheme; left out where it states none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gimbals: Option<GimbalReport>,
 }
 
-/// A turn to a position.
+/// Slew of finite duration to a position.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Slew {
-    /// The position.
+    /// Name of the position that the slew leads to.
     pub to: String,
-    /// How it turns.
+    /// Turn of the slew: its axis and angle.
     pub turn: Turn,
 }
 
-/// One unknown of a scheme.
+/// Verdict, sigma and requirement of one unknown of a scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Quantity {
-    /// Its name.
+    /// Name of the unknown, as in the scheme's model.
     pub name: String,
-    /// Unit of sigma.
+    /// Unit of sigma, of the requirement and of `sigma_extended`.
     pub unit: String,
-    /// The exact verdict.
+    /// Verdict: observable, inseparable or not excited.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree; null if the unknown is not observable.
     pub degree: Option<usize>,
-    /// The accuracy order.
+    /// Accuracy order; null if no dwell makes the unknown observable, or if none were computed.
     pub accuracy_order: Option<usize>,
-    /// Predicted standard deviation at the end of the scheme, by the conditions that are stated; null when
-    /// neither samples nor stated priors bound it.
+    /// Predicted standard deviation at the end of the scheme under the stated conditions, in the unit of
+    /// `unit`; null if neither samples nor stated priors bound it.
     pub sigma: Option<f64>,
-    /// True if the samples do not determine it, so that sigma rests on stated priors alone.
+    /// True if the samples do not determine the unknown, so that sigma depends on stated priors alone.
     pub by_prior: bool,
-    /// Standard deviation of a coefficient, where the small-angle model does not hold for the drifts that are
-    /// stated, by a filter with full attitudes at the end, with the prior.
+    /// Standard deviation of a coefficient at the end by a filter with full attitudes, with the prior, in the
+    /// unit of `unit`; null if the small-angle model holds for the stated drifts, or none are stated.
     pub sigma_extended: Option<f64>,
-    /// The largest sigma allowed.
+    /// Largest sigma allowed, in the unit of `unit`; null if none is required.
     pub requirement: Option<f64>,
-    /// Requirement over sigma: above 1 is met.
+    /// Requirement over sigma, dimensionless: met from 1; null if there is no requirement or no sigma.
     pub margin: Option<f64>,
-    /// Per position: how it moves the drift there, as a product of components of g (1 for D_F); its root mean square over the arc of a
-    /// rotating segment; empty for psi.
+    /// Factors by which the unknown enters the drift, position by position, dimensionless: products of
+    /// components of g (1 for D_F), root mean square over the arc of a rotating segment. Empty for psi.
     pub excitation: Vec<f64>,
-    /// Positions without which it is not observable.
+    /// Positions without which the unknown is not observable.
     pub carried_by: Vec<String>,
 }
 
-/// A scheme without one of its positions.
+/// Scheme without one of its positions.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct DropOne {
-    /// The position left out.
+    /// Name of the position that is left out.
     pub position: String,
-    /// Unknowns that are not observable without it.
+    /// Unknowns that are not observable without the position.
     pub lost: Vec<String>,
-    /// The worst sigma without it.
+    /// Worst sigma without the position; null if a coefficient is not observable.
     pub worst: Option<Worst>,
-    /// Outcome of the requirements without it.
+    /// Outcome of the requirements without the position.
     pub requirements: Requirements,
 }
 
-/// The worst sigma under another condition.
+/// Worst sigma of the scheme under another condition.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Sensitivity {
-    /// The condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` where the scheme has slews, which only
-    /// inertial carry knows.
+    /// Condition: `latitude 60 deg`, `dwell x 2`, `reset carry`; `platform carry, no slews` for a scheme with
+    /// slews, which only inertial carry has.
     pub condition: String,
-    /// The rank with dwell and the number of unknowns there.
+    /// Rank with dwell, then the number of unknowns, under the condition.
     pub rank: [usize; 2],
-    /// The worst sigma there.
+    /// Worst sigma under the condition; null if a coefficient is not observable.
     pub worst: Option<Worst>,
-    /// The worst sigma there of the coefficients that the scheme itself makes observable; null when one is not.
+    /// Worst sigma, under the condition, of the coefficients that are observable in the scheme itself; null
+    /// if one is not.
     pub worst_determined: Option<Worst>,
 }

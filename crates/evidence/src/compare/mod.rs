@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, Source, slew};
+use obsdeg_exact::interrupt;
 use rayon::prelude::*;
 
 use crate::requirements::{Claim, Miss};
@@ -257,19 +258,18 @@ fn drop_one(
         let unknown = |c: usize| &of.prediction.unknowns[c];
         c.is_some_and(|c| unknown(c).status == Status::Observable || unknown(c).determined)
     };
-    (0..scheme.positions.len())
-        .into_par_iter()
-        .map(|i| {
-            let position = scheme.positions[i].name.clone();
-            let judged = judged(&scheme.without_position(i), conditions, seed)?;
-            let names = whole.plan.platform.names().iter();
-            // under reset carry every position has a psi of its own
-            let names = names.filter(|n| !n.contains('@'));
-            let lost = names.filter(|n| observable(whole, n) && !observable(&judged, n)).cloned().collect();
-            let requirements = judged.requirements(conditions)?;
-            Ok(DropOne { position, lost, worst: judged.worst_of(&|_| true), requirements })
-        })
-        .collect()
+    let parts = interrupt::parts();
+    let without = |i: usize| {
+        let position = scheme.positions[i].name.clone();
+        let judged = judged(&scheme.without_position(i), conditions, seed)?;
+        let names = whole.plan.platform.names().iter();
+        // under reset carry every position has a psi of its own
+        let names = names.filter(|n| !n.contains('@'));
+        let lost = names.filter(|n| observable(whole, n) && !observable(&judged, n)).cloned().collect();
+        let requirements = judged.requirements(conditions)?;
+        Ok(DropOne { position, lost, worst: judged.worst_of(&|_| true), requirements })
+    };
+    (0..scheme.positions.len()).into_par_iter().map(|i| parts.part(|| without(i))).collect()
 }
 
 /// The worst sigma at other latitudes, dwells and carries.
@@ -304,5 +304,6 @@ fn sensitivity(
             worst_determined,
         })
     };
-    others.into_par_iter().map(of).collect()
+    let parts = interrupt::parts();
+    others.into_par_iter().map(|other| parts.part(|| of(other))).collect()
 }

@@ -11,44 +11,45 @@ use crate::simulation::answer::{ConditionsReport, TimelineReport, Validity};
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.crosscheck/1";
 
-/// The cross-check of one scheme.
+/// Cross-check of the verdicts on one scheme against filters and samples.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CrossCheck {
-    /// `obsdeg.crosscheck/1`.
+    /// Layout of this answer: `obsdeg.crosscheck/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// What is carried between positions.
+    /// Carry: quantity that continues from one position to the next.
     pub carry: Carry,
-    /// How the filter was made to differ from the truth; null for a right one.
+    /// Deliberate error of the filter's model; null for the right filter.
     pub filter: Option<String>,
-    /// Under which conditions.
+    /// Conditions of the runs, with their units.
     pub conditions: ConditionsReport,
-    /// The timeline.
+    /// Positions and slews of the run, in order of time.
     pub timeline: Vec<TimelineReport>,
-    /// Whether everything agrees.
+    /// True if no check disagrees, evidence a to f.
     pub passed: bool,
-    /// Whether all but d agrees: d holds the filter against drawn truths, which fails where the small-angle model does, too.
+    /// True if no check but evidence d disagrees. Evidence d compares the filter with drawn truths and also
+    /// fails if the small-angle model does not hold.
     pub verdicts_agree: bool,
-    /// What disagrees, in words.
+    /// Disagreements of the checks, in words.
     pub disagreements: Vec<String>,
     /// Reasons why checks are not resolvable, one for each such check.
     pub unresolved: Vec<String>,
-    /// How many checks agree, disagree, are not resolvable, were not made.
+    /// Number of checks by outcome.
     pub counts: Counts,
-    /// How slopes are measured, and when something is not resolvable.
+    /// Method of measuring slopes, and criteria for a check that is not resolvable.
     pub method: Vec<String>,
-    /// What an analysis says and nothing here is held against.
+    /// Statements of an analysis that no evidence checks.
     pub not_tested: Vec<String>,
-    /// a: ranks, null space and combinations against the samples.
+    /// Evidence a: ranks, null space and combinations against the samples.
     pub spaces: Vec<SpaceCheck>,
-    /// How many accuracy orders were measured.
+    /// Coverage of the accuracy orders by measured slopes.
     pub orders: Measured,
-    /// Evidence a and b per unknown and combination.
+    /// Evidence a and b on each unknown and combination.
     pub quantities: Vec<QuantityEvidence>,
-    /// Directions that Z does not see.
+    /// Evidence on each direction that Z does not observe.
     pub null_space: Vec<NullEvidence>,
-    /// Number of directions that Z does not see.
+    /// Number of independent directions that Z does not observe.
     pub defect: Count,
     /// Evidence c: covariance of the filter against the inverse information.
     pub covariance: Vec<Difference>,
@@ -56,31 +57,31 @@ pub struct CrossCheck {
     pub monte_carlo: MonteCarlo,
     /// Evidence e: rank correlation of predicted and measured orders.
     pub ranking: Ranking,
-    /// Evidence f: filters that are wrong on purpose.
+    /// Evidence f: filters with a deliberate model error.
     pub controls: Vec<Control>,
-    /// Whether the small-angle model holds for the true values.
+    /// Validity of the small-angle model at the true values.
     pub validity: Validity,
     /// Sigma against dwell, for the plot.
     pub slopes: Vec<SlopeCurve>,
-    /// Correlation of the estimate under a diffuse prior.
+    /// Correlation matrix of the estimates under a diffuse prior.
     pub correlation: Correlation,
-    /// Seed of the noise.
+    /// Seed of the noise and of all random choices.
     pub seed: u64,
     /// Bound on the probability that a prediction is wrong.
     pub error_bound: f64,
 }
 
-/// What evidence makes of a verdict.
+/// Outcome of a check of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Agreement {
-    /// What was measured is what the verdict says.
+    /// Agreement: the measurement confirms the verdict.
     Agrees,
-    /// It is not.
+    /// Disagreement: the measurement contradicts the verdict.
     Disagrees,
-    /// Something was measured, but neither for nor against the verdict, by a test that the answer states.
+    /// Measurement that neither supports nor contradicts the verdict, by a test that the answer states.
     NotResolvable,
-    /// Nothing was measured.
+    /// Check that was skipped: nothing was measured.
     NotTested,
 }
 
@@ -96,16 +97,16 @@ impl Agreement {
     }
 }
 
-/// How many checks came out how.
+/// Number of checks by outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
 pub struct Counts {
-    /// Agree.
+    /// Number of checks that agree with the verdicts.
     pub agree: usize,
-    /// Disagree.
+    /// Number of checks that disagree with the verdicts.
     pub disagree: usize,
-    /// Are not resolvable.
+    /// Number of checks that are not resolvable.
     pub not_resolvable: usize,
-    /// Were not made.
+    /// Number of checks that were skipped.
     pub not_tested: usize,
 }
 
@@ -124,27 +125,27 @@ impl Counts {
     }
 }
 
-/// Something that is no number, predicted and measured.
+/// Property that is no number, predicted and measured.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SpaceCheck {
-    /// What is held against the samples.
+    /// Property that is compared with the samples.
     pub what: String,
-    /// By the exact verdicts.
+    /// Value by the exact verdicts.
     pub predicted: String,
-    /// By the samples; empty when nothing was measured.
+    /// Value by the samples; empty if nothing was measured.
     pub measured: String,
-    /// Whether they agree.
+    /// Outcome of the comparison of both values.
     pub outcome: Agreement,
 }
 
-/// A predicted and a measured number.
+/// Number that was predicted and measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Check {
-    /// What the exact verdict says.
+    /// Predicted number by the exact verdict: a slope, factor, part or correlation, dimensionless.
     pub predicted: f64,
-    /// What the filter shows; null when it could not be measured.
+    /// Measured number by the filter, dimensionless; null if it could not be measured.
     pub measured: Option<f64>,
-    /// Whether they agree.
+    /// Outcome of the comparison of both numbers.
     pub outcome: Agreement,
 }
 
@@ -161,12 +162,12 @@ impl Check {
     }
 }
 
-/// How many of the orders that the verdicts say were measured by a slope.
+/// Coverage of the predicted orders by measured slopes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Measured {
-    /// Slopes that were measured.
+    /// Number of orders that were measured by a slope.
     pub measured: usize,
-    /// Unknowns and combinations that have an order.
+    /// Number of unknowns and combinations that have an order.
     pub of: usize,
 }
 
@@ -181,182 +182,188 @@ impl Measured {
 /// Evidence on one unknown or combination.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct QuantityEvidence {
-    /// The unknown or combination.
+    /// Name of the unknown, or the combination.
     pub name: String,
-    /// The exact verdict.
+    /// Verdict: observable, inseparable or not excited.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree; null if not observable.
     pub degree: Option<usize>,
-    /// The accuracy order.
+    /// Accuracy order; null if no dwell makes it observable, or if none were computed.
     pub accuracy_order: Option<usize>,
-    /// Whether the filter has it: one that was made wrong may lack an unknown, and nothing is measured then.
+    /// True if the filter contains the unknown. A filter with a deliberate error may lack it; then nothing is
+    /// measured.
     pub modelled: bool,
-    /// a: log-log slope of sigma against the dwell, psi handed on between positions as it was at the start of each:
-    /// -(degree + 1/2); 0 when nothing is learnt.
+    /// Evidence a: log-log slope of sigma against the dwell, with psi of the start of each position handed on
+    /// to the next. Predicted -(degree + 1/2); 0 if nothing is learnt.
     pub degree_slope: Check,
-    /// a: whether its column of that information is zero, and whether it is in the span; null when it was not measured.
+    /// Evidence a: status by the same information, from the column of the unknown and the span of the rows;
+    /// null if it was not measured.
     pub status_measured: Option<Status>,
-    /// Whether that is the verdict.
+    /// Outcome of the comparison with the verdict.
     pub status_outcome: Agreement,
-    /// Unknowns that derivatives do not tell it from; null for a combination.
+    /// Unknowns indistinguishable from it by derivatives; null for a combination.
     pub partners: Option<Partners>,
-    /// a: log-log slope of sigma (psi: of the start) against the dwell: -(accuracy order + 1/2); 0 when nothing is learnt.
+    /// Evidence a: log-log slope of sigma (psi: of the start) against the dwell. Predicted -(accuracy order +
+    /// 1/2); 0 if nothing is learnt.
     pub slope: Check,
-    /// The same with psi of the end, which is what a filter shows.
+    /// Log-log slope of sigma with psi of the end, as in a filter.
     pub slope_at_end: Check,
-    /// b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100.
+    /// Evidence b: factor on sigma (psi: of the end) when the prior variance is multiplied by 100.
     pub inflation: Check,
 }
 
-/// Unknowns that share with one a direction that Z does not see and that holds no shorter one.
+/// Unknowns indistinguishable from one: those in a common direction of minimal support that Z does not
+/// observe.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Partners {
-    /// By the exact verdicts.
+    /// Partners by the exact verdicts.
     pub predicted: Vec<String>,
-    /// Those of the directions that the samples do not show; null when they were not measured.
+    /// Partners by the directions that the samples do not show; null if they were not measured.
     pub measured: Option<Vec<String>>,
-    /// Whether they are the same.
+    /// Outcome of the comparison of both lists.
     pub outcome: Agreement,
 }
 
 /// Evidence on one null vector.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NullEvidence {
-    /// `psi_y = 1, D_FZ = 6.4e-5` in SI units.
+    /// Null vector, as in `psi_y = 1, D_FZ = 6.4e-5`, in SI units.
     pub direction: String,
-    /// How much of it Z sees, relative to the best seen direction: predicted 0.
+    /// Effect of the null vector on Z, relative to the most observable direction: predicted 0.
     pub seen: Check,
-    /// Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1; null
-    /// when other null vectors share its unknowns, or when it has only one.
+    /// Smallest correlation of its unknowns under a diffuse prior, signed by the prediction: predicted 1;
+    /// null if other null vectors share its unknowns, or if it has only one.
     pub correlation: Option<Check>,
 }
 
-/// A predicted and a measured count.
+/// Count that was predicted and measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Count {
-    /// By the exact verdicts.
+    /// Number that the exact verdicts predict.
     pub predicted: usize,
-    /// By the samples.
+    /// Number that the samples show.
     pub measured: usize,
-    /// Whether they agree.
+    /// Outcome of the comparison of both numbers.
     pub outcome: Agreement,
 }
 
-/// The largest difference of two covariances.
+/// Largest difference of two covariances.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Difference {
-    /// What is compared.
+    /// Covariances or models that are compared.
     pub name: String,
-    /// `max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`.
+    /// Largest relative difference, dimensionless: `max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`.
     pub difference: f64,
-    /// The limit.
+    /// Largest difference allowed, dimensionless.
     pub limit: f64,
-    /// Whether it is kept; not resolvable where rounding may make a tenth of it: the largest variance of the prior, beside the smallest at the
-    /// end, times the steps times 2e-16.
+    /// Outcome: agreement within the limit. Not resolvable if rounding may reach a tenth of the limit:
+    /// largest variance of the prior, over the smallest at the end, times steps times 2e-16.
     pub outcome: Agreement,
 }
 
-/// A statistic with its bands.
+/// Averaged statistic with its acceptance bands.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Statistic {
-    /// What is averaged.
+    /// Name of the averaged statistic.
     pub name: String,
-    /// Its expectation.
+    /// Expectation of the average, dimensionless.
     pub expected: f64,
-    /// The average.
+    /// Average over runs and samples, dimensionless.
     pub measured: f64,
-    /// The band of 95 %.
+    /// Band of 95 % of the average, dimensionless.
     pub band: (f64, f64),
-    /// The band of 99.9 %, in which it must be.
+    /// Acceptance band of 99.9 % of the average, dimensionless.
     pub wide_band: (f64, f64),
-    /// Whether it is.
+    /// True if `measured` lies inside its acceptance band.
     pub pass: bool,
 }
 
-/// Monte Carlo evidence.
+/// Evidence d: statistics of Monte Carlo runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MonteCarlo {
-    /// Which filter.
+    /// Filter of the runs: linear, extended or iterated.
     pub filter: FilterKind,
-    /// Whether all runs have the scheme's own truth, with initial estimates drawn about it from the prior; otherwise truths are drawn about the
-    /// initial estimate.
+    /// True if all runs have the scheme's own truth and draw initial estimates about it from the prior. If
+    /// false, truths are drawn about the initial estimate.
     pub about_the_truth: bool,
-    /// Number of runs.
+    /// Number of runs, each with its own noise.
     pub runs: usize,
-    /// Runs whose linearisations did not settle.
+    /// Number of runs whose linearisations did not converge.
     pub unsettled: usize,
-    /// ANEES and NIS.
+    /// Average NEES and NIS, with their bands.
     pub statistics: Vec<Statistic>,
     /// Probability that white innovations have autocorrelations as large.
     pub whiteness_probability: f64,
-    /// Whether that is above 0.001.
+    /// True if `whiteness_probability` is above 0.001.
     pub white: bool,
-    /// ANEES and mean NIS over time.
+    /// Average NEES and mean NIS over time.
     pub history: Vec<HistoryPoint>,
 }
 
 /// Averages over the runs at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct HistoryPoint {
-    /// Time in s.
+    /// Time since the start of the run, in s.
     pub t_s: f64,
-    /// ANEES of all unknowns.
+    /// Average NEES of all unknowns, dimensionless.
     pub nees: f64,
-    /// Mean NIS since the point before.
+    /// Mean NIS since the point before, dimensionless.
     pub nis: f64,
-    /// Number of samples in it, all runs together.
+    /// Number of samples in the mean NIS, all runs together.
     pub samples: usize,
 }
 
-/// Agreement of the order of all unknowns.
+/// Rank correlation of all unknowns by predicted and measured orders.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Ranking {
-    /// Kendall's tau-b of predicted and measured accuracy orders; null when all are tied.
+    /// Kendall's tau-b of predicted and measured accuracy orders, dimensionless, -1 to 1; null if all are
+    /// tied.
     pub kendall_tau: Option<f64>,
-    /// Whether it is 1 (or all are tied on both sides).
+    /// True if `kendall_tau` is 1 (or all orders are tied on both sides).
     pub pass: bool,
-    /// Of runs with full attitudes: Kendall's tau-b of the predicted orders at the end and the errors there, root mean square in sigmas of the
-    /// prior; null where the filter is linear. It decides nothing: orders are of short dwells, errors of those of the scheme.
+    /// Kendall's tau-b, dimensionless, of the predicted orders at the end and the errors of runs with full
+    /// attitudes, root mean square in sigmas of the prior; null for a linear filter. It decides nothing:
+    /// orders hold for short dwells, errors for those of the scheme.
     pub errors: Option<f64>,
 }
 
-/// A filter that is wrong on purpose, and must be found out.
+/// Filter with a deliberate model error, which the checks must detect.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Control {
-    /// What is wrong with it.
+    /// Deliberate error of the filter's model.
     pub name: String,
-    /// How many checks of a and b fail with it.
+    /// Number of checks of evidence a and b that fail with the filter.
     pub failed: usize,
-    /// Out of how many.
+    /// Number of checks of evidence a and b performed.
     pub checks: usize,
-    /// Its mean NIS.
+    /// Mean NIS of the filter, dimensionless.
     pub nis: f64,
-    /// The band in which a right filter's would be (99.9 %).
+    /// Band of 99.9 % of the mean NIS of a right filter, dimensionless.
     pub band: (f64, f64),
-    /// By how many degrees its latitude or an attitude is off.
+    /// Angle in degrees by which the filter's latitude or attitude is wrong.
     pub off_deg: f64,
-    /// Whether it was found out; not resolvable where it was not, and need not be.
+    /// Outcome: agreement if the error was detected. Not resolvable if it was not, and need not be.
     pub outcome: Agreement,
 }
 
-/// Sigma against the dwell.
+/// Sigma against the dwell, for one unknown or combination.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SlopeCurve {
-    /// The unknown or combination.
+    /// Name of the unknown, or the combination.
     pub name: String,
-    /// Unit of sigma.
+    /// Unit of the sigmas in `points`.
     pub unit: String,
-    /// The accuracy order.
+    /// Accuracy order; null if no dwell makes it observable.
     pub accuracy_order: Option<usize>,
-    /// `(dwell in s, sigma)`.
+    /// Points of the curve: `(dwell in s, sigma)`, sigma in the unit of `unit`.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A correlation matrix.
+/// Correlation matrix of the estimates.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Correlation {
-    /// The unknowns.
+    /// Names of the unknowns, in the order of rows and columns.
     pub names: Vec<String>,
-    /// Row by row.
+    /// Rows of the matrix: correlations, dimensionless, -1 to 1.
     pub values: Vec<Vec<f64>>,
 }

@@ -7,7 +7,7 @@ use obsdeg_core::model::slew::W_IE;
 use obsdeg_exact::SplitMix64;
 
 use super::asymptotics::functional;
-use super::precise::{Digits, Functional, Model, Posterior};
+use super::precise::{Digits, Functional, Information, Model, Posterior};
 use crate::prediction::Combination;
 use crate::simulation::conditions::is_rate;
 use crate::simulation::{Conditions, Plan};
@@ -43,55 +43,79 @@ pub(super) struct Resolution<'a> {
     conditions: &'a Conditions,
     /// Standard deviations of the prior, in SI units.
     prior: &'a [f64],
-    /// The model itself, then those that are rounded; `None` where many digits do not give it.
-    filtered: OnceCell<Option<Vec<Filtered>>>,
+    /// The model in many digits; `None` where these do not give it, here and below.
+    model: OnceCell<Option<Model>>,
+    /// The filter of the model.
+    exact: OnceCell<Option<Filtered>>,
+    /// Filters of the model with rounded numbers.
+    rounded: OnceCell<Option<Vec<Filtered>>>,
 }
 
 impl<'a> Resolution<'a> {
     /// Of the filter of `plan` with a prior of these standard deviations.
     pub(super) fn new(plan: &'a Plan, conditions: &'a Conditions, prior: &'a [f64]) -> Self {
-        Self { plan, conditions, prior, filtered: OnceCell::new() }
+        Self {
+            plan,
+            conditions,
+            prior,
+            model: OnceCell::new(),
+            exact: OnceCell::new(),
+            rounded: OnceCell::new(),
+        }
     }
 
     fn is_psi(&self, c: usize) -> bool {
         !is_rate(self.plan.platform.units()[c])
     }
 
-    fn compute(&self) -> Option<Vec<Filtered>> {
+    fn model(&self) -> Option<&Model> {
+        let compute = || {
+            let scheme = self.plan.platform.scheme().with_dwells(self.conditions.dwell_s, 1.0).ok()?;
+            Model::new(&scheme, Digits { bits: BITS })
+        };
+        self.model.get_or_init(compute).as_ref()
+    }
+
+    /// The filter of a model, at the times of its samples.
+    fn filtered(&self, model: &Model) -> Option<Filtered> {
         let conditions = self.conditions;
-        let scheme = self.plan.platform.scheme().with_dwells(conditions.dwell_s, 1.0).ok()?;
-        let dwell_s = scheme.positions[0].dwell?.seconds();
-        let density = (conditions.step_s * W_IE).sqrt();
+        let dwell_s = self.plan.segments.first().map(|s| s.dt * s.steps as f64)?;
+        let samples: Vec<usize> = self.plan.segments.iter().map(|s| s.steps).collect();
         let noise = [conditions.accelerometer_noise_g, conditions.azimuth_noise_deg.to_radians()];
-        let noise = noise.map(|s| s * density);
+        let information = Information::of_filter(model, dwell_s * W_IE, &samples, noise);
         let prior = |factor: f64| -> Vec<f64> {
             let unit = |c: usize| if self.is_psi(c) { 1.0 } else { W_IE };
             self.prior.iter().enumerate().map(|(c, s)| s * factor / unit(c)).collect()
         };
-        let own = Model::new(&scheme, Digits { bits: BITS })?;
-        let mut rng = SplitMix64::new(1);
-        let rounded: Vec<Model> = (0..DRAWS).map(|_| own.rounded(ROUNDING, &mut rng)).collect();
-        let filtered = |model: &Model| {
-            let at = |factor: f64| Posterior::new(model, dwell_s * W_IE, &prior(factor), noise);
-            Some(Filtered { prior: at(1.0)?, wider: at(WIDER)? })
+        let at = |factor: f64| Posterior::new(&information, &prior(factor));
+        Some(Filtered { prior: at(1.0)?, wider: at(WIDER)? })
+    }
+
+    fn exact(&self) -> Option<&Filtered> {
+        self.exact.get_or_init(|| self.filtered(self.model()?)).as_ref()
+    }
+
+    fn rounded(&self) -> Option<&[Filtered]> {
+        let compute = || {
+            let (own, mut rng) = (self.model()?, SplitMix64::new(1));
+            let rounded: Vec<Model> = (0..DRAWS).map(|_| own.rounded(ROUNDING, &mut rng)).collect();
+            rounded.iter().map(|model| self.filtered(model)).collect()
         };
-        std::iter::once(&own).chain(&rounded).map(filtered).collect()
+        self.rounded.get_or_init(compute).as_deref()
     }
 
     /// Why doubles may show something else than `limit`, to which a prior without bounds leads by many
     /// digits; `None` where they must show it. `of` is what is shown.
     fn why(&self, limit: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
-        let Some(filtered) = self.filtered.get_or_init(|| self.compute()) else {
-            return Some("many digits do not tell what the filter must show".into());
-        };
+        const UNKNOWN: &str = "many digits do not tell what the filter must show";
         let close = |x: f64| (x - limit).abs() <= close * limit;
-        let (exact, rounded) = filtered.split_first()?;
-        let exact = of(exact);
+        let Some(exact) = self.exact().map(of) else { return Some(UNKNOWN.into()) };
         if !close(exact) {
             return Some(format!(
                 "by many digits {exact:.4} at the prior of the filter, which is too narrow to show {limit:.0}"
             ));
         }
+        let Some(rounded) = self.rounded() else { return Some(UNKNOWN.into()) };
         let moved = rounded.iter().map(of).find(|x| !close(*x))?;
         Some(format!(
             "by many digits {exact:.4}, but {moved:.4} where rounding moves the model by 2^{ROUNDING}"

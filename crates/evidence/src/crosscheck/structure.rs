@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
-use obsdeg_ekf::linear::covariance_pass;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 
 use super::answer::{
@@ -289,15 +288,7 @@ pub(super) fn last_covariance(
     start: &RunStart,
     form: Form,
 ) -> Result<Covariance, SimulationError> {
-    let prior = start.covariance(form)?;
-    let mut last = prior.clone();
-    let total: usize = plan.segments.iter().map(|s| s.steps).sum();
-    covariance_pass(&plan.stages, prior, |step, p| {
-        if step + 1 == total {
-            last = p.clone();
-        }
-    })?;
-    Ok(last)
+    Ok(obsdeg_ekf::linear::last_covariance(&plan.stages, start.covariance(form)?)?)
 }
 
 fn quantities(

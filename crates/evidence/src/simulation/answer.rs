@@ -18,64 +18,65 @@ use crate::requirements::{Miss, Requirements, meets};
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.simulation/2";
 
-/// One run of the filter against a simulated truth.
+/// Run of the filter against a simulated truth.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Simulation {
-    /// `obsdeg.simulation/2`.
+    /// Layout of this answer: `obsdeg.simulation/2`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// What is carried between positions.
+    /// Carry: quantity that continues from one position to the next.
     pub carry: Carry,
-    /// Under which conditions.
+    /// Conditions of the run, with their units.
     pub conditions: ConditionsReport,
-    /// The timeline.
+    /// Positions and slews of the run, in order of time.
     pub timeline: Vec<TimelineReport>,
-    /// The unknowns in model order: at the end of the run.
+    /// Estimates of the unknowns at the end of the run, in model order.
     pub quantities: Vec<Estimate>,
-    /// Observable combinations of unknowns that are not observable alone.
+    /// Estimates of observable combinations of unknowns that are not observable alone.
     pub combinations: Vec<Estimate>,
     /// Outcome of the requirements by prediction, as in every other command: the information of all samples
     /// with the noise, the random drift and the priors that are stated.
     pub requirements: Requirements,
     /// Outcome of the requirements in this run, by the sigmas of its filter at the end.
     pub run: RunRequirements,
-    /// The same scheme under the other carries.
+    /// Outcome of the same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
-    /// Whether errors and innovations are what the filter believes.
+    /// Consistency of errors and innovations with the filter's covariances.
     pub consistency: Consistency,
-    /// Which filter it is, and why.
+    /// Filter of the run, and the reason for it.
     pub filter: FilterReport,
-    /// Whether the linear model holds for these drifts.
+    /// Validity of the small-angle model at these drifts.
     pub validity: Validity,
-    /// How well coefficients can be known however long the dwells; left out where the gyros have no noise of their own.
+    /// Noise floor: the least sigmas of coefficients, however long the dwells; left out where the gyros have
+    /// no noise of their own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_floor: Option<NoiseFloor>,
-    /// Angles and turns beyond the gimbal limits that the scheme states; left out where it states none.
+    /// Angles and turns beyond the gimbal limits of the scheme; left out where it states none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gimbals: Option<GimbalReport>,
-    /// Seed of the noise.
+    /// Seed of the noise and of all random choices.
     pub seed: u64,
 }
 
-/// A run's sigmas against the requirements, beside the prediction.
+/// Requirements by the sigmas of a run, beside the prediction.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunRequirements {
     /// Outcome of the requirements in the run.
     pub requirements: Requirements,
-    /// The largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null
-    /// where none has.
+    /// Largest ratio of a sigma of the run to the predicted one, over the unknowns that have both; null if
+    /// none has.
     pub largest_ratio: Option<SigmaRatio>,
-    /// The smallest such ratio; null where no unknown has both.
+    /// Smallest ratio of a sigma of the run to the predicted one; null if no unknown has both.
     pub smallest_ratio: Option<SigmaRatio>,
     /// Reasons why the sigmas of the run may differ from the predicted ones.
     pub differs: Vec<RunDiffers>,
 }
 
-/// The ratio of a run's sigma to the predicted one.
+/// Ratio of a run's sigma to the predicted one.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SigmaRatio {
-    /// The unknown.
+    /// Name of the unknown with this ratio.
     pub name: String,
     /// Sigma of the run over the predicted sigma, dimensionless.
     pub ratio: f64,
@@ -85,46 +86,48 @@ pub struct SigmaRatio {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RunDiffers {
-    /// The random drift of the program: none is stated.
+    /// Random drift of the program, since none is stated.
     RandomDrift,
-    /// Priors of the program: not every unknown has a stated one.
+    /// Priors of the program, since not every unknown has a stated one.
     Prior,
-    /// A filter with full attitudes: the prediction is that of small angles.
+    /// Filter with full attitudes, while the prediction is for small angles.
     FullAttitudes,
 }
 
-/// The conditions of a run with their units.
+/// Conditions of a run with their units.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ConditionsReport {
-    /// How the truth is generated.
+    /// Model that generates the truth: linear or exact.
     pub truth: Truth,
-    /// Latitude in degrees.
+    /// Latitude of the run, in degrees.
     pub latitude_deg: f64,
-    /// Whether the latitude was chosen by the program.
+    /// True if the program chose the latitude.
     pub latitude_by_default: bool,
-    /// Largest step in s.
+    /// Largest step between samples, in s.
     pub step_s: f64,
-    /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
+    /// Rate of slews in deg/s unless a position states its own; null for instantaneous slews.
     pub slew_rate_deg_s: Option<f64>,
-    /// Noise of the observation per sample in g.
+    /// Noise of the observation per sample, in g.
     pub accelerometer_noise_g: f64,
-    /// Bias instability of the accelerometers, states of the filter and of the truth; left out where there is none.
+    /// Bias instability of the accelerometers, states of the filter and of the truth; left out where there is
+    /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accelerometer_bias: Option<AccelerometerBias>,
     /// Random drift with its unit.
     pub drift_noise: String,
-    /// Its density in deg/sqrt(h) in the shortest and in the longest step of the timeline.
+    /// Density of the random drift, in deg/sqrt(h), in the shortest and in the longest step of the timeline.
     pub drift_noise_density_deg_sqrt_h: [f64; 2],
-    /// The step in s for which a bias of one step was given; null for a density.
+    /// Step, in s, for which a bias of one step was given; null for a density.
     pub drift_noise_step_s: Option<f64>,
-    /// Whether the density is another than with that step, by more than 1 %.
+    /// True if the density differs by more than 1 % from that with the given step.
     pub drift_noise_differs: bool,
-    /// What the datasheet of the gyros says besides, states of the filter and of the truth; left out where there is none.
+    /// Noise of the gyros by their datasheet, states of the filter and of the truth; left out where there is
+    /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_noise: Option<GyroNoise>,
-    /// Propagation of the filter.
+    /// Propagation of the filter: exponential or rk4.
     pub propagation: Propagation,
-    /// Factor on true drifts and their priors.
+    /// Factor on the true drifts and their priors, dimensionless.
     pub drift_scale: f64,
     /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg,
     /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors.
@@ -138,12 +141,13 @@ impl ConditionsReport {
     }
 }
 
-/// The bias instability of the accelerometers: a first-order Gauss-Markov process of each, which goes on in platform axes.
+/// Bias instability of the accelerometers: a first-order Gauss-Markov process of each, which continues in
+/// platform axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AccelerometerBias {
-    /// The coefficient B in ug; sigma of the process is 1.076 B.
+    /// Coefficient B of the bias instability, in ug; sigma of the process is 1.076 B.
     pub instability_ug: f64,
-    /// Its correlation time in s.
+    /// Correlation time of the process, in s.
     pub correlation_time_s: f64,
 }
 
@@ -161,30 +165,30 @@ impl AccelerometerBias {
 /// priors that are stated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasurementReport {
-    /// Latitude in degrees.
+    /// Latitude of the scheme, in degrees.
     pub latitude_deg: f64,
-    /// Whether the latitude was chosen by the program.
+    /// True if the program chose the latitude.
     pub latitude_by_default: bool,
-    /// Dwell of positions that do not say theirs, in s.
+    /// Dwell, in s, of positions that do not state their own.
     pub dwell_s: f64,
     /// Largest step between samples in s; a position is divided into equal steps.
     pub step_s: f64,
-    /// Noise of the observation per sample and axis in g.
+    /// Noise of the observation per sample and axis, in g.
     pub accelerometer_noise_g: f64,
     /// Bias instability of the accelerometers; left out where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accelerometer_bias: Option<AccelerometerBias>,
-    /// Noise of the azimuth per sample in deg; null where it is not measured.
+    /// Noise of the azimuth per sample, in deg; null if it is not measured.
     pub azimuth_noise_deg: Option<f64>,
-    /// Rate of slews in deg/s where a position does not say its own; null: instantaneous.
+    /// Rate of slews in deg/s unless a position states its own; null for instantaneous slews.
     pub slew_rate_deg_s: Option<f64>,
-    /// Random drift that is stated, with its unit; null: none counts.
+    /// Random drift that is stated, with its unit; null if none is.
     #[serde(default)]
     pub drift_noise: Option<String>,
-    /// Datasheet of the gyros; left out where they have no noise of their own.
+    /// Noise of the gyros by their datasheet; left out where they have no noise of their own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gyro_noise: Option<GyroNoise>,
-    /// Priors that are stated, as 1 sigma in the units of the unknowns; null: none counts.
+    /// Priors that are stated, as 1 sigma in the units of the unknowns; null if none are.
     #[serde(default)]
     pub prior: Option<String>,
     /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg,
@@ -227,117 +231,118 @@ pub(super) fn chosen(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
     all.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()).collect()
 }
 
-/// A position or slew of the timeline.
+/// Position or slew of the timeline.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TimelineReport {
-    /// The position, or the one a slew goes to.
+    /// Name of the position, or of the one that a slew leads to.
     pub position: String,
-    /// Whether it is a slew.
+    /// True if this is a slew, false for a position.
     pub slew: bool,
-    /// Start in s.
+    /// Start of the position or slew, in s.
     pub start_s: f64,
-    /// End in s.
+    /// End of the position or slew, in s.
     pub end_s: f64,
-    /// How a slew turns; null at a position.
+    /// Turn of the slew: its axis and angle; null for a position.
     pub turn: Option<Turn>,
 }
 
-/// The estimate of one unknown or combination at the end of the run.
+/// Estimate of one unknown or combination at the end of the run.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Estimate {
-    /// The unknown or combination.
+    /// Name of the unknown, or the combination.
     pub name: String,
-    /// Unit of all its numbers.
+    /// Unit of the truth, the estimates and the sigmas.
     pub unit: String,
-    /// The exact verdict.
+    /// Verdict: observable, inseparable or not excited.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree; null if not observable.
     pub degree: Option<usize>,
-    /// The accuracy order.
+    /// Accuracy order; null if no dwell makes it observable, or if none were computed.
     pub accuracy_order: Option<usize>,
-    /// The truth.
+    /// True value, in the unit of `unit`.
     pub truth: f64,
-    /// The estimate.
+    /// Estimate at the end of the run, in the unit of `unit`.
     pub estimate: f64,
-    /// Estimate minus truth.
+    /// Estimate minus true value, in the unit of `unit`.
     pub error: f64,
-    /// What the filter believes of the error.
+    /// Standard deviation of the error by the filter, in the unit of `unit`.
     pub sigma: f64,
-    /// Predicted sigma by the conditions that are stated; null where neither samples nor stated priors bound
-    /// it.
+    /// Predicted sigma under the stated conditions, in the unit of `unit`; null if neither samples nor stated
+    /// priors bound it.
     pub predicted_sigma: Option<f64>,
-    /// Error over sigma.
+    /// Error over sigma, dimensionless; about -3 to 3 for a consistent filter.
     pub error_over_sigma: f64,
-    /// What the linear filter makes of the same measurements; null where it is the filter.
+    /// Estimate of the linear filter from the same measurements; null if the run's filter is linear.
     pub linear: Option<LinearEstimate>,
-    /// Sigma at the start.
+    /// Standard deviation at the start of the run, in the unit of `unit`.
     pub prior_sigma: f64,
-    /// The sigma to be reached.
+    /// Largest sigma allowed, in the unit of `unit`; null if none is required.
     pub required_sigma: Option<f64>,
-    /// When it was reached first, in s; null for what the samples do not determine.
+    /// Time, in s, from which sigma meets the requirement to the end; null if it does not, or if the samples
+    /// do not determine the unknown.
     pub time_to_requirement_s: Option<f64>,
-    /// What came out.
+    /// Outcome of the run for this unknown or combination.
     pub outcome: Outcome,
-    /// On whose prior it rests besides its own: what the outputs do not tell it from. Empty unless it is known from the prior only.
+    /// Indistinguishable unknowns whose priors the estimate relies on besides its own. Empty unless it is
+    /// known from the prior only.
     pub prior_of: Vec<String>,
 }
 
-/// What the linear filter says at the end of the run.
+/// Estimate of the linear filter at the end of the run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct LinearEstimate {
-    /// Estimate minus truth.
+    /// Estimate minus true value, in the unit of the unknown.
     pub error: f64,
-    /// What it believes of the error.
+    /// Standard deviation of the error by the linear filter, in the unit of the unknown.
     pub sigma: f64,
 }
 
-/// Which filter ran.
+/// Filter of the run, and the reason for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct FilterReport {
-    /// The filter.
+    /// Filter of the run: linear, extended or iterated.
     pub kind: FilterKind,
-    /// Why this one.
+    /// Reason for the choice of this filter.
     pub reason: FilterReason,
-    /// Linearisations of the whole run: 1 but for the iterated filter.
+    /// Number of linearisations of the whole run: 1 except for the iterated filter.
     pub passes: usize,
-    /// Whether they settled.
+    /// True if the linearisations converged.
     pub converged: bool,
 }
 
-/// Why a filter was chosen.
+/// Reason for the choice of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FilterReason {
-    /// It was asked for.
+    /// Choice by a file or an option.
     Given,
-    /// The truth is that of the linear model.
+    /// Truth of the linear model.
     LinearTruth,
-    /// The small-angle model holds for the truth.
+    /// Validity of the small-angle model at the truth.
     Valid,
-    /// It does not.
+    /// Invalidity of the small-angle model at the truth.
     NotValid,
 }
 
-/// What a run says of one unknown.
+/// Outcome of a run for one unknown or combination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Sigma is at or below what is required.
+    /// Reached: sigma is at or below the requirement.
     Reached,
-    /// Sigma fell, but not to what is required.
+    /// Converging: sigma fell, but not to the requirement.
     Converging,
-    /// Sigma fell; nothing is required of it.
+    /// Determined: sigma fell; nothing is required of it.
     Determined,
-    /// The samples determine it, but sigma is (nearly) that of the prior.
+    /// Determined by the samples, but sigma is (nearly) that of the prior.
     RestsOnPrior,
-    /// The samples do not determine it: whatever sigma says, it comes of the prior.
+    /// Not determined by the samples: sigma comes from the prior alone.
     PriorOnly,
-    /// The verdict, which is about small angles, has it undetermined; a filter with full attitudes learns of it through large
-    /// ones.
+    /// Not determined for small angles; a filter with full attitudes learns of it through large ones.
     LargeAnglesOnly,
-    /// The error is beyond four sigma: the filter is wrong about it.
+    /// Inconsistent: the error is beyond four sigma, so the filter is wrong.
     Inconsistent,
-    /// The error or sigma is no number.
+    /// Error or sigma that is not a finite number.
     NoNumber,
 }
 

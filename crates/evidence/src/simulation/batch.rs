@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
+use obsdeg_exact::interrupt;
 
 use super::conditions::is_rate;
 use super::plan::Plan;
@@ -60,6 +61,7 @@ pub(crate) fn each_row(
     let mut scratch = Vec::new();
     for stage in &plan.stages {
         for _ in 0..stage.steps {
+            interrupt::check();
             for column in to_now.as_mut_slice().chunks_exact_mut(states) {
                 stage.transition.apply(column, &mut scratch);
             }

@@ -10,21 +10,21 @@ use super::error::SimulationError;
 use super::limits::MAX_UNKNOWNS;
 use crate::requirements::{Requirements, Worst};
 
-/// A scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which
-/// only inertial carry has, are left out.
+/// Scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only
+/// inertial carry has, are left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OtherCarry {
-    /// Carry: what of psi goes on between positions.
+    /// Carry: quantity that continues from one position to the next.
     pub carry: Carry,
-    /// The largest sigma of a drift coefficient in deg/h (per g); null where a coefficient is not observable,
-    /// or where nothing was judged.
+    /// Largest sigma of a drift coefficient in deg/h (per g); null if a coefficient is not observable, or if
+    /// nothing was judged.
     pub worst: Option<Worst>,
     /// True if the slews of the scheme are left out there, since only inertial carry has slews.
     #[serde(default)]
     pub without_slews: bool,
-    /// Outcome of the requirements; null where nothing was judged.
+    /// Outcome of the requirements; null if nothing was judged.
     pub requirements: Option<Requirements>,
-    /// The reason why nothing was judged; left out where it was.
+    /// Reason why nothing was judged; left out where something was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
 }

@@ -12,48 +12,49 @@ const STRICT: f64 = 0.999;
 /// Most lags of the autocorrelation.
 const LAGS: usize = 20;
 
-/// What speaks against a run.
+/// Statistical evidence against a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Doubt {
-    /// A statistic, an estimate or a sigma is no number.
+    /// Statistic, estimate or sigma that is not a finite number.
     NoNumber,
-    /// The mean NIS is outside its band of 99.9 %.
+    /// Mean NIS outside its acceptance band of 99.9 %.
     Nis,
-    /// The NEES is above the band of 99.9 %.
+    /// NEES above its acceptance band of 99.9 %.
     Nees,
-    /// An error is beyond four sigma.
+    /// Error beyond four sigma of the filter.
     Error,
-    /// The innovations are not white.
+    /// Innovations that are not white.
     Correlated,
 }
 
-/// Statistics of one run.
+/// Consistency statistics of one run: NIS, NEES, whiteness and errors.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Consistency {
-    /// Mean normalised innovation squared; its expectation is the number of outputs.
+    /// Mean normalised innovation squared (NIS), dimensionless; its expectation is the number of outputs.
     pub nis: f64,
-    /// The band of the mean NIS, 95 %.
+    /// Band of 95 % of the mean NIS, dimensionless.
     pub nis_band: (f64, f64),
-    /// The band of 99.9 %, in which it must be.
+    /// Acceptance band of 99.9 % of the mean NIS, dimensionless.
     pub nis_wide_band: (f64, f64),
-    /// Normalised estimation error squared at the end; its expectation is the number of states: unknowns, and the biases of the gyros where these
-    /// are states, but for the directions that are left out.
+    /// Normalised estimation error squared (NEES) at the end, dimensionless. Its expectation is the number of
+    /// states (unknowns, and gyro biases that are states) without the directions left out.
     pub nees: f64,
-    /// Directions that the NEES leaves out: known more than a million times better than the unknowns themselves, which a filter linearised at its
-    /// estimates believes but cannot know. None where the model is linear.
+    /// Number of directions that the NEES leaves out: a filter linearised at its estimates claims to know
+    /// them more than a million times better than the unknowns themselves. 0 for a linear model.
     pub unresolved_directions: usize,
-    /// Its band, 95 %.
+    /// Band of 95 % of the NEES, dimensionless.
     pub nees_band: (f64, f64),
-    /// The upper end of its band of 99.9 %, which it must not exceed. A small one says nothing: true values are given, not drawn.
+    /// Upper end of the acceptance band of 99.9 % of the NEES, dimensionless. A small NEES is no evidence:
+    /// true values are given, not drawn.
     pub nees_limit: f64,
     /// Probability that white noise has autocorrelations as large as the innovations', smallest over outputs.
     pub whiteness_probability: f64,
-    /// Unknowns whose error is beyond four sigma.
+    /// Unknowns with an error beyond four sigma.
     pub beyond: Vec<String>,
-    /// What speaks against the run.
+    /// Evidence against the run; empty if there is none.
     pub doubts: Vec<Doubt>,
-    /// Whether nothing does.
+    /// True if NIS, NEES, whiteness and errors all pass.
     pub consistent: bool,
 }
 

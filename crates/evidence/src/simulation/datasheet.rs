@@ -7,16 +7,17 @@ use serde::{Deserialize, Serialize};
 
 use super::error::SimulationError;
 
-/// The datasheet of the gyros X, Y, Z.
+/// Noise of the gyros X, Y, Z by their datasheet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GyroNoise {
-    /// Angle random walk in deg/sqrt(h).
+    /// Angle random walk of each gyro, in deg/sqrt(h).
     pub angle_random_walk_deg_sqrt_h: PerGyro,
-    /// Rate random walk in deg/h/sqrt(h).
+    /// Rate random walk of each gyro, in deg/h/sqrt(h).
     pub rate_random_walk_dph_sqrt_h: PerGyro,
-    /// Bias instability in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664 B.
+    /// Bias instability of each gyro, in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664
+    /// B.
     pub bias_instability_dph: PerGyro,
-    /// Correlation time in s of the Gauss-Markov process that stands for it.
+    /// Correlation time, in s, of the Gauss-Markov process that represents the bias instability.
     pub correlation_time_s: f64,
 }
 

@@ -22,6 +22,7 @@ use obsdeg_ekf::{
     Covariance, EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Stage, Transition,
     Update,
 };
+use obsdeg_exact::interrupt;
 
 use super::biases::{Bias, Sensor};
 use super::conditions::Conditions;
@@ -422,6 +423,7 @@ impl<'a> Extended<'a> {
         for (segment, s) in plan.segments.iter().enumerate() {
             let motion = self.motion(segment);
             for i in 0..s.steps {
+                interrupt::check();
                 filter.advance(&motion, i as f64 * s.dt, s.dt)?;
                 let mut whitened = Vec::new();
                 if !plan.stages[segment].outputs.is_empty() {

@@ -26,6 +26,7 @@ use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Scheme, ranges};
 use obsdeg_ekf::linear::last_covariance;
 use obsdeg_ekf::{Form, SquareRootInformation};
+use obsdeg_exact::interrupt;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -49,45 +50,48 @@ const WITHIN: f64 = 1.05;
 /// What gets there later than this part of the longest dwell still falls.
 const SETTLED: f64 = 0.25;
 
-/// How well coefficients can be known under random drift, however long the dwells.
+/// Noise floor: the least sigmas of coefficients under random drift, however long the dwells.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NoiseFloor {
-    /// Density of the random drift besides what the gyros have, in deg/sqrt(h).
+    /// Density of the random drift besides the noise of the gyros, in deg/sqrt(h).
     pub drift_noise_deg_sqrt_h: f64,
-    /// The gyros.
+    /// Noise of the gyros by their datasheet.
     pub gyro_noise: GyroNoise,
-    /// The shortest and the longest dwell looked at, in s: the mean of the positions, all in proportion.
+    /// Shortest and longest dwell that were examined, in s: the mean of the positions, all in proportion.
     pub dwells_s: [f64; 2],
-    /// Per coefficient.
+    /// Noise floor of each coefficient, in model order.
     pub coefficients: Vec<CoefficientFloor>,
 }
 
-/// The floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of the run.
+/// Noise floor of one coefficient, which is a constant: a drift coefficient D_F is the bias at the start of
+/// the run.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CoefficientFloor {
-    /// Its name.
+    /// Name of the coefficient, as in the model.
     pub name: String,
-    /// The unit of its sigmas.
+    /// Unit of the sigmas of the coefficient.
     pub unit: String,
-    /// Sigma with the dwells of the scheme, without prior; null when samples do not determine it.
+    /// Sigma with the dwells of the scheme, without prior, in the unit of `unit`; null if samples do not
+    /// determine it.
     pub sigma: Option<f64>,
-    /// The least sigma over all dwells looked at; null when samples do not determine it.
+    /// Least sigma over all dwells examined, in the unit of `unit`; null if samples do not determine it.
     pub least_sigma: Option<f64>,
-    /// Where it is reached; null when samples do not determine it.
+    /// Range of dwells in which the least sigma is reached; null if samples do not determine it.
     pub reached: Option<Reached>,
-    /// The shortest dwell (mean of the positions) in s at which sigma is within 5 % of the least, where this lies within the dwells looked at.
+    /// Shortest dwell, in s (mean of the positions), at which sigma is within 5 % of the least; null unless
+    /// it lies within the dwells examined.
     pub dwell_s: Option<f64>,
 }
 
-/// Where a sigma is within 5 % of the least.
+/// Range of dwells in which a sigma comes within 5 % of the least.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reached {
-    /// At the shortest dwell looked at already: shorter ones may do as well, or better.
+    /// Shortest dwell examined: shorter ones may give the same or a smaller sigma.
     AtTheShortest,
-    /// Within the dwells looked at.
+    /// Dwell between the shortest and a quarter of the longest examined.
     Within,
-    /// Beyond a quarter of the longest dwell: sigma still falls.
+    /// Dwell beyond a quarter of the longest examined: sigma still falls.
     StillFalls,
 }
 
@@ -106,8 +110,9 @@ pub fn noise_floor(
     let mean = mean_dwell(scheme, conditions);
     let factors = FACTORS.map(|k| 2f64.powf(f64::from(k) / 2.0));
     let factors: Vec<f64> = factors.filter(|f| *f == 1.0 || ranges::DWELL_S.admits(f * mean)).collect();
-    let curves: Vec<Vec<f64>> =
-        factors.par_iter().map(|&f| sigmas_without_prior(scheme, conditions, f)).collect::<Result<_, _>>()?;
+    let parts = interrupt::parts();
+    let curve = |&f: &f64| parts.part(|| sigmas_without_prior(scheme, conditions, f));
+    let curves: Vec<Vec<f64>> = factors.par_iter().map(curve).collect::<Result<_, _>>()?;
     let plan = Plan::new(scheme, conditions)?;
     let (names, units) = (plan.platform.names(), plan.platform.units());
     let of = |c: usize| {

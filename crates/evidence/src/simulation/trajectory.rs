@@ -1,6 +1,7 @@
 //! A run without noise, and the run linearised along it.
 
 use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage};
+use obsdeg_exact::interrupt;
 
 use super::extended::{Extended, PlatformMotion};
 use super::state::PlatformState;
@@ -26,6 +27,7 @@ impl Trajectory {
         for (segment, s) in filter.plan().segments.iter().enumerate() {
             let motion = filter.motion(segment);
             for i in 0..s.steps.min(most - out.states.len()) {
+                interrupt::check();
                 on_step(&motion, i as f64 * s.dt, s.dt, &mut x)?;
                 out.outputs.extend_from_slice(motion.h(0.0, &x).as_slice());
                 out.states.push(x.clone());

@@ -3,6 +3,7 @@
 use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::slew::{W_IE, apply, cross, rotation, rotation_vector, times, transpose};
 use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3};
+use obsdeg_exact::interrupt;
 
 use super::conditions::Conditions;
 use super::error::SimulationError;
@@ -103,6 +104,7 @@ impl<'a> TruthModel<'a> {
 
     /// One step of a segment; `z` is filled for a dwell (shape m). `step` counts within the segment.
     pub fn step(&mut self, segment: usize, step: usize, noise: &mut Noise, z: &mut [f64]) {
+        interrupt::check();
         if self.exact.is_some() {
             self.step_exact(segment, step, noise, z);
         } else {

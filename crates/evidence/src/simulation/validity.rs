@@ -7,20 +7,21 @@ use super::conditions::{Conditions, REQUIRED, is_rate, resolve, si_per_shown};
 use super::error::SimulationError;
 use super::plan::Plan;
 
-/// Whether the small-angle model holds for the drifts of a run.
+/// Validity of the small-angle model at the drifts of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Validity {
-    /// Largest `|psi|`, in deg.
+    /// Largest platform error `|psi|`, in deg.
     pub largest_psi_deg: f64,
-    /// Largest `|psi|^2/2`, in g: what the observation model (6) leaves out.
+    /// Largest `|psi|^2/2`, in g: the term that the observation model (6) neglects.
     pub neglected_g: f64,
-    /// Noise of the observation, in g.
+    /// Noise of the observation per sample, in g.
     pub accelerometer_noise_g: f64,
-    /// Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: what the drift model (3) leaves out.
+    /// Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: the term that the drift model (3)
+    /// neglects.
     pub neglected_dph: f64,
-    /// The smallest sigma required of a drift coefficient, in deg/h (per g).
+    /// Smallest sigma required of a drift coefficient, in deg/h (per g); null if none is required.
     pub smallest_requirement_dph: Option<f64>,
-    /// Whether both are small.
+    /// True if `neglected_g` is at most the noise and `neglected_dph` at most the smallest requirement.
     pub holds: bool,
 }
 

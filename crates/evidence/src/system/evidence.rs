@@ -40,63 +40,69 @@ const LEFT: f64 = 0.01;
 const SETTLED: usize = 4;
 const JITTER: f64 = 0.005;
 
-/// The evidence for one system.
+/// Cross-check of the verdicts on one system against the information of simulated samples.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemEvidence {
-    /// `obsdeg.system-evidence/1`.
+    /// Layout of this answer: `obsdeg.system-evidence/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The system.
+    /// Name of the system, as in its file.
     pub name: String,
-    /// Per unknown.
+    /// Evidence on each unknown, in model order.
     pub quantities: Vec<SystemQuantityEvidence>,
     /// Symmetries: the information along each, relative to the largest.
     pub symmetries: Vec<SymmetryEvidence>,
-    /// Unobservable directions: exact, and singular values that vanish.
+    /// Number of unobservable directions: exact, and singular values that vanish.
     pub defect: Count,
-    /// Checks that failed.
+    /// Number of checks that failed.
     pub failures: usize,
-    /// How many degrees were measured.
+    /// Coverage of the degrees by measured slopes.
     pub orders: Measured,
-    /// Checks that were made: what could not be measured, or not be resolved, is none.
+    /// Number of checks that agree or disagree, without those that are not resolvable or were skipped.
     pub checks: usize,
-    /// What was measured and is neither for nor against a verdict: an unknown that moves no output by more than rounding, or less than
-    /// a hundredth of its diffuse prior is learnt of it; singular values between what is seen and what is not.
+    /// Number of checks that neither support nor contradict a verdict: an unknown that affects the outputs by
+    /// no more than rounding, or whose diffuse prior shrinks by less than a hundredth; singular values
+    /// between observable and unobservable.
     pub not_resolvable: usize,
-    /// Whether none failed.
+    /// True if no check of the model failed.
     pub passed: bool,
-    /// The longest horizon, of every experiment, in the unit of the model.
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
+    /// equations nor the known inputs hold the time.
+    pub time: Option<f64>,
+    /// Longest horizon, of every experiment, in the unit of `t` in the model.
     pub duration: f64,
-    /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
+    /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
     pub error_bound: Option<f64>,
-    /// Of a model judged in real numbers: how clear its ranks were.
+    /// Margin of the rank decisions in real numbers; null for a model judged in prime fields.
     pub digits: Option<DigitsReport>,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// What the information says of one unknown.
+/// Evidence on one unknown of a system, by the information of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemQuantityEvidence {
-    /// The unknown.
+    /// Name of the unknown, as in the model.
     pub name: String,
-    /// The exact verdict.
+    /// Verdict on the unknown by the exact analysis.
     pub status: Status,
-    /// The degree.
+    /// Observable degree; null if the unknown is not observable.
     pub degree: Option<usize>,
-    /// Log-log slope of sigma against the horizon: -(degree + 1/2); measured null where it does not settle above rounding.
+    /// Log-log slope of sigma against the horizon: predicted -(degree + 1/2); measured null if it does not
+    /// settle above rounding.
     pub slope: Check,
-    /// Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 where not observable.
+    /// Factor on sigma at the full duration when the prior is ten times as loose: 1, or 10 for an
+    /// unobservable unknown.
     pub inflation: Check,
 }
 
-/// A symmetry against the information.
+/// Evidence on one symmetry, by the information of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SymmetryEvidence {
-    /// In words.
+    /// Symmetry in words, as in the analysis.
     pub words: String,
-    /// The information along it.
+    /// Information along the symmetry, relative to the largest: predicted 0.
     pub seen: Check,
 }
 
@@ -297,6 +303,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         checks: counts.agree + counts.disagree,
         not_resolvable: counts.not_resolvable,
         passed: counts.disagree == 0,
+        time: compiled.uses_time().then(|| model.time.number()),
         duration: setup.duration,
         error_bound: judged.error_bound(),
         digits: judged.digits(),

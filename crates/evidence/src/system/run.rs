@@ -8,6 +8,7 @@ use obsdeg_core::system::{
 };
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
+use obsdeg_exact::interrupt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -37,57 +38,60 @@ const DRAWS: usize = 64;
 /// rounding leave there.
 const RESOLUTION: f64 = 1e-6;
 
-/// A run of a system.
+/// Simulated run of a system with an extended Kalman filter.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemRun {
-    /// `obsdeg.system-run/1`.
+    /// Layout of this answer: `obsdeg.system-run/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The system.
+    /// Name of the system, as in its file.
     pub name: String,
-    /// Estimates at the end.
+    /// Estimates of the unknowns at the end of the run.
     pub quantities: Vec<SystemEstimate>,
-    /// Whether errors and innovations are what the filter believes.
+    /// Consistency of errors and innovations with the filter's covariances.
     pub consistency: Consistency,
-    /// How long every experiment ran, in the unit of the model.
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
+    /// equations nor the known inputs hold the time.
+    pub time: Option<f64>,
+    /// Duration of every experiment, in the unit of `t` in the model.
     pub duration: f64,
-    /// Between two samples.
+    /// Time between two samples, in the unit of `t` in the model.
     pub step: f64,
-    /// Standard deviation of the noise of a sample, by output.
+    /// Standard deviation of the noise of a sample, by output, in its unit.
     pub noise: Vec<(String, f64)>,
-    /// Of a model judged in prime fields: bound on the probability that a verdict is wrong.
+    /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
     pub error_bound: Option<f64>,
-    /// Of a model judged in real numbers: how clear its ranks were.
+    /// Margin of the rank decisions in real numbers; null for a model judged in prime fields.
     pub digits: Option<DigitsReport>,
     /// Seed of the noise and of the initial errors.
     pub seed: u64,
 }
 
-/// The estimate of one unknown at the end.
+/// Estimate of one unknown at the end of the run.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SystemEstimate {
-    /// Its name.
+    /// Name of the unknown, as in the model.
     pub name: String,
-    /// Its unit, as the file says.
+    /// Unit of the unknown, as in the model file.
     pub unit: String,
-    /// The exact verdict; null for a state whose start is known.
+    /// Verdict on the unknown; null for a state with a known initial value.
     pub status: Option<Status>,
-    /// The degree.
+    /// Observable degree; null if the unknown is not observable.
     pub degree: Option<usize>,
-    /// The truth.
+    /// True value of the unknown, in its unit.
     pub truth: f64,
-    /// The estimate.
+    /// Estimate of the unknown, in its unit.
     pub estimate: f64,
-    /// Estimate minus truth.
+    /// Estimate minus true value, in the unit of the unknown.
     pub error: f64,
-    /// What the filter believes of the error.
+    /// Standard deviation of the error by the filter, in the unit of the unknown.
     pub sigma: f64,
-    /// Error over sigma.
+    /// Error over sigma, dimensionless; about -3 to 3 for a consistent filter.
     pub error_over_sigma: f64,
-    /// Sigma at the start.
+    /// Standard deviation at the start of the run, in the unit of the unknown.
     pub prior_sigma: f64,
-    /// What came out; nothing is required.
+    /// Outcome for the unknown; requirements do not exist here.
     pub outcome: Outcome,
 }
 
@@ -303,6 +307,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         let process = numeric.process(part);
         let measurement = numeric.measurement(part, &sigmas);
         for k in 0..samples as usize {
+            interrupt::check();
             let t = begin + k as f64 * dt;
             truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?.x;
             filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
@@ -331,6 +336,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             name: model.name.clone(),
             quantities: estimates,
             consistency: consistency.map_err(stopped(duration))?,
+            time: compiled.uses_time().then(|| model.time.number()),
             duration,
             step: dt,
             noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),

@@ -223,6 +223,9 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             }
         }
         .into(),
+        Finding::Cells { column, .. } => format!(
+            "a look at column `{column}` of the record: codes of missing values are stated as `missing` under [record], an output that is stuck is no measurement"
+        ),
         Finding::Force { .. } => {
             "scales and zeros of the accelerometers among the unknowns (K1, K0 in `terms`), or the gravity of the place (--gravity, of forces in m/s^2)".into()
         }

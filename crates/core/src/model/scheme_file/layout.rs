@@ -19,17 +19,17 @@ pub(super) type Literal = Option<Spanned<toml::Value>>;
 /// Numbers by unknown or family.
 pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
 
-/// The layout of a scheme file. Angles and the latitude are read as exact decimals.
+/// Layout of a scheme file. Angles and the latitude are read as exact decimals.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SchemeFile {
-    /// What the scheme is called in a report; the name of the file when left out.
+    /// Name of the scheme in reports; the name of the file when left out.
     #[schemars(with = "Option<String>")]
     pub(super) name: Option<Spanned<String>>,
-    /// What it is for, where it comes from: a report says so.
+    /// Purpose and source of the scheme, printed in reports.
     #[schemars(with = "Option<String>")]
     pub(super) description: Option<Spanned<String>>,
-    /// platform (default), inertial or reset.
+    /// Carry between positions: platform (default), inertial or reset.
     #[schemars(with = "Option<Carry>")]
     pub(super) carry: Option<Spanned<String>>,
     /// Latitude in degrees; generic when left out.
@@ -38,19 +38,19 @@ pub struct SchemeFile {
     /// Unknown terms, for instance `["F", "I", "O", "S"]` or `["gyros", "K0"]`, or `"drift"`.
     #[schemars(with = "Option<Vec<TermEntry>>", extend("type" = ["array", "string", "null"]))]
     pub(super) terms: Literal,
-    /// Which sensors define the platform axes, and so which misalignments `gyros`, `accelerometers` and `all` among the terms have:
-    /// accelerometers (default; GM, M3), gyros (GM3, M6) or body (GM, M6).
+    /// Sensors that define the platform axes, and so the misalignments in `gyros`, `accelerometers` and `all`
+    /// among the terms: accelerometers (default; GM, M3), gyros (GM3, M6) or body (GM, M6).
     #[schemars(with = "Option<DefinedBy>")]
     pub(super) frame: Option<Spanned<String>>,
-    /// How the platform is turned from one position to the next, where a position does not say: one-axis (the
-    /// shortest way) or gimbals (alpha, beta, gamma one after another, within gimbal limits wherever both
-    /// ends are). Torquer errors (GS, GM, GM3) act on the way.
+    /// Slew path where a position states none: one-axis (the shortest turn) or gimbals (alpha, beta, gamma
+    /// one after another, within gimbal limits wherever both ends are). Torquer errors (GS, GM, GM3) act on
+    /// it.
     #[schemars(with = "Option<Path>")]
     pub(super) path: Option<Spanned<String>>,
-    /// Whether psi_y^n is measured too.
+    /// True if psi_y^n is measured too.
     #[serde(default)]
     pub(super) measured_azimuth: bool,
-    /// Axes of the gyros, the paper's when left out; and of the accelerometers, X_p, Y_p, Z_p when left out.
+    /// Axes of the gyros (the paper's when left out) and of the accelerometers (X_p, Y_p, Z_p when left out).
     #[schemars(with = "Option<Geometry>")]
     pub(super) geometry: Option<Spanned<Geometry>>,
     /// Linear combinations of unknowns to be judged, for instance `"D_IX - D_IY"`.
@@ -60,56 +60,59 @@ pub struct SchemeFile {
     /// Conditions of `obsdeg simulate` and `obsdeg crosscheck`.
     #[serde(default)]
     pub(super) simulation: SimulationEntry,
-    /// The largest sigma allowed by unknown or family, as in D_F = 0.02: deg for psi, deg/h for D_F, deg/h/g for the rest.
+    /// Largest sigma allowed, by unknown or family, as in D_F = 0.02: in deg for psi, in deg/h for D_F, in
+    /// deg/h/g for the rest.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::REQUIREMENT)))]
     pub(super) requirements: Numbers,
-    /// Gimbal limits; the gimbals turn freely when left out. Positions whose angles lie beyond are pointed
-    /// out with angles of the same attitude within.
+    /// Gimbal limits; free gimbals when left out. For positions beyond, the answer lists angles of the same
+    /// attitude within the limits.
     #[serde(default)]
     pub(super) gimbals: GimbalEntry,
-    /// How the records of `obsdeg calibrate` are read.
+    /// Reading of the records of `obsdeg calibrate`: columns, units and intervals at rest.
     #[schemars(with = "Option<SchemeRecord>")]
     pub(super) record: Option<Spanned<SchemeRecord>>,
-    /// The positions in order.
+    /// Positions of the scheme, in order of time.
     #[serde(default, rename = "position")]
     #[schemars(with = "Vec<PositionEntry>")]
     pub(super) positions: Vec<Spanned<PositionEntry>>,
 }
 
-/// The conditions of a run.
+/// Conditions of simulated and predicted runs.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SimulationEntry {
-    /// linear (default) or exact.
+    /// Model that generates the truth: linear (default) or exact.
     pub(super) truth: Option<Truth>,
-    /// linear, extended or iterated; when left out, linear where the small-angle model holds.
+    /// Filter: linear, extended or iterated; when left out, linear where the small-angle model holds.
     pub(super) filter: Option<FilterKind>,
     /// Largest step in s; 10 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::STEP_S.low, "maximum" = ranges::STEP_S.high))]
     pub(super) step_s: Option<Spanned<f64>>,
-    /// Dwell of positions without dwell_s; 1000 when left out.
+    /// Dwell, in s, of positions without dwell_s; 1000 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high))]
     pub(super) dwell_s: Option<Spanned<f64>>,
     /// Rate of the rotations between positions in deg/s; instantaneous when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
     pub(super) slew_rate_deg_s: Option<Spanned<f64>>,
-    /// Noise of the observation per sample in g; 1e-5 when left out.
+    /// Noise of the observation per sample, in g; 1e-5 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::NOISE_G.low, "maximum" = ranges::NOISE_G.high))]
     pub(super) accelerometer_noise_g: Option<Spanned<f64>>,
-    /// Bias instability of the accelerometers in ug (B of IEEE Std 952), a Gauss-Markov process of each; none when left out.
+    /// Bias instability of the accelerometers, in ug (B of IEEE Std 952), a Gauss-Markov process of each;
+    /// none when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::INSTABILITY_UG.low, "maximum" = ranges::INSTABILITY_UG.high))]
     pub(super) accelerometer_bias_instability_ug: Option<Spanned<f64>>,
-    /// Its correlation time in s; 3600 when left out.
+    /// Correlation time of the accelerometer bias instability, in s; 3600 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high))]
     pub(super) accelerometer_correlation_time_s: Option<Spanned<f64>>,
-    /// Noise of a measured azimuth per sample in deg; 0.001 when left out.
+    /// Noise of a measured azimuth per sample, in deg; 0.001 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::AZIMUTH_NOISE_DEG.low, "maximum" = ranges::AZIMUTH_NOISE_DEG.high))]
     pub(super) azimuth_noise_deg: Option<Spanned<f64>>,
-    /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
+    /// Random drift: "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
     #[schemars(with = "Option<String>", extend("pattern" = "deg */ *(h|sqrt\\(h\\))|^ *0+[.]?0* *$"))]
     pub(super) drift_noise: Option<Spanned<DriftNoise>>,
-    /// Angle random walk of the gyros in deg/sqrt(h), one for all or [X, Y, Z]; without drift_noise beside it, it is all the white drift there is.
+    /// Angle random walk of the gyros in deg/sqrt(h), one for all or [X, Y, Z]; all the white drift there is
+    /// if drift_noise is left out.
     #[schemars(with = "Option<PerGyroEntry>")]
     pub(super) angle_random_walk_deg_sqrt_h: Literal,
     /// Rate random walk of the gyros in deg/h/sqrt(h), one for all or [X, Y, Z].
@@ -121,42 +124,42 @@ pub(super) struct SimulationEntry {
     /// Correlation time of the bias instability in s; 3600 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high))]
     pub(super) correlation_time_s: Option<Spanned<f64>>,
-    /// exponential (default) or rk4.
+    /// Propagation of the filter: exponential (default) or rk4.
     pub(super) propagation: Option<Propagation>,
-    /// Factor on the true drift coefficients and their priors.
+    /// Factor on the true drift coefficients and their priors, dimensionless; 1 when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::DRIFT_SCALE.low, "maximum" = ranges::DRIFT_SCALE.high))]
     pub(super) drift_scale: Option<Spanned<f64>>,
-    /// True values by unknown or family, as in D_F = 11.
+    /// True values by unknown or family, as in D_F = 11, in the unit of the unknown.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::VALUE)))]
     pub(super) values: Numbers,
-    /// Initial estimates.
+    /// Initial estimates by unknown or family, in the unit of the unknown.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::VALUE)))]
     pub(super) estimates: Numbers,
-    /// Initial standard deviations.
+    /// Initial standard deviations by unknown or family, in the unit of the unknown.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::PRIOR)))]
     pub(super) priors: Numbers,
 }
 
-/// One position: `angles_deg` or `attitude`.
+/// Position of the scheme, by `angles_deg` or `attitude`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PositionEntry {
-    /// Name in solutions; p1, p2, ... when left out.
+    /// Name of the position in solutions; p1, p2, ... when left out.
     #[schemars(with = "Option<String>")]
     pub(super) name: Option<Spanned<String>>,
     /// Euler angles alpha, beta, gamma in degrees; a string names a generic angle.
     #[schemars(with = "Option<Vec<f64>>", extend("items" = angle(), "minItems" = 3, "maxItems" = 3))]
     pub(super) angles_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
-    /// How long the position lasts, in seconds.
+    /// Dwell at the position, in s; dwell_s of the simulation when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high))]
     pub(super) dwell_s: Literal,
-    /// Makes the position a rotating segment that starts there; dwell_s is how long it turns.
+    /// Rotation that starts at this position; dwell_s is its duration.
     #[schemars(with = "Option<RotationEntry>")]
     pub(super) rotation: Option<Spanned<RotationEntry>>,
-    /// The way from the position before, with psi^n carried; Z is not used meanwhile.
+    /// Slew from the position before, with psi^n carried; Z is not used meanwhile.
     #[schemars(with = "Option<SlewEntry>")]
     pub(super) slew: Option<Spanned<SlewEntry>>,
     /// Directions of X_p, Y_p, Z_p out of N S U D E W, as in "NUE".
@@ -164,39 +167,41 @@ pub(super) struct PositionEntry {
     pub(super) attitude: Option<Spanned<String>>,
 }
 
-/// A rotation at a constant rate.
+/// Rotation of the platform at a constant rate.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RotationEntry {
-    /// X_p, Y_p, Z_p (platform) or N, U, E (geographic).
+    /// Axis of the rotation: X_p, Y_p, Z_p (platform) or N, U, E (geographic).
     #[schemars(with = "String", extend("enum" = AXES))]
     pub(super) about: Spanned<String>,
-    /// The whole angle in degrees, right-handed. Two of angle_deg, rate_deg_s and the position's dwell_s say all; angle_deg alone
-    /// goes with the dwell of the conditions.
+    /// Total angle of the rotation in degrees, right-handed. Two of angle_deg, rate_deg_s and the position's
+    /// dwell_s determine the rotation; angle_deg alone takes the dwell of the conditions.
     #[schemars(with = "Option<f64>")]
     pub(super) angle_deg: Literal,
-    /// The rate in deg/s, right-handed.
+    /// Rate of the rotation in deg/s, right-handed.
     #[schemars(with = "Option<f64>")]
     pub(super) rate_deg_s: Literal,
 }
 
-/// A turn to a position at a constant rate.
+/// Turn to a position at a constant rate.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SlewEntry {
-    /// The rate in deg/s; slew_rate_deg_s of the simulation when left out.
+    /// Rate of the turn in deg/s; slew_rate_deg_s of the simulation when left out.
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
     pub(super) rate_deg_s: Option<Spanned<f64>>,
-    /// X_p, Y_p, Z_p (platform), N, U, E (geographic), or a direction [North, Up, East] such as [1, 1, 0]. When left out: the shortest way,
-    /// half turns about the direction whose first component that is not zero is positive.
+    /// Axis of the turn: X_p, Y_p, Z_p (platform), N, U, E (geographic), or a direction [North, Up, East]
+    /// such as [1, 1, 0]. When left out: the shortest turn; a half turn goes about the direction whose first
+    /// non-zero component is positive.
     #[schemars(with = "Option<AboutEntry>")]
     pub(super) about: Literal,
-    /// The whole angle about that axis in degrees, right-handed; the shorter way when left out, half turns right-handed.
+    /// Total angle about that axis in degrees, right-handed; the shorter turn when left out, half turns
+    /// right-handed.
     #[schemars(with = "Option<f64>")]
     pub(super) angle_deg: Literal,
 }
 
-/// A noise of all gyros, or of X, Y, Z.
+/// Noise of all gyros, or of X, Y, Z, in the unit of the key.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[allow(dead_code, reason = "says what a file may hold")]
@@ -205,7 +210,7 @@ enum PerGyroEntry {
     Each(#[schemars(extend("items" = none_or(ranges::GYRO_NOISE)))] [f64; 3]),
 }
 
-/// A term, or a family of them.
+/// Term of the error model, or family of terms.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[allow(dead_code, reason = "says what a file may hold")]
@@ -214,7 +219,7 @@ enum TermEntry {
     Family(#[schemars(extend("enum" = ["gyros", "accelerometers", "all"]))] String),
 }
 
-/// An axis by its name, or a direction in n.
+/// Axis by its name, or a direction in n (dimensionless, of any length above 0).
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[allow(dead_code, reason = "says what a file may hold")]

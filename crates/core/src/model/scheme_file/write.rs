@@ -114,6 +114,14 @@ fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
 }
 
 fn recording(out: &mut String, r: &Recording) {
+    let mut own = String::new();
+    if let Some(part) = r.tolerance {
+        line(&mut own, "tolerance", &number(part));
+    }
+    if !r.missing.is_empty() {
+        line(&mut own, "missing", &list(r.missing.iter().map(|x| number(*x))));
+    }
+    table(out, "record", &own);
     for (name, texts) in [("record.columns", &r.columns), ("record.units", &r.units)] {
         let mut lines = String::new();
         texts.iter().for_each(|(key, text)| line(&mut lines, &quoted(key), &quoted(text)));
@@ -303,6 +311,8 @@ mod tests {
                 columns: texts(),
                 units: if mirrored { texts() } else { [].into() },
                 still: mirrored.then_some(still),
+                tolerance: mirrored.then_some(0.25),
+                missing: if mirrored { vec![-9999.0, 0.0, 1e-7] } else { vec![] },
                 ..Recording::default()
             };
             let limits = limit.map(|(low, high)| [low * 1_234_567_891, high * 1_000_000_000]);

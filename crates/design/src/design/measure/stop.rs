@@ -3,12 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A position of a sequence: which candidate, and which way there.
+/// Position of a sequence: the candidate, and the slew path to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct Stop {
-    /// The candidate.
+    /// Index of the candidate, from 0.
     pub candidate: usize,
-    /// A half turn to it goes the other way round than `Slew::to` says.
+    /// True if a half turn to the position goes the other way round than by default: about the axis whose
+    /// first non-zero component is negative.
     pub reversed: bool,
 }
 

@@ -51,47 +51,49 @@ pub struct WalkOptions {
     pub seed: u64,
 }
 
-/// The fewest positions of a walk.
+/// Shortest slew sequence that makes every required coefficient observable.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Walks {
-    /// `obsdeg.walks/1`.
+    /// Layout of this answer: `obsdeg.walks/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// Unknown besides psi.
+    /// Terms of the error model that are unknown besides psi.
     pub terms: String,
-    /// The attitudes to choose from.
+    /// Candidate attitudes of the search.
     pub candidates: Vec<String>,
-    /// The largest turn from one position to the next, in degrees: by one axis, the shortest way.
+    /// Largest turn from one position to the next, in degrees, about one axis by the shortest path.
     pub most_turn_deg: f64,
-    /// Turns between candidates that are not larger.
+    /// Number of turns between candidates up to this size.
     pub turns: usize,
     /// Coefficients that must be observable.
     pub required: Vec<String>,
-    /// The fewest positions that were found; null when no walk does.
+    /// Number of positions of the shortest slew sequence that was found; null if none was.
     pub positions: Option<usize>,
-    /// A walk that does.
+    /// Slew sequence that makes all required coefficients observable: its candidates, in order; empty if none
+    /// was found.
     pub walk: Vec<String>,
-    /// Its Euler angles in degrees.
+    /// Euler angles of its positions, in degrees.
     pub angles: Vec<String>,
-    /// Its rank, and the number of unknowns.
+    /// Rank of the slew sequence, then the number of unknowns.
     pub rank: [usize; 2],
-    /// The latitude in degrees; null when generic.
+    /// Latitude of the scheme in degrees; null when generic.
     pub latitude_deg: Option<f64>,
-    /// Coefficients that even the tour of all turns leaves unobservable; no walk is sought then.
+    /// Coefficients that even the tour of all turns leaves unobservable; then no slew sequence is searched.
     pub never: Vec<String>,
-    /// No fewer can do: the required coefficients over the rows of a position, rounded up.
+    /// Number of positions below which no slew sequence is enough: the required coefficients over the rows of
+    /// a position, rounded up.
     pub counting_bound: usize,
-    /// The most independent rows that a position adds.
+    /// Largest number of independent rows that a position adds.
     pub rows_per_position: usize,
-    /// `[positions, walks]`: none of these does, by exhaustion.
+    /// Slew sequences excluded by exhaustion: `[positions, number of sequences]`, none of which is enough.
     pub none_of: Vec<[u64; 2]>,
-    /// Whether `positions` is the fewest of these candidates and turns: nothing smaller was left out, and the bound on the probability of an
-    /// error is below 1e-12.
+    /// True if `positions` is proven minimal for these candidates and turns: no shorter sequence was left
+    /// out, and the bound on the probability of an error is below 1e-12.
     pub proven: bool,
-    /// Whether the search was interrupted.
+    /// True if the search was interrupted.
     pub interrupted: bool,
-    /// Bound on the probability that a walk that does was overlooked.
+    /// Bound on the probability that a sufficient slew sequence was overlooked.
     pub error_bound: f64,
     /// Seed of all random choices.
     pub seed: u64,

@@ -24,36 +24,37 @@ pub const PART_SCHEMA: &str = "obsdeg.part/1";
 /// Starts that are searched at once: an interrupted part goes on behind the last that are all done.
 const CHUNK: usize = 16;
 
-/// One part of an exhaustive search, done or interrupted.
+/// Part of an exhaustive search, done or interrupted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Part {
-    /// `obsdeg.part/1`.
+    /// Layout of this answer: `obsdeg.part/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
     /// SHA-256 of all inputs: the parts of one search have the same.
     pub digest: String,
-    /// The inputs by name, as the library writes them: which differ, where digests do.
+    /// Inputs of the search by name, as the library writes them; they show the difference if digests differ.
     pub inputs: BTreeMap<String, String>,
     /// Options and files of the command that wrote it, as the JSON text that the command reads: its merge
-    /// needs no others; null where no command did.
+    /// needs no others; null if no command did.
     pub asked: Option<String>,
-    /// Which part, counted from 1, of how many.
+    /// Index of the part, from 1, then the number of parts.
     pub part: [usize; 2],
-    /// The starts that are its own, counted from 0: the first, the one behind the last, and how many there are in all.
+    /// Starts of the part: index of the first, index behind the last (both from 0), and the number of all
+    /// starts.
     pub starts: [usize; 3],
-    /// What was found, by worst degree, smallest first (under reset carry all degrees together).
+    /// Sequences found, by worst degree, smallest first (under reset carry all degrees together).
     pub levels: Vec<Level>,
-    /// Whether all of its starts were searched, at as many worst degrees as the whole may need.
+    /// True if all of its starts were searched, at as many worst degrees as the whole may need.
     pub complete: bool,
 }
 
-/// What was found among the sequences of one worst degree.
+/// Sequences found with one worst degree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Level {
-    /// The first start that is not yet searched.
+    /// Index of the first start that is not yet searched.
     pub next: usize,
-    /// What was examined, found, and the front.
+    /// Best sequences, the front and the counts at this worst degree.
     pub best: Best,
 }
 

@@ -6,23 +6,23 @@ use serde::{Deserialize, Serialize};
 use crate::design::search::score::{Scored, Worth, before};
 use crate::design::search::ties::{TIE, Ties};
 
-/// The best sequences, best first, and the front of time against the criterion.
+/// Best sequences, best first, and the front of time against the criterion.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Best {
-    /// At most as many as are kept.
+    /// Best sequences that were found, best first, up to the number to keep.
     pub found: Vec<Scored>,
     /// Sequences of the smallest worst degree that none of these beats in both time and criterion, by time.
     pub front: Vec<Scored>,
-    /// Those that are as good as the best.
+    /// Number of sequences as good as the best, by criterion.
     pub ties: Ties,
-    /// Whether everything was searched.
+    /// True if the search was complete.
     pub complete: bool,
-    /// Sequences whose sigma was computed.
+    /// Number of sequences whose sigma was computed.
     pub examined: u64,
-    /// Sequences, observable or not, that a bound left out: they are worse than those kept.
+    /// Number of sequences, observable or not, that a bound excluded: they are worse than those kept.
     pub excluded: u64,
-    /// Of those examined, observable ones (by the exact verdict, of repositioning at once) whose samples do not determine what
-    /// is required, as far as double precision tells.
+    /// Number of examined sequences that are observable (by the exact verdict, of repositioning at once) but
+    /// whose samples do not determine the required coefficients in double precision.
     pub lost: u64,
 }
 

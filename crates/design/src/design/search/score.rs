@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::design::measure::stop::Stop;
 
-/// What a sequence is worth, better first: constraints kept, then a small worst degree, then a small criterion.
+/// Score of a sequence, better first: constraints kept, then a small worst degree, then a small criterion.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
 pub struct Worth {
-    /// How far time limits, requirements and degree caps are missed; 0 when kept.
+    /// Violation of time limits, requirements and degree caps, dimensionless; 0 when kept.
     pub violation: f64,
-    /// The largest degree of a required coefficient.
+    /// Largest observable degree of a required coefficient.
     pub degree: usize,
-    /// The criterion.
+    /// Criterion of the sequence, in the unit of the criterion asked for.
     pub value: f64,
 }
 
@@ -37,14 +37,14 @@ impl Worth {
     }
 }
 
-/// A sequence with its worth.
+/// Sequence of candidates with its score.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scored {
-    /// What it is worth.
+    /// Score: constraints, worst degree and criterion.
     pub worth: Worth,
-    /// Dwells and turns, in s.
+    /// Total time of dwells and turns, in s.
     pub seconds: f64,
-    /// The candidates in order, with the ways there.
+    /// Candidates of the sequence, in order, with the slew paths to them.
     pub sequence: Vec<Stop>,
 }
 

@@ -10,23 +10,25 @@ use crate::design::search::score::Worth;
 /// Sequences tie when their worst degrees are equal and their criteria differ by less than this part.
 pub(crate) const TIE: f64 = 1e-6;
 
-/// The sequences near the best so far: how many there are of each criterion.
+/// Sequences near the best so far, counted by criterion.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "Counted", into = "Counted")]
 #[schemars(with = "Counted")]
 pub struct Ties {
-    /// The smallest worst degree.
+    /// Smallest worst degree of the sequences.
     degree: usize,
-    /// By the bits of the criterion, which order positive numbers, and the searched images of a sequence.
+    /// Number of sequences by the bits of the criterion, which order positive numbers, and the searched
+    /// images of a sequence.
     counts: BTreeMap<(u64, usize), u64>,
 }
 
-/// The same as a list.
+/// Sequences near the best so far, counted by criterion, as a list.
 #[derive(Serialize, Deserialize, JsonSchema)]
 struct Counted {
-    /// The smallest worst degree.
+    /// Smallest worst degree of the sequences.
     degree: usize,
-    /// Criterion, searched images of a sequence, how many there are.
+    /// Criterion (in the unit of the criterion asked for), number of searched images of a sequence, number of
+    /// sequences.
     counts: Vec<(f64, usize, u64)>,
 }
 

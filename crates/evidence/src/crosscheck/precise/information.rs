@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::digits::{Digits, Real, Vector};
 use super::model::{LOCAL, Model, Moments};
+use super::seen::Functional;
 
 /// What becomes of psi between the start of one position and that of the next, besides the carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,16 +22,25 @@ struct Local {
 }
 
 /// The information of all samples on the unknowns at the start.
-pub(super) struct Information {
+pub(in super::super) struct Information {
     pub(super) digits: Digits,
     /// Its matrix (n x n), symmetric.
     pub(super) matrix: Vec<Vector>,
-    /// psi of the end in the carried axes as functionals of the unknowns at the start, where psi is handed
-    /// on.
-    pub(super) psi_at_end: Option<[Vector; 3]>,
+    /// psi of the end in the carried axes as functionals of the unknowns at the start: one for each unknown psi,
+    /// which is that of the end of the run, with reset carry of the end of its own position.
+    pub(super) psi_at_end: Vec<Functional>,
 }
 
 impl Information {
+    /// Of the samples of a filter: at the ends of equal steps, as many as `samples` says of each position, over
+    /// dwells of which the first is `dwell / w_ie`, with noise of these standard deviations, of Z and of a
+    /// measured azimuth.
+    pub(in super::super) fn of_filter(model: &Model, dwell: f64, samples: &[usize], noise: [f64; 2]) -> Self {
+        let d = model.digits;
+        let weights = noise.map(|s| d.double(1.0 / (s * s)));
+        Self::new(model, &model.moments(dwell, samples, &weights), Between::Dwell)
+    }
+
     /// Of the samples `moments`, one for each position.
     pub(super) fn new(model: &Model, moments: &[Arc<Moments>], between: Between) -> Self {
         let (d, reset) = (model.digits, model.reset);
@@ -41,6 +51,7 @@ impl Information {
         // psi in the carried axes, as functionals of psi at the start and the coefficients
         let mut psi: [Vector; 3] = std::array::from_fn(unit);
         let mut matrix = vec![vec![d.int(0); n]; n];
+        let mut psi_at_end = Vec::new();
         for (i, (to_n, drift)) in model.carried.iter().zip(&model.drifts).enumerate() {
             if reset {
                 psi = std::array::from_fn(unit);
@@ -61,7 +72,7 @@ impl Information {
             });
             let local = Local { columns, rows };
             local.add(d, &moments[i].gram, &mut matrix);
-            if between == Between::Dwell && !reset {
+            if between == Between::Dwell {
                 let moved = &moments[i].end;
                 let after: [Vector; 3] = std::array::from_fn(|r| {
                     // what the dwell makes of torqued psi^n, less that itself: no digits of it are left where
@@ -82,8 +93,15 @@ impl Information {
                         .collect()
                 });
             }
+            if !reset {
+                psi_at_end.clear();
+            }
+            psi_at_end.extend(psi.iter().map(|row| -> Functional {
+                let entries = local.columns.iter().copied().zip(row.iter().cloned());
+                entries.filter(|(_, x)| !x.is_zero()).collect()
+            }));
         }
-        Self { digits: d, matrix, psi_at_end: (!reset).then_some(psi) }
+        Self { digits: d, matrix, psi_at_end }
     }
 }
 

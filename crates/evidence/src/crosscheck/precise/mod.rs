@@ -12,7 +12,7 @@ mod posterior;
 mod seen;
 
 pub(super) use digits::{Digits, add_up, double};
-pub(super) use information::Between;
+pub(super) use information::{Between, Information};
 pub(super) use model::Model;
 pub(super) use posterior::Posterior;
 pub(super) use seen::{Functional, Seen};
@@ -21,8 +21,10 @@ use std::sync::{Arc, OnceLock};
 
 use obsdeg_core::model::Scheme;
 
-use information::Information;
 use model::Moments;
+
+/// Samples of Z in a position: more than any derivative that a solution needs.
+const SAMPLES: usize = 6;
 
 /// A scheme in so many bits, with samples over dwells.
 struct Sampled {
@@ -51,7 +53,11 @@ impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
     pub(super) fn seen(&self, digits: usize, between: Between) -> Option<Vec<Seen>> {
         let sampled = self.taken[digits].get_or_init(|| {
             let model = Model::new(self.scheme, Digits { bits: self.bits[digits] })?;
-            let moments = self.dwells.iter().map(|&dwell| model.moments(dwell, 1.0)).collect();
+            let samples = vec![SAMPLES; self.scheme.positions.len()];
+            // of noise of one density: shorter steps have larger noise
+            let weights = |dwell: f64| std::array::from_fn(|_| model.digits.double(dwell));
+            let of = |&dwell: &f64| model.moments(dwell, &samples, &weights(dwell));
+            let moments = self.dwells.iter().map(of).collect();
             Some(Sampled { model, moments })
         });
         let Sampled { model, moments } = sampled.as_ref()?;

@@ -7,8 +7,6 @@ use obsdeg_exact::SplitMix64;
 
 use super::digits::{Constants, Digits, ROUNDING, Real, Vector, log2};
 
-/// Samples of Z in a position: more than any derivative that a solution needs.
-const SAMPLES: i64 = 6;
 /// Of the digits of a sum in turns, the part that is never lost: what is smaller is the rest of what cancels.
 const CANCELLED: f64 = 0.75;
 
@@ -46,6 +44,9 @@ pub(in super::super) struct Model {
     turning: [Vector; 3],
     outputs: Vec<Output>,
 }
+
+/// Weight of a sample of Z, and of a measured azimuth: one over the variance of its noise.
+pub(super) type Weights = [Real; 2];
 
 /// Samples over the dwell of one position.
 pub(super) struct Moments {
@@ -361,48 +362,98 @@ impl Model {
         sum
     }
 
-    /// Samples over the dwell of each position, the first of `dwell / w_ie`, at a density of noise of one;
-    /// `azimuth` is the weight of a measured azimuth beside Z. Equal dwells share them.
-    pub(super) fn moments(&self, dwell: f64, azimuth: f64) -> Vec<Arc<Moments>> {
+    /// Samples at the ends of equal steps over the dwell of each position, the first of `dwell / w_ie`: as many
+    /// as `samples` says of a position, of these weights ([`Weights`]). Equal dwells share them.
+    pub(super) fn moments(&self, dwell: f64, samples: &[usize], weights: &Weights) -> Vec<Arc<Moments>> {
         let d = self.digits;
         let mut out: Vec<Arc<Moments>> = Vec::new();
-        for (i, ratio) in self.ratios.iter().enumerate() {
-            let known = self.ratios[..i].iter().position(|r| r == ratio).map(|j| out[j].clone());
-            let new = || Arc::new(self.of_dwell(&d.mul(ratio, &d.double(dwell)), azimuth));
+        for (i, (ratio, &count)) in self.ratios.iter().zip(samples).enumerate() {
+            let same = |j: usize| self.ratios[j] == *ratio && samples[j] == count;
+            let known = (0..i).find(|&j| same(j)).map(|j| out[j].clone());
+            let new = || Arc::new(self.of_dwell(&d.mul(ratio, &d.double(dwell)), count, weights));
             out.push(known.unwrap_or_else(new));
         }
         out
     }
 
-    fn of_dwell(&self, dwell: &Real, azimuth: f64) -> Moments {
+    /// `sum_k F^k^T G F^k` for k = 1 to `count`, by doubling, with the step `F` and the information `G` of a
+    /// sample.
+    fn of_dwell(&self, dwell: &Real, count: usize, weights: &Weights) -> Moments {
         let d = self.digits;
-        let step = d.div(dwell, &d.int(SAMPLES));
-        let mut gram = vec![vec![d.int(0); LOCAL]; LOCAL];
-        let mut moved: [Vector; 3] = std::array::from_fn(|_| Vec::new());
-        for k in 1..=SAMPLES {
-            moved = self.moved(&d.mul(&step, &d.int(k)));
-            for output in &self.outputs {
-                let mut row = vec![d.int(0); LOCAL];
-                if let Some((psi, negative)) = output.psi {
-                    for (x, y) in row.iter_mut().zip(&moved[psi]) {
-                        *x = if negative { y.neg() } else { y.clone() };
-                    }
-                }
-                if let Some(k) = output.error {
-                    row[6 + k] = d.int(1);
-                }
-                let weight = if output.azimuth { &d.mul(&step, &d.double(azimuth)) } else { &step };
-                for i in (0..LOCAL).filter(|&i| !row[i].is_zero()) {
-                    let weighted = d.mul(weight, &row[i]);
-                    for j in (i..LOCAL).filter(|&j| !row[j].is_zero()) {
-                        gram[i][j] = d.add(&gram[i][j], &d.mul(&weighted, &row[j]));
-                    }
+        let sample = self.sample(weights);
+        let step = self.moved(&d.div(dwell, &d.int(count as i64)));
+        let (mut gram, mut end) = (congruent(d, &sample, &step), step.clone());
+        // the bits of the count behind the first
+        for bit in (0..count.max(1).ilog2()).rev() {
+            gram = sum(d, &gram, &congruent(d, &gram, &end));
+            end = composed(d, &end, &end);
+            if count >> bit & 1 == 1 {
+                gram = congruent(d, &sum(d, &gram, &sample), &step);
+                end = composed(d, &step, &end);
+            }
+        }
+        Moments { gram, end }
+    }
+
+    /// The information of one sample on the local unknowns at its time (9 x 9).
+    fn sample(&self, weights: &Weights) -> Vec<Vector> {
+        let d = self.digits;
+        let mut out = vec![vec![d.int(0); LOCAL]; LOCAL];
+        for output in &self.outputs {
+            let weight = &weights[usize::from(output.azimuth)];
+            let psi = output.psi.map(|(i, negative)| (i, d.int(if negative { -1 } else { 1 })));
+            let row: Vec<(usize, Real)> =
+                psi.into_iter().chain(output.error.map(|k| (6 + k, d.int(1)))).collect();
+            for (i, x) in &row {
+                for (j, y) in &row {
+                    out[*i][*j] = d.add(&out[*i][*j], &d.mul(weight, &d.mul(x, y)));
                 }
             }
         }
-        for (i, j) in (0..LOCAL).flat_map(|i| (0..i).map(move |j| (i, j))) {
-            gram[i][j] = gram[j][i].clone();
-        }
-        Moments { gram, end: moved }
+        out
     }
+}
+
+/// The sum of two matrices.
+fn sum(d: Digits, a: &[Vector], b: &[Vector]) -> Vec<Vector> {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(x, y)| d.add(x, y)).collect()).collect()
+}
+
+/// `F^T G F` of a symmetric `G` (9 x 9); `F` moves psi (3 x 6) and leaves eps and a.
+fn congruent(d: Digits, g: &[Vector], f: &[Vector; 3]) -> Vec<Vector> {
+    let column = |k: usize| f.iter().map(move |row| &row[k]);
+    // row by row: G F, whose columns from 3 on have those of G besides
+    let right: Vec<Vector> = (0..LOCAL)
+        .map(|i| {
+            let entry = |k: usize| match k {
+                0..3 => d.dot(g[i].iter().zip(column(k))),
+                3..6 => d.add(&g[i][k], &d.dot(g[i].iter().zip(column(k)))),
+                _ => g[i][k].clone(),
+            };
+            (0..LOCAL).map(entry).collect()
+        })
+        .collect();
+    let mut out = vec![vec![d.int(0); LOCAL]; LOCAL];
+    for (i, k) in (0..LOCAL).flat_map(|i| (i..LOCAL).map(move |k| (i, k))) {
+        let own = || right.iter().map(|row| &row[k]);
+        let x = match i {
+            0..3 => d.dot(own().zip(column(i))),
+            3..6 => d.add(&right[i][k], &d.dot(own().zip(column(i)))),
+            _ => right[i][k].clone(),
+        };
+        out[k][i] = x.clone();
+        out[i][k] = x;
+    }
+    out
+}
+
+/// What moves psi by `first`, then by `after` (3 x 6).
+fn composed(d: Digits, after: &[Vector; 3], first: &[Vector; 3]) -> [Vector; 3] {
+    std::array::from_fn(|r| {
+        let entry = |k: usize| {
+            let moved = d.dot(after[r].iter().zip(first.iter().map(|row| &row[k])));
+            if k < 3 { moved } else { d.add(&moved, &after[r][k]) }
+        };
+        (0..6).map(entry).collect()
+    })
 }

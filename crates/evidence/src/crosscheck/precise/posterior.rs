@@ -1,8 +1,7 @@
 //! What a filter's covariance is in many digits.
 
 use super::digits::{Digits, ROUNDING, Vector, double};
-use super::information::{Between, Information};
-use super::model::Model;
+use super::information::Information;
 use super::seen::{Functional, at_start};
 
 /// The covariance at the end, by its inverse: samples and prior.
@@ -12,25 +11,22 @@ pub(in super::super) struct Posterior {
     prior: Vector,
     /// Lower triangular `L` (n x n), whose rows grow: `L L^T` is the information in units of the prior.
     factor: Vec<Vector>,
-    psi_at_end: Option<[Vector; 3]>,
+    psi_at_end: Vec<Functional>,
 }
 
 impl Posterior {
-    /// Of samples of `model` over a first dwell of `dwell / w_ie` and a prior (standard deviations in rad and
-    /// in w_ie). `noise` is that of Z per root of density and that of a measured azimuth. `None` when
-    /// rounding leaves no information.
-    pub(in super::super) fn new(model: &Model, dwell: f64, prior: &[f64], noise: [f64; 2]) -> Option<Self> {
-        let d = model.digits;
-        let moments = model.moments(dwell, (noise[0] / noise[1]).powi(2));
-        let Information { matrix, psi_at_end, .. } = Information::new(model, &moments, Between::Dwell);
+    /// Of the information of samples and a prior (standard deviations in rad and in w_ie). `None` when rounding
+    /// leaves no information.
+    pub(in super::super) fn new(information: &Information, prior: &[f64]) -> Option<Self> {
+        let Information { digits: d, matrix, psi_at_end } = information;
+        let d = *d;
         let prior: Vector = prior.iter().map(|p| d.double(*p)).collect();
-        let density = d.double(noise[0].powi(2));
         let n = prior.len();
         let mut factor: Vec<Vector> = Vec::with_capacity(n);
         for i in 0..n {
             let mut row: Vector = Vec::with_capacity(i + 1);
             for j in 0..=i {
-                let scaled = d.div(&d.mul(&d.mul(&prior[i], &prior[j]), &matrix[i][j]), &density);
+                let scaled = d.mul(&d.mul(&prior[i], &prior[j]), &matrix[i][j]);
                 let own = if i == j { d.add(&scaled, &d.int(1)) } else { scaled };
                 let above = factor.get(j).unwrap_or(&row);
                 let rest = d.sub(&own, &d.dot(row.iter().zip(above).take(j)));
@@ -41,14 +37,14 @@ impl Posterior {
             }
             factor.push(row);
         }
-        Some(Self { digits: d, prior, factor, psi_at_end })
+        Some(Self { digits: d, prior, factor, psi_at_end: psi_at_end.clone() })
     }
 
     /// `L^-1 c` of a functional of psi at the end and the coefficients, in units of the prior: its square is the variance.
     fn solved(&self, functional: &Functional) -> Vector {
         let d = self.digits;
         let mut c = vec![d.int(0); self.prior.len()];
-        for (i, x) in at_start(d, self.psi_at_end.as_ref(), functional) {
+        for (i, x) in at_start(d, &self.psi_at_end, functional) {
             c[i] = d.add(&c[i], &d.mul(&x, &self.prior[i]));
         }
         let mut out: Vector = Vec::with_capacity(c.len());

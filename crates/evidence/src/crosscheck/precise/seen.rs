@@ -28,7 +28,7 @@ pub(in super::super) struct Seen {
     pub(in super::super) excited: Vec<bool>,
     /// Binary logarithms of the diagonal of N.
     own: Vec<f64>,
-    psi_at_end: Option<[Vector; 3]>,
+    psi_at_end: Vec<Functional>,
 }
 
 impl Information {
@@ -86,12 +86,13 @@ impl Information {
 pub(in super::super) type Functional = Vec<(usize, Real)>;
 
 /// A functional of psi at the end and the coefficients as one of the unknowns at the start; `psi` is psi of
-/// the end, where it is handed on.
-pub(super) fn at_start(d: Digits, psi: Option<&[Vector; 3]>, functional: &Functional) -> Functional {
-    let Some(psi) = psi else { return functional.clone() };
-    let moved = functional.iter().filter(|(c, _)| *c < 3);
-    let moved = moved.flat_map(|(c, x)| psi[*c].iter().enumerate().map(move |(k, y)| (k, d.mul(x, y))));
-    moved.chain(functional.iter().filter(|(c, _)| *c >= 3).cloned()).filter(|(_, x)| !x.is_zero()).collect()
+/// the end.
+pub(super) fn at_start(d: Digits, psi: &[Functional], functional: &Functional) -> Functional {
+    let moved = functional.iter().flat_map(|(c, x)| match psi.get(*c) {
+        Some(psi) => psi.iter().map(|(k, y)| (*k, d.mul(x, y))).collect(),
+        None => vec![(*c, x.clone())],
+    });
+    moved.filter(|(_, x)| !x.is_zero()).collect()
 }
 
 impl Seen {
@@ -150,7 +151,7 @@ impl Seen {
 
     /// A functional of psi at the end and the coefficients as one of the unknowns at the start.
     pub(in super::super) fn at_start(&self, functional: &Functional) -> Functional {
-        at_start(self.digits, self.psi_at_end.as_ref(), functional)
+        at_start(self.digits, &self.psi_at_end, functional)
     }
 
     /// Unknowns that are excited and no pivots.

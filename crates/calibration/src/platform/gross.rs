@@ -1,0 +1,251 @@
+//! Cells of a record that cannot be: a robust pass over every position before anything is estimated.
+//!
+//! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row that is
+//! furthest from the cubic of all others is left out, and the cubic is fitted again, until none is far.
+//! Scatter is that of third differences, which neither a slow turn nor single rows move. Values that repeat
+//! to the last digit, and are far from their neighbours, are codes of missing values.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Length of a window that is fitted by one cubic, in s; the fewest rows of a window follow.
+const WINDOW_S: f64 = 1000.0;
+const FEWEST: usize = 16;
+/// Distance from the cubic at which a row is gross, in standard deviations.
+const GROSS: f64 = 8.0;
+/// Least distance of a code of missing values from its neighbours, in standard deviations.
+const CODE: f64 = 20.0;
+/// Largest fraction of a window that may be gross.
+const MOST: f64 = 0.3;
+/// Least scatter, as a fraction of the stated noise.
+const LEAST: f64 = 0.1;
+/// Number of neighbouring rows on either side.
+const BESIDE: usize = 2;
+/// Least distance of a code from its neighbours, in usual differences between rows.
+const STEPS: f64 = 10.0;
+/// Number of equal rows in succession that are stuck, where values seldom repeat.
+const STUCK: usize = 4;
+
+/// Row of a record, or the median of a dense bin of rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Row {
+    /// First and last line.
+    pub lines: (u64, u64),
+    /// Time of the row, in s of the record's clock.
+    pub t: f64,
+    /// Values of the three columns, in their unit; NaN for an empty cell.
+    pub values: [f64; 3],
+    /// Index of the bin within its position.
+    pub bin: usize,
+}
+
+/// Reason to leave a cell out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Why {
+    /// Far from the cubic of the rows around it.
+    Far,
+    /// Code of missing values: far from its neighbours, and equal to other cells to the last digit.
+    Code,
+    /// Stuck output: equal to the rows before it to the last digit.
+    Stuck,
+}
+
+/// Cell that is left out.
+#[derive(Debug, Clone)]
+pub(crate) struct Cell {
+    /// First and last line.
+    pub lines: (u64, u64),
+    pub t: f64,
+    /// Index of the column, 0 to 2.
+    pub axis: usize,
+    /// Value of the cell, in the unit of its column.
+    pub value: f64,
+    /// Distance from the expected value, in standard deviations.
+    pub sigmas: f64,
+    pub why: Why,
+}
+
+/// The median of some numbers; zero of none.
+pub(crate) fn median(mut of: Vec<f64>) -> f64 {
+    let middle = of.len() / 2;
+    if of.is_empty() { 0.0 } else { *of.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// The standard deviation of a sample by third differences.
+fn scatter(values: &[f64]) -> f64 {
+    let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+    1.4826 * median(values.windows(4).map(third).collect()) / 20f64.sqrt()
+}
+
+/// Distance of the value of row `i` from its nearest neighbours; equal values are skipped.
+fn beside(values: &[f64], i: usize) -> f64 {
+    let other = |x: &&f64| **x != values[i];
+    let left = values[..i].iter().rev().filter(other).take(BESIDE);
+    let right = values[i + 1..].iter().filter(other).take(BESIDE);
+    let off = left.chain(right).map(|x| values[i] - x);
+    off.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+}
+
+/// The cells of a window whose values are gross: index, sigmas and why. `noise` is about the standard
+/// deviation of a row.
+fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
+    let n = values.len();
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let count = |x: f64| sorted.partition_point(|y| *y <= x) - sorted.partition_point(|y| *y < x);
+    let steps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
+    // a converter with steps above the noise
+    let step = if 2 * steps.len() < n { steps.iter().copied().fold(f64::INFINITY, f64::min) } else { 0.0 };
+    let s = scatter(values).max(LEAST * noise).max(if step.is_finite() { step } else { 0.0 });
+    let mut out: Vec<(usize, f64, Why)> = Vec::new();
+    let far = (CODE * s).max(STEPS * median(values.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
+    for (i, &x) in values.iter().enumerate() {
+        let off = beside(values, i);
+        if (x == 0.0 || count(x) > 1) && off.abs() > far {
+            out.push((i, off / s, Why::Code));
+        }
+    }
+    // values that hardly ever repeat, and then do many times in a row
+    for run in values.chunk_by(|a, b| a == b).scan(0, |at, run| {
+        *at += run.len();
+        Some(*at - run.len()..*at)
+    }) {
+        let seldom = 2 * steps.len() > n - run.len();
+        if run.len() >= STUCK && seldom && out.iter().all(|o| !run.contains(&o.0)) {
+            out.extend((run.start + 1..run.end).map(|i| (i, 0.0, Why::Stuck)));
+        }
+    }
+    let (from, to) = (t[0], t[n - 1]);
+    let x = |t: f64| if to > from { (2.0 * t - from - to) / (to - from) } else { 0.0 };
+    let mut kept: Vec<usize> = (0..n).filter(|i| out.iter().all(|o| o.0 != *i)).collect();
+    while kept.len() >= FEWEST / 2 && (out.len() as f64) < MOST * n as f64 {
+        let a = DMatrix::from_fn(kept.len(), 4, |i, j| x(t[kept[i]]).powi(j as i32));
+        let y = DVector::from_fn(kept.len(), |i, _| values[kept[i]]);
+        let q = a.qr().q();
+        let left = &y - &q * (q.transpose() * &y);
+        // what all others leave of a row
+        let alone = |i: usize| {
+            let free = (1.0 - q.row(i).norm_squared()).max(1e-6);
+            (i, left[i] / free.sqrt() / s)
+        };
+        let furthest = (0..kept.len()).map(alone).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let Some((i, sigmas)) = furthest.filter(|f| f.1.abs() > GROSS) else { break };
+        out.push((kept.remove(i), sigmas, Why::Far));
+    }
+    // so much is no matter of single cells
+    if out.len() as f64 >= MOST * n as f64 {
+        out.retain(|o| o.2 == Why::Code)
+    }
+    out
+}
+
+/// The gross cells of the rows of a position; `noise` is about the standard deviation of a sample.
+pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
+    let mut out = Vec::new();
+    let mut from = 0;
+    while from < rows.len() {
+        let long = |to: usize| to - from >= FEWEST && rows[to - 1].t - rows[from].t >= WINDOW_S;
+        let mut to = (from + 1..=rows.len()).find(|&to| long(to)).unwrap_or(rows.len());
+        if rows.len() - to < FEWEST {
+            to = rows.len();
+        }
+        let own = &rows[from..to];
+        for axis in 0..3 {
+            let there: Vec<&Row> = own.iter().filter(|r| r.values[axis].is_finite()).collect();
+            if there.len() < FEWEST / 2 {
+                continue;
+            }
+            let (t, values): (Vec<f64>, Vec<f64>) = there.iter().map(|r| (r.t, r.values[axis])).unzip();
+            out.extend(window(&t, &values, noise).into_iter().map(|(i, sigmas, why)| Cell {
+                lines: there[i].lines,
+                t: there[i].t,
+                axis,
+                value: values[i],
+                sigmas,
+                why,
+            }));
+        }
+        from = to;
+    }
+    // a run of equal values that a window ends in
+    let stuck: Vec<(usize, f64)> =
+        out.iter().filter(|c| c.why == Why::Stuck).map(|c| (c.axis, c.value)).collect();
+    for cell in out.iter_mut().filter(|c| c.why == Why::Far && stuck.contains(&(c.axis, c.value))) {
+        (cell.why, cell.sigmas) = (Why::Stuck, 0.0);
+    }
+    out.sort_by_key(|c| (c.lines, c.axis));
+    out
+}
+
+/// Largest change of the length of the force during a turn, in g; the least angle of a turn, in deg, follows.
+const LONG: f64 = 1e-3;
+const TURNS_DEG: f64 = 1.0;
+
+/// Keeps rows at the beginning and the end of a position whose force is as long as usual, and elsewhere:
+/// there the platform turns.
+pub(crate) fn keep_turns(rows: &[Row], found: &mut Vec<Cell>) {
+    let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let is_found = |r: &Row| found.iter().any(|c| c.lines == r.lines && c.why == Why::Far);
+    let good: Vec<&Row> = rows.iter().filter(|r| !is_found(r)).collect();
+    let (Some(first), Some(last)) = (good.first(), good.last()) else { return };
+    let turns = |r: &Row, beside: &Row| {
+        let dot: f64 = r.values.iter().zip(&beside.values).map(|(a, b)| a * b).sum();
+        let (own, usual) = (length(&r.values), length(&beside.values));
+        let turned = (dot / (own * usual)).clamp(-1.0, 1.0).acos().to_degrees();
+        is_found(r) && (own - usual).abs() < LONG && turned > TURNS_DEG
+    };
+    let begin = rows.iter().take_while(|r| turns(r, first)).map(|r| r.lines);
+    let end = rows.iter().rev().take_while(|r| turns(r, last)).map(|r| r.lines);
+    let kept: Vec<(u64, u64)> = begin.chain(end).collect();
+    found.retain(|c| !kept.contains(&c.lines));
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_evidence::simulation::Noise;
+
+    use super::*;
+
+    /// A platform that drifts by thirteen degrees an hour about its second axis, with noise of 1e-5.
+    fn rows(seed: u64) -> Vec<Row> {
+        let mut noise = Noise::new(seed, 0);
+        let of = |i: usize| {
+            let t = 10.0 * i as f64;
+            let angle = 0.3 + 6.3e-5 * t;
+            let values = [angle.cos(), 0.2, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
+            Row { lines: (i as u64 + 2, i as u64 + 2), t, values, bin: i }
+        };
+        (0..250).map(of).collect()
+    }
+
+    #[test]
+    fn what_is_gross_is_found_and_no_more() {
+        for seed in 0..20 {
+            let right = rows(seed);
+            assert!(cells(&right, 1e-5).is_empty(), "{:?}", cells(&right, 1e-5));
+            let mut spoiled = right.clone();
+            spoiled[0].values[0] += 0.1;
+            spoiled[60].values[2] -= 2e-4;
+            spoiled[130].values[1] = -9999.0;
+            (160..172).for_each(|i| spoiled[i].values[0] = 0.0);
+            let held = spoiled[200].values[2];
+            (200..206).for_each(|i| spoiled[i].values[2] = held);
+            let found = cells(&spoiled, 1e-5);
+            let mut expected: Vec<(u64, usize, Why)> =
+                vec![(2, 0, Why::Far), (62, 2, Why::Far), (132, 1, Why::Far)];
+            expected.extend((162..174).map(|line| (line, 0, Why::Code)));
+            expected.extend((203..208).map(|line| (line, 2, Why::Stuck)));
+            let found: Vec<_> = found.iter().map(|c| (c.lines.0, c.axis, c.why)).collect();
+            assert_eq!(found, expected, "{seed}");
+        }
+    }
+
+    /// Values in steps of a converter repeat, and are no codes.
+    #[test]
+    fn steps_of_a_converter_are_right() {
+        for quantum in [1e-6, 2e-5, 1e-4] {
+            let mut all = rows(3);
+            all.iter_mut().for_each(|r| r.values = r.values.map(|x| (x / quantum).round() * quantum));
+            assert!(cells(&all, 1e-5).is_empty(), "{quantum}: {:?}", cells(&all, 1e-5));
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! How records are read, before anything is estimated.
+
+use obsdeg_core::model::Scheme;
+use obsdeg_evidence::simulation::{Conditions, Plan};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::gross::Why;
+use super::observe::{Reading, observe};
+use super::{CalibrationError, Options, run};
+use crate::Going;
+use crate::answer::{EmptyCells, Gap, PositionsBy};
+use crate::record::Record;
+
+/// Reading of records, as `calibrate --dry-run` shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RecordsRead {
+    /// `obsdeg.records/1`.
+    pub schema: String,
+    /// Version of the program.
+    pub version: String,
+    /// The records, in the order in which they are given.
+    pub records: Vec<RecordRead>,
+}
+
+/// Reading of one record.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RecordRead {
+    /// Name of the record.
+    pub record: String,
+    /// Separator of columns and decimal mark; null for commas and points, and for Parquet.
+    pub written: Option<String>,
+    /// Columns that are used.
+    pub columns: Vec<ColumnRead>,
+    /// Headers of the columns that are not used.
+    pub ignored: Vec<String>,
+    /// Number of rows.
+    pub samples: usize,
+    /// Number of rows at no position of the scheme.
+    pub unused: usize,
+    /// Usual interval between rows, in s.
+    pub interval_s: f64,
+    /// First and last time, in s as they are in the record.
+    pub span_s: (f64, f64),
+    /// What says where each sample was taken.
+    pub positions_by: PositionsBy,
+    /// Time of the record, in s, that is 0 of the timeline: the start of the scheme, or of its first row at a position where only rows say when positions begin.
+    pub origin_s: f64,
+    /// Earliest and latest such time, in s, where the labels leave it open; `calibrate` estimates it.
+    pub origin_open_s: Option<(f64, f64)>,
+    /// Positions of the scheme.
+    pub positions: Vec<PositionRead>,
+    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between.
+    pub gaps: Vec<Gap>,
+    /// Number of empty cells at positions, by column.
+    pub empty_cells: Vec<EmptyCells>,
+    /// Cells that are left out.
+    pub left_out: Vec<CellRead>,
+    /// Mean length of the specific force, in g; null where the record has none.
+    pub force_g: Option<f64>,
+    /// Largest angle between the gimbals and the attitudes of the scheme, in deg; null where the record has no gimbal angles.
+    pub gimbals_deg: Option<f64>,
+}
+
+/// A column that is used.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ColumnRead {
+    /// The header, as it is written.
+    pub column: String,
+    /// Factor from the unit of the column to s, g, g s (increments of velocity), rad or degC.
+    pub factor: f64,
+}
+
+/// A position of a record.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PositionRead {
+    /// Name of the position.
+    pub position: String,
+    /// Time of its first row, in s as it is in the record.
+    pub from_s: f64,
+    /// Time of its last row, in s as it is in the record.
+    pub to_s: f64,
+    /// Number of bins that its rows are taken together in.
+    pub bins: usize,
+    /// Length of the specific force, in g, a median; null where the record has none.
+    pub force_g: Option<f64>,
+}
+
+/// A cell that is left out.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CellRead {
+    /// First and last line; more than one where a dense bin is left out as a whole.
+    pub lines: (u64, u64),
+    /// The header of its column.
+    pub column: String,
+    /// Its value, as it is written.
+    pub value: f64,
+    /// Reason to leave it out: `far` from the rows beside it, a `code` of missing values, `stuck`.
+    pub why: &'static str,
+}
+
+/// Reads records as [`super::calibrate`] does, and estimates nothing.
+///
+/// # Errors
+/// [`CalibrationError`].
+pub fn read_records(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    records: Vec<Record>,
+    options: &Options,
+    going: &dyn Fn(Going<'_>) -> bool,
+) -> Result<RecordsRead, CalibrationError> {
+    if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
+        return Err(CalibrationError::Rotates { position: p.name.clone() });
+    }
+    let own = run::conditions(conditions);
+    let plan = Plan::new(scheme, &own)?;
+    let sigmas: Vec<f64> = plan.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
+    let read = |record| {
+        let reading = observe(record, &plan, options.gravity_m_s2, conditions.step_s, sigmas.clone(), going)?;
+        Ok(of(&reading, scheme))
+    };
+    let records = records.into_iter().map(read).collect::<Result<_, CalibrationError>>()?;
+    Ok(RecordsRead { schema: "obsdeg.records/1".into(), version: env!("CARGO_PKG_VERSION").into(), records })
+}
+
+fn of(r: &Reading, scheme: &Scheme) -> RecordRead {
+    let position = |(p, stay): (usize, &(f64, f64))| PositionRead {
+        position: scheme.positions[p].name.clone(),
+        from_s: r.origin + stay.0,
+        to_s: r.origin + stay.1,
+        bins: r.bins[p].len(),
+        force_g: r.lengths[p].map(|l| l.length),
+    };
+    let cell = |(cell, column): &(super::gross::Cell, String)| CellRead {
+        lines: cell.lines,
+        column: column.clone(),
+        value: cell.value,
+        why: match cell.why {
+            Why::Far => "far",
+            Why::Code => "code",
+            Why::Stuck => "stuck",
+        },
+    };
+    let column = |(column, factor): &(String, f64)| ColumnRead { column: column.clone(), factor: *factor };
+    RecordRead {
+        record: r.name.clone(),
+        written: r.written.clone(),
+        columns: r.columns.iter().map(column).collect(),
+        ignored: r.ignored.clone(),
+        samples: r.samples,
+        unused: r.unused,
+        interval_s: r.interval,
+        span_s: r.span,
+        positions_by: r.by.into(),
+        origin_s: r.origin,
+        origin_open_s: r.open,
+        positions: r.stays.iter().enumerate().map(position).collect(),
+        gaps: r.gaps(scheme),
+        empty_cells: r.empty_cells(),
+        left_out: r.cells.iter().map(cell).collect(),
+        force_g: r.force,
+        gimbals_deg: r.gimbals,
+    }
+}

@@ -1,0 +1,209 @@
+//! The clock of a record beside the timeline of its scheme: when the scheme begins by that clock, and where
+//! rows are missing.
+//!
+//! A row labelled with a position lies inside it. So the first and the last row of every position bound the
+//! moment at which the scheme begins. Where these bounds hold zero, the clock of the record is that of the
+//! scheme.
+
+use obsdeg_evidence::simulation::{Plan, Segment, SegmentKind};
+
+use super::clock::bounds;
+
+/// An interval between rows that is longer than so many usual ones is a gap.
+const GAP: f64 = 3.0;
+/// Most gaps that are kept.
+const MOST: usize = 1000;
+/// Smallest difference of times, in s: below it they are equal but for rounding.
+const ROUNDING_S: f64 = 1e-9;
+/// Largest rate of a clock that is tried, as a part.
+const FASTEST: f64 = 0.1;
+
+/// The moments of a record's clock at which its scheme may begin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Begin {
+    /// The one that is taken, in s.
+    pub at: f64,
+    /// The earliest and the latest, in s; `None` where the one that is taken is that of the scheme's own
+    /// clock.
+    pub open: Option<(f64, f64)>,
+}
+
+/// Bounds of the beginning where positions last `1 + rate` times as long as in the scheme.
+fn window(stays: &[(f64, f64)], bounds: &[(f64, f64)], rate: f64) -> (f64, f64) {
+    let each = || stays.iter().zip(bounds);
+    let from = each().map(|(stay, own)| stay.1 - (1.0 + rate) * own.1).fold(f64::NEG_INFINITY, f64::max);
+    let to = each().map(|(stay, own)| stay.0 - (1.0 + rate) * own.0).fold(f64::INFINITY, f64::min);
+    (from, to)
+}
+
+/// When the scheme begins by the clock of a record whose positions have their first and last rows at `stays`
+/// (s): all of these lie inside the positions of the timeline, but for `tolerance` s. `None` where no
+/// beginning makes them.
+pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option<Begin> {
+    let (from, to) = window(stays, &bounds(plan), 0.0);
+    let tolerance = tolerance.max(ROUNDING_S);
+    if from - to > 2.0 * tolerance {
+        return None;
+    }
+    let (from, to) = if from <= to { (from, to) } else { ((from + to) / 2.0, (from + to) / 2.0) };
+    let nearest = 0.0_f64.clamp(from, to);
+    let at = if nearest.abs() <= ROUNDING_S { 0.0 } else { nearest };
+    let open = (at.abs() > tolerance && to - from > tolerance).then_some((from, to));
+    // rows of a position that are all there leave one interval open: its middle is as likely as any
+    Some(Begin { at: open.map_or(at, |(from, to)| (from + to) / 2.0), open })
+}
+
+/// The rate, as a part, by which positions last longer than in the scheme so that all rows lie inside them:
+/// the middle of the rates that do.
+fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f64> {
+    let beyond = |rate: f64| {
+        let (from, to) = window(stays, bounds, rate);
+        from - to - 2.0 * tolerance
+    };
+    // convex in the rate
+    let (mut low, mut high) = (-FASTEST, FASTEST);
+    for _ in 0..100 {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if beyond(a) < beyond(b) { high = b } else { low = a }
+    }
+    let best = (low + high) / 2.0;
+    let end = |mut outside: f64| {
+        let mut inside = best;
+        for _ in 0..60 {
+            let middle = (inside + outside) / 2.0;
+            if beyond(middle) <= 0.0 { inside = middle } else { outside = middle }
+        }
+        inside
+    };
+    (beyond(best) <= 0.0).then(|| (end(-FASTEST) + end(FASTEST)) / 2.0)
+}
+
+/// Duration of the slew to each position, in s.
+pub(crate) fn slews(plan: &Plan) -> Vec<f64> {
+    let of = |p: usize| {
+        let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
+        plan.segments.iter().filter(slew).map(|s| s.dt * s.steps as f64).sum()
+    };
+    (0..plan.attitudes.len()).map(of).collect()
+}
+
+/// The ends of positions that were held otherwise than in the scheme: the last row of each or, where rows are
+/// missing behind it, so many intervals later as a common rate has it;
+/// `after` has the next row of any kind.
+pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interval: f64, tolerance: f64) {
+    let (own, slews) = (bounds(plan), slews(plan));
+    let Some(rate) = rate(stays, &own, tolerance) else { return };
+    let (from, to) = window(stays, &own, rate);
+    for p in 0..stays.len() {
+        let Some(next) = stays.get(p + 1) else { break };
+        let room = (next.0 - slews[p + 1]).min(after[p]) - stays[p].1;
+        let by = (1.0 + rate) * own[p].1 + (from + to) / 2.0 - stays[p].1;
+        // the next row is no longer at the position
+        let most = ((room / interval - 0.5).floor()).max(0.0);
+        stays[p].1 += (by / interval).floor().clamp(0.0, most) * interval;
+    }
+}
+
+/// An interval without rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gap {
+    /// The rows before and after it, in s of the record's clock.
+    pub from: f64,
+    pub to: f64,
+    /// The line of the row after it.
+    pub line: u64,
+    /// The positions of these rows.
+    pub between: [Option<usize>; 2],
+}
+
+/// Intervals between the rows of a record.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Intervals {
+    /// The first ones, until the usual one is known.
+    first: Vec<Gap>,
+    usual: Option<f64>,
+    last: Option<(f64, Option<usize>)>,
+    found: Vec<Gap>,
+}
+
+/// Number of intervals from which the usual interval is taken.
+const FIRST: usize = 101;
+
+impl Intervals {
+    /// Takes a row.
+    pub(crate) fn push(&mut self, t: f64, line: u64, position: Option<usize>) {
+        if let Some((from, before)) = self.last.replace((t, position)) {
+            let gap = Gap { from, to: t, line, between: [before, position] };
+            match self.usual {
+                Some(usual) => self.keep(gap, usual),
+                None => {
+                    self.first.push(gap);
+                    if self.first.len() == FIRST {
+                        self.end();
+                    }
+                }
+            }
+        }
+    }
+
+    fn keep(&mut self, gap: Gap, usual: f64) {
+        if gap.to - gap.from > GAP * usual && self.found.len() < MOST {
+            self.found.push(gap);
+        }
+    }
+
+    /// The record is over, or its usual interval is known.
+    fn end(&mut self) {
+        let mut all: Vec<f64> = self.first.iter().map(|g| g.to - g.from).collect();
+        let middle = all.len() / 2;
+        let usual = if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        self.usual = Some(usual);
+        for gap in std::mem::take(&mut self.first) {
+            self.keep(gap, usual);
+        }
+    }
+
+    /// The usual interval in s, one second of a single row; and the gaps: of those over a slew what of them
+    /// is longer than it.
+    pub(crate) fn finish(mut self, plan: &Plan) -> (f64, Vec<Gap>) {
+        if self.usual.is_none() {
+            self.end();
+        }
+        let usual = self.usual.unwrap_or(1.0);
+        let slews = slews(plan);
+        let slew = |g: &Gap| match g.between {
+            [Some(p), Some(q)] if q > p => (p + 1..=q).map(|k| slews[k]).sum(),
+            _ => 0.0,
+        };
+        self.found.retain(|g| g.to - g.from - slew(g) > GAP * usual);
+        (usual, self.found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_and_rates() {
+        let own = [(0.0, 100.0), (110.0, 210.0), (220.0, 320.0)];
+        let stays = [(1003.0, 1100.0), (1113.0, 1209.0), (1223.0, 1320.0)];
+        assert_eq!(window(&stays, &own, 0.0), (1000.0, 1003.0));
+        let slow = stays.map(|(a, b)| (0.98 * a, 0.98 * b));
+        let found = rate(&slow, &own, 0.0).expect("a rate");
+        assert!(
+            (found + 0.02).abs() < 0.01 && rate(&[(0.0, 10.0), (400.0, 450.0)], &own[..2], 0.0).is_none()
+        );
+    }
+
+    #[test]
+    fn gaps_are_found_when_the_usual_interval_is_known() {
+        let mut of = Intervals::default();
+        for k in (0..300).filter(|k| !(40..44).contains(k) && !(200..203).contains(k) && *k != 250) {
+            of.push(f64::from(k) / 2.0, k as u64 + 2, None);
+        }
+        assert_eq!(of.usual, Some(0.5));
+        let found: Vec<(f64, u64)> = of.found.iter().map(|g| (g.from, g.line)).collect();
+        assert_eq!(found, [(19.5, 46), (99.5, 205)]);
+    }
+}

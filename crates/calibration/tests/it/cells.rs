@@ -1,0 +1,96 @@
+//! Cells that cannot be: each is named by row and column, and the estimate is that of the others.
+
+use obsdeg_calibration::answer::{CellKind, Finding};
+use obsdeg_calibration::{Calibration, CalibrationError};
+
+use crate::round_trip::{errors, of_csv, six, with_recording};
+use crate::simulator::{Bench, Sample, csv};
+
+fn bench() -> Bench {
+    Bench { seed: 31, slew_deg_s: Some(2.0), ..six() }
+}
+
+fn is_near(bench: &Bench, c: &Calibration, what: &str) {
+    for (name, sigmas) in errors(bench, c) {
+        assert!(sigmas.abs() < 3.5, "{what}: {name} by {sigmas} sigma, {:?}", c.findings);
+    }
+}
+
+/// The first row of a position, one in its middle and one at its end.
+fn places(samples: &[Sample]) -> [usize; 3] {
+    let of = |label: &str| samples.iter().position(|s| s.label == label).expect("there");
+    [of("p2"), of("p3") + 40, of("p5") - 30]
+}
+
+#[test]
+fn a_gross_cell_is_named_and_left_out() {
+    for step_s in [10.0, 2.0, 0.5] {
+        let bench = Bench { step_s, ..bench() };
+        let samples = bench.record();
+        let middle = samples.iter().position(|s| s.label == "p4").expect("there") + 50;
+        for (axis, column) in ["fx [g]", "fy [g]", "fz [g]"].into_iter().enumerate() {
+            for (k, what) in
+                [(middle, 0.1), (middle, f64::NAN), (middle, -9999.0), (places(&samples)[0], 0.1)]
+            {
+                let mut own = samples.clone();
+                own[k].f[axis] = match what {
+                    0.1 => own[k].f[axis] + 0.1,
+                    what if what.is_nan() => 0.0,
+                    what => what,
+                };
+                let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+                is_near(&bench, &c, &format!("{step_s} s, {column}, {what}"));
+                let line = k as u64 + 2;
+                let outlier = c.outliers.iter().any(|o| o.lines == (line, line) && o.channel == column);
+                let code = c.findings.iter().any(|f| {
+                    matches!(f,
+                    Finding::Cells { column: found, lines, .. } if *lines == (line, line) && found == column)
+                });
+                assert!(outlier || code, "{step_s} s, {column}, {what}: {:?} {:?}", c.outliers, c.findings);
+                // about the line of a dense bin some samples are far by chance
+                assert!(step_s < 1.0 || c.outliers.len() < 4, "{:?}", c.outliers);
+            }
+        }
+    }
+}
+
+/// Codes of missing values are asked about; where the file states them they are empty cells, which are
+/// counted as NaN are.
+#[test]
+fn codes_are_asked_about() {
+    let bench = bench();
+    let samples = bench.record();
+    let from = samples.iter().position(|s| s.label == "p3").expect("there") + 20;
+    for code in [-9999.0, 0.0] {
+        let mut own = samples.clone();
+        (from..from + 12).for_each(|k| own[k].f[1] = code);
+        let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+        is_near(&bench, &c, "a code");
+        let [Finding::Cells { column, kind_of_cells: CellKind::Code, value, count: 12, lines, .. }] =
+            &c.findings[..]
+        else {
+            panic!("{:?}", c.findings)
+        };
+        assert_eq!((column.as_str(), *value, *lines), ("fy [g]", code, (from as u64 + 2, from as u64 + 13)));
+        let recording = obsdeg_core::model::Recording { missing: vec![code], ..Default::default() };
+        let stated = with_recording(&bench, recording, csv(&own)).expect("calibrated");
+        assert!(stated.consistent, "{:?}", stated.findings);
+        is_near(&bench, &stated, "stated");
+        let [empty] = &stated.records[0].empty_cells[..] else { panic!("{:?}", stated.records) };
+        assert_eq!((empty.column.as_str(), empty.count), ("fy [g]", 12));
+        // as if these cells were empty
+        let blank = csv(&own).replace(&format!(",{code},"), ",,");
+        let blank = of_csv(&bench, "F,I,O,S", blank).expect("calibrated");
+        assert_eq!(
+            (&blank.quantities, &blank.records[0].empty_cells),
+            (&stated.quantities, &stated.records[0].empty_cells)
+        );
+    }
+    let mut own = samples.clone();
+    (from..from + 9).for_each(|k| own[k].f = own[from].f);
+    let c: Result<_, CalibrationError> = of_csv(&bench, "F,I,O,S", csv(&own));
+    let c = c.expect("calibrated");
+    is_near(&bench, &c, "stuck");
+    let stuck = |f: &&Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Stuck, .. });
+    assert_eq!(c.findings.iter().filter(stuck).count(), 3, "{:?}", c.findings);
+}

@@ -1,0 +1,157 @@
+//! Ends work for which nobody waits any longer.
+//!
+//! The loops that take long call [`check`]; whoever runs them says with [`hearing`] whether they go on. An end
+//! unwinds the stack up to there, so that no result in between has to carry it. Without [`hearing`] nothing is
+//! asked, and no clock is read. No answer depends on it: there is either the whole answer or none.
+
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// How it is known whether the work of a thread goes on.
+enum Hearing {
+    /// By asking, whenever the interval has passed.
+    Asked { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant },
+    /// By what another thread says.
+    Told(Arc<AtomicBool>),
+}
+
+/// What unwinds.
+struct Interrupted;
+
+thread_local! {
+    static HEARING: Cell<Option<Hearing>> = const { Cell::new(None) };
+}
+
+/// Runs `work`, and asks `goes_on` on this thread whenever `interval` has passed, at the next [`check`]. None if it
+/// said false; panics of the work go on.
+pub fn hearing<T>(
+    interval: Duration,
+    goes_on: impl FnMut() -> bool + 'static,
+    work: impl FnOnce() -> T,
+) -> Option<T> {
+    run(Hearing::Asked { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
+}
+
+/// Runs `work` until `wanted` is false: None then. [`parts`] carries this to other threads.
+pub fn while_wanted<T>(wanted: Arc<AtomicBool>, work: impl FnOnce() -> T) -> Option<T> {
+    run(Hearing::Told(wanted), work)
+}
+
+fn run<T>(own: Hearing, work: impl FnOnce() -> T) -> Option<T> {
+    let before = HEARING.replace(Some(own));
+    let done = catch_unwind(AssertUnwindSafe(work));
+    HEARING.set(before);
+    match done {
+        Ok(done) => Some(done),
+        Err(reason) if reason.is::<Interrupted>() => None,
+        Err(panic) => resume_unwind(panic),
+    }
+}
+
+/// Called by loops that take long, at least every tenth of a second. Does not return if the work is to end.
+pub fn check() {
+    // what is asked may ask for other work on this thread
+    let Some(mut hearing) = HEARING.take() else { return };
+    let goes_on = match &mut hearing {
+        Hearing::Told(wanted) => wanted.load(Ordering::Relaxed),
+        Hearing::Asked { last, interval, .. } if last.elapsed() < *interval => true,
+        Hearing::Asked { goes_on, last, .. } => {
+            let goes_on = goes_on();
+            *last = Instant::now();
+            goes_on
+        }
+    };
+    HEARING.set(Some(hearing));
+    if !goes_on {
+        resume_unwind(Box::new(Interrupted));
+    }
+}
+
+/// What the parts of the work of this thread need to end with it on other threads.
+#[derive(Debug, Clone)]
+pub struct Parts(Option<Arc<AtomicBool>>);
+
+/// For the parts of the work of this thread.
+pub fn parts() -> Parts {
+    let hearing = HEARING.take();
+    let wanted = match &hearing {
+        Some(Hearing::Told(wanted)) => Some(wanted.clone()),
+        _ => None,
+    };
+    HEARING.set(hearing);
+    Parts(wanted)
+}
+
+impl Parts {
+    /// Runs a part on the thread that calls this. It ends with the whole.
+    pub fn part<T>(&self, work: impl FnOnce() -> T) -> T {
+        match &self.0 {
+            None => work(),
+            Some(wanted) => match while_wanted(wanted.clone(), work) {
+                Some(done) => done,
+                None => resume_unwind(Box::new(Interrupted)),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::rc::Rc;
+
+    use super::*;
+
+    fn count(to: u32, at: &Rc<Cell<u32>>) -> u32 {
+        for i in 0..to {
+            check();
+            at.set(i);
+        }
+        at.get()
+    }
+
+    #[test]
+    fn work_ends_where_it_is_told_to() {
+        let at = Rc::new(Cell::new(0));
+        let before = at.clone();
+        let ended = hearing(Duration::ZERO, move || before.get() < 5, || count(100, &at));
+        assert_eq!((ended, at.get()), (None, 5));
+        // nothing is left of it
+        assert_eq!(count(100, &at), 99);
+    }
+
+    #[test]
+    fn what_is_asked_may_work_itself() {
+        let inner = move || hearing(Duration::ZERO, || false, || count(9, &Rc::default())).is_none();
+        assert_eq!(hearing(Duration::ZERO, inner, || count(50, &Rc::default())), Some(49));
+    }
+
+    #[test]
+    fn parts_end_with_the_whole_on_their_own_threads() {
+        let wanted = Arc::new(AtomicBool::new(true));
+        let ended = while_wanted(wanted.clone(), || {
+            let parts = parts();
+            std::thread::scope(|scope| {
+                let part = scope.spawn(|| {
+                    parts.part(|| {
+                        loop {
+                            check()
+                        }
+                    })
+                });
+                wanted.store(false, Ordering::Relaxed);
+                part.join().is_err()
+            })
+        });
+        assert_eq!(ended, Some(true));
+        assert_eq!(super::parts().part(|| count(9, &Rc::default())), 8);
+    }
+
+    #[test]
+    fn panics_stay_panics() {
+        let panic = catch_unwind(|| hearing(Duration::ZERO, || true, || resume_unwind(Box::new("other"))));
+        assert!(panic.is_err_and(|reason| reason.is::<&str>()));
+    }
+}

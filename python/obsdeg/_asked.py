@@ -1,0 +1,99 @@
+"""What a task of a sweep asks: as it is written, and in canonical form, by which tasks are told apart."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping
+from decimal import Context, Decimal
+from typing import Any
+
+import obsdeg
+
+from ._files import Text
+
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)", re.ASCII)
+_NUMBER = re.compile(_DECIMAL.pattern + r"([eE][+-]?\d{1,4})?", re.ASCII)
+
+
+def plain(value: Any) -> Any:
+    """What is no JSON by itself, with all its digits.
+
+    Raises:
+        TypeError: a value that JSON cannot hold.
+    """
+    if isinstance(value, Text):
+        return value.text
+    if isinstance(value, (Decimal, os.PathLike)):
+        return str(value)
+    if isinstance(value, range):
+        return list(value)
+    if hasattr(value, "tolist"):
+        # arrays and numbers of numpy
+        return value.tolist()
+    expected = "what JSON can hold, a decimal, an array or a Scheme"
+    raise TypeError(f"found {value!r} of type {type(value).__name__}; expected {expected}")
+
+
+def written(options: Any) -> str:
+    """Options as JSON, as they were given.
+
+    Raises:
+        TypeError: a value that JSON cannot hold.
+    """
+    return json.dumps(options, sort_keys=True, default=plain)
+
+
+def key(task: Mapping[str, Any]) -> bytes:
+    """A digest of a task by value: 0, ``0.0``, ``"0"``, ``Decimal("0.00")`` and numpy's 0 are one, and a
+    missing option is the same as None.
+
+    Raises:
+        TypeError: a value that JSON cannot hold.
+    """
+    as_read = json.loads(written(task))
+    by_value = {name: _canonical(name, value) for name, value in as_read.items() if value is not None}
+    return hashlib.sha256(written(by_value).encode()).digest()[:16]
+
+
+def digest(asked: Any) -> str:
+    """A name for what is asked of this version of the program."""
+    return hashlib.sha256(written([obsdeg.__version__, asked]).encode()).hexdigest()[:16]
+
+
+def _canonical(name: str, value: Any) -> Any:
+    if name == "scheme":
+        return value
+    try:
+        return _by_value(obsdeg._READ.get(name, obsdeg._plain)(value))
+    except (TypeError, ValueError):
+        # what no option can be is an error when it is judged; until then it is what it was written as
+        return value
+
+
+def _by_value(value: Any) -> Any:
+    """The options of a request, with one text for each number; a text and a number stay different."""
+    if isinstance(value, (list, tuple)):
+        return [_by_value(v) for v in value]
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, (int, float)):
+        return {"number": _number(repr(value), _NUMBER)}
+    if isinstance(value, str):
+        return ",".join(map(_part, value.split(",")))
+    return value
+
+
+def _part(text: str) -> str:
+    # angles are read without exponents, values of unknowns with
+    name, equals, value = text.rpartition("=")
+    return name.strip() + equals + _number(value.strip(), _NUMBER if equals else _DECIMAL)
+
+
+def _number(text: str, form: re.Pattern[str]) -> str:
+    if not form.fullmatch(text):
+        return text
+    number = Decimal(text).normalize(Context(prec=len(text)))
+    return format(number, "f") if number else "0"

@@ -1,0 +1,137 @@
+"""Executors of campaigns: number of workers, whether a cluster still answers, replacement of one that
+broke."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from typing import Any
+
+#: Makes an executor; one that is broken, because a worker was killed, is replaced by another.
+Executors = Callable[[], Executor]
+
+#: Seconds between two looks at a cluster from which nothing comes, and until it has to answer one.
+PULSE = 5.0
+
+
+def processes(workers: int | None = None) -> ProcessPoolExecutor:
+    """A pool of processes on this machine, by default as many as it has cores.
+
+    They do not begin as copies of this process (``fork``), of which another thread may be half way through
+    something, and end when it ends, also where it is killed.
+    """
+    start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    return ProcessPoolExecutor(workers, multiprocessing.get_context(start), initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """Ends a worker whose parent was killed; it would wait for ever for what comes after its last task."""
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def workers_of(pool: Executor) -> int:
+    """Number of tasks that an executor works on at once; 32 where it does not say."""
+    client = _dask(pool)
+    if client is not None:
+        try:
+            return sum(worker["nthreads"] for worker in _identity(client)["workers"].values())
+        except Exception:  # a scheduler that does not answer is noticed by `unreachable`
+            return 1
+    counted = getattr(pool, "workers", None)
+    if callable(counted):
+        return int(counted())
+    most = getattr(pool, "_max_workers", None)
+    return most if isinstance(most, int) else 32
+
+
+def unreachable(pool: Executor) -> str | None:
+    """Why nothing more can come from a cluster, or None. Asks the scheduler of Dask; waits at most
+    :data:`PULSE` seconds."""
+    client = _dask(pool)
+    if client is None:
+        return None
+    try:
+        _identity(client)
+    except Exception as e:
+        return f"the scheduler of Dask does not answer ({type(e).__name__})"
+    return None
+
+
+def _identity(client: Any) -> Any:
+    """What the scheduler of Dask says of itself and its workers, or an error after :data:`PULSE` seconds."""
+    if client.status not in ("running", "connecting"):
+        raise RuntimeError(f"the client of Dask is {client.status}")
+    return client.sync(client.scheduler.identity, callback_timeout=PULSE)
+
+
+def _dask(pool: Executor) -> Any:
+    client = getattr(pool, "_client", None)
+    return client if hasattr(client, "scheduler") and hasattr(client, "nthreads") else None
+
+
+def close(pool: Executor, at_once: bool) -> None:
+    """Ends an executor; never raises.
+
+    Args:
+        at_once: processes of this machine that still work are killed: one that began while its pool broke
+            would be waited for without end when this process ends.
+    """
+    processes = dict(getattr(pool, "_processes", None) or {}) if isinstance(pool, ProcessPoolExecutor) else {}
+    try:
+        try:
+            pool.shutdown(wait=False, cancel_futures=True)
+        except TypeError:
+            # Dask's has no such option
+            pool.shutdown(wait=False)
+    except (Exception, CancelledError):
+        # the executor of a lost cluster cannot even be closed; the loss is reported by who noticed it
+        pass
+    for process in processes.values() if at_once else ():
+        try:
+            process.kill()
+        except (OSError, ValueError):
+            # it has ended
+            continue
+
+
+def _call(fn: Callable[..., Any], args: Any, kwargs: Any) -> Any:
+    # what Ray takes must be a function; a partial one is none
+    return fn(*args, **kwargs)
+
+
+class RayExecutor(Executor):
+    """Ray as an executor.
+
+    Args:
+        options: those of ``ray.init``, where Ray does not run yet; it then runs until the process ends.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        import ray
+
+        if not ray.is_initialized():
+            ray.init(**options)
+        # what a lost worker had in hand is tried again by the campaign, not there
+        self._remote = ray.remote(max_retries=0)(_call)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Hands a call to Ray."""
+        future: Future[Any] = self._remote.remote(fn, args, kwargs).future()
+        return future
+
+    def workers(self) -> int:
+        """Number of processors of the cluster."""
+        import ray
+
+        resources: Any = ray.cluster_resources()
+        return max(1, int(resources.get("CPU", 1)))

@@ -1,0 +1,153 @@
+"""Tasks of a sweep as rows: what a worker does with a chunk, and which tasks the files of a folder hold."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import obsdeg
+
+from ._asked import digest, key, written
+from ._files import place
+from ._work import INPUT
+from .options import Analyze, Simulate
+
+# what only numbers have: noise, dwells, requirements
+_MEASURED = Simulate.__optional_keys__ - Analyze.__optional_keys__
+_JUDGED = Analyze.__optional_keys__ - Simulate.__optional_keys__
+
+
+def _rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What is found of a task, a row per unknown."""
+    given: Any = task.get("scheme")
+    what = []
+    if "scheme" in task:
+        what = [given if isinstance(given, obsdeg.Scheme) else obsdeg.Scheme.from_text(given)]
+    options = {name: value for name, value in task.items() if name != "scheme"}
+    exact = {"solutions": False, **{k: v for k, v in options.items() if k not in _MEASURED}}
+    verdicts = obsdeg.analyze(*what, **exact).to_dict()
+    numbers = {}
+    if _MEASURED & options.keys():
+        run = obsdeg.simulate(*what, **{k: v for k, v in options.items() if k not in _JUDGED}).to_dict()
+        numbers = {q["name"]: q for q in run["quantities"]}
+    asked = _options(task)
+    rows = []
+    for q in verdicts["quantities"]:
+        n = numbers.get(q["name"], {})
+        verdict = {"name": q["name"], "status": q["status"], "degree": q.get("degree")}
+        number = {name: n.get(name) for name in ("sigma", "unit", "outcome")}
+        rows.append({**asked, "rank": verdicts["rank"], **verdict, **number, "error": None})
+    return rows
+
+
+def _options(task: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns that say what was asked."""
+    return {"task": name_of(task), **{name: str(value) for name, value in task.items() if name != "scheme"}}
+
+
+def name_of(task: Mapping[str, Any]) -> str:
+    try:
+        return written(task)
+    except (TypeError, ValueError):
+        return json.dumps({name: repr(value) for name, value in task.items()}, sort_keys=True)
+
+
+#: Columns of what is found, with their types in Parquet.
+FOUND = {
+    "rank": "int64",
+    "name": "string",
+    "status": "string",
+    "degree": "int32",
+    "sigma": "double",
+    "unit": "string",
+    "outcome": "string",
+    "error": "string",
+}
+
+
+def row_of(task: Mapping[str, Any], error: BaseException) -> dict[str, Any]:
+    """The row of a task that has no answer."""
+    return {**_options(task), **dict.fromkeys(FOUND), "error": _said(error)}
+
+
+def _said(error: BaseException) -> str:
+    return str(error) if isinstance(error, INPUT) else f"{type(error).__name__}: {error}"
+
+
+def parquet(rows: list[dict[str, Any]], columns: list[str]) -> bytes:
+    """Rows as a Parquet file, with these columns first whether a row has them or not."""
+    import pyarrow
+    import pyarrow.parquet
+
+    sink = pyarrow.BufferOutputStream()
+    names = dict.fromkeys([*columns, *(name for row in rows for name in row)])
+    kinds = [(name, pyarrow.type_for_alias(FOUND.get(name, "string"))) for name in names]
+    table = pyarrow.Table.from_pylist(rows, pyarrow.schema(kinds, {"obsdeg": obsdeg.__version__}))
+    pyarrow.parquet.write_table(table, sink)
+    return bytes(sink.getvalue())
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What came of a chunk: seconds, the name of its file, its bytes where the worker does not see the
+    folder, and what was wrong with tasks by their place in it."""
+
+    seconds: float
+    name: str | None
+    table: bytes | None
+    wrong: list[tuple[int, Exception]]
+
+
+def judge(chunk: tuple[list[dict[str, Any]], str | None], *, columns: list[str], record: bool) -> Judged:
+    """Judges the tasks of a chunk, and writes the file with their rows into a folder where one is named."""
+    tasks, stage = chunk
+    start = time.perf_counter()
+    rows: list[dict[str, Any]] = []
+    keys: list[str] = []
+    wrong: list[tuple[int, Exception]] = []
+    for i, task in enumerate(tasks):
+        try:
+            found = _rows(task)
+        except (MemoryError, OSError, KeyboardInterrupt, SystemExit):
+            # of this machine, not of the task: tried again
+            raise
+        except BaseException as e:
+            # the panic of the engine is no Exception, and cannot be sent
+            problem = e if isinstance(e, INPUT) else RuntimeError(f"{type(e).__name__}: {e}")
+            wrong.append((i, problem))
+            if not record:
+                continue
+            found = [row_of(task, problem)]
+        rows += found
+        keys.append(key(task).hex())
+    if not rows:
+        return Judged(time.perf_counter() - start, None, None, wrong)
+    name, table = f"{digest(keys)}.parquet", parquet(rows, columns)
+    if stage is not None and Path(stage).is_dir():
+        place(Path(stage) / name, table)
+        return Judged(time.perf_counter() - start, name, None, wrong)
+    return Judged(time.perf_counter() - start, name, table, wrong)
+
+
+def done(folder: Path) -> set[bytes]:
+    """The tasks of this version that the files of a folder hold, by value."""
+    import pyarrow
+    import pyarrow.parquet
+
+    there: set[bytes] = set()
+    for file in sorted(folder.glob("*.parquet")):
+        try:
+            head = pyarrow.parquet.read_schema(file)
+            version = (head.metadata or {}).get(b"obsdeg", b"").decode()
+            if "task" not in head.names or version != obsdeg.__version__:
+                continue
+            tasks = pyarrow.parquet.read_table(file, columns=["task"]).column("task").unique().to_pylist()
+        except pyarrow.ArrowInvalid as e:
+            advice = "remove it, and its tasks are asked again"
+            raise ValueError(f"{file}: found what is no Parquet file ({e}); {advice}") from None
+        there.update(key(json.loads(task)) for task in tasks)
+    return there

@@ -1,0 +1,245 @@
+"""Tasks through executors that break: each ends once, with a result or an error."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from dataclasses import dataclass
+from pickle import PicklingError
+from typing import Any
+
+from ._executors import PULSE, Executors, close, unreachable, workers_of
+
+#: Errors of input: the same task would raise them again. ``obsdeg.ProblemError`` is a ValueError.
+INPUT = (ValueError, TypeError, PicklingError)
+#: What `draw` returns when there is no task.
+END: Any = object()
+#: Seconds for which a cluster may leave every look unanswered before it is given up.
+PATIENCE = 30.0
+#: Executors in a row that may take no task.
+REFUSED = 3
+#: Seconds between two counts of the workers.
+COUNTED = 10.0
+
+
+class CampaignError(RuntimeError):
+    """What a campaign could not do.
+
+    Attributes:
+        task: the task that failed as often as it may; None where no executor could be had.
+        pending: other tasks that were drawn and are not done.
+    """
+
+    def __init__(self, text: str, task: Any = None, pending: list[Any] | None = None) -> None:
+        super().__init__(text)
+        self.task, self.pending = task, pending or []
+
+
+@dataclass
+class Ended:
+    """A task that ended: `result`, or where it failed `tries` times, the last `error`."""
+
+    task: Any
+    result: Any = None
+    error: BaseException | None = None
+    tries: int = 1
+
+
+@dataclass
+class _Tried:
+    """A task that has not ended: failures of its own, and executors that broke while they had it."""
+
+    task: Any
+    tries: int = 0
+    losses: int = 0
+
+
+class Work:
+    """Tasks on their way through executors.
+
+    A task is in exactly one place: not drawn, `pending`, `waiting` (handed out), `suspects`, or ended. A pool
+    that breaks does not say which of its tasks broke it. Those it had are tried again, and after `retries`
+    losses one at a time with no other beside it, so that the task that is reported is the one that did it.
+
+    Args:
+        function: what is done with a task.
+        draw: the next task, or :data:`END`; is asked again after each task that ends.
+        executor: makes the executor, and another where one broke.
+        retries: how often a task is tried again.
+        ahead: most tasks that are handed out; None for twice the number of workers, at least 8.
+        divide: the tasks that one consists of which failed too often, tried instead of it; none where it
+            cannot be divided.
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Any], Any],
+        draw: Callable[[], Any],
+        executor: Executors,
+        retries: int,
+        ahead: int | None,
+        divide: Callable[[Any], list[Any]] = lambda task: [],
+    ) -> None:
+        self.function, self.draw, self.executor = function, draw, executor
+        self.retries, self.ahead, self.divide = retries, ahead, divide
+        self.pending: deque[_Tried] = deque()
+        self.suspects: deque[_Tried] = deque()
+        self.waiting: dict[Future[Any], _Tried] = {}
+        self._counted = (-COUNTED, 0)
+
+    def open(self) -> list[Any]:
+        """Tasks that were drawn and have not ended."""
+        return [t.task for t in (*self.waiting.values(), *self.pending, *self.suspects)]
+
+    def ended(self) -> Iterator[Ended]:
+        """Every task that is drawn, once, in the order in which they end.
+
+        Raises:
+            CampaignError: no executor can be had, or the cluster does not answer.
+        """
+        pool = self.executor()
+        fruitless = 0
+        try:
+            while True:
+                broken: BaseException | None = None
+                for refused in self._hand_out(pool):
+                    if isinstance(refused, Ended):
+                        yield refused
+                    else:
+                        broken = refused
+                if not self.waiting and broken is None:
+                    return
+                if broken is None:
+                    self._heard(pool)
+                for future in [f for f in self.waiting if f.done()]:
+                    end = self._taken(future)
+                    if isinstance(end, Ended):
+                        yield end
+                    elif end is not None:
+                        broken = end
+                if broken is not None:
+                    # one that had tasks has them counted as losses, which end; one that takes none says
+                    # nothing of any task
+                    fruitless = 0 if self.waiting else fruitless + 1
+                    why = unreachable(pool)
+                    if why is not None or fruitless > REFUSED:
+                        raise self._without_workers(why or str(broken) or type(broken).__name__) from broken
+                    yield from self._lose(broken)
+                    close(pool, at_once=True)
+                    # what starts workers may itself be starting again
+                    time.sleep(fruitless / 4)
+                    pool = self._another(broken)
+                    self._counted = (-COUNTED, 0)
+        finally:
+            close(pool, at_once=bool(self.waiting))
+
+    def _hand_out(self, pool: Executor) -> Iterator[Ended | BaseException]:
+        """Fills the executor. Yields tasks that it refuses as input, and the error of one that takes none."""
+        room = 1 if self._alone() else self._room(pool)
+        while len(self.waiting) < room:
+            if not self.pending and (drawn := self.draw()) is not END:
+                self.pending.append(_Tried(drawn))
+            if not self.pending and self.suspects and not self.waiting:
+                self.pending.append(self.suspects.popleft())
+                room = 1
+            if not self.pending:
+                return
+            first = self.pending[0]
+            try:
+                future = pool.submit(self.function, first.task)
+            except INPUT as e:
+                self.pending.popleft()
+                yield Ended(first.task, error=e, tries=first.tries + 1)
+            except Exception as e:
+                yield e
+                return
+            else:
+                self.waiting[future] = self.pending.popleft()
+
+    def _alone(self) -> bool:
+        """True if the only task that is handed out is a suspect."""
+        return len(self.waiting) == 1 and next(iter(self.waiting.values())).losses > self.retries
+
+    def _room(self, pool: Executor) -> int:
+        if self.ahead is not None:
+            return self.ahead
+        when, workers = self._counted
+        if time.monotonic() - when >= COUNTED:
+            workers = workers_of(pool)
+            self._counted = (time.monotonic(), workers)
+        return max(8, 2 * workers)
+
+    def _heard(self, pool: Executor) -> None:
+        """Waits until a task ends.
+
+        Raises:
+            CampaignError: the cluster leaves every question unanswered.
+        """
+        silent_since: float | None = None
+        while not wait(self.waiting, timeout=PULSE, return_when=FIRST_COMPLETED).done:
+            began = time.monotonic()
+            why = unreachable(pool)
+            if why is None:
+                silent_since = None
+                continue
+            silent_since = began if silent_since is None else silent_since
+            if time.monotonic() - silent_since >= PATIENCE:
+                raise self._without_workers(why)
+
+    def _taken(self, future: Future[Any]) -> Ended | BaseException | None:
+        """What a future that is done says: the end of its task, that its executor broke, or None where the
+        task is tried again."""
+        tried = self.waiting[future]
+        try:
+            error = future.exception()
+        except CancelledError as e:
+            error = e
+        if error is None:
+            del self.waiting[future]
+            return Ended(tried.task, future.result())
+        if isinstance(error, (BrokenExecutor, CancelledError)):
+            # what the others say is heard first: it stays among those that wait
+            return error
+        del self.waiting[future]
+        tried.tries += 1
+        if isinstance(error, INPUT):
+            return Ended(tried.task, error=error, tries=tried.tries)
+        if tried.tries > self.retries:
+            return self._given_up(tried, error)
+        self.pending.append(tried)
+        return None
+
+    def _lose(self, broken: BaseException) -> list[Ended]:
+        """Takes back what a broken executor had; the ends of tasks that broke it by themselves too often."""
+        alone = self._alone()
+        lost = list(self.waiting.values())
+        self.waiting.clear()
+        if alone:
+            lost[0].tries += 1
+            if lost[0].tries > self.retries or self.divide(lost[0].task):
+                end = self._given_up(lost[0], broken)
+                return [end] if end is not None else []
+        for tried in lost:
+            tried.losses += 1
+        self.suspects.extend(t for t in lost if t.losses > self.retries)
+        self.pending.extendleft(reversed([t for t in lost if t.losses <= self.retries]))
+        return []
+
+    def _given_up(self, tried: _Tried, error: BaseException) -> Ended | None:
+        """The end of a task that failed too often, or None if the tasks of which it consists are tried."""
+        parts = self.divide(tried.task)
+        self.suspects.extend(_Tried(part, losses=self.retries + 1) for part in parts)
+        return None if parts else Ended(tried.task, error=error, tries=tried.tries)
+
+    def _another(self, broken: BaseException) -> Executor:
+        try:
+            return self.executor()
+        except Exception as e:
+            raise self._without_workers(f"no other executor: {e}") from broken
+
+    def _without_workers(self, why: str) -> CampaignError:
+        pending = self.open()
+        text = f"{why}: {len(pending)} tasks that were handed out are not done, nor those after them"
+        return CampaignError(text, pending=pending)

@@ -1,0 +1,201 @@
+"""What an importer takes on: counted before the work is done, so that careless input ends in a sentence.
+
+| what | limit |
+| --- | --- |
+| characters of a text | `TEXT` |
+| characters of a formula or statement | `FORMULA` |
+| brackets, functions and powers in each other | `DEPTH` |
+| elements of XML in each other | `ELEMENTS` |
+| operations of a formula when what it names is put in | `OPERATIONS` |
+| operations of a formula when max and min are written by abs | `WRITTEN` |
+| digits of a number that powers make | `DIGITS` |
+| digits and exponent of a number as it is written | `LITERAL` |
+| entries of a vector | `ENTRIES` |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import sympy  # type: ignore[import-untyped]
+
+from .._files import TEXT, read_text
+from .problem import OverLimit
+
+#: Bytes of a file of a PEtab problem.
+TABLE = 100_000_000
+FORMULA = 100_000
+DEPTH = 150
+ELEMENTS = 2_000
+OPERATIONS = 100_000
+WRITTEN = 1_000_000
+DIGITS = 10_000
+LITERAL = 1_000
+ENTRIES = 10_000
+
+
+def text_of_file(path: str | Path, *, errors: str = "strict") -> str:
+    """The text of a file.
+
+    Raises:
+        OverLimit: it is longer than `TEXT`.
+    """
+    try:
+        return read_text(path, errors=errors)
+    except ValueError as error:
+        if isinstance(error, UnicodeDecodeError):
+            raise
+        raise OverLimit(f"more than {TEXT} characters", f"a text of at most {TEXT}", file=str(path)) from None
+
+
+def bounded_power(base: Any, exponent: Any) -> Any:
+    """`base ** exponent`, unless that is a number of more than `DIGITS` digits.
+
+    Raises:
+        OverLimit: it is.
+    """
+    _hold_power(base, exponent)
+    return base**exponent
+
+
+def bounded_exp(argument: Any) -> Any:
+    """`exp(argument)`, which SymPy makes a power where logarithms of numbers are in it.
+
+    Raises:
+        OverLimit: that power is a number of more than `DIGITS` digits.
+    """
+    for term in sympy.Add.make_args(argument):
+        coefficient, rest = term.as_coeff_Mul()
+        for factor in sympy.Mul.make_args(rest):
+            if isinstance(factor, sympy.log):
+                _hold_power(factor.args[0], coefficient)
+    return sympy.exp(argument)
+
+
+def _hold_power(base: Any, exponent: Any) -> None:
+    if not (isinstance(exponent, sympy.Rational) and isinstance(base, sympy.Expr)):
+        return
+    digits = _digits(base)
+    if digits and digits * abs(int(exponent.p)) > DIGITS * int(exponent.q):
+        raise OverLimit("a power that is a number of too many digits", f"at most {DIGITS} digits")
+
+
+def _digits(base: Any) -> float:
+    """Digits of the numbers among the factors of an expression; 0 where they are 1 and -1 alone."""
+    if isinstance(base, sympy.Rational):
+        largest = max(abs(int(base.p)), int(base.q))
+        return 0.0 if largest <= 1 else largest.bit_length() * math.log10(2)
+    if base.is_Pow and isinstance(base.exp, sympy.Rational):
+        return _digits(base.base) * abs(float(base.exp))
+    if base.is_Mul:
+        return sum(map(_digits, base.args))
+    return 0.0
+
+
+#: Number of operations, and how deep they are in each other.
+Size = tuple[int, int]
+
+
+def measured(expression: Any, sizes: Callable[[Any], Size | None] = lambda leaf: None) -> Size:
+    """Number of operations of an expression as it is written out, and how deep they are in each other.
+
+    Common parts are counted wherever they stand, and visited once.
+
+    Arguments:
+        expression: What is measured.
+        sizes: Those of what will stand for a symbol, or None where it stays.
+    """
+    known: dict[Any, Size] = {}
+    stack = [(sympy.sympify(expression, strict=True), False)]
+    while stack:
+        part, visited = stack.pop()
+        if part in known:
+            continue
+        if not part.args:
+            known[part] = (sizes(part) if part.is_Symbol else None) or (1, 0)
+        elif visited:
+            parts = [known[a] for a in part.args]
+            known[part] = (1 + sum(p[0] for p in parts), 1 + max(p[1] for p in parts))
+        else:
+            stack.append((part, True))
+            stack.extend((a, False) for a in part.args)
+    return known[sympy.sympify(expression, strict=True)]
+
+
+def hold(size: Size, what: str) -> None:
+    """Holds that operations and depth are within limits.
+
+    Raises:
+        OverLimit: they are not.
+    """
+    operations, depth = size
+    if operations > OPERATIONS:
+        raise OverLimit(f"{what} of more than {OPERATIONS} operations", f"at most {OPERATIONS}")
+    if depth > DEPTH:
+        raise OverLimit(f"{what} with {depth} operations in each other", f"at most {DEPTH}")
+
+
+def entries(rows: str, columns: str) -> int:
+    """Entries of an array, from its numbers of rows and columns.
+
+    Raises:
+        OverLimit: a vector of more than `ENTRIES` entries.
+    """
+    # many digits are no number that Python makes of a text
+    number = ENTRIES + 1 if max(len(rows), len(columns)) > 9 else int(rows) * int(columns)
+    if number > ENTRIES:
+        raise OverLimit(f"an array of {rows[:20]} x {columns[:20]} entries", f"at most {ENTRIES}")
+    return number
+
+
+def hold_brackets(text: str, pairs: Iterable[str] = ("()", "[]", "{}")) -> None:
+    """Holds that brackets are not too deep in each other for the parser of Python, which may crash.
+
+    Raises:
+        OverLimit: they are.
+    """
+    steps = {p[0]: 1 for p in pairs} | {p[1]: -1 for p in pairs}
+    depth = 0
+    for c in text:
+        depth += steps.get(c, 0)
+        if depth > DEPTH:
+            raise OverLimit(f"more than {DEPTH} brackets in each other", f"at most {DEPTH}")
+
+
+def hold_xml(path: str | Path) -> None:
+    """Holds that an XML file is neither too long nor too deep for libSBML, which would end the interpreter.
+
+    Raises:
+        OverLimit: it is, or defines entities, which may grow without bound.
+    """
+    text = text_of_file(path, errors="replace")
+    parser = expat.ParserCreate()
+    depth = 0
+
+    def place() -> str:
+        return f"line {parser.CurrentLineNumber}"
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > ELEMENTS:
+            construct = f"more than {ELEMENTS} elements in each other"
+            raise OverLimit(construct, f"at most {ELEMENTS}", place=place(), file=str(path))
+
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def entity(name: str, *rest: Any) -> None:
+        raise OverLimit(f"the entity `{name}`", "XML without its own entities", place=place(), file=str(path))
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = start, end, entity
+    try:
+        parser.Parse(text.encode(), True)
+    except expat.ExpatError:
+        # what is no XML is said by libSBML
+        return
