@@ -383,7 +383,7 @@ pub fn resolve(
             return Err(SimulationError::UnknownName {
                 what,
                 found: a.name.clone(),
-                known: known(platform, &a.name),
+                known: known(platform.names(), &a.name),
             });
         }
     }

@@ -7,9 +7,6 @@ use std::ops::Range;
 
 use obsdeg_exact::Field;
 
-pub use super::parser::{Components, Shapes, parse, parse_components, parse_equation, parse_with};
-pub use super::vectors::{MAX_ENTRIES, Shape};
-
 /// Deepest nesting of brackets, signs and powers.
 pub const MAX_DEPTH: usize = 200;
 
@@ -421,6 +418,7 @@ pub(crate) fn goes_on(name: &str, longer: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::parser::parse;
     use rstest::rstest;
 
     struct Env;
