@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use obsdeg_core::model::expression::{Expression, Names, Node, parse_with};
+use obsdeg_core::language::{Expression, Names, Node, parse_with};
 use obsdeg_core::system::{
     Constant, KnownInput, StateStart, SystemAnalysis, SystemModel, SystemOptions, analyze_system, json,
     model_file,
@@ -231,7 +231,8 @@ fn expressions_of_models_solve_and_do_not_rest_on_themselves() {
             files.map(|f| f.expect("a file").path()).filter(|f| f.extension() == Some("toml".as_ref()))
         {
             let text = std::fs::read_to_string(&file).expect("readable");
-            if let Ok(model) = model_file::read(&text) {
+            let wrong = folder.ends_with("wrong-models");
+            if let Some(model) = model_file::read(&text).ok().filter(|_| !wrong) {
                 examples += tried(&file.display().to_string(), &model, 2);
             }
         }

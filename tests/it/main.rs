@@ -18,6 +18,7 @@ mod expressions;
 #[cfg(unix)]
 mod files;
 mod formulas;
+mod front_door;
 mod functions;
 mod grammar;
 mod help;

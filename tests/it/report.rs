@@ -93,7 +93,8 @@ fn assert_status(page: &Html, verdict: &str) {
     let limits = |what: &str| of(what).is_some_and(|r| r[1] == "limited");
     assert_eq!((!limits("Filter, one run"), !limits("Small-angle model")), (consistent, valid), "{verdict}");
     assert!(good("Resting on the prior") || prior, "{verdict}");
-    let limited = !(consistent && valid && !prior && good("Filter and exact verdicts"));
+    let evidence = good("Filter and exact verdicts") && good("Samples and exact verdicts");
+    let limited = !(consistent && valid && !prior && evidence);
     assert!(!limited || verdict.contains("Limited: "), "{verdict}");
     // what is missed anywhere on the page leads, and is never a green ok
     let missed = whole.contains(" are NOT met, ");
@@ -102,8 +103,8 @@ fn assert_status(page: &Html, verdict: &str) {
     assert_eq!(graded, leads, "{verdict}");
     assert!(missed || !leads, "{verdict}");
     assert!(leads || !limited || verdict.starts_with("Limited: "), "{verdict}");
-    assert!(!(whole.contains("confirms the verdicts") && limited), "{verdict}");
-    let (confirms, limits) = (verdict.contains("confirms the verdicts"), verdict.contains("Limited: "));
+    assert!(!(whole.contains("agrees with all verdicts") && limited), "{verdict}");
+    let (confirms, limits) = (verdict.contains("agrees with all verdicts"), verdict.contains("Limited: "));
     let partly = verdict.contains("agrees with the verdicts as far as it shows them");
     assert!(!(confirms && (limits || partly)) && (confirms || limits || partly), "{verdict}");
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 pub struct EngineBusy {
     /// Time after which the wait for the engine ended, in s.
     pub waited_s: u64,
-    /// What to do to get the missing solutions.
+    /// Advice on how to get the missing solutions.
     pub advice: String,
 }
 

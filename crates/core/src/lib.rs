@@ -42,6 +42,7 @@ pub mod analysis;
 pub mod degree;
 pub mod engine;
 pub mod findings;
+pub mod language;
 pub mod model;
 pub mod remedies;
 pub mod solution;

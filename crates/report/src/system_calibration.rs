@@ -21,7 +21,7 @@ fn finding(f: &SystemFinding) -> String {
         }
         SystemFinding::Noise { chi_square, factor } if *factor >= 1.0 => {
             format!(
-                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small",
+                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small, or the model leaves something out",
                 number(*chi_square)
             )
         }

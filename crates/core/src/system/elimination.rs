@@ -196,8 +196,11 @@ impl Elimination<'_> {
     fn eliminate_states(&mut self, mut equations: Vec<Equation>) -> Result<Vec<Equation>, OverLimit> {
         while let Some((e, i, x)) = self.best(&equations)? {
             let v = self.system.states[i];
-            // its derivative, before anything is put in
-            let next = self.derivative(&equations.swap_remove(e).zero)?;
+            equations.swap_remove(e);
+            // the equation without what divides all of it; its derivative, before anything is put in
+            let mut own = self.s.product(&Polynomial::variable(&self.s.f, v), &x.denominator)?;
+            own.add_scaled(&self.s.f, &x.numerator, self.s.f.neg(self.s.f.one()));
+            let next = self.derivative(&own)?;
             let put = |s: &mut Algebra, a: &Fraction| s.replaced(a, v, &x)?.ok_or(OverLimit);
             let below = x.denominator.clone();
             for k in 0..self.rates.len() {

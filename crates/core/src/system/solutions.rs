@@ -21,7 +21,7 @@ use super::judge::Judgement;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::SystemRows;
 use super::values::Values;
-use crate::model::expression::{Environment, Names, evaluate, parse_with};
+use crate::language::{Environment, Names, evaluate, parse_with};
 
 /// Most unknowns.
 const UNKNOWNS: usize = 30;

@@ -139,7 +139,7 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
                     .into()
             }
             None => {
-                "No action from what was computed: every unknown is observable. No run was made, and no evidence taken."
+                "No action from what was computed: every unknown is observable. No evidence was taken."
                     .into()
             }
         });

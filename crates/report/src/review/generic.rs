@@ -43,7 +43,7 @@ pub(super) fn status(g: &GenericReview) -> Status {
             row("Filter and exact verdicts", Grade::Open, "not taken: generic angles have no numbers".into()),
         ],
         actions: vec![format!(
-            "numbers for {}: then accuracy, requirements and evidence are reviewed as well",
+            "State numbers for {}: then accuracy, requirements and evidence are reviewed as well.",
             g.angles.join(" and ")
         )],
     }

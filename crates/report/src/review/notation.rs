@@ -63,7 +63,7 @@ const SCHEMES: [[&str; 4]; 15] = [
     ["not excited", "no derivative of Z changes with it at any of the positions", "-", "-"],
     [
         "sigma",
-        "standard deviation; predicted: by the information of all samples of Z, without a prior and without drift noise",
+        "standard deviation; predicted: by the information of all samples of Z, with the priors and the random drift that are stated",
         "as the unknown",
         "-",
     ],
