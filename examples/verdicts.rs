@@ -1,8 +1,8 @@
 //! The library in ten lines: the degrees of the paper's two positions under each carry.
 #![allow(clippy::print_stdout, reason = "an example")]
 
-use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
-use obsdeg_core::model::{Angle, Carry, Scheme};
+use obsdeg::error::AnalysisError;
+use obsdeg::{AnalysisOptions, Angle, Carry, Scheme, analyze};
 
 fn main() -> Result<(), AnalysisError> {
     let positions = [[0, 0, 0], [180, 0, 0]].map(|p| p.map(Angle::from_degrees));

@@ -17,6 +17,7 @@ mod examples;
 #[cfg(unix)]
 mod files;
 mod formulas;
+mod front_door;
 mod functions;
 mod grammar;
 mod help;

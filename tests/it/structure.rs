@@ -76,6 +76,7 @@ fn crates() -> Imports {
         "report",
         "commands",
         "python",
+        "library",
         "cli",
         "web",
     ];

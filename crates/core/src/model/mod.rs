@@ -11,6 +11,7 @@ pub(crate) mod file_error;
 pub(crate) mod geometry;
 mod gimbal_turns;
 pub(crate) mod gimbals;
+mod matrices;
 mod parser;
 pub(crate) mod path;
 pub(crate) mod per_gyro;
@@ -38,6 +39,7 @@ pub use error_model::{Columns, ErrorModel};
 pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, SignedAxis};
 pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
 pub use gimbals::{GimbalError, Gimbals};
+pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{

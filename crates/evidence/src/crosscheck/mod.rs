@@ -117,6 +117,13 @@ pub struct CrossCheckOptions {
     pub filter: FilterChange,
 }
 
+impl Default for CrossCheckOptions {
+    /// 200 runs of an unchanged filter, seed 1.
+    fn default() -> Self {
+        Self { runs: 200, seed: 1, filter: FilterChange::default() }
+    }
+}
+
 /// Holds the exact verdicts on `scheme` against a filter. `progress` hears how many of the
 /// runs are done and says whether to go on.
 ///
