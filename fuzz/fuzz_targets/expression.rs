@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use obsdeg_core::model::expression::{Names, parse, parse_with};
+use obsdeg_core::language::{Names, parse, parse_with};
 use obsdeg_core::system::{json, judge};
 
 fuzz_target!(|data: &[u8]| {

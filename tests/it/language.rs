@@ -1,7 +1,7 @@
 //! What modellers write: vectors, matrices, quaternions, definitions in any order.
 
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
-use obsdeg_core::model::expression::{Components, Shape, Shapes, evaluate_f64, parse_components};
+use obsdeg_core::language::{Components, Shape, Shapes, evaluate_f64, parse_components};
 use obsdeg_core::system::{Judgement, ModelError, SystemModel, judge, model_file};
 use obsdeg_evidence::system::{crosscheck_system, simulate_system};
 use proptest::prelude::*;
@@ -365,7 +365,7 @@ fn what_does_not_fit_is_named_with_its_place() {
         assert!(!place.is_empty() || e.what == "`sin[1]`", "{text}: {e}");
     }
     // vectors are not the platform's
-    assert!(obsdeg_core::model::expression::parse("[1, 2]").is_err());
+    assert!(obsdeg_core::language::parse("[1, 2]").is_err());
     // deep and large
     let deep = format!("{}1", "[".repeat(1_000_000));
     assert!(parse_components(&deep, &shapes()).expect_err("deep").to_string().contains("nested"));

@@ -487,7 +487,7 @@ fn filters_of_models() {
 #[cfg(feature = "symbolica")]
 #[test]
 fn solving_expressions() {
-    use obsdeg_core::model::expression::{Names, evaluate_f64, parse_with};
+    use obsdeg_core::language::{Names, evaluate_f64, parse_with};
     let solved = |file: &str| -> (BTreeMap<String, String>, Value) {
         let answer = crate::program::json(&["analyze", "--format", "json", "--model", file]);
         let of = |q: &Value| Some((q["name"].as_str()?.to_string(), q["solution"].as_str()?.to_string()));

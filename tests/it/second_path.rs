@@ -4,7 +4,7 @@
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use obsdeg_core::degree::{Degrees, DerivativeRows, climb, staircase};
-use obsdeg_core::model::expression::{Environment, evaluate, parse};
+use obsdeg_core::language::{Environment, evaluate, parse};
 use obsdeg_core::model::{Carry, Platform, RandomValues, Scheme};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 

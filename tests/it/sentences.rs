@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::model::expression::{Expression, Names, evaluate_f64, parse_with};
+use obsdeg_core::language::{Expression, Names, evaluate_f64, parse_with};
 use obsdeg_core::system::{
     Constant, ModelError, SystemAnalysis, SystemModel, SystemOptions, analyze_system, json, model_file,
 };

@@ -210,7 +210,7 @@ pub(crate) fn concern_some<'a>(
                 hint = None;
                 break;
             }
-            hint.get_or_insert_with(|| known(&platform, &a.name));
+            hint.get_or_insert_with(|| known(platform.names(), &a.name));
         }
         if let Some(hint) = hint {
             let message =

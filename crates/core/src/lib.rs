@@ -41,6 +41,7 @@ pub mod accuracy;
 pub mod analysis;
 pub mod degree;
 pub mod findings;
+pub mod language;
 pub mod model;
 pub mod remedies;
 pub mod solution;

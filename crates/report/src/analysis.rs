@@ -4,15 +4,8 @@ use obsdeg_core::analysis::{Analysis, Component, PositionReport, Solution};
 use obsdeg_core::degree::Status;
 use obsdeg_core::solution::Formula;
 
-use crate::document::{Block, Cell, Column, Document, Typeset, left, right};
+use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
 use crate::{Answer, gimbals, latex, resolve, words};
-
-/// Three decimals, without trailing zeros.
-pub(crate) fn short(x: f64) -> String {
-    let text = format!("{x:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
-}
 
 fn positions(positions: &[PositionReport]) -> Block {
     let turned = positions.iter().any(|p| !p.turns.is_empty());

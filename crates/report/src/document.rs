@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use serde_json::{Value, json};
 
 use crate::figure::Figure;
-use crate::poses::Panels;
+use crate::panels::Panels;
 
 /// A part of a document.
 pub(crate) enum Block {
@@ -256,6 +256,13 @@ pub(crate) fn estimate(x: Option<f64>, sigma: Option<f64>) -> String {
     } else {
         number(x)
     }
+}
+
+/// Three decimals, without trailing zeros.
+pub(crate) fn short(x: f64) -> String {
+    let text = format!("{x:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
 }
 
 /// A number, or a dash.

@@ -2,8 +2,7 @@
 
 use obsdeg_core::model::{GimbalReport, GimbalStop, GimbalTurn};
 
-use crate::analysis::short as deg;
-use crate::document::Block;
+use crate::document::{Block, short as deg};
 use crate::words;
 
 /// Names of the Euler angles, with what each gimbal turns about.

@@ -9,38 +9,20 @@ use std::fmt::Write;
 use obsdeg_core::model::{Matrix3, Pose, Scheme};
 use obsdeg_evidence::simulation::latitude_of;
 
-use crate::figure::{BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE};
+use crate::figure::{BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE};
 use crate::figures::File;
+use crate::panels::{Panel, Panels, WIDTH, escaped};
 use crate::{visible, words};
 
 /// The view.
 const AZIMUTH_DEG: f64 = 40.0;
 const ELEVATION_DEG: f64 = 20.0;
 
-/// Width of a panel, and of the space that it leaves to the next.
-const WIDTH: f64 = 220.0;
-const GAP: f64 = 8.0;
 /// Height of a panel without its lines of text, and of one of these.
 const HEIGHT: f64 = 232.0;
 const LINE: f64 = 14.0;
 /// One, in pixels.
 const UNIT: f64 = 70.0;
-/// Panels in a row of a picture that holds several.
-const COLUMNS: usize = 4;
-
-/// A panel for each position, of one height, and what they show.
-pub(crate) struct Panels {
-    pub(crate) panels: Vec<Panel>,
-    height: f64,
-}
-
-/// The picture of one position.
-pub(crate) struct Panel {
-    /// What it shows, in words.
-    pub(crate) title: String,
-    body: String,
-}
-
 /// A vector of n on the sheet, in pixels from the origin (right, down), and how far it points towards the reader.
 fn seen([n, u, e]: [f64; 3]) -> ([f64; 2], f64) {
     let ((sa, ca), (sh, ch)) = (AZIMUTH_DEG.to_radians().sin_cos(), ELEVATION_DEG.to_radians().sin_cos());
@@ -228,48 +210,6 @@ fn body(pose: &Pose, texts: &[String], latitude_deg: f64, top: f64) -> String {
     }
     out.push_str("</g>");
     out
-}
-
-fn escaped(text: &str) -> String {
-    visible(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
-impl Panels {
-    /// Every panel as an SVG of its own.
-    pub(crate) fn each(&self) -> impl Iterator<Item = String> {
-        let height = self.height;
-        self.panels.iter().map(move |p| {
-            format!(
-                "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
-                 font-family=\"{FONT}\"><title>{}</title>{}</svg>",
-                escaped(&p.title),
-                p.body
-            )
-        })
-    }
-
-    /// All panels in rows of one SVG.
-    pub(crate) fn svg(&self) -> String {
-        let columns = self.panels.len().clamp(1, COLUMNS);
-        let rows = self.panels.len().div_ceil(columns);
-        let across = |n: usize, size: f64| n as f64 * (size + GAP) - GAP;
-        let (width, height) = (across(columns, WIDTH), across(rows, self.height));
-        let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             font-family=\"{FONT}\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />"
-        );
-        for (i, p) in self.panels.iter().enumerate() {
-            let (x, y) = ((i % columns) as f64 * (WIDTH + GAP), (i / columns) as f64 * (self.height + GAP));
-            let _ = write!(
-                out,
-                "<g transform=\"translate({x} {y})\" role=\"img\"><title>{}</title>{}</g>",
-                escaped(&p.title),
-                p.body
-            );
-        }
-        out.push_str("</svg>\n");
-        out
-    }
 }
 
 /// What the pictures of all positions show.

@@ -3,10 +3,10 @@
 use obsdeg_exact::radical::Ratio;
 use obsdeg_exact::{Field, Radical, SplitMix64};
 
-use super::expression::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 use super::platform::{RandomValues, Sample};
 use super::symbols::Symbols;
 use super::{Angle, Platform};
+use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 
 /// What the names of a combination stand for.
 pub(crate) struct Names<'a> {

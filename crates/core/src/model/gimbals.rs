@@ -11,7 +11,7 @@ use std::fmt;
 
 use super::angle::{Angle, format_decimal, parse_decimal};
 use super::attitude::{Euler, Matrix3, angles_text, c_n_f64};
-use super::scheme::Position;
+use super::position::Position;
 use crate::model::slew::Slew;
 
 /// A turn in 1e-9 degrees.
@@ -272,7 +272,7 @@ mod tests {
     use super::*;
     use crate::model::attitude::{cardinal, cardinal_names};
     use crate::model::rotation::Rotation;
-    use crate::model::scheme::{Scheme, parse_attitude};
+    use crate::model::{position::parse_attitude, scheme::Scheme};
     use proptest::prelude::*;
 
     const DEG: i64 = 1_000_000_000;

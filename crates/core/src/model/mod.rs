@@ -6,17 +6,16 @@ mod canonical;
 pub(crate) mod combination;
 pub(crate) mod dwell;
 pub(crate) mod error_model;
-pub mod expression;
-pub(crate) mod file_error;
 pub(crate) mod geometry;
 mod gimbal_turns;
 pub(crate) mod gimbals;
 mod matrices;
-mod parser;
+pub(crate) mod observed;
 pub(crate) mod path;
 pub(crate) mod per_gyro;
 pub(crate) mod platform;
 pub(crate) mod pose;
+pub(crate) mod position;
 pub mod ranges;
 pub(crate) mod recording;
 pub(crate) mod ring;
@@ -27,7 +26,6 @@ pub mod settings;
 pub mod slew;
 pub(crate) mod symbols;
 pub(crate) mod terms;
-pub(crate) mod vectors;
 
 pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
 pub use attitude::{
@@ -40,19 +38,18 @@ pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, Sig
 pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
 pub use gimbals::{GimbalError, Gimbals};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
+pub use observed::{LOCAL, Observed, PSI_EPS};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{
-    AZIMUTH, Block, LOCAL, Observed, PSI_EPS, Platform, Point, RandomValues, Sample, SteadyTurn,
-    earth_rate_in, local_dynamics, local_output,
+    AZIMUTH, Block, Platform, Point, RandomValues, Sample, SteadyTurn, earth_rate_in, local_dynamics,
+    local_output,
 };
 pub use pose::{Pose, Way};
+pub use position::{Carry, CarryError, Position, PositionError, Station, parse_attitude};
 pub use recording::{Recording, Still};
 pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
-pub use scheme::{
-    Carry, CarryError, Latitude, LatitudeError, Position, PositionError, Scheme, SchemeError, Station,
-    parse_attitude,
-};
+pub use scheme::{Latitude, LatitudeError, Scheme, SchemeError};
 pub use symbols::Symbols;
 pub use terms::{DefinedBy, ErrorTerm, FrameError, Source, Term, TermError, Unknowns};

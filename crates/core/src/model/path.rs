@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use super::angle::Angle;
 use super::attitude::{Matrix3, Turned, c_n, c_n_f64, elementary, product};
+use super::position::Position;
 use super::ring::{Float, Ring};
 use super::rotation::{Axis, SlewAxis};
-use super::scheme::Position;
 use super::slew::Slew;
 
 /// Slew path: turn of the platform from one position to the next.

@@ -5,16 +5,14 @@ use obsdeg_exact::{Field, PrimeError, RootField, SplitMix64, turn::common_order}
 use super::angle::Angle;
 use super::attitude::{Matrix3, product};
 use super::error_model::{Columns, ErrorModel};
+pub(crate) use super::observed::{LOCAL, Observed, PSI_EPS};
 use super::path::{PathError, PathStep, TurnAt};
+use super::position::{Carry, Position, Station};
 use super::ring::{Float, Ring};
 use super::rotation::Axis;
-use super::scheme::{Carry, Position, Scheme, SchemeError, Station};
+use super::scheme::{Scheme, SchemeError};
 use super::terms::{ErrorTerm, Unknowns};
 
-/// The local unknowns of one position, in n: `psi^n`, `eps^n`, then the error of the accelerometers in `Z^n`.
-pub const LOCAL: usize = 9;
-/// Of these `psi^n` and `eps^n`.
-pub const PSI_EPS: usize = 6;
 /// Names of the local unknowns.
 pub(crate) const LOCAL_NAMES: [&str; LOCAL] =
     ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n", "a_x^n", "a_y^n", "a_z^n"];
@@ -30,22 +28,6 @@ pub struct Platform {
     errors: ErrorModel,
     /// The turns that lead to every position, where torquer errors act on them.
     paths: Vec<Vec<PathStep>>,
-}
-
-/// What is observed, and which local unknowns there are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Observed {
-    /// `psi_y^n` is measured too.
-    pub azimuth: bool,
-    /// Errors of the accelerometers are unknown, so that Z has three components.
-    pub accelerometers: bool,
-}
-
-impl Observed {
-    /// How many local unknowns there are: the first so many.
-    pub fn locals(self) -> usize {
-        if self.accelerometers { LOCAL } else { PSI_EPS }
-    }
 }
 
 /// The platform at one point: cosines and sines of all angles and the earth rate, in some ring.

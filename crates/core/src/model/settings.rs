@@ -7,9 +7,9 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::expression::{among, nearest};
+use super::per_gyro::PerGyro;
 use super::ranges::{self, Range, RangeError};
-use super::{PerGyro, Platform};
+use crate::language::{among, nearest};
 
 /// Model that generates the truth of a simulated run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -359,12 +359,12 @@ pub(crate) fn meant(name: &str) -> String {
     }
 }
 
-/// What could have been meant by `name`: the nearest, or all there is (the first of very many).
-pub fn known(platform: &Platform, name: &str) -> String {
+/// What could have been meant by `name` among the `names` of unknowns and their families: the nearest, or all there is (the first of very many).
+pub fn known(names: &[String], name: &str) -> String {
     let mut families: Vec<String> = families().collect();
     families.dedup();
-    let families = families.into_iter().filter(|f| platform.names().iter().any(|n| concerns(f, n)));
-    let names: Vec<String> = platform.names().iter().cloned().chain(families).collect();
+    let families = families.into_iter().filter(|f| names.iter().any(|n| concerns(f, n)));
+    let names: Vec<String> = names.iter().cloned().chain(families).collect();
     among(name, &names)
 }
 

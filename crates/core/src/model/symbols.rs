@@ -2,8 +2,8 @@
 
 use std::sync::OnceLock;
 
+use crate::language::{Environment, Expression, Node, evaluate, parse};
 use crate::model::angle::{Angle, format_decimal};
-use crate::model::expression::{Environment, Expression, Node, evaluate, parse};
 use crate::model::platform::{Platform, Point, RandomValues, Sample};
 use crate::model::ring::{ManyDigits, Real, Ring, Text};
 use crate::model::scheme::Station;

@@ -1,6 +1,6 @@
 //! Where a polynomial in the tangent of half an angle vanishes, in degrees.
 
-use crate::model::expression::{Expression, Node};
+use crate::language::{Expression, Node};
 
 /// The largest degree that is solved.
 const DEGREE: usize = 200;
@@ -253,7 +253,7 @@ fn refine(mut low: f64, mut high: f64, mut b: Vec<Rounded>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::expression::parse;
+    use crate::language::parse;
 
     fn roots(text: &str) -> Roots {
         let c = coefficients(&parse(text).expect("parses"), "t_a", &|_| 3f64.sqrt()).expect("a polynomial");

@@ -9,9 +9,9 @@ use super::solver::Sparse;
 use crate::degree::coefficient::{Coefficient, Image, Number, rates_between, recover_radical};
 use crate::degree::ensemble::Verdicts;
 use crate::degree::status::{Status, Verdict};
+use crate::language::{Expression, ExpressionError, Function, Node, parse};
 use crate::model::Platform;
 use crate::model::combination::{At, Names, not_zero, row_of, square_root};
-use crate::model::expression::{Expression, ExpressionError, Function, Node, parse};
 use crate::model::ring::{Ring, Text};
 
 /// A combination that is asked for is no linear combination of the unknowns.

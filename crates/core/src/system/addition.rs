@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::dag::{Dag, Op};
 use super::functions::{gcd, plus, times};
 use super::model::Compiled;
-use crate::model::expression::Function;
+use crate::language::Function;
 
 /// Most terms of an argument.
 const TERMS: usize = 24;

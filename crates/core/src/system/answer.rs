@@ -15,7 +15,7 @@ use super::rows::Unknown;
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};
-use crate::model::expression::Function;
+use crate::language::Function;
 use crate::remedies::Remedies;
 
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.

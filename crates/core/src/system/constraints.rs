@@ -56,7 +56,7 @@ impl Constraint<'_> {
             out[i] = match self.dag.ops[i] {
                 Op::Number { mantissa, decimals } => {
                     let ten = f.pow(f.from_u64(10), decimals.unsigned_abs().into());
-                    let m = crate::model::expression::from_i128(f, mantissa);
+                    let m = crate::language::from_i128(f, mantissa);
                     if decimals < 0 { (f.mul(m, ten), f.one()) } else { (m, ten) }
                 }
                 Op::Slot(s) => (values[s], f.one()),

@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use crate::model::expression::{Expression, Function, Node};
+use crate::language::{Expression, Function, Node};
 
 /// An operation; operands are indices of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::constraints::below;
 use super::dag::{Dag, DagError, Op};
-use crate::model::expression::Function;
+use crate::language::Function;
 
 /// Largest integer exponent.
 const MAX_POWER: i64 = 1000;

@@ -23,7 +23,7 @@ use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::{Layout, Maker, random_field};
 use super::taylor::{Signal, Taylor};
 use super::values::Values;
-use crate::model::expression::Function;
+use crate::language::Function;
 
 /// Most points at which gradients are taken.
 const POINTS: usize = 32;

@@ -11,9 +11,9 @@ use super::model::{
     Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, PlacedExpression, Segment,
     State, StateStart, SystemModel,
 };
+use crate::language::file_error::{json_kind, words};
+use crate::language::{Names, parse_with};
 use crate::model::angle::excerpt;
-use crate::model::expression::{Names, parse_with};
-use crate::model::file_error::{json_kind, words};
 
 /// The layout; keys that are not listed are left alone.
 #[derive(Debug, Deserialize)]

@@ -14,7 +14,7 @@ use super::values::Values;
 use crate::degree::findings::{ByPrimes, Findings};
 use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
-use crate::model::expression::Function;
+use crate::language::Function;
 
 /// Pairs of fields that are tried.
 const ATTEMPTS: usize = 5;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
-use crate::model::expression::{Expression, Function, among, nearest};
+use crate::language::{Expression, Function, among, nearest};
 use crate::model::recording::Recording;
 
 /// Where something is written.

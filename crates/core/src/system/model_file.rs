@@ -14,8 +14,8 @@ use super::model::{
 };
 use super::nominal::nominal;
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
-use crate::model::expression::{Node, Shape, Shapes, nearest, parse};
-use crate::model::file_error::explain;
+use crate::language::file_error::explain;
+use crate::language::{Node, Shape, Shapes, nearest, parse};
 use crate::model::recording::ModelRecord;
 
 /// Layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact),

@@ -7,7 +7,7 @@ use toml::Value;
 use super::model::{ModelError, Named, SystemModel};
 use super::model_file::SimulationEntry;
 use super::reader::Reader;
-use crate::model::expression::{Node, Shapes, nearest};
+use crate::language::{Node, Shapes, nearest};
 
 /// The numbers in a value, row by row; `None` where there is something else.
 fn numbers(value: &Value) -> Option<Vec<f64>> {

@@ -7,11 +7,9 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::model::{ModelError, Named, Place, PlacedExpression};
+use crate::language::vectors::{Mismatch, stacked};
+use crate::language::{Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_components, parse_equation};
 use crate::model::angle::excerpt;
-use crate::model::expression::{
-    Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_components, parse_equation,
-};
-use crate::model::vectors::{Mismatch, stacked};
 
 /// A key and what it says.
 pub(super) type Entry<'a> = (&'a String, &'a Spanned<Value>);

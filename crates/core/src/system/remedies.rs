@@ -9,7 +9,7 @@ use super::model::{
     Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
 };
 use super::values::Values;
-use crate::model::expression::{Expression, Node};
+use crate::language::{Expression, Node};
 use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
 
 /// Most verdicts on single changes, and half as many on pairs, of a model of up to `UNKNOWNS`; beyond, the

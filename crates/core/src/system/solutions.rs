@@ -11,7 +11,7 @@ use super::dag::{Dag, Op};
 use super::judge::Judgement;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::SystemRows;
-use crate::model::expression::{Environment, Names, evaluate, parse_with};
+use crate::language::{Environment, Names, evaluate, parse_with};
 
 /// Most unknowns.
 const UNKNOWNS: usize = 30;

@@ -12,7 +12,7 @@ use obsdeg_exact::{SplitMix64, interrupt};
 use super::constraints::below;
 use super::dag::{Dag, Op};
 use super::values::Values;
-use crate::model::expression::Function;
+use crate::language::Function;
 
 /// What a slot holds in one run.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,7 @@ use obsdeg_exact::{Ball, Field, RealSpace, Reals, RowSpace, Scalars, SplitMix64,
 use super::constraints::hold;
 use super::dag::Dag;
 use super::taylor::{Signal, Taylor};
-use crate::model::expression::{Function, from_i128};
+use crate::language::{Function, from_i128};
 
 /// A field in which a model has values.
 pub(crate) trait Values: Scalars {

@@ -2,7 +2,7 @@
 
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::degree::EnsembleError;
-use obsdeg_core::model::expression::{Environment, ExpressionError, evaluate, parse};
+use obsdeg_core::language::{Environment, ExpressionError, evaluate, parse};
 use obsdeg_core::model::{
     LOCAL, Matrix3, Platform, RandomValues, Scheme, local_dynamics, local_output, parse_attitude,
 };

@@ -18,7 +18,7 @@ use crate::simulation::answer::MeasurementReport;
 use crate::simulation::carries::under;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::iterated::at_own_drifts;
-use crate::simulation::plan::MAX_UNKNOWNS;
+use crate::simulation::limits::MAX_UNKNOWNS;
 use crate::simulation::{Attained, SimulationError, noise_floor, other_carries};
 
 /// Latitudes of the sweep, in degrees.

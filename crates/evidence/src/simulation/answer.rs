@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::carries::OtherCarry;
 use super::conditions::{Conditions, latitude_of};
 use super::consistency::{CREDIBLE, Consistency};
+use super::datasheet::GyroNoise;
 use super::floor::NoiseFloor;
-use super::gyro_noise::GyroNoise;
+pub use super::validity::Validity;
 use crate::requirements::{Miss, Requirements, meets};
 
 /// Name and version of the JSON layout.
@@ -383,22 +384,4 @@ impl Outcome {
             Self::NoNumber => Some(Miss::NoNumber),
         }
     }
-}
-
-/// Validity of the small-angle model at the drifts of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Validity {
-    /// Largest platform error `|psi|`, in deg.
-    pub largest_psi_deg: f64,
-    /// Largest `|psi|^2/2`, in g: the term that the observation model (6) neglects.
-    pub neglected_g: f64,
-    /// Noise of the observation per sample, in g.
-    pub accelerometer_noise_g: f64,
-    /// Largest g-sensitive coefficient times the largest `|psi|`, in deg/h: the term that the drift model (3)
-    /// neglects.
-    pub neglected_dph: f64,
-    /// Smallest sigma required of a drift coefficient, in deg/h (per g); null if none is required.
-    pub smallest_requirement_dph: Option<f64>,
-    /// True if `neglected_g` is at most the noise and `neglected_dph` at most the smallest requirement.
-    pub holds: bool,
 }

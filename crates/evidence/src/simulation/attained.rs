@@ -11,13 +11,13 @@ use obsdeg_core::model::Scheme;
 use obsdeg_ekf::linear::last_covariance;
 use obsdeg_ekf::{Covariance, EkfError, Form, SquareRootInformation};
 
-use super::SimulationError;
 use super::batch::{Batch, batch};
 use super::conditions::{Conditions, PRIOR, REQUIRED, is_rate, resolve, si_per_shown};
+use super::error::SimulationError;
 use super::floor::wide_prior;
 use super::plan::Plan;
-use super::record::RunStart;
 use super::seen::{no_prior, predict};
+use super::start::RunStart;
 use crate::prediction::Prediction;
 use crate::requirements::{Claim, Miss, Requirements, Worst};
 

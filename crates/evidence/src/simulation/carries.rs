@@ -4,10 +4,10 @@ use obsdeg_core::model::{Carry, Platform, Scheme};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SimulationError;
 use super::attained::Attained;
 use super::conditions::Conditions;
-use super::plan::MAX_UNKNOWNS;
+use super::error::SimulationError;
+use super::limits::MAX_UNKNOWNS;
 use crate::requirements::{Requirements, Worst};
 
 /// Scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only

@@ -10,8 +10,8 @@ use obsdeg_core::model::{Latitude, Platform, Position, Scheme};
 
 use obsdeg_ekf::SensorNoise;
 
-use super::SimulationError;
-use super::gyro_noise::GyroNoise;
+use super::datasheet::GyroNoise;
+use super::error::SimulationError;
 use crate::requirements::Basis;
 
 /// Everything that a run needs besides the scheme.
@@ -383,7 +383,7 @@ pub fn resolve(
             return Err(SimulationError::UnknownName {
                 what,
                 found: a.name.clone(),
-                known: known(platform, &a.name),
+                known: known(platform.names(), &a.name),
             });
         }
     }

@@ -17,8 +17,8 @@ use nalgebra::DMatrix;
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Stage};
 
 use super::extended::Extended;
-use super::iterated::Trajectory;
 use super::state::PlatformState;
+use super::trajectory::Trajectory;
 
 /// Most directions that bend: their products are columns.
 const MOST_DIRECTIONS: usize = 6;

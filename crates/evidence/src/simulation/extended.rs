@@ -24,11 +24,12 @@ use obsdeg_ekf::{
 };
 use obsdeg_exact::interrupt;
 
-use super::SimulationError;
+use super::biases::{Bias, Sensor};
 use super::conditions::Conditions;
-use super::gyro_noise::{Bias, Sensor};
-use super::plan::{G_N, MAX_INTEGRATION, Plan, integration_steps};
-use super::record::RunStart;
+use super::error::SimulationError;
+use super::limits::MAX_INTEGRATION;
+use super::plan::{G_N, Plan, integration_steps};
+use super::start::RunStart;
 use super::state::{PlatformState, inverse_left_jacobian, orthonormal};
 use super::truth::drift_turn;
 

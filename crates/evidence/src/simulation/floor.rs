@@ -33,9 +33,10 @@ use serde::Serialize;
 
 use super::batch::{batch, wider};
 use super::conditions::{Conditions, shown_unit, si_per_shown};
+use super::datasheet::GyroNoise;
+use super::error::SimulationError;
 use super::plan::Plan;
-use super::record::RunStart;
-use super::{GyroNoise, SimulationError};
+use super::start::RunStart;
 use crate::prediction::Prediction;
 
 /// Factors on the dwells as powers of sqrt 2.

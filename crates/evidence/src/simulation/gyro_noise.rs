@@ -6,106 +6,15 @@
 //! `b_B` is there. A coefficient is not what the bias is at the end.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::ranges;
 use obsdeg_core::model::slew::apply;
-use obsdeg_core::model::{Float, GYROS, Matrix3, PerGyro, local_dynamics};
+use obsdeg_core::model::{Float, Matrix3, local_dynamics};
+use obsdeg_ekf::SensorNoise;
 use obsdeg_ekf::noise::discretised;
-use obsdeg_ekf::{BiasState, SensorNoise};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use super::SimulationError;
+use super::biases::{Bias, Sensor, Step, root};
+use super::error::SimulationError;
+use super::noise::Noise;
 use super::plan::{Plan, SegmentKind};
-use super::truth::Noise;
-
-/// Noise of the gyros X, Y, Z by their datasheet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct GyroNoise {
-    /// Angle random walk of each gyro, in deg/sqrt(h).
-    pub angle_random_walk_deg_sqrt_h: PerGyro,
-    /// Rate random walk of each gyro, in deg/h/sqrt(h).
-    pub rate_random_walk_dph_sqrt_h: PerGyro,
-    /// Bias instability of each gyro, in deg/h: the coefficient B of IEEE Std 952, whose Allan floor is 0.664
-    /// B.
-    pub bias_instability_dph: PerGyro,
-    /// Correlation time, in s, of the Gauss-Markov process that represents the bias instability.
-    pub correlation_time_s: f64,
-}
-
-impl Default for GyroNoise {
-    fn default() -> Self {
-        let none = PerGyro::default();
-        Self {
-            angle_random_walk_deg_sqrt_h: none,
-            rate_random_walk_dph_sqrt_h: none,
-            bias_instability_dph: none,
-            correlation_time_s: 3600.0,
-        }
-    }
-}
-
-impl GyroNoise {
-    fn lists(&self) -> [(&'static str, PerGyro); 3] {
-        [
-            ("angle_random_walk_deg_sqrt_h", self.angle_random_walk_deg_sqrt_h),
-            ("rate_random_walk_dph_sqrt_h", self.rate_random_walk_dph_sqrt_h),
-            ("bias_instability_dph", self.bias_instability_dph),
-        ]
-    }
-
-    /// Whether there is none.
-    pub fn is_none(&self) -> bool {
-        self.lists().iter().all(|(_, x)| x.is_none())
-    }
-
-    /// Checks that every number is in its range.
-    ///
-    /// # Errors
-    /// [`SimulationError::Range`] naming the offender.
-    pub(crate) fn validate(&self) -> Result<(), SimulationError> {
-        for (what, x) in self.lists() {
-            x.check(what)?;
-        }
-        Ok(ranges::CORRELATION_S.check("correlation_time_s", self.correlation_time_s)?)
-    }
-
-    /// The gyros X, Y, Z in SI units.
-    pub fn sensors(&self) -> [SensorNoise; GYROS.len()] {
-        let [angle, rate, bias] = self.lists().map(|(_, x)| x.0);
-        std::array::from_fn(|g| SensorNoise::gyro(angle[g], rate[g], bias[g], self.correlation_time_s))
-    }
-}
-
-/// Whose bias it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sensor {
-    /// A gyro: 0, 1, 2 for X, Y, Z. Its bias is a drift, in rad/s.
-    Gyro(usize),
-    /// What accelerometers make of a component of Z, in platform axes x, y, z: 0, 1, 2; in g. Three alike and independent make the same in any
-    /// axes, so the mounting does not matter.
-    Accelerometer(usize),
-}
-
-/// A state behind the unknowns: part of the bias of a sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bias {
-    /// Whose.
-    pub sensor: Sensor,
-    /// Its process.
-    pub process: BiasState,
-}
-
-/// What of all gyros goes on as states, then what of the accelerometers.
-pub(super) fn biases(gyros: &[SensorNoise; 3], accelerometer: &SensorNoise) -> Vec<Bias> {
-    let of = |sensor: Sensor, noise: &SensorNoise| {
-        noise.states().into_iter().map(move |process| Bias { sensor, process })
-    };
-    let gyros = gyros.iter().enumerate().flat_map(|(g, noise)| of(Sensor::Gyro(g), noise));
-    gyros.chain((0..3).flat_map(|a| of(Sensor::Accelerometer(a), accelerometer))).collect()
-}
-
-/// `(Phi, Q)` of some states over a step.
-pub(super) type Step = (DMatrix<f64>, DMatrix<f64>);
 
 impl Plan {
     /// The input axis of a gyro in platform axes.
@@ -204,24 +113,6 @@ impl Plan {
         let white: f64 = self.gyros.iter().map(|g| g.white / dt.sqrt()).sum();
         6.0 * (self.drift_biases().map(|(_, b)| bias(b)).sum::<f64>() + white)
     }
-}
-
-/// The lower triangular root of a covariance, zero in directions without noise.
-pub(super) fn root(q: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = q.nrows();
-    let mut l = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            let sum: f64 = q[(i, j)] - (0..j).map(|k| l[(i, k)] * l[(j, k)]).sum::<f64>();
-            // a pivot that rounding leaves is no noise
-            l[(i, j)] = match (i == j, l[(j, j)]) {
-                (true, _) if sum > 1e-13 * q[(i, i)] => sum.sqrt(),
-                (false, d) if d > 0.0 => sum / d,
-                _ => 0.0,
-            };
-        }
-    }
-    l
 }
 
 /// The gyros of an exact truth, drawn part by part of a step: angle and biases of each together.

@@ -11,17 +11,17 @@ use std::borrow::Cow;
 
 use obsdeg_ekf::consistency::Nees;
 use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
-use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
-use obsdeg_exact::interrupt;
+use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Update};
 
-use super::SimulationError;
-use super::answer::Validity;
 use super::conditions::Conditions;
 use super::curvature::Curvature;
-use super::extended::{Ended, Extended, PlatformMotion, check_measurements};
+use super::error::SimulationError;
+use super::extended::{Ended, Extended, check_measurements};
 use super::plan::Plan;
-use super::record::RunStart;
+use super::start::RunStart;
 use super::state::PlatformState;
+use super::trajectory::{Along, Trajectory};
+use super::validity::Validity;
 
 /// Most steps of a run that is iterated: each has a model of its own.
 pub(crate) const MAX_ITERATED_STEPS: usize = 100_000;
@@ -35,69 +35,6 @@ const POOR: f64 = 2.0;
 const HALVINGS: usize = 12;
 /// A step leads away when the sum of the squared innovations grows by more than this part of it, and this.
 const AWAY: (f64, f64) = (0.02, 10.0);
-
-/// A run without noise.
-pub(super) struct Trajectory {
-    /// Its outputs, as many per step as there are.
-    pub outputs: Vec<f64>,
-    /// Its states after the steps.
-    pub states: Vec<PlatformState>,
-}
-
-impl Trajectory {
-    /// From `x`, of at most so many steps. `on_step` hears the segment, the time within it, how long the step is, and the state to be
-    /// moved by it.
-    fn through(
-        filter: &Extended<'_>,
-        most: usize,
-        mut x: PlatformState,
-        mut on_step: impl FnMut(&PlatformMotion<'_>, f64, f64, &mut PlatformState) -> Result<(), EkfError>,
-    ) -> Result<Self, EkfError> {
-        let mut out = Self { outputs: Vec::new(), states: Vec::new() };
-        for (segment, s) in filter.plan().segments.iter().enumerate() {
-            let motion = filter.motion(segment);
-            for i in 0..s.steps.min(most - out.states.len()) {
-                interrupt::check();
-                on_step(&motion, i as f64 * s.dt, s.dt, &mut x)?;
-                out.outputs.extend_from_slice(motion.h(0.0, &x).as_slice());
-                out.states.push(x.clone());
-            }
-        }
-        Ok(out)
-    }
-
-    /// From `x`.
-    pub(super) fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
-        Self::through(filter, usize::MAX, x, |motion, t, dt, x| motion.carry(t, dt, x))
-    }
-}
-
-/// A run linearised along one trajectory.
-pub(super) struct Along {
-    /// One per step.
-    pub stages: Vec<Stage>,
-    /// Where it is linearised.
-    pub at: Trajectory,
-}
-
-impl Along {
-    /// Along the trajectory that starts from `x`, of at most so many steps.
-    fn new(filter: &Extended<'_>, most: usize, x: PlatformState) -> Result<Self, EkfError> {
-        let mut stages = Vec::new();
-        let at = Trajectory::through(filter, most, x, |motion, t, dt, x| {
-            let (transition, noise) = motion.advance(t, dt, x)?;
-            let rows = Measurement::jacobian(motion, 0.0, x);
-            let row = |(j, o): (usize, &ScalarOutput)| ScalarOutput {
-                h: rows.row(j).iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect(),
-                r: o.r,
-            };
-            let outputs = motion.stage().outputs.iter().enumerate().map(row).collect();
-            stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
-            Ok(())
-        })?;
-        Ok(Self { stages, at })
-    }
-}
 
 /// What a pass over the run made of it.
 struct Pass {

@@ -12,20 +12,11 @@ use obsdeg_core::model::{
 use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, SensorNoise, Stage, Transition};
 
-use super::SimulationError;
+use super::biases::{Bias, biases, root};
 use super::conditions::{Conditions, latitude_of};
-use super::gyro_noise::{Bias, biases, root};
+use super::error::SimulationError;
+use super::limits::{MAX_INTEGRATION, MAX_NUMBERS, MAX_STEPS, MAX_TURNING_STEPS, MAX_UNKNOWNS};
 
-/// Most unknowns of a run: the covariance is a full matrix.
-pub(crate) const MAX_UNKNOWNS: usize = 300;
-/// Most steps of a run.
-pub(crate) const MAX_STEPS: usize = 1_000_000;
-/// Most steps of rotating segments: each has a model of its own.
-pub(crate) const MAX_TURNING_STEPS: usize = 100_000;
-/// Most numbers of a series: steps times unknowns.
-pub(crate) const MAX_NUMBERS: usize = 20_000_000;
-/// Most integration steps, of slews and rotations or of a true attitude.
-pub(crate) const MAX_INTEGRATION: usize = 2_000_000;
 /// Largest turn of one integration step, in rad.
 const MAX_TURN: f64 = 0.02;
 

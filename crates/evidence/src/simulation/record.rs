@@ -1,79 +1,21 @@
 //! One run: truth, filter, and everything that is plotted of it.
 
-use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form, Manifold, Update};
 
-use super::SimulationError;
-use super::answer::{FilterReason, FilterReport, Validity};
-use super::conditions::{
-    Conditions, ESTIMATE, PRIOR, TRUE_VALUE, is_rate, resolve, shown_unit, si_per_shown,
-};
+use super::answer::{FilterReason, FilterReport};
+use super::conditions::{Conditions, shown_unit, si_per_shown};
+use super::error::SimulationError;
 use super::extended::{Ended, Extended};
 use super::iterated::{MAX_ITERATED_STEPS, iterated};
+use super::noise::Noise;
 use super::plan::Plan;
+pub(crate) use super::start::RunStart;
 use super::state::PlatformState;
-use super::truth::{Noise, TruthModel, check_drifts};
+use super::truth::{TruthModel, check_drifts};
+use super::validity::Validity;
 use crate::prediction::Prediction;
-
-/// Where a run starts, in SI units (shape n each: the unknowns, then the biases).
-#[derive(Debug, Clone, PartialEq)]
-pub struct RunStart {
-    /// The true unknowns.
-    pub truth: Vec<f64>,
-    /// The initial estimate.
-    pub estimate: Vec<f64>,
-    /// Its standard deviations.
-    pub sigma: Vec<f64>,
-}
-
-impl RunStart {
-    /// What the conditions say for the unknowns of `plan`.
-    ///
-    /// # Errors
-    /// [`SimulationError`] for unknown names, and exact truth without coefficients.
-    pub fn new(plan: &Plan, conditions: &Conditions) -> Result<Self, SimulationError> {
-        if conditions.truth == Truth::Exact && !plan.has_coefficients() {
-            return Err(SimulationError::ExactDrift);
-        }
-        let p = &plan.platform;
-        let si = |values: Vec<f64>, scaled: bool| -> Vec<f64> {
-            let units = p.units().iter();
-            let scale = |u: &str| if scaled && is_rate(u) { conditions.drift_scale } else { 1.0 };
-            units.zip(values).map(|(u, v)| v * si_per_shown(u) * scale(u)).collect()
-        };
-        let sigma = resolve(PRIOR, p, &conditions.priors, 1.0)?;
-        let mut out = Self {
-            truth: si(resolve(TRUE_VALUE, p, &conditions.values, 0.0)?, true),
-            estimate: si(resolve(ESTIMATE, p, &conditions.estimates, 0.0)?, false),
-            sigma: si(sigma, true),
-        };
-        let biases = plan.bias_sigmas();
-        out.truth.extend(biases.iter().map(|_| 0.0));
-        out.estimate.extend(biases.iter().map(|_| 0.0));
-        out.sigma.extend(biases);
-        Ok(out)
-    }
-
-    /// The initial covariance.
-    ///
-    /// # Errors
-    /// [`SimulationError::Filter`].
-    pub fn covariance(&self, form: Form) -> Result<Covariance, SimulationError> {
-        Ok(Covariance::new("P0", &self.variances(), form)?)
-    }
-
-    /// The initial variances (n x n, diagonal).
-    pub(super) fn variances(&self) -> DMatrix<f64> {
-        DMatrix::from_diagonal(&DVector::from_iterator(self.sigma.len(), self.sigma.iter().map(|s| s * s)))
-    }
-
-    /// The initial estimate as the state of a filter that carries attitudes.
-    pub(super) fn state(&self, plan: &Plan) -> PlatformState {
-        PlatformState::of_unknowns(&self.estimate, plan.constants())
-    }
-}
 
 /// One unknown or combination over time, in SI units, from t = 0.
 #[derive(Debug, Clone, PartialEq, Default)]

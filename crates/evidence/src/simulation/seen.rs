@@ -4,8 +4,8 @@
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
 
-use super::SimulationError;
 use super::batch::{Batch, batch, diffuse_prior, wider};
+use super::error::SimulationError;
 use super::plan::Plan;
 use crate::prediction::Prediction;
 

@@ -3,33 +3,15 @@
 use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::slew::{W_IE, apply, cross, rotation, rotation_vector, times, transpose};
 use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3};
-use obsdeg_exact::{SplitMix64, interrupt};
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
+use obsdeg_exact::interrupt;
 
-use super::SimulationError;
 use super::conditions::Conditions;
+use super::error::SimulationError;
 use super::gyro_noise::Gyros;
-use super::plan::{G_N, MAX_INTEGRATION, Plan, SegmentKind, integration_steps};
+use super::limits::MAX_INTEGRATION;
+pub(crate) use super::noise::Noise;
+use super::plan::{G_N, Plan, SegmentKind, integration_steps};
 use super::state::orthonormal;
-
-/// The stream of random numbers of one run.
-#[derive(Debug, Clone)]
-pub struct Noise(Pcg64);
-
-impl Noise {
-    /// The stream of run `run` under `seed`: streams do not depend on who else draws.
-    pub fn new(seed: u64, run: u64) -> Self {
-        let mut mixed = SplitMix64::new(seed ^ run.rotate_left(32));
-        let state = u128::from(mixed.next_u64()) << 64 | u128::from(mixed.next_u64());
-        Self(Pcg64::new(state, u128::from(run)))
-    }
-
-    /// A standard normal.
-    pub fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
-    }
-}
 
 /// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at
 /// most.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Measurement, Process};
 
-use obsdeg_core::model::expression::{Expression, evaluate_f64};
+use obsdeg_core::language::{Expression, evaluate_f64};
 use obsdeg_core::system::{Compiled, KnownInput, ModelError, Named, Op, Role, SystemModel};
 
 /// A state of the filter; what belongs to an experiment says to which.

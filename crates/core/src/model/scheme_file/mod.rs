@@ -13,12 +13,12 @@ pub use layout::SchemeFile;
 pub use write::write;
 
 use super::angle::parse_decimal;
-use super::file_error::explain;
 use super::path::{Path, PathError};
 use super::per_gyro::PerGyro;
 use super::platform::Platform;
 use super::scheme::{Latitude, Scheme};
 use super::terms::{DefinedBy, Unknowns};
+use crate::language::file_error::explain;
 use crate::model::settings::Settings;
 use crate::model::{combination, settings};
 use layout::{GimbalEntry, Literal, Numbers, SimulationEntry};
@@ -188,7 +188,8 @@ impl Reader<'_> {
             let concerned = |name: &String| platform.names().iter().any(|n| settings::concerns(name, n));
             let strange = list.keys().find(|name| !concerned(name));
             if let Some(name) = strange {
-                let message = format!("`{name}`: no such unknown; {}", settings::known(&platform, name));
+                let message =
+                    format!("`{name}`: no such unknown; {}", settings::known(platform.names(), name));
                 let span = self.places.get(&format!("{key}.{name}")).cloned();
                 return Err(SchemeFileError { message, span });
             }

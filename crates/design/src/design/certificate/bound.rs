@@ -116,8 +116,8 @@ mod tests {
     use super::super::exact::{Real, Reals, real};
     use super::super::weights::weigh;
     use super::*;
-    use crate::design::criterion::{Criterion, Limits};
-    use crate::design::information::Evaluator;
+    use crate::design::measure::criterion::{Criterion, Limits};
+    use crate::design::measure::evaluator::Evaluator;
     use obsdeg_core::model::{Angle, Carry, Euler, Ring, Scheme};
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;

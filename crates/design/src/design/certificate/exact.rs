@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Ring, earth_rate_in, elementary, product};
 use obsdeg_exact::Ball;
 
-use super::super::criterion::Criterion;
-use super::super::information::Evaluator;
-use super::super::ways::Stop;
+use crate::design::measure::criterion::Criterion;
+use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::stop::Stop;
 
 pub(super) type Real = Ball<8>;
 

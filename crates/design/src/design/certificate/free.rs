@@ -14,10 +14,10 @@ use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64, earth_rate_in, elementary, product};
 use rayon::prelude::*;
 
-use super::super::criterion::{Criterion, Limits};
-use super::super::information::Evaluator;
 use super::bounded::{Bounded, Bounds, rounding};
 use super::weights::{Weighed, listed, weigh};
+use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::evaluator::Evaluator;
 
 /// Step of the net of Euler angles on which attitudes are looked for, in degrees.
 const COARSE: usize = 9;
@@ -164,10 +164,7 @@ impl Evaluator {
 
     /// How far the information of the positions of a sequence, as the search has it, is from that of the rotations of their angles with G as it is, at
     /// most (m x m, sizes).
-    pub(in super::super) fn errors_of<'e>(
-        &self,
-        positions: impl Iterator<Item = (usize, &'e Euler)>,
-    ) -> DMatrix<f64> {
+    pub(crate) fn errors_of<'e>(&self, positions: impl Iterator<Item = (usize, &'e Euler)>) -> DMatrix<f64> {
         let (n, m) = (self.n, self.n - 3);
         let g = self.information_of_effects();
         let g = DMatrix::from_fn(LOCAL - 3, LOCAL - 3, |i, j| g[i][j]);

@@ -2,20 +2,20 @@
 //! of every scheme of k candidates, from the optimal weights of the candidates (approximate design theory).
 
 mod bound;
-mod bounded;
+pub(crate) mod bounded;
 #[cfg(test)]
 mod exact;
 mod free;
 mod scheme;
+pub(crate) mod value;
 mod weights;
 
-pub(super) use bounded::rounding;
 pub use free::Everywhere;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::criterion::{Criterion, Limits};
-use super::information::Evaluator;
+use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::evaluator::Evaluator;
 use bound::{Additive, Aim};
 use weights::{listed, weigh};
 

@@ -13,16 +13,16 @@
 
 use nalgebra::DMatrix;
 
-use super::super::criterion::Criterion;
-use super::super::information::Evaluator;
-use super::super::ways::Stop;
 use super::bounded::rounding;
+use crate::design::measure::criterion::Criterion;
+use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::stop::Stop;
 
 impl Evaluator {
     /// The criterion of a sequence is not above this, of the information of each of its positions as double precision gives it, whose
     /// error is at most `errors` (m x m, sizes; psi left out): deg/h (per g), or for margin a ratio. `None` where order matters, and where
     /// rounding may hide all of it.
-    pub(in super::super) fn at_most(
+    pub(crate) fn at_most(
         &self,
         sequence: &[Stop],
         criterion: &Criterion,
@@ -103,7 +103,7 @@ fn largest_eigenvalue_at_most(k: &DMatrix<f64>) -> Option<f64> {
 mod tests {
     use super::super::exact::{Exact, square_root};
     use super::*;
-    use crate::design::criterion::Limits;
+    use crate::design::measure::criterion::Limits;
     use crate::design::{Candidates, Stop};
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;

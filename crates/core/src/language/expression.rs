@@ -1,0 +1,545 @@
+//! Arithmetic expressions, and their values in a prime field and in floating point.
+//!
+//! `+ - * / ^`, brackets, decimals (exact), names, and functions of one argument. Operations are held in a list, operands before what is
+//! made of them, so that nothing walks a tree as deep as a file is long.
+
+use std::ops::Range;
+
+use obsdeg_exact::Field;
+
+/// Deepest nesting of brackets, signs and powers.
+pub const MAX_DEPTH: usize = 200;
+
+/// An expression: its operations in order, the last one being the whole.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Expression {
+    /// Operations; operands are indices of earlier ones.
+    pub nodes: Vec<Node>,
+    /// Byte range of each in the text.
+    pub spans: Vec<Range<usize>>,
+}
+
+/// The kinds of operations.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "the usual operations")]
+pub enum Node {
+    /// `mantissa / 10^decimals`.
+    Number {
+        mantissa: i128,
+        decimals: i32,
+    },
+    Name(String),
+    Call {
+        function: Function,
+        argument: usize,
+    },
+    Negate(usize),
+    Add(usize, usize),
+    Subtract(usize, usize),
+    Multiply(usize, usize),
+    Divide(usize, usize),
+    Power(usize, usize),
+}
+
+impl Node {
+    /// The same operation on other operands.
+    pub(super) fn with(&self, place: &mut dyn FnMut(usize) -> usize) -> Self {
+        match self {
+            Self::Number { .. } | Self::Name(_) => self.clone(),
+            Self::Call { function, argument } => {
+                Self::Call { function: *function, argument: place(*argument) }
+            }
+            Self::Negate(a) => Self::Negate(place(*a)),
+            Self::Add(a, b) => Self::Add(place(*a), place(*b)),
+            Self::Subtract(a, b) => Self::Subtract(place(*a), place(*b)),
+            Self::Multiply(a, b) => Self::Multiply(place(*a), place(*b)),
+            Self::Divide(a, b) => Self::Divide(place(*a), place(*b)),
+            Self::Power(a, b) => Self::Power(place(*a), place(*b)),
+        }
+    }
+}
+
+/// Functions of one argument.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the usual functions")]
+pub enum Function {
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Exp,
+    Log,
+    Sqrt,
+    Tanh,
+    Abs,
+    Sign,
+}
+
+impl Function {
+    /// All of them, with their names.
+    pub const ALL: [(&'static str, Self); 12] = [
+        ("sin", Self::Sin),
+        ("cos", Self::Cos),
+        ("tan", Self::Tan),
+        ("asin", Self::Asin),
+        ("acos", Self::Acos),
+        ("atan", Self::Atan),
+        ("exp", Self::Exp),
+        ("log", Self::Log),
+        ("sqrt", Self::Sqrt),
+        ("tanh", Self::Tanh),
+        ("abs", Self::Abs),
+        ("sign", Self::Sign),
+    ];
+
+    /// Its value in floating point; the sign of zero is zero.
+    pub fn value(self, x: f64) -> f64 {
+        match self {
+            Self::Sin => x.sin(),
+            Self::Cos => x.cos(),
+            Self::Tan => x.tan(),
+            Self::Asin => x.asin(),
+            Self::Acos => x.acos(),
+            Self::Atan => x.atan(),
+            Self::Exp => x.exp(),
+            Self::Log => x.ln(),
+            Self::Sqrt => x.sqrt(),
+            Self::Tanh => x.tanh(),
+            Self::Abs => x.abs(),
+            Self::Sign if x == 0.0 => 0.0,
+            Self::Sign => x.signum(),
+        }
+    }
+
+    /// The function of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, f)| *f)
+    }
+}
+
+/// Why a text is no expression, or has no value.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ExpressionError {
+    /// The grammar is violated.
+    #[error("expected {expected}, found {found}")]
+    Syntax {
+        /// What could stand here.
+        expected: &'static str,
+        /// What stands here.
+        found: String,
+        /// Where.
+        span: Range<usize>,
+    },
+    /// Brackets, signs or powers nested too deeply.
+    #[error("nested more than {MAX_DEPTH} deep")]
+    TooDeep {
+        /// Where.
+        span: Range<usize>,
+    },
+    /// Vectors and matrices that do not fit.
+    #[error("expected {expected}, found {found}")]
+    Shape {
+        /// What would fit.
+        expected: String,
+        /// What stands here.
+        found: String,
+        /// Where.
+        span: Range<usize>,
+    },
+    /// A name without a meaning.
+    #[error("`{name}` is not known here; {hint}")]
+    UnknownName {
+        /// The name.
+        name: String,
+        /// The nearest known name, or what there is.
+        hint: String,
+        /// Where.
+        span: Range<usize>,
+    },
+    /// A division by zero.
+    #[error("division by zero")]
+    DivisionByZero {
+        /// Where.
+        span: Range<usize>,
+    },
+}
+
+impl ExpressionError {
+    /// Where in the text the error is.
+    pub fn span(&self) -> Range<usize> {
+        match self {
+            Self::Syntax { span, .. }
+            | Self::Shape { span, .. }
+            | Self::TooDeep { span }
+            | Self::UnknownName { span, .. }
+            | Self::DivisionByZero { span } => span.clone(),
+        }
+    }
+}
+
+/// Which names there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Names {
+    /// Of the platform: `psi_x@1` and `psi_x^n` are names.
+    Platform,
+    /// Letters, digits and `_`.
+    Plain,
+}
+
+/// Where the names of an expression get their values.
+pub trait Environment {
+    /// The value of a name.
+    fn name(&self, name: &str) -> Option<u64>;
+    /// The cosine and sine of a named angle, or of one such as `20 deg`.
+    fn cos_sin(&self, angle: &str) -> Option<(u64, u64)>;
+    /// The square root of an integer.
+    fn sqrt(&self, _: i32) -> Option<u64> {
+        None
+    }
+    /// All known names, for hints.
+    fn known(&self) -> Vec<String>;
+}
+
+impl Expression {
+    /// The whole.
+    pub fn root(&self) -> usize {
+        self.nodes.len().saturating_sub(1)
+    }
+
+    /// The byte range of the whole.
+    pub fn span(&self) -> Range<usize> {
+        self.spans.last().cloned().unwrap_or(0..0)
+    }
+
+    /// The name that an operation is, and whether it has a minus.
+    pub(crate) fn angle_at(&self, i: usize) -> Option<(&str, bool)> {
+        match &self.nodes[i] {
+            Node::Name(name) => Some((name, false)),
+            Node::Negate(a) => self.angle_at(*a).map(|(name, minus)| (name, !minus)),
+            _ => None,
+        }
+    }
+
+    /// The integer that an operation is, if it is a small one.
+    pub(crate) fn integer_at(&self, i: usize) -> Option<i32> {
+        match self.nodes[i] {
+            Node::Number { mantissa, decimals: 0 } => i32::try_from(mantissa).ok(),
+            Node::Negate(a) => self.integer_at(a).map(|x| -x),
+            _ => None,
+        }
+    }
+}
+
+/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots of
+/// integers, exponents integers.
+///
+/// # Errors
+/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for other
+/// functions and exponents.
+pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Result<u64, ExpressionError> {
+    let syntax = |i: usize, expected| ExpressionError::Syntax {
+        expected,
+        found: "something else".into(),
+        span: expression.spans[i].clone(),
+    };
+    let mut values: Vec<u64> = Vec::with_capacity(expression.nodes.len());
+    // what only names an angle, or is an exponent, needs no value
+    let mut arguments = vec![false; expression.nodes.len()];
+    for (i, node) in expression.nodes.iter().enumerate().rev() {
+        match node {
+            Node::Call { argument, .. } => arguments[*argument] = true,
+            Node::Negate(a) => arguments[*a] |= arguments[i],
+            _ => (),
+        }
+    }
+    for (i, node) in expression.nodes.iter().enumerate() {
+        let span = || expression.spans[i].clone();
+        let unknown = |name: &str| ExpressionError::UnknownName {
+            name: name.into(),
+            hint: among(name, &env.known()),
+            span: span(),
+        };
+        let inverse = |a: u64| match a {
+            0 => Err(ExpressionError::DivisionByZero { span: span() }),
+            _ => Ok(f.inv(a)),
+        };
+        let value = match node {
+            Node::Number { mantissa, decimals } => {
+                let ten = f.pow(f.from_u64(10), decimals.unsigned_abs().into());
+                f.mul(from_i128(f, *mantissa), if *decimals < 0 { ten } else { f.inv(ten) })
+            }
+            Node::Name(_) if arguments[i] => 0,
+            Node::Name(name) if name.ends_with(" deg") => {
+                return Err(ExpressionError::Syntax {
+                    expected: "angles in sin or cos only",
+                    found: format!("`{name}`"),
+                    span: span(),
+                });
+            }
+            Node::Name(name) => env.name(name).ok_or_else(|| unknown(name))?,
+            Node::Call { function, argument } => {
+                let angle = || {
+                    let Some((angle, minus)) = expression.angle_at(*argument) else {
+                        return Err(syntax(*argument, "the name of an angle, or one such as `20 deg`"));
+                    };
+                    let known = env.cos_sin(angle);
+                    let (c, s) =
+                        known.ok_or_else(|| match angle.ends_with(" deg") || env.name(angle).is_some() {
+                            true => ExpressionError::Syntax {
+                                expected: "an angle that the scheme has",
+                                found: format!("`{angle}`"),
+                                span: expression.spans[*argument].clone(),
+                            },
+                            false => unknown(angle),
+                        })?;
+                    Ok((c, if minus { f.neg(s) } else { s }))
+                };
+                match function {
+                    Function::Cos => angle()?.0,
+                    Function::Sin => angle()?.1,
+                    Function::Sqrt => {
+                        let n = expression.integer_at(*argument);
+                        n.and_then(|n| env.sqrt(n)).ok_or_else(|| ExpressionError::Syntax {
+                            expected: "the root of 2, 3 or 6, or of one of these times a square",
+                            found: n
+                                .map_or_else(|| "that of something else".into(), |n| format!("that of {n}")),
+                            span: expression.spans[i].clone(),
+                        })?
+                    }
+                    _ => return Err(syntax(i, "sin or cos of an angle, or a square root")),
+                }
+            }
+            Node::Negate(a) => f.neg(values[*a]),
+            Node::Add(a, b) => f.add(values[*a], values[*b]),
+            Node::Subtract(a, b) => f.sub(values[*a], values[*b]),
+            Node::Multiply(a, b) => f.mul(values[*a], values[*b]),
+            Node::Divide(a, b) => f.mul(values[*a], inverse(values[*b])?),
+            Node::Power(a, b) => {
+                let Some(e) = expression.integer_at(*b) else {
+                    return Err(syntax(*b, "an integer exponent"));
+                };
+                let power = f.pow(values[*a], e.unsigned_abs().into());
+                if e < 0 { inverse(power)? } else { power }
+            }
+        };
+        values.push(value);
+    }
+    Ok(values.last().copied().unwrap_or(0))
+}
+
+/// The image of an integer.
+pub fn from_i128(f: &Field, x: i128) -> u64 {
+    let p = u128::from(f.modulus());
+    let image = f.from_u64((x.unsigned_abs() % p) as u64);
+    if x < 0 { f.neg(image) } else { image }
+}
+
+/// The constants that every model knows unless it gives the name another meaning: `pi`, and a degree in radians.
+pub fn constant(name: &str) -> Option<f64> {
+    match name {
+        "pi" => Some(std::f64::consts::PI),
+        "deg" => Some(std::f64::consts::PI / 180.0),
+        _ => None,
+    }
+}
+
+/// The value of an expression in floating point, with the names' values from `at`: NaN for a name that it does not know.
+pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
+    let mut values: Vec<f64> = Vec::with_capacity(e.nodes.len());
+    for node in &e.nodes {
+        let value = match node {
+            Node::Number { mantissa, decimals } => *mantissa as f64 / 10f64.powi(*decimals),
+            Node::Name(n) => match (at(n), constant(n)) {
+                (x, Some(own)) if x.is_nan() => own,
+                (x, _) => x,
+            },
+            Node::Call { function, argument } => function.value(values[*argument]),
+            Node::Negate(a) => -values[*a],
+            Node::Add(a, b) => values[*a] + values[*b],
+            Node::Subtract(a, b) => values[*a] - values[*b],
+            Node::Multiply(a, b) => values[*a] * values[*b],
+            Node::Divide(a, b) => values[*a] / values[*b],
+            Node::Power(a, b) => match e.integer_at(*b) {
+                Some(k) => values[*a].powi(k),
+                None => values[*a].powf(values[*b]),
+            },
+        };
+        values.push(value);
+    }
+    values.last().copied().unwrap_or(f64::NAN)
+}
+
+/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends: `latitude`,
+/// `latitude_deg`.
+pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
+    let distance = |a: &str, b: &str| {
+        let b: Vec<char> = b.chars().collect();
+        let mut row: Vec<usize> = (0..=b.len()).collect();
+        for (i, ca) in a.chars().enumerate() {
+            let mut diagonal = row[0];
+            row[0] = i + 1;
+            for (j, cb) in b.iter().enumerate() {
+                let substituted = diagonal + usize::from(!ca.eq_ignore_ascii_case(cb));
+                diagonal = row[j + 1];
+                row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+            }
+        }
+        row[b.len()]
+    };
+    // one letter for another is no slip
+    let length = name.chars().count();
+    let limit = (length * 2 / 5).max(1).min(length.saturating_sub(1));
+    known
+        .iter()
+        .map(|k| (distance(name, k).min(distance(name, k.split_once('_').map_or(k, |(stem, _)| stem))), k))
+        .map(|(d, k)| (d > 0 && !goes_on(name, k), d, k))
+        .min()
+        .filter(|(far, d, _)| !far || *d <= limit)
+        .map(|(_, _, k)| k.clone())
+}
+
+/// What could have been meant by `name`: the nearest of the known names, or which there are (the first of very many).
+pub(crate) fn among(name: &str, known: &[String]) -> String {
+    match nearest(name, known) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if known.len() > 40 => format!("expected one of {}, ...", known[..20].join(", ")),
+        None => format!("expected one of {}", known.join(", ")),
+    }
+}
+
+/// Whether `longer` is `name` with more behind it, as `latitude_deg` is for `Latitude`.
+pub(crate) fn goes_on(name: &str, longer: &str) -> bool {
+    let start = longer.get(..name.len()).filter(|_| name.len() > 2);
+    start.is_some_and(|s| s.eq_ignore_ascii_case(name)) && longer[name.len()..].starts_with('_')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::parser::parse;
+    use rstest::rstest;
+
+    struct Env;
+    impl Environment for Env {
+        fn name(&self, name: &str) -> Option<u64> {
+            let f = Field::new((1 << 60) + 33);
+            match name {
+                "x" => Some(f.from_i64(3)),
+                "D_FX" => Some(f.from_i64(5)),
+                "psi_x@1" => Some(f.from_i64(7)),
+                "psi_x^n" => Some(f.from_i64(11)),
+                _ => None,
+            }
+        }
+        fn cos_sin(&self, angle: &str) -> Option<(u64, u64)> {
+            let f = Field::new((1 << 60) + 33);
+            (angle == "alpha").then(|| (f.from_i64(20), f.from_i64(21)))
+        }
+        fn known(&self) -> Vec<String> {
+            ["x", "D_FX", "psi_x@1", "psi_x^n", "alpha"].map(String::from).to_vec()
+        }
+    }
+
+    #[rstest]
+    #[case("1+2*3", 7)]
+    #[case("(1+2)*3", 9)]
+    #[case("2-3-4", -5)]
+    #[case("-x^2", -9)]
+    #[case("8/4/2", 1)]
+    #[case("2*x^3 - D_FX", 49)]
+    #[case("0.5*psi_x@1*2", 7)]
+    #[case("psi_x^n^2", 121)]
+    #[case("x^-1*3", 1)]
+    #[case("sin(alpha)-cos(alpha)", 1)]
+    #[case("- - +x", 3)]
+    #[case("(2^3)**2 - 64", 0)]
+    #[case("-2^2", -4)]
+    #[case("x^-(1)*9", 3)]
+    #[case("1.5e1 + 50E-1", 20)]
+    #[case("x--x-+x", 3)]
+    fn values(#[case] text: &str, #[case] expected: i64) {
+        let f = Field::new((1 << 60) + 33);
+        let e = parse(text).expect("it parses");
+        assert_eq!(evaluate(&e, &f, &Env), Ok(f.from_i64(expected)));
+    }
+
+    #[rstest]
+    #[case("", "expected a number, a name or `(`, found the end of the expression", 0..0)]
+    #[case("1 +", "expected a number, a name or `(`, found the end of the expression", 3..3)]
+    #[case("(x", "expected an operator or `)`, found the end of the expression", 2..2)]
+    #[case("x x", "expected an operator or the end of the expression, found `x`", 2..3)]
+    #[case("sin 2", "expected `(`, found `2`", 4..5)]
+    #[case("2^^3", "expected a number, a name or `(`, found `^`", 2..3)]
+    #[case("1e999", "expected an exponent of at most 400, found `1e999`", 0..5)]
+    #[case("§", "expected a number, a name or `(`, found `§`", 0..2)]
+    #[case("1.2.3", "expected a number of at most 36 digits, found `1.2.3`", 0..5)]
+    #[case("2*abs(x)", "expected a known function (sin, cos, sqrt) or an operator before `(`, found `abs`", 2..5)]
+    #[case("(x)(x)", "expected an operator or the end of the expression, found `(`", 3..4)]
+    fn syntax_errors(#[case] text: &str, #[case] message: &str, #[case] span: Range<usize>) {
+        let e = parse(text).expect_err("wrong");
+        assert_eq!((e.to_string().as_str(), e.span()), (message, span));
+    }
+
+    #[test]
+    fn values_that_fail() {
+        let f = Field::new((1 << 60) + 33);
+        let wrong =
+            |text: &str| evaluate(&parse(text).expect("parses"), &f, &Env).expect_err("wrong").to_string();
+        assert_eq!(wrong("D_FZ"), "`D_FZ` is not known here; did you mean `D_FX`?");
+        assert_eq!(wrong("1/(x-3)"), "division by zero");
+        assert_eq!(
+            wrong("nothing_like_it"),
+            "`nothing_like_it` is not known here; expected one of x, D_FX, psi_x@1, psi_x^n, alpha"
+        );
+        let angle = "expected the name of an angle, or one such as `20 deg`, found something else";
+        assert_eq!(wrong("sin(2)"), angle);
+        assert_eq!(wrong("sin(2.5 deg)"), "expected an angle that the scheme has, found `2.5 deg`");
+        assert_eq!(wrong("2 deg"), "expected angles in sin or cos only, found `2 deg`");
+        assert_eq!(wrong("sin(x)"), "expected an angle that the scheme has, found `x`");
+        assert_eq!(
+            wrong("tan(alpha)"),
+            "expected sin or cos of an angle, or a square root, found something else"
+        );
+        assert_eq!(
+            wrong("sqrt(5)"),
+            "expected the root of 2, 3 or 6, or of one of these times a square, found that of 5"
+        );
+        assert_eq!(wrong("x^x"), "expected an integer exponent, found something else");
+    }
+
+    #[test]
+    fn names_that_are_near() {
+        let known =
+            ["name", "attitude", "latitude_deg", "slew_rate_deg_s", "D_FX", "psi_x", "psi"].map(String::from);
+        for (name, found) in [
+            ("latitude", "latitude_deg"),
+            ("Latitude", "latitude_deg"),
+            ("lattitude_deg", "latitude_deg"),
+            ("slew_rate", "slew_rate_deg_s"),
+            ("d_fx", "D_FX"),
+            ("Psi", "psi"),
+            ("atitude", "attitude"),
+        ] {
+            assert_eq!(nearest(name, &known).as_deref(), Some(found), "{name}");
+        }
+        for strange in ["lat", "la", "ä", "latitude_deg_and_more", "carry"] {
+            assert_eq!(nearest(strange, &known), None, "{strange}");
+        }
+    }
+
+    #[test]
+    fn deep_nesting_is_refused() {
+        for deep in ["(", "-", "x^", "2^-", "sin(", "x*(", "- ", "x**", "2**-"] {
+            let e = parse(&deep.repeat(1_000_000)).expect_err("too deep");
+            assert!(matches!(e, ExpressionError::TooDeep { .. }), "{deep}: {e}");
+        }
+        // what is long is not deep
+        let f = Field::new((1 << 60) + 33);
+        for (long, value) in [("x+", 3 * 300_001), ("x^2-y^2+y^2-x^2+", 3), ("1*", 3), ("1^2*", 3)] {
+            let text = format!("{}x", long.repeat(if value > 3 { 300_000 } else { 1000 })).replace('y', "x");
+            assert_eq!(evaluate(&parse(&text).expect("long"), &f, &Env), Ok(f.from_i64(value)));
+        }
+    }
+}

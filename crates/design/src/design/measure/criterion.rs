@@ -1,0 +1,194 @@
+//! Criteria of optimal design, from the information of a sequence.
+
+use nalgebra::DMatrix;
+use obsdeg_core::model::Carry;
+use obsdeg_ekf::EkfError;
+use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::{Attained, si_per_shown};
+
+use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::stop::Stop;
+use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
+
+/// What makes one scheme better than another, of the coefficients that count.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Criterion {
+    /// The largest sigma.
+    #[default]
+    Worst,
+    /// The root of the mean variance (A-optimal).
+    A,
+    /// The geometric mean of the principal sigmas: the volume of the error ellipsoid (D-optimal).
+    D,
+    /// The largest principal sigma (E-optimal).
+    E,
+    /// The largest sigma over its requirement.
+    Margin(Limits),
+}
+
+/// The largest sigmas allowed; infinite where there is no requirement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Of the coefficients that count, in deg/h (per g) (shape d).
+    pub coefficients: Vec<f64>,
+    /// Largest sigmas of psi_x, psi_y, psi_z at the end, under reset carry at the end of every position, in
+    /// deg.
+    pub psi: [f64; 3],
+}
+
+impl Criterion {
+    /// worst, A, D, E or margin.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Worst => "worst",
+            Self::A => "A",
+            Self::D => "D",
+            Self::E => "E",
+            Self::Margin(_) => "margin",
+        }
+    }
+}
+
+impl Criterion {
+    /// The criterion of a scheme by its covariance at the end, random drift included; `counts` names the
+    /// coefficients that count.
+    pub(crate) fn of_attained(
+        &self,
+        attained: &Attained,
+        requirements: &Requirements,
+        counts: &dyn Fn(&String) -> bool,
+    ) -> Result<f64, EkfError> {
+        let (names, units) = (attained.plan.platform.names(), attained.plan.platform.units());
+        let counted: Vec<usize> = (0..names.len()).filter(|&c| counts(&names[c])).collect();
+        if let Self::Margin(_) = self {
+            return Ok(match &requirements.worst {
+                Some(worst) if !requirements.leaves_out() => 1.0 / worst.margin,
+                _ => f64::INFINITY,
+            });
+        }
+        if counted.iter().any(|&c| attained.sigmas[c].is_none()) {
+            return Ok(f64::INFINITY);
+        }
+        let scale = |k: usize| 1.0 / si_per_shown(units[counted[k]]);
+        let own = attained.covariance_of(&counted)?;
+        let shown = DMatrix::from_fn(own.nrows(), own.ncols(), |i, j| own[(i, j)] * scale(i) * scale(j));
+        let n = shown.nrows() as f64;
+        Ok(match self {
+            Self::A => (shown.trace() / n).sqrt(),
+            Self::D => shown.symmetric_eigenvalues().iter().map(|x| x.ln() / (2.0 * n)).sum::<f64>().exp(),
+            Self::E => shown.symmetric_eigenvalues().max().sqrt(),
+            _ => shown.diagonal().max().sqrt(),
+        })
+    }
+}
+
+impl Evaluator {
+    /// The root of the information, psi and the coefficients that do not count first: the block of the others is the
+    /// root of the inverse of their covariance. False when one of them is not determined.
+    pub(crate) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+        self.root_from(if self.carry() == Carry::Reset { 3 } else { 0 }, state, root)
+    }
+
+    /// The same of the unknowns from `first` on.
+    pub(crate) fn root_from(&self, first: usize, state: &State, root: &mut Vec<f64>) -> bool {
+        let n = self.n;
+        root.resize(n * n, 0.0);
+        let l = &mut root[..];
+        for i in first..n {
+            let (done, rest) = l.split_at_mut(i * n);
+            let row = &mut rest[..=i];
+            let given = &state.information[i * n..=i * n + i];
+            for j in first..i {
+                let other = &done[j * n..=j * n + j];
+                let sum: f64 = row[first..j].iter().zip(&other[first..j]).map(|(a, b)| a * b).sum();
+                row[j] = if other[j] > 0.0 { (given[j] - sum) / other[j] } else { 0.0 };
+            }
+            let pivot = given[i] - row[first..i].iter().map(|a| a * a).sum::<f64>();
+            // what rounding leaves of an undetermined direction
+            row[i] = match pivot <= 1e-13 * given[i] {
+                false => pivot.sqrt(),
+                // it couples with nothing that comes later
+                true if i < 3 + self.nuisance => 0.0,
+                true => return false,
+            };
+        }
+        true
+    }
+
+    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient
+    /// that counts is not determined. Sigmas are in deg/h (per g). `root` is working space.
+    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+        if !self.root(state, root) {
+            return f64::INFINITY;
+        }
+        let (n, begin) = (self.n, 3 + self.nuisance);
+        let d = n - begin;
+        let l = &root[..];
+        if *criterion == Criterion::D {
+            // the geometric mean of the principal sigmas
+            let logs: f64 = (begin..n).map(|i| l[i * n + i].ln()).sum();
+            return (-logs / d as f64).exp() / self.dph;
+        }
+        if *criterion == Criterion::E {
+            let block =
+                DMatrix::from_fn(d, d, |i, j| if j <= i { l[(i + begin) * n + j + begin] } else { 0.0 });
+            let information = &block * block.transpose();
+            return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
+        }
+        let variances = (begin..n).map(|i| self.variance(l, i));
+        match criterion {
+            Criterion::A => (variances.sum::<f64>() / d as f64).sqrt() / self.dph,
+            Criterion::Margin(limits) => {
+                let over = variances.zip(&limits.coefficients).map(|(v, limit)| v.sqrt() / self.dph / limit);
+                over.fold(self.psi_over(state, l, &limits.psi), f64::max)
+            }
+            _ => variances.fold(0.0, f64::max).sqrt() / self.dph,
+        }
+    }
+
+    /// The variance of unknown `i`: the square of column i of the inverse of the root `l`.
+    fn variance(&self, l: &[f64], i: usize) -> f64 {
+        match self.n {
+            0..=MAX_DRIFTS => self.variance_in::<MAX_DRIFTS>(l, i),
+            _ => self.variance_in::<MAX_UNKNOWNS>(l, i),
+        }
+    }
+
+    fn variance_in<const N: usize>(&self, l: &[f64], i: usize) -> f64 {
+        let n = self.n;
+        let mut column = [0.0; N];
+        column[i] = 1.0 / l[i * n + i];
+        let mut variance = column[i] * column[i];
+        for r in i + 1..n {
+            let row = &l[r * n..=r * n + r];
+            let product: f64 = row[i..r].iter().zip(&column[i..r]).map(|(a, b)| a * b).sum();
+            column[r] = -product / row[r];
+            variance += column[r] * column[r];
+        }
+        variance
+    }
+
+    /// The state behind a whole sequence.
+    pub(crate) fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
+        let (mut now, mut next) = (self.start(), self.start());
+        for &stop in sequence {
+            self.extend(&now, stop.into(), &mut next);
+            std::mem::swap(&mut now, &mut next);
+        }
+        now
+    }
+
+    /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not determined.
+    pub fn sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<f64> {
+        let mut root = Vec::new();
+        if !self.root(&self.state_of(sequence), &mut root) {
+            return Vec::new();
+        }
+        (3 + self.nuisance..self.n).map(|i| self.variance(&root, i).sqrt() / self.dph).collect()
+    }
+
+    /// The criterion of a whole sequence.
+    pub fn of_sequence<S: Copy + Into<Stop>>(&self, sequence: &[S], criterion: &Criterion) -> f64 {
+        self.value(&self.state_of(sequence), criterion, &mut Vec::new())
+    }
+}

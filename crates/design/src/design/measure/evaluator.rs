@@ -1,0 +1,335 @@
+//! The evaluator of a search: its candidates, their dwells and what is known beforehand.
+
+use std::ops::Mul;
+use std::sync::OnceLock;
+
+use nalgebra::DMatrix;
+use obsdeg_core::model::slew::Slew;
+use obsdeg_core::model::{
+    Carry, Float, LOCAL, Matrix3, PSI_EPS, Platform, earth_rate_in, local_dynamics, local_output,
+};
+use obsdeg_ekf::BiasState;
+use obsdeg_ekf::integrate::van_loan;
+use obsdeg_evidence::simulation::{Conditions, Plan, steps};
+
+use crate::design::measure::elimination::eliminate;
+use crate::design::measure::noise_process::{Joint, OfDwell, Output, of_dwell};
+use crate::design::measure::slew_path::SlewPath;
+use crate::design::request::error::DesignError;
+use crate::design::request::limits::MAX_UNKNOWNS;
+
+/// One candidate: its attitude, and what coefficients make of drift and accelerometers there.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) c: Matrix3<f64>,
+    /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the order of the evaluator; the last three
+    /// are empty where none is unknown.
+    pub(crate) effects: [Vec<f64>; LOCAL - 3],
+    /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower triangle): what it
+    /// adds to any scheme under reset carry; empty under the others.
+    pub(crate) own: Vec<f64>,
+    /// Its own psi under reset carry, as soon as that was asked for.
+    pub(crate) psi: OnceLock<OwnPsi>,
+    /// Which of the dwells of the evaluator it has.
+    pub(crate) dwell: usize,
+}
+
+/// A position's own psi in platform axes, at the end of the position.
+#[derive(Debug, Clone)]
+pub(crate) struct OwnPsi {
+    /// The variance in rad^2 of every component, prior included, where the coefficients are known; infinite where it is not determined.
+    pub(crate) variances: [f64; 3],
+    /// By which functional of the coefficients each component is off where they are not known (d x 3, in the order of the evaluator);
+    /// zero where it is not determined.
+    pub(crate) moved: Vec<[f64; 3]>,
+}
+
+/// What a dwell makes of the local unknowns at a position.
+#[derive(Debug, Clone)]
+pub(crate) struct Dwelling {
+    pub(crate) seconds: f64,
+    /// Information of the position on its local unknowns.
+    pub(crate) local: [[f64; LOCAL]; LOCAL],
+    /// `psi^n` behind it as a function of `(psi^n, eps^n)` before.
+    pub(crate) phi: [[f64; PSI_EPS]; 3],
+    /// What its samples say where the noise of Z is correlated.
+    pub(crate) correlated: Option<Box<OfDwell>>,
+}
+
+/// What is known beforehand: information, zero where nothing is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Prior {
+    /// On psi in platform axes at the start, under reset carry of every position, in 1/rad^2.
+    pub(crate) psi: [f64; 3],
+    /// On the coefficients, in the order and the units of the evaluator (shape d).
+    pub(crate) coefficients: Vec<f64>,
+}
+
+/// What every evaluation shares.
+#[derive(Debug, Clone)]
+pub struct Evaluator {
+    pub(crate) platform: Platform,
+    pub(crate) conditions: Conditions,
+    /// The column of every coefficient in the order of the evaluator: those that count come last.
+    pub(crate) order: Vec<usize>,
+    /// How many coefficients do not count.
+    pub(crate) nuisance: usize,
+    /// The unit of every coefficient that is shown as 1, in `dph`, in the order of the evaluator.
+    pub(crate) scale: Vec<f64>,
+    /// Unknowns: psi, then d coefficients.
+    pub(crate) n: usize,
+    /// Local unknowns of a position.
+    pub(crate) locals: usize,
+    /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
+    pub(crate) w: Matrix3<f64>,
+    /// That of all positions; where they have dwells of their own, of the first.
+    pub(crate) dwells: Vec<Dwelling>,
+    pub(crate) candidates: Vec<Candidate>,
+    /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
+    pub(crate) ways: Vec<SlewPath>,
+    pub(crate) prior: Prior,
+    /// The process that each accelerometer has beside white noise.
+    pub(crate) bias: Option<BiasState>,
+    /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its coefficient.
+    pub(crate) dph: f64,
+}
+
+/// A sequence so far.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Information (n x n), row by row, lower triangle.
+    pub(crate) information: Vec<f64>,
+    /// psi in the carried axes as a functional of the unknowns (3 x n).
+    pub(crate) psi: [Vec<f64>; 3],
+    /// Where the noise of Z is correlated: what is known of it by now.
+    pub(crate) joint: Option<Joint>,
+    /// The candidates in order.
+    pub(crate) path: Vec<usize>,
+    /// Dwells and turns, in s.
+    pub seconds: f64,
+}
+
+impl Evaluator {
+    /// The same with another dwell.
+    ///
+    /// # Errors
+    /// [`DesignError::Filter`].
+    pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
+        self.dwells = vec![self.dwelling(dwell_s)?];
+        let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
+        let ways = std::mem::take(&mut self.ways);
+        self.stand_at(&attitudes);
+        self.ways = ways;
+        Ok(self)
+    }
+
+    /// What so many seconds at a position are.
+    pub(crate) fn dwelling(&self, dwell_s: f64) -> Result<Dwelling, DesignError> {
+        let f = local_dynamics(&Float, &self.w[1][2], &-self.w[0][2]);
+        let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
+        let steps = steps(dwell_s, self.conditions.step_s)?;
+        let none = DMatrix::zeros(LOCAL, LOCAL);
+        let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
+        let outputs: Vec<Output> = local_output(&Float, self.platform.observed())
+            .into_iter()
+            .map(|(component, row)| {
+                let weight = 1.0 / Plan::output_sigma(component, &self.conditions).powi(2);
+                Output { component, row, weight }
+            })
+            .collect();
+        let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
+        let mut local = [[0.0; LOCAL]; LOCAL];
+        let of = |bias| Box::new(of_dwell(&outputs, bias, &step, steps, dwell_s / steps as f64));
+        let correlated = self.bias.as_ref().map(of);
+        for _ in 0..steps {
+            now = &step * now;
+            for Output { row: h, weight, .. } in &outputs {
+                let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
+                for i in 0..LOCAL {
+                    for j in 0..LOCAL {
+                        local[i][j] += weight * row[i] * row[j];
+                    }
+                }
+            }
+        }
+        let phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
+        Ok(Dwelling { seconds: dwell_s, local, phi, correlated })
+    }
+
+    /// Every candidate with a dwell of its own, which [`Self::dwell_at`] changes.
+    pub(crate) fn with_dwells(mut self) -> Self {
+        self.dwells = vec![self.dwells[0].clone(); self.candidates.len()];
+        self.candidates.iter_mut().enumerate().for_each(|(i, c)| c.dwell = i);
+        self
+    }
+
+    /// Changes the dwell of a candidate that has one of its own.
+    pub(crate) fn dwell_at(&mut self, candidate: usize, dwelling: &Dwelling) {
+        let Candidate { c, effects, dwell, .. } = &self.candidates[candidate];
+        self.dwells[*dwell].clone_from(dwelling);
+        let own = self.information_alone(c, effects, dwelling);
+        (self.candidates[candidate].own, self.candidates[candidate].psi) = (own, OnceLock::new());
+    }
+
+    /// What the dwell of a candidate is.
+    pub(crate) fn dwelling_of(&self, candidate: usize) -> &Dwelling {
+        &self.dwells[self.candidates[candidate].dwell]
+    }
+
+    /// The rows of `eps^n` at an attitude, while the platform turns as `slew` says.
+    pub(crate) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
+        let rate = || {
+            let earth = earth_rate_in(&Float, c, &self.w[1][2], &-self.w[0][2]);
+            std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
+        };
+        self.platform.errors().drift_rows(&Float, c, rate)
+    }
+
+    /// [`Candidate::effects`] of an attitude.
+    pub(crate) fn effects(&self, c: &Matrix3<f64>) -> [Vec<f64>; LOCAL - 3] {
+        let [x, y, z] = self.ordered_columns(self.drift_rows(c, None));
+        let [a, b, c] = match self.platform.observed().accelerometers {
+            true => self.ordered_columns(self.platform.errors().accelerometer_rows(&Float, c)),
+            false => Default::default(),
+        };
+        [x, y, z, a, b, c]
+    }
+
+    /// The candidates without the ways between them.
+    pub(crate) fn stand_at(&mut self, attitudes: &[Matrix3<f64>]) {
+        self.candidates = attitudes
+            .iter()
+            .map(|c| {
+                let effects = self.effects(c);
+                Candidate {
+                    own: self.information_alone(c, &effects, &self.dwells[0]),
+                    effects,
+                    c: *c,
+                    psi: OnceLock::new(),
+                    dwell: 0,
+                }
+            })
+            .collect();
+        self.ways.clear();
+    }
+
+    /// Where a candidate stands, and how long.
+    pub(crate) fn stands(&self, candidate: usize) -> (&Matrix3<f64>, &Dwelling) {
+        let Candidate { c, dwell, .. } = &self.candidates[candidate];
+        (c, &self.dwells[*dwell])
+    }
+
+    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on, or the noise of Z.
+    fn information_alone(
+        &self,
+        c: &Matrix3<f64>,
+        effects: &[Vec<f64>; LOCAL - 3],
+        dwelling: &Dwelling,
+    ) -> Vec<f64> {
+        if self.ordered() {
+            return Vec::new();
+        }
+        let n = self.n;
+        let mut local = [[0.0; MAX_UNKNOWNS]; LOCAL];
+        for r in 0..3 {
+            local[r][..3].copy_from_slice(&c[r]);
+        }
+        for (row, effect) in local[3..self.locals].iter_mut().zip(effects) {
+            row[3..n].copy_from_slice(effect);
+        }
+        let weighted = self.weighted(&local, dwelling);
+        let mut own = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
+        for (i, row) in own[..n].iter_mut().enumerate() {
+            for (l, w) in local.iter().zip(&weighted) {
+                for (x, y) in row[..=i].iter_mut().zip(&w[..=i]) {
+                    *x += l[i] * y;
+                }
+            }
+        }
+        self.prior.psi.iter().enumerate().for_each(|(k, p)| own[k][k] += p);
+        eliminate(&mut own, n, 0..3);
+        own[..n]
+            .iter()
+            .enumerate()
+            .flat_map(|(i, row)| (0..n).map(move |j| if j <= i { row[j] } else { 0.0 }))
+            .collect()
+    }
+
+    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi eliminated, whose prior is
+    /// the same about every axis.
+    pub(crate) fn information_of_effects(&self) -> [[f64; LOCAL - 3]; LOCAL - 3] {
+        let mut all = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
+        for (row, local) in all.iter_mut().zip(&self.dwells[0].local) {
+            row[..LOCAL].copy_from_slice(local);
+        }
+        self.prior.psi.iter().enumerate().for_each(|(k, p)| all[k][k] += p);
+        eliminate(&mut all, LOCAL, 0..3);
+        std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
+    }
+
+    /// `G L` for the functionals L of the local unknowns at a position (of n unknowns each).
+    pub(crate) fn weighted<const L: usize, const N: usize>(
+        &self,
+        local: &[[f64; N]; L],
+        dwelling: &Dwelling,
+    ) -> [[f64; N]; L] {
+        let n = self.n;
+        let mut weighted = [[0.0; N]; L];
+        for (row, weights) in weighted.iter_mut().zip(&dwelling.local) {
+            for (l, &g) in local.iter().zip(weights) {
+                if g != 0.0 {
+                    for (x, y) in row[..n].iter_mut().zip(&l[..n]) {
+                        *x += g * y;
+                    }
+                }
+            }
+        }
+        weighted
+    }
+
+    /// Rows on the coefficients in SI units, in the order and the units of the evaluator.
+    pub(crate) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
+        rows.map(|row| self.in_order(&row))
+    }
+
+    /// One of these rows, of any numbers.
+    pub(crate) fn in_order<X: Copy + Mul<f64, Output = X>>(&self, row: &[X]) -> Vec<X> {
+        self.order.iter().zip(&self.scale).filter_map(|(&c, scale)| Some(*row.get(c)? * *scale)).collect()
+    }
+
+    /// The same where nothing is known beforehand.
+    pub(crate) fn without_prior(&self) -> Self {
+        let prior = Prior { psi: [0.0; 3], coefficients: vec![0.0; self.n - 3] };
+        let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
+        let mut out = Self { prior, ..self.clone() };
+        out.stand_at(&attitudes);
+        out.ways.clone_from(&self.ways);
+        out
+    }
+
+    /// Whether the order of positions makes a difference.
+    pub(crate) fn ordered(&self) -> bool {
+        self.carry() != Carry::Reset || self.bias.is_some()
+    }
+
+    pub(crate) fn carry(&self) -> Carry {
+        self.platform.scheme().carry
+    }
+
+    /// Largest time between samples, in s.
+    pub(crate) fn step_s(&self) -> f64 {
+        self.conditions.step_s
+    }
+
+    /// Dwell of each position, in s; where they have dwells of their own, of the first.
+    pub fn dwell_s(&self) -> f64 {
+        self.dwells[0].seconds
+    }
+}
+
+impl Prior {
+    /// Whether psi is known as well about every axis.
+    pub(crate) fn is_alike(&self) -> bool {
+        self.psi.iter().all(|p| *p == self.psi[0])
+    }
+}

@@ -1,0 +1,74 @@
+//! The information of a sequence, built up position by position: what a search evaluates millions of times.
+
+use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
+
+use crate::design::measure::evaluator::{Candidate, Evaluator, State};
+use crate::design::measure::noise_process::Joint;
+use crate::design::measure::stop::Stop;
+use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
+
+impl Evaluator {
+    /// Nothing but what is known beforehand.
+    pub fn start(&self) -> State {
+        let n = self.n;
+        let unit = |r: usize| (0..n).map(|c| f64::from(u8::from(c == r))).collect();
+        let mut information = vec![0.0; n * n];
+        let mut known = |i: usize, p: f64| information[i * n + i] = p;
+        self.prior.coefficients.iter().enumerate().for_each(|(j, &p)| known(3 + j, p));
+        // of platform axes; psi^n is known by the first position, and that of reset carry by every one
+        if self.carry() == Carry::Platform {
+            self.prior.psi.iter().enumerate().for_each(|(k, &p)| known(k, p));
+        }
+        State {
+            information,
+            psi: std::array::from_fn(unit),
+            joint: self.bias.as_ref().map(|bias| Joint::start(bias, n)),
+            path: Vec::new(),
+            seconds: 0.0,
+        }
+    }
+
+    /// Adds a position to `state`; the result goes to `out`.
+    pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
+        if let Some(bias) = &self.bias {
+            return self.extend_correlated(bias, state, stop, false, out);
+        }
+        // sizes that the compiler knows
+        match self.locals {
+            PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, out),
+            _ => self.extend_in::<LOCAL, MAX_UNKNOWNS>(state, stop, out),
+        }
+    }
+
+    fn extend_in<const L: usize, const N: usize>(&self, state: &State, stop: Stop, out: &mut State) {
+        let n = self.n;
+        let carry = self.carry();
+        let Candidate { c, own, dwell, .. } = &self.candidates[stop.candidate];
+        let dwelling = &self.dwells[*dwell];
+        let turn = self.way_to(state.path.last().copied(), stop);
+        out.path.clone_from(&state.path);
+        out.path.push(stop.candidate);
+        out.seconds = state.seconds + dwelling.seconds + turn.map_or(0.0, |t| t.seconds);
+        if carry == Carry::Reset {
+            // psi of the position is eliminated: information adds
+            for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
+                *sum = x + y;
+            }
+            return;
+        }
+        let local = self.functionals::<L, N>(state, stop);
+        // L^T (G L)
+        let weighted = self.weighted(&local, dwelling);
+        out.information.copy_from_slice(&state.information);
+        self.know_first(state, c, |i, j, known| out.information[i * n + j] += known);
+        for i in 0..n {
+            let row = &mut out.information[i * n..=i * n + i];
+            for (l, w) in local.iter().zip(&weighted).filter(|(l, _)| l[i] != 0.0) {
+                for (x, y) in row.iter_mut().zip(&w[..=i]) {
+                    *x += l[i] * y;
+                }
+            }
+        }
+        self.go_on(dwelling, c, &local, out);
+    }
+}

@@ -1,0 +1,506 @@
+//! Which sets of candidates make the required coefficients observable, and with what degrees: exact ranks in several
+//! prime fields, sets in lexicographic order with the echelon bases of the prefix shared.
+//!
+//! A rank in a field can only be too small. So a set that one field calls observable is observable, and the smallest
+//! degree that any field gives is right unless all of them err: for each rank with probability below `miss^fields`.
+
+use std::collections::HashMap;
+
+use obsdeg_core::degree::{EnsembleError, local_chain};
+use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme, Source};
+use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::{Echelon, Field};
+use rayon::prelude::*;
+
+use crate::design::observable::symmetry::Symmetry;
+use crate::design::request::error::DesignError;
+
+/// So many fields are taken that a rank is wrong in all of them with a probability below this: a search makes up to
+/// 1e12 of them.
+const MISS: f64 = 1e-24;
+/// Sets and prefixes between two questions whether to go on.
+const PATIENCE: u64 = 256;
+
+/// The rows that each candidate adds, whatever its place in the scheme.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    /// The same in independent random fields.
+    fields: Vec<InField>,
+    columns: usize,
+    /// The columns that must be solved.
+    required: Vec<usize>,
+    /// Bound on the probability that one rank is too small in one field.
+    miss: f64,
+    platform: Platform,
+}
+
+/// The rows in one field.
+#[derive(Debug, Clone)]
+struct InField {
+    field: Field,
+    /// Of every candidate: all its rows.
+    rows: Vec<Vec<Vec<u64>>>,
+    /// Of every order and candidate: the rows that derivatives of that order add.
+    by_order: Vec<Vec<Vec<Vec<u64>>>>,
+    /// The most rows that a candidate adds.
+    most: usize,
+    /// `C_c^n` of every candidate in the field.
+    attitudes: Vec<Matrix3<u64>>,
+}
+
+/// How long a walk over sets goes on.
+pub struct Patience<'a> {
+    /// Prefixes and sets that may still be looked at.
+    pub budget: u64,
+    /// Asked every now and then.
+    pub going: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl<'a> Patience<'a> {
+    /// As long as `going` says so.
+    pub(crate) fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { budget: u64::MAX, going }
+    }
+
+    /// Counts one more; false when it is enough.
+    fn goes_on(&mut self) -> bool {
+        self.budget = self.budget.saturating_sub(1);
+        if self.budget.is_multiple_of(PATIENCE) && !(self.going)() {
+            self.budget = 0;
+        }
+        self.budget > 0
+    }
+}
+
+impl Rows {
+    /// The rows of `candidates` under the assumptions of `base`, in random fields that `seed` and all of this choose;
+    /// `required` are indices among the coefficients. Under platform and inertial carry psi is shared and the rows are
+    /// those of the chain; under reset carry psi of the position is eliminated, and rows of the coefficients are left.
+    ///
+    /// # Errors
+    /// [`DesignError`].
+    pub fn new(
+        base: &Scheme,
+        candidates: &[Euler],
+        required: &[usize],
+        seed: u64,
+    ) -> Result<Self, DesignError> {
+        let reset = base.carry == Carry::Reset;
+        // psi of a position of its own: any carry does for one position
+        let carry = if reset { Carry::Platform } else { base.carry };
+        let positions = Scheme::of_angles(candidates.iter().cloned()).positions;
+        let gimbals = Gimbals::default();
+        let scheme = Scheme { positions, carry, combinations: Vec::new(), gimbals, ..base.clone() };
+        let platform = Platform::new(scheme)?;
+        let first = if reset { 3 } else { 0 };
+        let entries = 3 + platform.coefficients();
+        let factors = base.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0).max(2);
+        let mut rng = platform.scheme().random(seed, "sets of candidates");
+        let (mut fields, mut miss) = (Vec::new(), 1.0);
+        while fields.len() < 2 || f64::powi(miss, fields.len() as i32) > MISS {
+            let values = RandomValues::draw(platform.scheme(), &mut rng).map_err(EnsembleError::from)?;
+            let here = InField::new(&platform, &values, first);
+            // a rank is one minor: of the rows of all orders of some positions, each with a psi of its own under reset
+            // carry
+            let psi = if reset { 3 * candidates.len() } else { 3 };
+            let orders = here.by_order.len();
+            let claim = Claim {
+                unknowns: platform.coefficients() + psi,
+                decisions: 1,
+                order: values.roots().order,
+                row_degree: orders + usize::from(base.unknowns.have(Source::Rate)),
+                // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
+                row_bits: 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0,
+            };
+            miss = error_bound(&claim, 1);
+            fields.push(here);
+        }
+        Ok(Self {
+            fields,
+            columns: platform.names().len() - first,
+            required: required.iter().map(|c| c + 3 - first).collect(),
+            miss,
+            platform,
+        })
+    }
+
+    /// The number of candidates.
+    pub fn candidates(&self) -> usize {
+        self.fields.first().map_or(0, |here| here.rows.len())
+    }
+
+    /// The number of fields.
+    pub fn fields(&self) -> usize {
+        self.fields.len()
+    }
+
+    /// Bound on the probability that of so many sets any was taken for less than it is, or that candidates were taken
+    /// for images of each other which are not.
+    pub fn error_bound(&self, sets: f64) -> f64 {
+        let images = 24.0 * (self.candidates() as f64).powi(2);
+        let ranks = (sets + 1.0) * (self.last_order() + 1) as f64;
+        ((ranks + images) * self.miss.powi(self.fields.len() as i32)).min(1.0)
+    }
+
+    /// The rows of some candidates, in this order.
+    pub fn select(&self, order: &[usize]) -> Self {
+        let of = |rows: &Vec<Vec<Vec<u64>>>| order.iter().map(|&i| rows[i].clone()).collect();
+        let fields = self.fields.iter().map(|here| InField {
+            field: here.field,
+            rows: of(&here.rows),
+            by_order: here.by_order.iter().map(of).collect(),
+            most: here.most,
+            attitudes: order.iter().map(|&i| here.attitudes[i]).collect(),
+        });
+        Self {
+            fields: fields.collect(),
+            required: self.required.clone(),
+            platform: self.platform.clone(),
+            ..*self
+        }
+    }
+
+    /// Candidates that are the same attitude as an earlier one.
+    pub fn repeated(&self) -> Vec<usize> {
+        let mut first: HashMap<Vec<&Matrix3<u64>>, usize> = HashMap::new();
+        let everywhere = |i: usize| self.fields.iter().map(|here| &here.attitudes[i]).collect();
+        let seen = |i: usize| (*first.entry(everywhere(i)).or_insert(i) != i).then_some(i);
+        (0..self.candidates()).filter_map(seen).collect()
+    }
+
+    /// How turning the platform axes maps the candidates.
+    pub fn symmetry(&self, same: &dyn Fn(usize, usize) -> bool) -> Symmetry {
+        let fields: Vec<(Field, &[Matrix3<u64>])> =
+            self.fields.iter().map(|here| (here.field, &here.attitudes[..])).collect();
+        Symmetry::new(&fields, &self.platform, same)
+    }
+
+    /// The least number of positions that could do, by counting rows.
+    pub fn counting_bound(&self) -> usize {
+        self.required.len().div_ceil(self.most().max(1))
+    }
+
+    /// The most rows that a candidate adds.
+    pub fn most(&self) -> usize {
+        self.fields.iter().map(|here| here.most).max().unwrap_or(0)
+    }
+
+    /// Highest order of a derivative that adds anything.
+    pub fn last_order(&self) -> usize {
+        self.fields.iter().map(|here| here.by_order.len() - 1).max().unwrap_or(0)
+    }
+
+    /// The degree of every required coefficient in a set; `None` where it is not observable.
+    pub fn degrees(&self, set: &[usize]) -> Vec<Option<usize>> {
+        let mut best = self.likely_degrees(set);
+        for here in &self.fields[1..] {
+            // no degree is below 0
+            if best.iter().all(|d| *d == Some(0)) {
+                break;
+            }
+            for (best, other) in best.iter_mut().zip(here.degrees(set, self.columns, &self.required)) {
+                *best = best.zip(other).map(|(a, b)| a.min(b)).or(*best).or(other);
+            }
+        }
+        best
+    }
+
+    /// The same in one field: a degree may be too large.
+    pub(crate) fn likely_degrees(&self, set: &[usize]) -> Vec<Option<usize>> {
+        self.fields[0].degrees(set, self.columns, &self.required)
+    }
+
+    /// All sets of `size` candidates with every required coefficient observable, each ascending, in lexicographic
+    /// order.
+    pub fn observable_sets(&self, size: usize) -> Vec<Vec<usize>> {
+        let behind = |first: usize| {
+            let mut out = Vec::new();
+            self.each(&[first], size, false, &mut Patience::while_going(&|| true), &mut |set| {
+                out.push(set.to_vec());
+                true
+            });
+            out
+        };
+        (0..self.candidates()).into_par_iter().flat_map_iter(behind).collect()
+    }
+
+    /// The first such set among those that begin with one of `firsts`, and whether all were examined otherwise: no more
+    /// than `budget` prefixes and sets are looked at for each of `firsts`, and only while `going`.
+    pub(crate) fn first_observable_set(
+        &self,
+        size: usize,
+        firsts: &[usize],
+        budget: u64,
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> (Option<Vec<usize>>, bool) {
+        let found: Vec<(Option<Vec<usize>>, bool)> = firsts
+            .par_iter()
+            .map(|&first| {
+                let (mut out, mut patience) = (None, Patience { budget, going });
+                self.each(&[first], size, false, &mut patience, &mut |set| {
+                    out = Some(set.to_vec());
+                    false
+                });
+                (out, patience.budget > 0)
+            })
+            .collect();
+        let complete = found.iter().all(|f| f.1);
+        (found.into_iter().find_map(|f| f.0), complete)
+    }
+
+    /// Hands all observable sets of `size` that begin with `prefix` (ascending) to `found`, in lexicographic order,
+    /// until it wants no more; `repeat`: a candidate may be taken more than once.
+    pub fn each(
+        &self,
+        prefix: &[usize],
+        size: usize,
+        repeat: bool,
+        patience: &mut Patience<'_>,
+        found: &mut dyn FnMut(&[usize]) -> bool,
+    ) {
+        let Some((&last, before)) = prefix.split_last() else { return };
+        let mut bases: Vec<Echelon> =
+            self.fields.iter().map(|here| Echelon::new(here.field, self.columns)).collect();
+        for (basis, here) in bases.iter_mut().zip(&self.fields) {
+            before.iter().for_each(|&c| here.add(basis, c));
+        }
+        self.extend(&bases, &mut before.to_vec(), last, (size, usize::from(!repeat)), patience, found);
+    }
+
+    /// Adds `candidate` and everything behind it, `step` further on at least, to a set with these bases; false when
+    /// `found` wants no more or patience is at its end.
+    fn extend(
+        &self,
+        bases: &[Echelon],
+        set: &mut Vec<usize>,
+        candidate: usize,
+        (size, step): (usize, usize),
+        patience: &mut Patience<'_>,
+        found: &mut dyn FnMut(&[usize]) -> bool,
+    ) -> bool {
+        if !patience.goes_on() {
+            return false;
+        }
+        let left = size - set.len() - 1;
+        let longer = |(here, basis): (&InField, &Echelon)| {
+            let mut basis = basis.clone();
+            here.add(&mut basis, candidate);
+            basis
+        };
+        let mut bases = self.fields.iter().zip(bases);
+        // every further position adds at most its rows
+        let may_do = |here: &InField, basis: &Echelon| basis.rank() + left * here.most >= self.required.len();
+        set.push(candidate);
+        let mut go_on = true;
+        if left == 0 {
+            let does = |basis: &Echelon| self.required.iter().all(|&c| basis.has_unit(c));
+            if bases.any(|both| does(&longer(both))) {
+                go_on = found(set);
+            }
+        } else {
+            let bases: Vec<Echelon> = bases.map(longer).collect();
+            if !self.fields.iter().zip(&bases).any(|(here, basis)| may_do(here, basis)) {
+                // none of what follows does
+            } else if left == 1 {
+                go_on = self.last(&bases, set, candidate + step, patience, found);
+            } else {
+                for next in candidate + step..self.candidates() {
+                    if step > 0 && self.candidates() - next < left {
+                        break;
+                    }
+                    go_on = self.extend(&bases, set, next, (size, step), patience, found);
+                    if !go_on {
+                        break;
+                    }
+                }
+            }
+        }
+        set.pop();
+        go_on
+    }
+
+    /// Adds one more, from `first` on, to a set with these bases.
+    fn last(
+        &self,
+        bases: &[Echelon],
+        set: &mut Vec<usize>,
+        first: usize,
+        patience: &mut Patience<'_>,
+        found: &mut dyn FnMut(&[usize]) -> bool,
+    ) -> bool {
+        // in further fields only when the first says no
+        let mut unseen: Vec<Unseen> = Vec::with_capacity(bases.len());
+        let mut scratch = Vec::new();
+        for next in first..self.candidates() {
+            if !patience.goes_on() {
+                return false;
+            }
+            let does = self.fields.iter().zip(bases).enumerate().any(|(i, (here, basis))| {
+                if unseen.len() == i {
+                    unseen.push(Unseen::new(basis, &self.required));
+                }
+                unseen[i].is_seen(&here.rows[next], &mut scratch)
+            });
+            if does {
+                set.push(next);
+                let go_on = found(set);
+                set.pop();
+                if !go_on {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
+
+/// What a set does not see: a basis v_1 .. v_m of the null space of its rows.
+struct Unseen {
+    field: Field,
+    vectors: Vec<Vec<u64>>,
+    /// Independent rows of the matrix of the required components of v_1 .. v_m: what must be seen.
+    wanted: Vec<Vec<u64>>,
+}
+
+impl Unseen {
+    fn new(basis: &Echelon, required: &[usize]) -> Self {
+        let f = basis.field();
+        // with pivot entries d_i and D their product: D at a free column, -row_i (D / d_i) at pivot i
+        let pivots: Vec<(usize, u64)> =
+            basis.pivots().enumerate().map(|(i, c)| (c, basis.row(i)[c])).collect();
+        let mut weights = vec![f.one(); pivots.len()];
+        let mut product = f.one();
+        for (w, (_, d)) in weights.iter_mut().zip(&pivots) {
+            *w = product;
+            product = f.mul(product, *d);
+        }
+        let mut after = f.neg(f.one());
+        for (w, (_, d)) in weights.iter_mut().zip(&pivots).rev() {
+            *w = f.mul(*w, after);
+            after = f.mul(after, *d);
+        }
+        let vector = |free: usize| {
+            let mut v = vec![0; basis.columns()];
+            v[free] = product;
+            for (i, ((c, _), &w)) in pivots.iter().zip(&weights).enumerate() {
+                v[*c] = f.mul(basis.row(i)[free], w);
+            }
+            v
+        };
+        let is_free = |c: &usize| basis.pivot_row(*c).is_none();
+        let vectors: Vec<Vec<u64>> = (0..basis.columns()).filter(is_free).map(vector).collect();
+        let mut components = Echelon::new(f, vectors.len());
+        for &c in required {
+            if components.rank() < vectors.len() {
+                components.insert(&vectors.iter().map(|v| v[c]).collect::<Vec<_>>());
+            }
+        }
+        let wanted = (0..components.rank()).map(|i| components.row(i).to_vec()).collect();
+        Self { field: f, vectors, wanted }
+    }
+
+    /// Whether `rows` leave no required component unseen: what they make of v_1 .. v_m spans `wanted`.
+    fn is_seen(&self, rows: &[Vec<u64>], scratch: &mut Vec<u64>) -> bool {
+        let (f, m) = (self.field, self.vectors.len());
+        if rows.len() < self.wanted.len() {
+            return false;
+        }
+        scratch.clear();
+        for row in rows {
+            let entry = |v: &Vec<u64>| f.dot(0, row.iter().copied().zip(v.iter().copied()));
+            scratch.extend(self.vectors.iter().map(entry));
+        }
+        self.wanted.iter().for_each(|row| scratch.extend(row));
+        // elimination with the pivots in `rows`
+        let (mut top, all) = (0, rows.len() + self.wanted.len());
+        for c in 0..m {
+            let Some(p) = (top..rows.len()).find(|r| scratch[r * m + c] != 0) else { continue };
+            (0..m).for_each(|j| scratch.swap(p * m + j, top * m + j));
+            let (done, below) = scratch.split_at_mut((top + 1) * m);
+            let pivot = &done[top * m..];
+            for row in below.chunks_exact_mut(m).take(all - top - 1) {
+                if row[c] != 0 {
+                    let factor = f.neg(row[c]);
+                    for (x, &y) in row.iter_mut().zip(pivot).skip(c) {
+                        *x = f.add(f.mul(*x, pivot[c]), f.mul(factor, y));
+                    }
+                }
+            }
+            top += 1;
+        }
+        scratch[rows.len() * m..].iter().all(|x| *x == 0)
+    }
+}
+
+impl InField {
+    /// The rows of every position of `platform` at random values; psi, the first `leading` columns, eliminated.
+    fn new(platform: &Platform, values: &RandomValues, leading: usize) -> Self {
+        let sample = values.sample(platform.scheme(), 1);
+        let (f, point) = (sample.point.ring, &sample.point);
+        let chain = local_chain(&f, point.w_n, point.w_u, platform.observed());
+        let n = platform.names().len();
+        let blocks = platform.blocks(point);
+        let up_to = |order: usize| -> Vec<Vec<Vec<u64>>> {
+            let rows = blocks.iter().map(|block| {
+                let rows = chain.iter().filter(|local| local.order <= order).map(|local| {
+                    let entry = |k: usize| block.entry(&f, &local.row, k);
+                    (0..n).map(entry).collect::<Vec<u64>>()
+                });
+                if leading > 0 { without_leading(f, rows.collect(), leading) } else { rows.collect() }
+            });
+            rows.collect()
+        };
+        let last = chain.iter().map(|local| local.order).max().unwrap_or(0);
+        let mut by_order: Vec<Vec<Vec<Vec<u64>>>> = (0..=last).map(up_to).collect();
+        let rows = by_order[last].clone();
+        if leading == 0 {
+            // what lower orders gave need not be given again
+            for order in (1..=last).rev() {
+                let (lower, this) = by_order.split_at_mut(order);
+                for (rows, seen) in this[0].iter_mut().zip(&lower[order - 1]) {
+                    rows.drain(..seen.len());
+                }
+            }
+        }
+        let most = rows.iter().map(Vec::len).max().unwrap_or(0);
+        Self { field: f, rows, by_order, most, attitudes: sample.point.attitudes }
+    }
+
+    fn add(&self, basis: &mut Echelon, candidate: usize) {
+        for row in &self.rows[candidate] {
+            basis.insert(row);
+        }
+    }
+
+    fn degrees(&self, set: &[usize], columns: usize, required: &[usize]) -> Vec<Option<usize>> {
+        let mut basis = Echelon::new(self.field, columns);
+        let mut degrees = vec![None; required.len()];
+        for (order, rows) in self.by_order.iter().enumerate() {
+            for row in set.iter().flat_map(|&c| &rows[c]) {
+                basis.insert(row);
+            }
+            for (degree, &c) in degrees.iter_mut().zip(required) {
+                if degree.is_none() && basis.has_unit(c) {
+                    *degree = Some(order);
+                }
+            }
+        }
+        degrees
+    }
+}
+
+/// Combinations of `rows` that vanish in the first `leading` columns, without these columns.
+fn without_leading(f: Field, mut rows: Vec<Vec<u64>>, leading: usize) -> Vec<Vec<u64>> {
+    for c in 0..leading {
+        let Some(p) = rows.iter().position(|r| r[c] != 0) else { continue };
+        let pivot = rows.swap_remove(p);
+        let inverse = f.inv(pivot[c]);
+        for row in rows.iter_mut().filter(|r| r[c] != 0) {
+            let factor = f.neg(f.mul(row[c], inverse));
+            for (x, &y) in row.iter_mut().zip(&pivot) {
+                *x = f.add(*x, f.mul(factor, y));
+            }
+        }
+    }
+    rows.into_iter().map(|r| r[leading..].to_vec()).filter(|r| r.iter().any(|&x| x != 0)).collect()
+}

@@ -1,0 +1,472 @@
+//! Fewest positions where the way between them counts: torquer errors act in every turn, so a scheme is a walk over candidates, and a position
+//! adds rows that depend on all turns before it.
+//!
+//! In n a position at `C_i`, with `J` the sum of what the turns so far have left in `psi^n`, adds the rows `[r_psi | r_psi J + B_i]` of the
+//! local chain, `B_i = r_eps E_i + r_a A_i`: six at most. Walks are taken depth first with the echelon bases of their beginnings; a walk ends
+//! where even six more rows in every position to come could not do. A walk that is found is exact whatever the prime; that no shorter one
+//! does is wrong with a probability that is stated.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use obsdeg_core::degree::{EnsembleError, local_chain};
+use obsdeg_core::model::settings::concerns;
+use obsdeg_core::model::slew::{rotation_vector, times, transpose};
+use obsdeg_core::model::{
+    Carry, Euler, Gimbals, LOCAL, Matrix3, Path, Platform, RandomValues, Scheme, Source, c_n_f64,
+    parse_attitude,
+};
+use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::{Echelon, Field, SplitMix64};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::design::request::candidates::Candidates;
+use crate::design::request::error::DesignError;
+use crate::design::request::limits::PROOF;
+
+/// Name and version of the JSON layout.
+const WALKS_SCHEMA: &str = "obsdeg.walks/1";
+/// Most walks of one length that are examined.
+const MOST_WALKS: u64 = 100_000_000;
+/// Most candidates: every turn between two of them is a position of one tour.
+const MOST_TURNS: usize = 900;
+/// Walks that go on from every length when one that does is sought.
+const BEAM: usize = 400;
+/// Longest walk that is sought.
+const LONGEST: usize = 40;
+/// Walks between two questions whether to go on.
+const PATIENCE: u64 = 256;
+
+/// What is to be found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WalkOptions {
+    /// What to choose from.
+    pub candidates: Candidates,
+    /// Coefficients or families that must be observable; none: all.
+    pub required: Vec<String>,
+    /// The largest turn from one position to the next, in degrees.
+    pub most_turn_deg: f64,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// Shortest slew sequence that makes every required coefficient observable.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Walks {
+    /// Layout of this answer: `obsdeg.walks/1`.
+    pub schema: String,
+    /// Version of the program that wrote it.
+    pub version: String,
+    /// Terms of the error model that are unknown besides psi.
+    pub terms: String,
+    /// Candidate attitudes of the search.
+    pub candidates: Vec<String>,
+    /// Largest turn from one position to the next, in degrees, about one axis by the shortest path.
+    pub most_turn_deg: f64,
+    /// Number of turns between candidates up to this size.
+    pub turns: usize,
+    /// Coefficients that must be observable.
+    pub required: Vec<String>,
+    /// Number of positions of the shortest slew sequence that was found; null if none was.
+    pub positions: Option<usize>,
+    /// Slew sequence that makes all required coefficients observable: its candidates, in order; empty if none
+    /// was found.
+    pub walk: Vec<String>,
+    /// Euler angles of its positions, in degrees.
+    pub angles: Vec<String>,
+    /// Rank of the slew sequence, then the number of unknowns.
+    pub rank: [usize; 2],
+    /// Latitude of the scheme in degrees; null when generic.
+    pub latitude_deg: Option<f64>,
+    /// Coefficients that even the tour of all turns leaves unobservable; then no slew sequence is searched.
+    pub never: Vec<String>,
+    /// Number of positions below which no slew sequence is enough: the required coefficients over the rows of
+    /// a position, rounded up.
+    pub counting_bound: usize,
+    /// Largest number of independent rows that a position adds.
+    pub rows_per_position: usize,
+    /// Slew sequences excluded by exhaustion: `[positions, number of sequences]`, none of which is enough.
+    pub none_of: Vec<[u64; 2]>,
+    /// True if `positions` is proven minimal for these candidates and turns: no shorter sequence was left
+    /// out, and the bound on the probability of an error is below 1e-12.
+    pub proven: bool,
+    /// True if the search was interrupted.
+    pub interrupted: bool,
+    /// Bound on the probability that a sufficient slew sequence was overlooked.
+    pub error_bound: f64,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+/// The rows of every candidate and turn in one field.
+struct InField {
+    field: Field,
+    /// Rows of the local chain on psi (3 each), with their rows on the coefficients, by candidate.
+    of_psi: Vec<[u64; 3]>,
+    rows: Vec<Vec<Vec<u64>>>,
+    /// What a turn leaves in `psi^n` (3 rows on the coefficients), by the place of the turn.
+    turns: Vec<[Vec<u64>; 3]>,
+    coefficients: usize,
+}
+
+/// The way so far.
+#[derive(Clone)]
+struct Walk {
+    places: Vec<usize>,
+    /// `J`.
+    torqued: [Vec<u64>; 3],
+    basis: Echelon,
+}
+
+impl InField {
+    fn new(tour: &Platform, values: &RandomValues, first_visit: &[usize], turn_at: &[usize]) -> Self {
+        let sample = values.sample(tour.scheme(), 1);
+        let (f, point) = (sample.point.ring, &sample.point);
+        let chain = local_chain(&f, point.w_n, point.w_u, tour.observed());
+        let blocks = tour.blocks(point);
+        let d = tour.coefficients();
+        let rows = first_visit.iter().map(|&i| {
+            let row = |row: &[u64; LOCAL]| -> Vec<u64> {
+                let mut without_psi = *row;
+                without_psi[..3].fill(0);
+                (0..d).map(|k| blocks[i].entry(&f, &without_psi, 3 + k)).collect()
+            };
+            chain.iter().map(|local| row(&local.row)).collect()
+        });
+        let jump = |i: usize, r: usize| -> Vec<u64> {
+            let (after, before) = (&blocks[i].rows[r][3..], &blocks[i - 1].rows[r][3..]);
+            after.iter().zip(before).map(|(a, b)| f.sub(*a, *b)).collect()
+        };
+        Self {
+            field: f,
+            of_psi: chain.iter().map(|local| [local.row[0], local.row[1], local.row[2]]).collect(),
+            rows: rows.collect(),
+            turns: turn_at.iter().map(|&i| std::array::from_fn(|r| jump(i, r))).collect(),
+            coefficients: d,
+        }
+    }
+
+    fn start(&self, place: usize) -> Walk {
+        let zero = vec![0; self.coefficients];
+        let torqued = [zero.clone(), zero.clone(), zero];
+        let basis = Echelon::new(self.field, 3 + self.coefficients);
+        let mut walk = Walk { places: Vec::new(), torqued, basis };
+        self.arrive(&mut walk, place);
+        walk
+    }
+
+    fn arrive(&self, walk: &mut Walk, place: usize) {
+        let f = &self.field;
+        walk.places.push(place);
+        let mut row = vec![0; 3 + self.coefficients];
+        for (psi, rest) in self.of_psi.iter().zip(&self.rows[place]) {
+            row[..3].copy_from_slice(psi);
+            for (k, slot) in row[3..].iter_mut().enumerate() {
+                *slot = f.dot(rest[k], (0..3).map(|r| (psi[r], walk.torqued[r][k])));
+            }
+            walk.basis.insert(&row);
+        }
+    }
+
+    fn go(&self, walk: &Walk, turn: usize, to: usize) -> Walk {
+        let mut next = walk.clone();
+        for (sum, left) in next.torqued.iter_mut().zip(&self.turns[turn]) {
+            for (x, y) in sum.iter_mut().zip(left) {
+                *x = self.field.add(*x, *y);
+            }
+        }
+        self.arrive(&mut next, to);
+        next
+    }
+}
+
+/// Everything that is shared.
+struct Space {
+    fields: [InField; 2],
+    /// Of every candidate: `(turn, candidate)`.
+    neighbours: Vec<Vec<(usize, usize)>>,
+    required: Vec<usize>,
+    /// The rows that a position adds at most.
+    most: usize,
+}
+
+impl Space {
+    fn does(&self, basis: &Echelon) -> bool {
+        self.required.iter().all(|c| basis.has_unit(3 + c))
+    }
+
+    /// A walk of `length` that goes on from `walk` and does.
+    fn search(
+        &self,
+        walk: &Walk,
+        length: usize,
+        seen: &AtomicU64,
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<usize>> {
+        if walk.places.len() == length {
+            if seen.fetch_add(1, Ordering::Relaxed).is_multiple_of(PATIENCE) && !going() {
+                return None;
+            }
+            return (self.does(&walk.basis) || self.does_elsewhere(&walk.places))
+                .then(|| walk.places.clone());
+        }
+        let left = length - walk.places.len();
+        // every required coefficient needs a row of its own
+        if walk.basis.rank() + self.most * left < self.required.len() || !going() {
+            return None;
+        }
+        let here = *walk.places.last()?;
+        let next = |&(turn, to): &(usize, usize)| {
+            self.search(&self.fields[0].go(walk, turn, to), length, seen, going)
+        };
+        if walk.places.len() < 4 {
+            self.neighbours[here].par_iter().find_map_first(next)
+        } else {
+            self.neighbours[here].iter().find_map(next)
+        }
+    }
+
+    /// The same in the second field.
+    fn does_elsewhere(&self, places: &[usize]) -> bool {
+        let field = &self.fields[1];
+        let Some((&first, rest)) = places.split_first() else { return false };
+        let mut walk = field.start(first);
+        for &to in rest {
+            let here = walk.places[walk.places.len() - 1];
+            let Some(&(turn, _)) = self.neighbours[here].iter().find(|n| n.1 == to) else { return false };
+            walk = field.go(&walk, turn, to);
+        }
+        self.does(&walk.basis)
+    }
+
+    /// The way through some places, in the first field; a place that no turn leads to begins anew.
+    fn along(&self, places: &[usize]) -> Walk {
+        let field = &self.fields[0];
+        let mut walk = field.start(places[0]);
+        for &to in &places[1..] {
+            let here = walk.places[walk.places.len() - 1];
+            match self.neighbours[here].iter().find(|n| n.1 == to) {
+                Some(&(turn, _)) => walk = field.go(&walk, turn, to),
+                None => field.arrive(&mut walk, to),
+            }
+        }
+        walk
+    }
+
+    /// The number of walks of so many positions.
+    fn walks(&self, length: usize) -> u64 {
+        let n = self.neighbours.len();
+        let mut ends = vec![1u64; n];
+        for _ in 1..length {
+            let mut next = vec![0u64; n];
+            for (from, list) in self.neighbours.iter().enumerate() {
+                list.iter().for_each(|(_, to)| next[*to] = next[*to].saturating_add(ends[from]));
+            }
+            ends = next;
+        }
+        ends.into_iter().fold(0, u64::saturating_add)
+    }
+
+    /// A short walk that does, by the best of many at every length.
+    fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<Walk> {
+        let mut rng = SplitMix64::new(seed);
+        let mut beam: Vec<Walk> = (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
+        for _ in 1..LONGEST {
+            if let Some(done) = beam.iter().find(|w| self.does(&w.basis)) {
+                return Some(done.clone());
+            }
+            if !going() {
+                return None;
+            }
+            let grown = |walk: &Walk| -> Vec<Walk> {
+                let here = walk.places[walk.places.len() - 1];
+                self.neighbours[here].iter().map(|&(turn, to)| self.fields[0].go(walk, turn, to)).collect()
+            };
+            let next: Vec<Walk> = beam.par_iter().flat_map_iter(grown).collect();
+            let mut order: Vec<(usize, u64, usize)> = next
+                .iter()
+                .enumerate()
+                .map(|(i, w)| (usize::MAX - w.basis.rank(), rng.next_u64(), i))
+                .collect();
+            order.sort_unstable();
+            beam = order.into_iter().take(BEAM).map(|(.., i)| next[i].clone()).collect();
+        }
+        None
+    }
+}
+
+/// Finds the fewest positions of a walk over candidates that make the required coefficients observable under the assumptions of `base`,
+/// whose carry is inertial and whose torquer errors are unknown. `going` is asked whether to go on.
+///
+/// # Errors
+/// [`DesignError`].
+pub fn walks(
+    base: &Scheme,
+    options: &WalkOptions,
+    going: &(dyn Fn() -> bool + Sync),
+) -> Result<Walks, DesignError> {
+    let names = options.candidates.names.clone();
+    let attitudes = &options.candidates.attitudes;
+    let (neighbours, tour) = tour(attitudes, options.most_turn_deg);
+    let turns: usize = neighbours.iter().map(Vec::len).sum();
+    if turns == 0 || turns > MOST_TURNS {
+        return Err(DesignError::Turns { found: turns, most: MOST_TURNS });
+    }
+    let positions = Scheme::of_angles(tour.iter().map(|&c| attitudes[c].clone())).positions;
+    let scheme = Scheme {
+        positions,
+        path: Some(Path::OneAxis),
+        combinations: Vec::new(),
+        gimbals: Gimbals::default(),
+        ..base.clone()
+    };
+    let platform = Platform::new(scheme)?;
+    let d = platform.coefficients();
+    let all = &platform.names()[3..];
+    let asked =
+        |name: &String| options.required.is_empty() || options.required.iter().any(|r| concerns(r, name));
+    if let Some(found) = options.required.iter().find(|r| !all.iter().any(|name| concerns(r, name))) {
+        return Err(DesignError::UnknownName { found: found.clone(), known: all.join(", ") });
+    }
+    let required: Vec<usize> = (0..d).filter(|&c| asked(&all[c])).collect();
+    let visit = |c: usize| tour.iter().position(|x| *x == c).unwrap_or(0);
+    let first_visit: Vec<usize> = (0..attitudes.len()).map(visit).collect();
+    let place = |from: usize, to: usize| tour.windows(2).position(|w| w == [from, to]).map(|i| i + 1);
+    let pairs = neighbours.iter().enumerate().flat_map(|(from, list)| list.iter().map(move |to| (from, *to)));
+    let turn_at: Vec<usize> = pairs.filter_map(|(from, to)| place(from, to)).collect();
+    let mut number = 0;
+    let mut numbered = |to: &usize| {
+        number += 1;
+        (number - 1, *to)
+    };
+    let neighbours: Vec<Vec<(usize, usize)>> =
+        neighbours.iter().map(|list| list.iter().map(&mut numbered).collect()).collect();
+    let mut rng = platform.scheme().random(options.seed, "walks");
+    let values =
+        [RandomValues::draw(platform.scheme(), &mut rng), RandomValues::draw(platform.scheme(), &mut rng)];
+    let [first, second] = values;
+    let (first, second) = (first.map_err(EnsembleError::from)?, second.map_err(EnsembleError::from)?);
+    let order = first.roots().order;
+    let fields = [first, second].map(|v| InField::new(&platform, &v, &first_visit, &turn_at));
+    let most = fields[0].of_psi.len();
+    let space = Space { fields, neighbours, required, most };
+    let counting_bound = space.required.len().div_ceil(most).max(1);
+    let claim = |length: usize| Claim {
+        unknowns: 3 + d,
+        decisions: space.required.len(),
+        order,
+        row_degree: 4,
+        // as of a verdict, and of so many turns by parts of half a turn
+        row_bits: 60.0 + (length as f64).log2(),
+    };
+    let whole = space.along(&tour);
+    let lost = space.required.iter().filter(|c| !whole.basis.has_unit(3 + **c));
+    let never: Vec<String> = lost.map(|&c| all[c].clone()).collect();
+    let shortest = if never.is_empty() { space.short(options.seed, going) } else { None };
+    let longest = shortest.as_ref().map_or(LONGEST, |w| w.places.len());
+    let mut out = Walks {
+        schema: WALKS_SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        terms: base.unknowns.to_string(),
+        candidates: names.clone(),
+        most_turn_deg: options.most_turn_deg,
+        turns,
+        required: space.required.iter().map(|&c| all[c].clone()).collect(),
+        positions: None,
+        walk: Vec::new(),
+        angles: Vec::new(),
+        rank: [0, 3 + d],
+        latitude_deg: base.latitude.map(|l| l.degrees()),
+        never,
+        counting_bound,
+        rows_per_position: most,
+        none_of: Vec::new(),
+        proven: false,
+        interrupted: false,
+        error_bound: 0.0,
+        seed: options.seed,
+    };
+    let mut best = shortest.map(|w| w.places);
+    let mut complete = true;
+    let lengths = if out.never.is_empty() { counting_bound..longest } else { 0..0 };
+    for length in lengths {
+        let count = space.walks(length);
+        if count > MOST_WALKS {
+            complete = false;
+            break;
+        }
+        let seen = AtomicU64::new(0);
+        let stopped = AtomicBool::new(false);
+        let going = || {
+            let go = !stopped.load(Ordering::Relaxed) && going();
+            stopped.fetch_or(!go, Ordering::Relaxed);
+            go
+        };
+        let found = (0..space.neighbours.len())
+            .into_par_iter()
+            .find_map_first(|c| space.search(&space.fields[0].start(c), length, &seen, &going));
+        if let Some(found) = found {
+            best = Some(found);
+            break;
+        }
+        if stopped.load(Ordering::Relaxed) {
+            out.interrupted = true;
+            complete = false;
+            break;
+        }
+        out.none_of.push([length as u64, count]);
+        out.error_bound += count as f64 * error_bound(&claim(length), 2);
+    }
+    if let Some(places) = &best {
+        out.positions = Some(places.len());
+        out.rank[0] = space.along(places).basis.rank();
+        let angles = |&c: &usize| obsdeg_core::model::angles_text(&attitudes[c]);
+        out.angles = places.iter().map(angles).collect();
+        out.walk = places.iter().map(|&c| names[c].clone()).collect();
+    }
+    out.proven = complete && best.is_some() && out.error_bound < PROOF;
+    Ok(out)
+}
+
+/// The walk as a scheme under the assumptions of `base`; `None` where none was found.
+pub fn scheme_of_walk(found: &Walks, base: &Scheme) -> Option<Scheme> {
+    let attitudes: Result<Vec<Euler>, _> = found.angles.iter().map(|a| parse_attitude(a)).collect();
+    let positions = Scheme::of_angles(attitudes.ok()?).positions;
+    (!positions.is_empty()).then(|| Scheme { positions, path: Some(Path::OneAxis), ..base.clone() })
+}
+
+/// Of every candidate those that a turn of at most so many degrees leads to, and a tour that takes every such turn.
+fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>) {
+    let matrices: Vec<Matrix3<f64>> = attitudes.iter().map(c_n_f64).collect();
+    let angle = |i: usize, j: usize| {
+        let v = rotation_vector(&times(&matrices[j], &transpose(&matrices[i])));
+        v.iter().map(|x| x * x).sum::<f64>().sqrt().to_degrees()
+    };
+    let near = |i: usize| -> Vec<usize> {
+        (0..attitudes.len()).filter(|&j| j != i && angle(i, j) <= most_turn_deg + 1e-6).collect()
+    };
+    let neighbours: Vec<Vec<usize>> = (0..attitudes.len()).map(near).collect();
+    // Hierholzer: as many turns lead to a candidate as away from it
+    let mut left = neighbours.clone();
+    let mut tour = Vec::new();
+    for start in 0..attitudes.len() {
+        let (mut stack, mut circuit) = (vec![start], Vec::new());
+        while let Some(&here) = stack.last() {
+            match left[here].pop() {
+                Some(to) => stack.push(to),
+                None => circuit.extend(stack.pop()),
+            }
+        }
+        if circuit.len() > 1 || !tour.contains(&start) {
+            circuit.reverse();
+            tour.extend(circuit);
+        }
+    }
+    (neighbours, tour)
+}
+
+/// Whether the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets does.
+pub fn is_walk(base: &Scheme) -> bool {
+    base.carry == Carry::Inertial && base.unknowns.have(Source::Rate)
+}

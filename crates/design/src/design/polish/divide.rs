@@ -1,0 +1,67 @@
+//! The total time divided among the positions of a sequence: dwells of their own, in steps of the samples.
+
+use std::collections::BTreeMap;
+
+use obsdeg_evidence::simulation::steps;
+
+use crate::design::measure::criterion::Criterion;
+use crate::design::measure::evaluator::{Dwelling, Evaluator};
+use crate::design::measure::stop::Stop;
+use crate::design::request::error::DesignError;
+
+/// Times that are moved from one position to another, as parts of an equal dwell: from the largest to the smallest, or to one step.
+const FINEST: usize = 256;
+
+/// Dwells of the positions of `path`, whose candidates are those of `evaluator` in this order, that make the criterion smaller than
+/// equal ones: multiples of the time between samples, none without a sample, of the same sum. None of them is made better by moving the
+/// finest part from one position to another. `allowed` says whether dwells keep what else is wanted. `None` when equal ones are as good.
+///
+/// # Errors
+/// [`DesignError::Filter`].
+pub(crate) fn divide(
+    evaluator: &Evaluator,
+    path: &[Stop],
+    criterion: &Criterion,
+    allowed: &dyn Fn(&Evaluator) -> bool,
+) -> Result<Option<(f64, Evaluator)>, DesignError> {
+    let equal = evaluator.dwell_s();
+    let samples = steps(equal, evaluator.step_s())?;
+    let unit = equal / samples as f64;
+    let mut known: BTreeMap<usize, Dwelling> = BTreeMap::new();
+    let mut of = |samples: usize| -> Result<Dwelling, DesignError> {
+        if let Some(dwelling) = known.get(&samples) {
+            return Ok(dwelling.clone());
+        }
+        let dwelling = evaluator.dwelling(samples as f64 * unit)?;
+        known.insert(samples, dwelling.clone());
+        Ok(dwelling)
+    };
+    let mut now = evaluator.clone().with_dwells();
+    let mut counts = vec![samples; path.len()];
+    let first = now.of_sequence(path, criterion);
+    let mut best = first;
+    let mut moved = samples / 2;
+    while moved * FINEST >= samples.max(FINEST) {
+        let before = best;
+        for (from, to) in (0..path.len()).flat_map(|a| (0..path.len()).map(move |b| (a, b))) {
+            if from == to || counts[from] <= moved {
+                continue;
+            }
+            let held = [from, to].map(|i| now.dwelling_of(i).clone());
+            now.dwell_at(from, &of(counts[from] - moved)?);
+            now.dwell_at(to, &of(counts[to] + moved)?);
+            let value = now.of_sequence(path, criterion);
+            if value < best && allowed(&now) {
+                best = value;
+                counts[from] -= moved;
+                counts[to] += moved;
+            } else {
+                [from, to].iter().zip(&held).for_each(|(&i, held)| now.dwell_at(i, held));
+            }
+        }
+        if best == before {
+            moved /= 2;
+        }
+    }
+    Ok((best < first).then_some((best, now)))
+}

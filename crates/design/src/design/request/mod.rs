@@ -1,0 +1,6 @@
+//! What is asked for: options, candidates, limits, errors.
+
+pub(crate) mod candidates;
+pub(crate) mod error;
+pub(crate) mod limits;
+pub(crate) mod options;

@@ -1,0 +1,106 @@
+//! What is said of how good the best can be: bounds on the schemes of a task.
+
+use obsdeg_core::model::{Euler, angles_text};
+use rayon::prelude::*;
+
+use crate::design::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
+use crate::design::certificate::value::{Value, excess};
+use crate::design::certificate::{Bound, Everywhere};
+use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::stop::Stop;
+use crate::design::polish::rounding::Moved;
+use crate::design::run::task::{DWELLS, Task};
+use crate::design::search::score::Scored;
+
+/// Number of attitudes of the weights over all attitudes that are listed.
+const LISTED: usize = 10;
+
+/// The bound over all attitudes in the light of the best scheme found, of this criterion.
+pub(crate) fn everywhere(
+    found: &Everywhere,
+    value: Value,
+    rounded: Option<(i64, Option<&Moved>)>,
+) -> EverywhereReport {
+    let weight = |(euler, weight): &(Euler, f64)| Weight { candidate: angles_text(euler), weight: *weight };
+    let (listed, lighter) = found.support.split_at(found.support.len().min(LISTED));
+    EverywhereReport {
+        best_possible: found.value,
+        within_percent: 100.0 * excess(value.at_most, found.value),
+        rounding: value.rounding,
+        attained: found.attained,
+        weights: listed.iter().map(weight).collect(),
+        lighter: lighter.len(),
+        lighter_weight: lighter.iter().map(|(_, weight)| weight).sum(),
+        rounded: rounded.map(|(step, finer)| Rounded {
+            step_deg: step as f64 / 1e9,
+            finer: finer
+                .filter(|f| f.value < value.computed)
+                .map(|f| Finer { value: f.value, angles: f.scheme.iter().map(angles_text).collect() }),
+        }),
+    }
+}
+
+impl Task<'_> {
+    /// What no scheme of `k` candidates is below.
+    pub(crate) fn bound(&self, evaluator: &Evaluator, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+        evaluator.bound(&self.criterion, k, &self.symmetry.representatives(), going)
+    }
+
+    /// The criterion of a scheme, of the information of its positions as it is evaluated.
+    pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> Value {
+        Value::new(of.worth.value, evaluator.at_most(&of.sequence, &self.criterion, None))
+    }
+
+    /// The same, of the information of its positions as that of all attitudes is bounded: without psi.
+    pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> Value {
+        let attitudes = |stop: &Stop| (stop.candidate, &self.candidates.attitudes[stop.candidate]);
+        let errors = evaluator.errors_of(of.sequence.iter().map(attitudes));
+        Value::new(of.worth.value, evaluator.at_most(&of.sequence, &self.criterion, Some(&errors)))
+    }
+
+    /// The bound in the light of the best scheme found, of this criterion.
+    pub(crate) fn certificate(&self, bound: &Bound, value: Value) -> Certificate {
+        let excess = excess(value.at_most, bound.value);
+        let weights = self.candidates.names.iter().zip(&bound.listed.0).filter(|(_, w)| **w > 0.0);
+        Certificate {
+            best_possible: bound.value,
+            within_percent: 100.0 * excess,
+            efficiency: (1.0 + excess).powi(-2),
+            rounding: value.rounding,
+            attained: bound.listed.1,
+            weights: weights.map(|(name, &weight)| Weight { candidate: name.clone(), weight }).collect(),
+            everywhere: None,
+            front: Vec::new(),
+        }
+    }
+
+    /// `[total time, criterion]`: no scheme of the candidates that takes this time in equal dwells is below, whatever of
+    /// the numbers of positions asked for it has.
+    pub(crate) fn front_bound(
+        &self,
+        evaluator: &Evaluator,
+        (k, dwell_s): (usize, f64),
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<[f64; 2]> {
+        let mut counts = vec![k];
+        counts.extend(self.options.front.iter().filter(|f| **f != k));
+        let mut totals: Vec<f64> =
+            counts.iter().flat_map(|&count| DWELLS.map(|factor| count as f64 * dwell_s * factor)).collect();
+        totals.sort_by(f64::total_cmp);
+        totals.dedup();
+        let at = |total: f64| {
+            let least = counts.iter().filter_map(|&count| {
+                // a dwell of too many steps is no point of the front
+                let there = evaluator.clone().with_dwell(total / count as f64).ok()?;
+                Some(self.bound(&there, count, going).map(|b| b.value))
+            });
+            // where one is not known, nothing is
+            least
+                .collect::<Option<Vec<f64>>>()?
+                .into_iter()
+                .min_by(f64::total_cmp)
+                .map(|value| [total, value])
+        };
+        totals.into_par_iter().filter_map(at).collect()
+    }
+}

@@ -1,0 +1,222 @@
+//! Free attitudes: those that weights on all attitudes need, and those near them, with angles rounded. What is chosen is
+//! evaluated as it is rounded.
+//!
+//! Schemes begin with the cardinal attitudes, with the rounded ones of the weights, and at random. Each of their positions
+//! then moves on the grid of rounded angles until no move helps; the attitudes of the best are what is chosen from, beside those
+//! they began with. The cardinal attitudes stay among them, and the best scheme of these is one to begin with, so that
+//! no free scheme is worse.
+
+use obsdeg_core::model::{Carry, Euler, Scheme, c_n_f64, format_decimal};
+use obsdeg_evidence::simulation::Conditions;
+use obsdeg_exact::SplitMix64;
+use rayon::prelude::*;
+
+use crate::design::certificate::Everywhere;
+use crate::design::measure::stop::Stop;
+use crate::design::polish::rounding::{Moved, Moves, OnGrids, random, rounded};
+use crate::design::request::candidates::Candidates;
+use crate::design::request::error::DesignError;
+use crate::design::request::limits::QUICK;
+use crate::design::request::options::DesignOptions;
+use crate::design::run::prepared::Prepared;
+use crate::design::run::task::Task;
+use crate::design::search::best::Best;
+use crate::design::search::progress::NOTHING_YET;
+use crate::design::search::progress::Progress;
+use crate::design::search::score::Scored;
+use crate::design::search::scoring::Search;
+
+/// Schemes that are moved, of different criteria: found by exchange, and at random.
+const MOVED: usize = 8;
+const RANDOM: usize = 8;
+/// Attitudes of the weights that schemes are exchanged from, heaviest first.
+const WEIGHED: usize = 48;
+/// Those of them whose attitudes are chosen from.
+const CHOSEN: usize = 2;
+/// Criteria that differ by less than this part are those of images of one scheme.
+const ALIKE: f64 = 1e-6;
+/// What a search for free attitudes chooses from, and where it begins.
+pub(crate) struct Free {
+    /// What no scheme of any attitudes is below.
+    pub(crate) every: Everywhere,
+    /// The cardinal attitudes, those of the weights, and those of the schemes that were moved.
+    pub(crate) candidates: Candidates,
+    /// Schemes to begin with.
+    starts: Vec<Vec<Euler>>,
+    /// Sequences that were evaluated to find them.
+    examined: u64,
+    /// No scheme of the cardinal attitudes has a smaller worst degree, or a smaller criterion.
+    cardinal: Option<(usize, f64)>,
+    /// The best that was found with angles in hundredths of a degree.
+    pub(crate) finer: Option<Moved>,
+}
+
+/// The task with the cardinal attitudes.
+fn of_cardinals(options: &DesignOptions) -> DesignOptions {
+    DesignOptions { candidates: Candidates::cardinals(), free: None, front: Vec::new(), ..options.clone() }
+}
+
+impl Free {
+    /// The attitudes for a task whose candidates are where the search for them begins; angles are multiples of `step` 1e-9 degrees.
+    ///
+    /// # Errors
+    /// [`DesignError`].
+    pub(crate) fn new(
+        base: &Scheme,
+        conditions: &Conditions,
+        options: &DesignOptions,
+        step: i64,
+        progress: &(dyn Fn(Progress) -> bool + Sync),
+    ) -> Result<Self, DesignError> {
+        let going = || progress(NOTHING_YET);
+        let wrong = |found: String| DesignError::Free { found };
+        let k = options.positions.ok_or_else(|| wrong("no number of positions".into()))?;
+        if base.carry != Carry::Reset {
+            return Err(wrong(format!("{} carry", base.carry)));
+        }
+        if step <= 0 {
+            return Err(wrong(format!("angles rounded to {} degrees", format_decimal(step))));
+        }
+        let prepared = Prepared::new(base, conditions, options, &going)?;
+        prepared.check(k)?;
+        if prepared.evaluator.bias.is_some() {
+            return Err(wrong("noise of Z that is correlated from position to position".into()));
+        }
+        if !prepared.evaluator.prior.is_alike() {
+            return Err(wrong("priors of psi that differ by axis".into()));
+        }
+        let every = prepared.evaluator.everywhere(&prepared.task.criterion, k, &going);
+        let every = every.ok_or(DesignError::Interrupted)?;
+        let (mut candidates, _) = Candidates::cardinals().within(&base.gimbals);
+        let mut out = Self {
+            every,
+            candidates: candidates.clone(),
+            starts: Vec::new(),
+            examined: 0,
+            cardinal: None,
+            finer: None,
+        };
+        if !candidates.attitudes.is_empty() {
+            out.begin_with_cardinals(base, conditions, options, k, progress)?;
+        }
+        let mut support: Vec<&(Euler, f64)> = out.every.support.iter().collect();
+        support.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (euler, _) in support.into_iter().take(WEIGHED) {
+            candidates.add(euler.each_ref().map(|angle| rounded(angle, step)));
+        }
+        out.candidates = candidates;
+        // schemes of these, by exchange
+        let chosen = DesignOptions { candidates: out.candidates.clone(), ..options.clone() };
+        let prepared = Prepared::new(base, conditions, &chosen, &going)?;
+        let task = &prepared.task;
+        let search = Search { keep: options.restarts as usize, ..prepared.search(progress) };
+        let best = search.exchange(k, &task.sequences_of(&out.starts), options.restarts, options.seed);
+        out.examined += best.examined;
+        let exchanged = unlike(&best.found);
+        let attitudes = |scored: &Scored| task.placed(scored).0;
+        out.starts.extend(exchanged.iter().take(options.keep.max(MOVED)).map(|s| attitudes(s)));
+        let mut rng = SplitMix64::new(options.seed ^ 0x726f_756e_6465_6421);
+        let random = (0..RANDOM).filter_map(|_| random(k, step, &base.gimbals, &mut rng));
+        let first: Vec<Vec<Euler>> =
+            exchanged.iter().take(MOVED).map(|s| attitudes(s)).chain(random).collect();
+        let moves = Moves {
+            evaluator: &prepared.evaluator,
+            gimbals: &base.gimbals,
+            constraints: &task.constraints,
+            criterion: &task.criterion,
+            going: &going,
+        };
+        let mut moved: Vec<OnGrids> = first.par_iter().map(|start| moves.rounded(start, step)).collect();
+        out.examined += moved.iter().map(|m| m.finer.examined + m.on_step.examined).sum::<u64>();
+        let finer = moved.iter().map(|m| &m.finer).min_by(|a, b| a.order(b));
+        out.finer = finer.filter(|f| f.violation == 0.0 && f.value.is_finite()).cloned();
+        moved.sort_by(|a, b| a.on_step.order(&b.on_step));
+        for OnGrids { on_step: Moved { scheme, .. }, .. } in moved.into_iter().take(CHOSEN) {
+            scheme.iter().for_each(|euler| out.candidates.add(euler.clone()));
+            out.starts.push(scheme);
+        }
+        Ok(out)
+    }
+
+    /// The best schemes of the cardinal attitudes that an exchange finds, and what none of them is below.
+    fn begin_with_cardinals(
+        &mut self,
+        base: &Scheme,
+        conditions: &Conditions,
+        options: &DesignOptions,
+        k: usize,
+        progress: &(dyn Fn(Progress) -> bool + Sync),
+    ) -> Result<(), DesignError> {
+        let going = || progress(NOTHING_YET);
+        let options = of_cardinals(options);
+        let prepared = Prepared::new(base, conditions, &options, &going)?;
+        if prepared.check(k).is_err() {
+            return Ok(());
+        }
+        let search = prepared.search(progress);
+        let bound = prepared.task.bound(&prepared.evaluator, k, &going);
+        self.cardinal = Some((search.floor, bound.map_or(0.0, |b| b.value)));
+        let best = search.exchange(k, &[], options.restarts, options.seed);
+        self.examined += best.examined;
+        self.starts.extend(best.found.iter().take(1).map(|s| prepared.task.placed(s).0));
+        Ok(())
+    }
+
+    /// The best of the candidates, which `prepared` has; all of them where they are few, with the number of sets and sequences.
+    ///
+    /// # Errors
+    /// [`DesignError`].
+    pub(crate) fn searched(
+        &self,
+        prepared: &Prepared<'_>,
+        search: &Search<'_>,
+        k: usize,
+    ) -> Result<(Best, Option<(u64, u64)>), DesignError> {
+        let task = &prepared.task;
+        let space = task.space(k, &prepared.evaluator).filter(|space| space.1 < QUICK);
+        if space.is_some() {
+            return Ok((search.exhaust(&task.symmetry, k), space));
+        }
+        let mut best = search.exchange(k, &task.sequences_of(&self.starts), 0, task.options.seed);
+        let better = |(degree, least): (usize, f64)| {
+            best.found.first().is_some_and(|f| f.worth.degree <= degree && f.worth.value <= least)
+        };
+        if best.complete && self.cardinal.is_some_and(|cardinal| !better(cardinal)) {
+            // what the cardinal attitudes can do is not beaten: then it is sought as it is without free ones
+            let options = of_cardinals(task.options);
+            let going = || (search.progress)(NOTHING_YET);
+            let cardinal = Prepared::new(task.base, prepared.conditions, &options, &going)?;
+            let bound = cardinal.task.bound(&cardinal.evaluator, k, &going);
+            let (found, _) = cardinal.searched(&cardinal.search(search.progress), k, bound.as_ref());
+            let starts: Vec<Vec<Euler>> = found.found.iter().map(|s| cardinal.task.placed(s).0).collect();
+            best.examined += found.examined;
+            best.merge(search.keep, search.exchange(k, &task.sequences_of(&starts), 0, task.options.seed));
+        }
+        best.examined += self.examined;
+        Ok((best, None))
+    }
+}
+
+/// Those of different criteria, best first.
+fn unlike(found: &[Scored]) -> Vec<&Scored> {
+    let mut out: Vec<&Scored> = Vec::new();
+    for scored in found {
+        let alike = |last: &&Scored| {
+            last.worth.degree == scored.worth.degree && scored.worth.value <= last.worth.value * (1.0 + ALIKE)
+        };
+        if !out.last().is_some_and(alike) {
+            out.push(scored);
+        }
+    }
+    out
+}
+
+impl Task<'_> {
+    /// Sequences of attitudes that are candidates.
+    fn sequences_of(&self, schemes: &[Vec<Euler>]) -> Vec<Vec<Stop>> {
+        let matrix = |euler: &Euler| c_n_f64(euler).map(|row| row.map(|x| (x * 1e9).round() as i64));
+        let known: Vec<_> = self.candidates.attitudes.iter().map(matrix).collect();
+        let place = |euler: &Euler| known.iter().position(|c| *c == matrix(euler)).map(Stop::from);
+        schemes.iter().filter_map(|scheme| scheme.iter().map(place).collect()).collect()
+    }
+}

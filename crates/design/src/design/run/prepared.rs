@@ -1,0 +1,156 @@
+//! A search that can begin: its task, with what evaluates sequences.
+
+use obsdeg_core::model::{Euler, Path, Scheme, c_n_f64};
+use obsdeg_evidence::simulation::Conditions;
+
+use crate::design::certificate::Bound;
+use crate::design::certificate::value::excess;
+use crate::design::measure::evaluator::Evaluator;
+use crate::design::observable::slew_sequences::is_walk;
+use crate::design::request::error::DesignError;
+use crate::design::request::limits::{EXHAUSTIVE, MANY, QUICK};
+use crate::design::request::options::DesignOptions;
+use crate::design::run::task::Task;
+use crate::design::search::best::Best;
+use crate::design::search::exhaust::Pruning;
+use crate::design::search::progress::Progress;
+use crate::design::search::score::Scored;
+use crate::design::search::scoring::Search;
+
+/// A search that can begin: its task, and what evaluates sequences.
+pub(crate) struct Prepared<'a> {
+    pub(crate) task: Task<'a>,
+    pub(crate) evaluator: Evaluator,
+    pub(crate) conditions: &'a Conditions,
+    /// The degree of every required coefficient in all candidates together.
+    pub(crate) degrees: Vec<Option<usize>>,
+    /// Attitudes that the gimbals do not reach.
+    pub(crate) beyond: Vec<String>,
+}
+
+impl<'a> Prepared<'a> {
+    pub(crate) fn new(
+        base: &'a Scheme,
+        conditions: &'a Conditions,
+        options: &'a DesignOptions,
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self, DesignError> {
+        if is_walk(base) {
+            check_walks(base, conditions, options)?;
+        }
+        let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
+        let task = Task::new(base, conditions, options, reached)?;
+        if options.positions.is_some() {
+            task.unit()?;
+        }
+        let every: Vec<usize> = (0..task.rows.candidates()).collect();
+        let degrees = task.rows.degrees(&every);
+        let indices: Vec<usize> = task.required.iter().map(|r| r.1).collect();
+        // without a number of positions nothing is evaluated
+        let evaluated = options.positions.map_or(1, |_| task.candidates.attitudes.len());
+        let attitudes = &task.candidates.attitudes[..evaluated];
+        let evaluator = Evaluator::while_going(base, attitudes, &indices, conditions, going)?;
+        Ok(Self { task, evaluator, conditions, degrees, beyond })
+    }
+
+    pub(crate) fn search<'s>(&'s self, progress: &'s (dyn Fn(Progress) -> bool + Sync)) -> Search<'s> {
+        Search {
+            rows: &self.task.rows,
+            walks: self.task.walks,
+            evaluator: &self.evaluator,
+            criterion: &self.task.criterion,
+            constraints: &self.task.constraints,
+            keep: self.task.options.keep,
+            floor: self.degrees.iter().flatten().max().copied().unwrap_or(0),
+            progress,
+        }
+    }
+
+    /// Whether schemes of `k` positions can do at all.
+    pub(crate) fn check(&self, k: usize) -> Result<(), DesignError> {
+        let impossible = |why| Err(DesignError::Impossible { positions: k, wanted: self.task.wanted(), why });
+        if let Some(limit) = self.task.options.total_s
+            && limit < k as f64 * self.conditions.dwell_s
+        {
+            return impossible(format!(
+                "{k} times {} s at a position are more than {limit} s",
+                self.conditions.dwell_s
+            ));
+        }
+        if self.task.walks {
+            return Ok(());
+        }
+        let never: Vec<&str> = self.task.never(&self.degrees).collect();
+        match never.is_empty() {
+            true => Ok(()),
+            false => impossible(format!("all together leave {} unobservable", never.join(", "))),
+        }
+    }
+
+    /// What is left out of an exhaustive search.
+    pub(crate) fn pruning<'s>(&self, search: &'s Search<'_>, k: usize) -> Option<Pruning<'s>> {
+        let (_, sequences) = self.task.space(k, &self.evaluator)?;
+        (sequences >= MANY).then(|| search.pruning(&self.task.symmetry, k, self.task.options.seed))?
+    }
+
+    /// The best sequences: all are searched, with the number of sets and sequences, unless they are too many or `bound` shows that those
+    /// an exchange finds are good enough.
+    pub(crate) fn searched(
+        &self,
+        search: &Search<'_>,
+        k: usize,
+        bound: Option<&Bound>,
+    ) -> (Best, Option<(u64, u64)>) {
+        let (task, options) = (&self.task, self.task.options);
+        let all = options.within == Some(0.0);
+        let most = if all { u64::MAX } else { EXHAUSTIVE };
+        let exhaustive = task.space(k, &self.evaluator).filter(|space| space.1 <= most);
+        let exchanged = || search.exchange(k, &[], options.restarts, options.seed);
+        if let (Some((_, QUICK..)), Some(bound)) = (exhaustive, bound)
+            && !all
+        {
+            let exchanged = exchanged();
+            let near = |f: &Scored| excess(task.value(&self.evaluator, f).at_most, bound.value);
+            let enough = |f: &Scored| {
+                options.within.is_none_or(|within| f.worth.degree == search.floor && near(f) < within)
+            };
+            if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
+                return (exchanged, None);
+            }
+        }
+        let best = match exhaustive {
+            Some((_, MANY..)) => search.exhaust_pruned(&task.symmetry, k, options.seed),
+            Some(_) => search.exhaust(&task.symmetry, k),
+            None => exchanged(),
+        };
+        (best, exhaustive)
+    }
+
+    /// The number of sets and of sequences of an exhaustive search.
+    pub(crate) fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
+        if self.task.walks {
+            return Err(DesignError::Walks { found: "a search of all sequences".into() });
+        }
+        let too_many = DesignError::TooMany { positions: k, candidates: self.task.rows.candidates() };
+        self.task.space(k, &self.evaluator).ok_or(too_many)
+    }
+}
+
+/// Refuses what is not done where torquer errors act on the way between positions.
+fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> Result<(), DesignError> {
+    let whole = |x: &f64| (x - x.round()).abs() < 1e-12;
+    let cardinal = |a: &Euler| c_n_f64(a).as_flattened().iter().all(whole);
+    let other = options.candidates.attitudes.iter().position(|a| !cardinal(a));
+    let found = [
+        conditions.slew_rate_deg_s.is_none().then(|| "repositioning at once".into()),
+        (base.path == Some(Path::Gimbals)).then(|| "slews gimbal by gimbal".into()),
+        other.map(|i| format!("candidate {}", options.candidates.names[i])),
+        options.refine.then(|| "--refine".into()),
+        options.divide.then(|| "--divide".into()),
+        (!options.degree_caps.is_empty()).then(|| "a cap of degrees".into()),
+    ];
+    match found.into_iter().flatten().next() {
+        Some(found) => Err(DesignError::Walks { found }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,560 @@
+//! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
+
+use std::collections::HashMap;
+
+use obsdeg_core::accuracy::Accuracy;
+use obsdeg_core::degree::judge;
+use obsdeg_core::model::settings::{Assignment, concerns};
+use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, angles_text, c_n_f64};
+use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
+use rayon::prelude::*;
+
+use crate::design::answer::{Found, HalfTurn, Minimum};
+use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::stop::Stop;
+use crate::design::observable::rows::Rows;
+use crate::design::observable::slew_sequences::is_walk;
+use crate::design::observable::symmetry::Symmetry;
+use crate::design::polish::{divide, refine};
+use crate::design::request::candidates::Candidates;
+use crate::design::request::error::DesignError;
+use crate::design::request::limits::{EXHAUSTIVE, MAX_CANDIDATES};
+use crate::design::request::options::{CriterionName, DesignOptions};
+use crate::design::run::winner;
+use crate::design::search::best::Best;
+use crate::design::search::constraints::Constraints;
+use crate::design::search::score::Scored;
+use crate::design::search::scoring::Search;
+
+/// Most sets of which a bit is held for every degree.
+const MOST_SETS: u64 = 5_000_000;
+/// Most prefixes and sets that are looked at for the minimum, when it is not what was asked for.
+const MINIMUM_SETS: u64 = 1_000_000;
+/// Factors on the dwell for the front of total time.
+pub(crate) const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
+/// Restarts of the exchange at each of them, besides those from the schemes found.
+const FRONT_RESTARTS: u64 = 8;
+
+/// Conditions of a search: where only some coefficients are asked for, requirements on psi and on the others
+/// are left out, also of the file that is written, so that every command judges the same.
+///
+/// # Errors
+/// [`DesignError::Scheme`] for a base that is no platform.
+pub fn asked(base: &Scheme, conditions: &Conditions, required: &[String]) -> Result<Conditions, DesignError> {
+    if required.is_empty() {
+        return Ok(conditions.clone());
+    }
+    let any = std::array::from_fn(|_| Angle::from_degrees(0));
+    let positions = Scheme::of_angles([any]).positions;
+    let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
+    let counts = |name: &&String| required.iter().any(|asked| concerns(asked, name));
+    let names: Vec<&String> = platform.names().iter().filter(counts).collect();
+    let of = |a: &Assignment| -> Vec<Assignment> {
+        let concerned = names.iter().filter(|name| concerns(&a.name, name));
+        concerned.map(|name| Assignment { name: name.to_string(), value: a.value }).collect()
+    };
+    let requirements = conditions.requirements.iter().flat_map(of).collect();
+    Ok(Conditions { requirements, ..conditions.clone() })
+}
+
+/// A search in preparation: names resolved, candidates ordered by orbits.
+pub(crate) struct Task<'a> {
+    pub(crate) base: &'a Scheme,
+    pub(crate) options: &'a DesignOptions,
+    pub(crate) candidates: Candidates,
+    /// Names of the coefficients that count, and their indices.
+    pub(crate) required: Vec<(String, usize)>,
+    pub(crate) criterion: Criterion,
+    pub(crate) constraints: Constraints,
+    conditions: &'a Conditions,
+    pub(crate) rows: Rows,
+    pub(crate) symmetry: Symmetry,
+    /// Whether repositioning takes time.
+    slews: bool,
+    /// The units of all coefficients.
+    units: Vec<&'static str>,
+    /// Whether torquer errors act on the way between positions: sets have no verdict then.
+    pub(crate) walks: bool,
+}
+
+impl<'a> Task<'a> {
+    pub(crate) fn new(
+        base: &'a Scheme,
+        conditions: &'a Conditions,
+        options: &'a DesignOptions,
+        candidates: Candidates,
+    ) -> Result<Self, DesignError> {
+        conditions.validate()?;
+        let found = candidates.attitudes.len();
+        if !(1..=MAX_CANDIDATES).contains(&found) {
+            return Err(DesignError::Candidates { found });
+        }
+        let counts = options.positions.iter().chain(&options.front);
+        if let Some(&found) = counts.into_iter().find(|k| !(1..=100).contains(*k)) {
+            return Err(DesignError::Positions { found });
+        }
+        if base.unknowns == Unknowns::Drift {
+            return Err(DesignError::Drift);
+        }
+        for (what, limit) in [("a total time", options.total_s), ("a longest slew", options.slew_s)] {
+            if let Some(found) = limit.filter(|l| !(l.is_finite() && *l > 0.0)) {
+                return Err(DesignError::Limit { what, found });
+            }
+        }
+        if base.path == Some(Path::Gimbals) && conditions.slew_rate_deg_s.is_some() {
+            return Err(DesignError::GimbalPath);
+        }
+        let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
+        if let Some((name, _)) = generic {
+            return Err(DesignError::GenericAngle { name: name.into() });
+        }
+        let positions = Scheme::of_angles(candidates.attitudes.iter().take(1).cloned()).positions;
+        let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
+        let first = platform.names().len() - platform.coefficients();
+        let all: Vec<(String, usize)> = platform.names()[first..].iter().cloned().zip(0..).collect();
+        let named = |asked: &String| {
+            let known = all.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(", ");
+            let found: Vec<usize> = all.iter().filter(|c| concerns(asked, &c.0)).map(|c| c.1).collect();
+            let unknown = DesignError::UnknownName { found: asked.clone(), known };
+            if found.is_empty() { Err(unknown) } else { Ok(found) }
+        };
+        let mut required = all.clone();
+        if !options.required.is_empty() {
+            let asked = options.required.iter().map(named).collect::<Result<Vec<_>, _>>()?.concat();
+            required.retain(|c| asked.contains(&c.1));
+        }
+        let mut caps = vec![usize::MAX; required.len()];
+        for (name, cap) in &options.degree_caps {
+            let concerned = name.as_ref().map(named).transpose()?;
+            for (slot, c) in caps.iter_mut().zip(&required) {
+                if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
+                    *slot = *cap;
+                }
+            }
+        }
+        for (what, list) in
+            [("requirement", &conditions.requirements[..]), ("prior", conditions.stated_priors())]
+        {
+            if let Some(of_one) = list.iter().find(|a| a.name.contains('@')) {
+                return Err(DesignError::OnePosition { what, found: of_one.name.clone() });
+            }
+        }
+        let priors = resolve(PRIOR, &platform, conditions.stated_priors(), f64::INFINITY)?;
+        let limits_of = resolve("required sigma", &platform, &conditions.requirements, f64::INFINITY)?;
+        let limits = Limits {
+            coefficients: required.iter().map(|c| limits_of[first + c.1]).collect(),
+            psi: [0, 1, 2].map(|k| limits_of[k]),
+        };
+        let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
+        if uses_requirements && limits.coefficients.iter().chain(&limits.psi).all(|l| l.is_infinite()) {
+            let what = if options.meet { "--meet" } else { "--criterion margin" };
+            return Err(DesignError::NoRequirement { what });
+        }
+        let criterion = match options.criterion {
+            CriterionName::Worst => Criterion::Worst,
+            CriterionName::A => Criterion::A,
+            CriterionName::D => Criterion::D,
+            CriterionName::E => Criterion::E,
+            CriterionName::Margin => Criterion::Margin(limits.clone()),
+        };
+        let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
+        let walks = is_walk(base);
+        // of walks these say which attitudes are the same
+        let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
+        let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
+        // an attitude counts once
+        let repeated = rows.repeated();
+        let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
+        let place = |c: usize| required.iter().position(|r| r.1 == c);
+        // a turn of the platform axes renames psi as well
+        let turned = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
+            && priors[..3].iter().all(|p| *p == priors[0]);
+        let same = |i: usize, j: usize| match (place(i), place(j)) {
+            _ if (!turned || priors[first + i] != priors[first + j]) && i != j => false,
+            (None, None) => true,
+            (Some(i), Some(j)) => {
+                caps[i] == caps[j] && (!uses_requirements || limits.coefficients[i] == limits.coefficients[j])
+            }
+            _ => false,
+        };
+        let symmetry = rows.select(&kept).symmetry(&same);
+        // orbit by orbit: a set that begins with a representative stands for all its images
+        let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
+        order.sort_unstable();
+        let order: Vec<usize> = order.into_iter().map(|(_, c)| c).collect();
+        let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
+        let symmetry = rows.symmetry(&same);
+        let constraints = Constraints {
+            total_s: options.total_s,
+            slew_s: options.slew_s,
+            sigmas: options.meet.then_some(limits),
+            degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
+        };
+        Ok(Self {
+            base,
+            conditions,
+            options,
+            candidates,
+            required,
+            criterion,
+            constraints,
+            rows,
+            symmetry,
+            slews: conditions.slew_rate_deg_s.is_some(),
+            units: platform.units()[first..].to_vec(),
+            walks,
+        })
+    }
+
+    /// The unit of the criterion; none when it has none, or several.
+    ///
+    /// # Errors
+    /// [`DesignError::Units`] when no unit is that of what the criterion compares.
+    pub(crate) fn unit(&self) -> Result<Option<&'static str>, DesignError> {
+        let families = [("deg/h", "deg/h"), ("ug", "ug"), ("ppm", "ppm"), ("arcsec", "arcsec")];
+        let named = |family: &str| self.required.iter().find(|r| self.units[r.1].starts_with(family));
+        let found: Vec<_> = families.iter().filter_map(|(f, unit)| Some((*unit, &named(f)?.0))).collect();
+        match (&self.criterion, &found[..]) {
+            (Criterion::Margin(_), _) => Ok(None),
+            (_, [(unit, _)]) => Ok(Some(*unit)),
+            (Criterion::D, _) => Ok(None),
+            (criterion, _) => {
+                let units = found.iter().map(|(unit, name)| format!("{name} [{unit}]"));
+                let units = units.collect::<Vec<_>>().join(", ");
+                Err(DesignError::Units { criterion: criterion.name(), units })
+            }
+        }
+    }
+
+    /// The required coefficients that all candidates together, of these degrees, leave unobservable.
+    pub(crate) fn never<'s>(&'s self, degrees: &'s [Option<usize>]) -> impl Iterator<Item = &'s str> {
+        let lost = self.required.iter().zip(degrees).filter(|(_, d)| d.is_none());
+        lost.map(|(c, _)| c.0.as_str())
+    }
+
+    /// The fewest candidates that do, with the proof; `proven` without regard to the bound on errors.
+    ///
+    /// # Errors
+    /// [`DesignError::Interrupted`].
+    pub(crate) fn minimum(
+        &self,
+        best_degrees: &[Option<usize>],
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Minimum, DesignError> {
+        let names = |set: &[usize]| set.iter().map(|&c| self.candidates.names[c].clone()).collect();
+        let mut out = Minimum {
+            positions: None,
+            witness: Vec::new(),
+            counting_bound: self.rows.counting_bound(),
+            rows_per_position: self.rows.most(),
+            none_of: Vec::new(),
+            never: if self.walks { Vec::new() } else { self.never(best_degrees).map(Into::into).collect() },
+            proven: true,
+        };
+        if !out.never.is_empty() {
+            return Ok(out);
+        }
+        if self.walks {
+            return Ok(Minimum { counting_bound: 0, proven: false, ..out });
+        }
+        let firsts = self.symmetry.representatives();
+        let asked = self.options.positions.is_none();
+        let most = if asked { EXHAUSTIVE } else { MINIMUM_SETS / firsts.len() as u64 };
+        let n = self.rows.candidates() as u64;
+        for size in out.counting_bound..=self.rows.candidates() {
+            let sets = choose(n, size as u64).unwrap_or(u64::MAX);
+            let (set, all) = self.rows.first_observable_set(size, &firsts, most, going);
+            if !going() {
+                return Err(DesignError::Interrupted);
+            }
+            match set {
+                Some(set) => {
+                    out.positions = Some(size);
+                    out.witness = names(&set);
+                    return Ok(out);
+                }
+                None if all => out.none_of.push([size as u64, sets]),
+                None => break,
+            }
+        }
+        out.proven = false;
+        Ok(out)
+    }
+
+    /// The number of sets behind an exhaustive search of `k` positions, and of sequences up to symmetry; `None` where
+    /// there are too many to hold, or to count.
+    pub(crate) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<(u64, u64)> {
+        if self.walks {
+            return None;
+        }
+        let n = self.rows.candidates() as u64;
+        let sets: u64 = (1..=k as u64).try_fold(0u64, |sum, size| sum.checked_add(choose(n, size)?))?;
+        let searched = if evaluator.ordered() {
+            evaluator.sequences(&self.symmetry.representatives(), k).filter(|_| sets <= MOST_SETS)?
+        } else {
+            choose(n + k as u64 - 1, k as u64)? / self.symmetry.order as u64
+        };
+        Some((sets, searched))
+    }
+
+    /// A sequence with its exact verdict; `None` when rounding called it determined and it is not.
+    fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
+        let attitudes: Vec<Euler> =
+            scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
+        let names = scored.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
+        self.attained(self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)?)
+    }
+
+    /// Those of some sequences that are what they seem.
+    pub(crate) fn all_found(
+        &self,
+        evaluator: &Evaluator,
+        list: &[Scored],
+    ) -> Result<Vec<Found>, DesignError> {
+        let found: Vec<Option<Found>> =
+            list.par_iter().map(|scored| self.found(evaluator, scored)).collect::<Result<_, _>>()?;
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    /// Says of those of `found` that turns of the platform axes make of others listed before them.
+    pub(crate) fn mark_images(&self, found: &mut [Found], ordered: bool) {
+        // candidates in order, and half turns with their axes
+        type Way = (Vec<usize>, Vec<(usize, [i64; 3])>);
+        let names: HashMap<&str, usize> = self.candidates.names.iter().map(String::as_str).zip(0..).collect();
+        let arranged = |mut sequence: Vec<usize>| {
+            if !ordered {
+                sequence.sort_unstable();
+            }
+            sequence
+        };
+        // every image of those that are none themselves
+        let mut known: HashMap<Way, usize> = HashMap::new();
+        for (i, f) in found.iter_mut().enumerate() {
+            let sequence: Option<Vec<usize>> =
+                f.positions.iter().map(|p| names.get(p.as_str()).copied()).collect();
+            let Some(sequence) = sequence else { continue };
+            let turns: Vec<_> =
+                f.half_turns.iter().map(|t| (t.to, t.about.map(|x| (x * 1e9).round() as i64))).collect();
+            f.image_of = known.get(&(arranged(sequence.clone()), turns.clone())).copied();
+            if f.image_of.is_none() {
+                for map in &self.symmetry.maps {
+                    let image = arranged(sequence.iter().map(|&c| map[c]).collect());
+                    known.entry((image, turns.clone())).or_insert(i + 1);
+                }
+            }
+        }
+    }
+
+    fn judged(
+        &self,
+        evaluator: &Evaluator,
+        sequence: &[Stop],
+        attitudes: Vec<Euler>,
+        positions: Vec<String>,
+        value: f64,
+    ) -> Result<Option<Found>, DesignError> {
+        let angles = attitudes.iter().map(angles_text).collect();
+        let mut stops = Scheme::of_angles(attitudes).positions;
+        let half_turns = evaluator.half_turns(sequence);
+        for (k, turn) in &half_turns {
+            stops[*k].slew = self.walks.then(|| winner::half_turn(&turn.about));
+        }
+        let scheme = Scheme {
+            positions: stops,
+            path: if self.walks { Some(Path::OneAxis) } else { self.base.path },
+            latitude: latitude_of(self.base),
+            combinations: Vec::new(),
+            ..self.base.clone()
+        };
+        let platform = Platform::new(scheme)?;
+        let verdicts = judge(&platform, self.options.seed)?;
+        let first = platform.names().len() - platform.coefficients();
+        let columns = || self.required.iter().map(|r| first + r.1);
+        let degrees: Option<Vec<usize>> = columns().map(|c| verdicts.degrees.degree[c]).collect();
+        let Some(degrees) = degrees.filter(|d| self.constraints.cap(d)) else { return Ok(None) };
+        // beyond the precision of the series the order is not known
+        let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
+        let order_of = |c: usize| accuracy.as_ref().and_then(|a| a.order[c]);
+        let orders = columns().map(order_of).collect::<Option<Vec<_>>>();
+        if evaluator.sigmas(sequence).is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Found {
+            positions,
+            image_of: None,
+            angles,
+            half_turns: half_turns
+                .into_iter()
+                .map(|(k, turn)| HalfTurn { to: k + 1, about: turn.about })
+                .collect(),
+            refined: false,
+            dwell_s: evaluator.dwell_s(),
+            dwells_s: Vec::new(),
+            total_s: evaluator.state_of(sequence).seconds,
+            value,
+            worst_sigma_dph: None,
+            worst: None,
+            requirements: Requirements::of(self.conditions.basis(), []),
+            worst_degree: degrees.into_iter().max().unwrap_or(0),
+            worst_accuracy_order: orders.and_then(|o| o.into_iter().max()),
+            rank: [verdicts.degrees.rank(), platform.names().len()],
+        }))
+    }
+
+    /// Scheme that was found, with the figures that every other command gives of its file; `None` where
+    /// requirements are a constraint and one is missed.
+    ///
+    /// # Errors
+    /// [`DesignError`] for a scheme that cannot be run.
+    pub(crate) fn attained(&self, found: Option<Found>) -> Result<Option<Found>, DesignError> {
+        let Some(found) = found else { return Ok(None) };
+        let scheme = winner::scheme(&found, self.base, self.conditions)?;
+        let conditions = Conditions::of(&scheme);
+        let attained = Attained::new(&scheme, &conditions, self.options.seed)?;
+        let requirements = attained.requirements(&conditions)?;
+        if self.options.meet && !requirements.all_met() {
+            return Ok(None);
+        }
+        let counts = |name: &String| self.required.iter().any(|r| r.0 == *name);
+        let (worst, worst_sigma_dph) = attained.worst_of(&counts).map(|w| (w.name, w.sigma_dph)).unzip();
+        let value = match self.is_noisy() {
+            false => found.value,
+            true => self
+                .criterion
+                .of_attained(&attained, &requirements, &counts)
+                .map_err(SimulationError::from)?,
+        };
+        Ok(Some(Found { requirements, worst, worst_sigma_dph, value, ..found }))
+    }
+
+    /// True if random drift is stated: the search leaves it out, and what it finds is evaluated with it.
+    pub(crate) fn is_noisy(&self) -> bool {
+        !self.conditions.gyro_noise.is_none() || self.conditions.as_stated().drift_noise.amount() > 0.0
+    }
+
+    /// What is found at other dwells and numbers of positions.
+    pub(crate) fn front(
+        &self,
+        evaluator: &Evaluator,
+        search: &Search<'_>,
+        (k, dwell_s): (usize, f64),
+        main: &Best,
+    ) -> Result<Vec<Found>, DesignError> {
+        let mut out = Vec::new();
+        let mut counts = vec![k];
+        counts.extend(self.options.front.iter().filter(|f| **f != k));
+        for count in counts {
+            let known = main.found.iter().filter(|s| s.sequence.len() == count);
+            let mut given: Vec<Vec<Stop>> = known.map(|s| s.sequence.clone()).collect();
+            for factor in DWELLS {
+                if (count, factor) == (k, 1.0) {
+                    continue;
+                }
+                // a dwell of too many steps is no point of the front
+                let Ok(other) = evaluator.clone().with_dwell(dwell_s * factor) else { continue };
+                // the schemes are compared by their criterion alone
+                let there = Search { evaluator: &other, keep: 1, ..*search };
+                let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };
+                let best = there.exchange(count, &given, restarts, self.options.seed);
+                if !best.complete {
+                    return Ok(out);
+                }
+                given.extend(best.found.iter().map(|s| s.sequence.clone()));
+                out.extend(self.all_found(&other, &best.front)?);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The attitudes of a sequence, and the way through them where they are the candidates.
+    pub(crate) fn placed(&self, of: &Scored) -> (Vec<Euler>, Vec<Stop>) {
+        let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
+        let path = of.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s });
+        (of.sequence.iter().map(attitude).collect(), path.collect())
+    }
+
+    /// The best sequence with the total time divided among its positions, if that makes it better.
+    pub(crate) fn divided(
+        &self,
+        evaluator: &Evaluator,
+        best: &Scored,
+        going: &dyn Fn() -> bool,
+    ) -> Result<Option<Found>, DesignError> {
+        let (attitudes, path) = self.placed(best);
+        let along = evaluator.along(&attitudes.iter().map(c_n_f64).collect::<Vec<_>>());
+        let allowed = |there: &Evaluator| going() && self.constraints.keep(there, &path);
+        let divided = divide::divide(&along, &path, &self.criterion, &allowed)?;
+        let Some((value, there)) = divided else { return Ok(None) };
+        let names = best.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
+        let found = self.judged(&there, &path, attitudes, names, value)?;
+        let dwells_s: Vec<f64> = (0..path.len()).map(|i| there.dwelling_of(i).seconds).collect();
+        self.attained(found.map(|f| Found { dwells_s, dwell_s: evaluator.dwell_s(), ..f }))
+    }
+
+    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a
+    /// smaller criterion.
+    pub(crate) fn refined(
+        &self,
+        evaluator: &Evaluator,
+        best: &Scored,
+        going: &dyn Fn() -> bool,
+    ) -> Result<Option<Found>, DesignError> {
+        let (start, path) = self.placed(best);
+        let c = &self.constraints;
+        let allowed = |there: &Evaluator| going() && c.keep(there, &path);
+        let refined = refine::refine(evaluator, &start, &path, &self.criterion, &self.base.gimbals, &allowed);
+        let Some((value, attitudes)) = refined else { return Ok(None) };
+        let matrices: Vec<_> = attitudes.iter().map(c_n_f64).collect();
+        let there = evaluator.along(&matrices);
+        let mut names = Candidates::default();
+        attitudes.iter().for_each(|a| names.add(a.clone()));
+        let found = self.judged(&there, &path, attitudes, names.names, value)?;
+        let found = found.filter(|f| f.worst_degree <= best.worth.degree);
+        self.attained(found.map(|f| Found { refined: true, ..f }))
+    }
+
+    /// `makes D_FX, D_FY observable with at most 10 s in all`.
+    pub(crate) fn wanted(&self) -> String {
+        let every = self.options.required.is_empty();
+        let names: Vec<&str> = self.required.iter().map(|r| r.0.as_str()).collect();
+        let what = if every { "every coefficient".into() } else { names.join(", ") };
+        let limits = self.constraints_in_words();
+        let limits = if limits.is_empty() { String::new() } else { format!(" with {}", limits.join(", ")) };
+        let slews = if self.slews { " by repositioning at once as well as with its slews" } else { "" };
+        format!("makes {what} observable{slews}{limits}")
+    }
+
+    pub(crate) fn constraints_in_words(&self) -> Vec<String> {
+        let c = &self.constraints;
+        let mut out = Vec::new();
+        out.extend(c.total_s.map(|s| format!("at most {s} s in all")));
+        out.extend(c.slew_s.map(|s| format!("slews of at most {s} s")));
+        if c.sigmas.is_some() {
+            out.push(match self.options.required.is_empty() {
+                true => "every stated requirement met as predicted".into(),
+                false => "every stated requirement on what must be observable met as predicted".into(),
+            });
+        }
+        for (name, cap) in &self.options.degree_caps {
+            let name = name.as_deref().unwrap_or("every required coefficient");
+            out.push(format!("degree of {name} at most {cap}"));
+        }
+        if !self.base.gimbals.are_free() {
+            out.push(format!("gimbals: {}", self.base.gimbals));
+        }
+        out
+    }
+}
+
+/// The number of sets of `k` of `n`; `None` beyond 2^64.
+fn choose(n: u64, k: u64) -> Option<u64> {
+    if k > n {
+        return Some(0);
+    }
+    let k = k.min(n - k);
+    (0..k)
+        .try_fold(1u128, |product, i| product.checked_mul(u128::from(n - i)).map(|p| p / u128::from(i + 1)))
+        .and_then(|x| u64::try_from(x).ok())
+}

@@ -1,0 +1,99 @@
+//! The sequences that a search keeps: the best, the front of time against the criterion, ties.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::design::search::score::{Scored, Worth, before};
+use crate::design::search::ties::{TIE, Ties};
+
+/// Best sequences, best first, and the front of time against the criterion.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Best {
+    /// Best sequences that were found, best first, up to the number to keep.
+    pub found: Vec<Scored>,
+    /// Sequences of the smallest worst degree that none of these beats in both time and criterion, by time.
+    pub front: Vec<Scored>,
+    /// Number of sequences as good as the best, by criterion.
+    pub ties: Ties,
+    /// True if the search was complete.
+    pub complete: bool,
+    /// Number of sequences whose sigma was computed.
+    pub examined: u64,
+    /// Number of sequences, observable or not, that a bound excluded: they are worse than those kept.
+    pub excluded: u64,
+    /// Number of examined sequences that are observable (by the exact verdict, of repositioning at once) but
+    /// whose samples do not determine the required coefficients in double precision.
+    pub lost: u64,
+}
+
+impl Best {
+    /// Whether a sequence would be kept.
+    pub(crate) fn wants(&self, keep: usize, worth: &Worth, seconds: f64) -> bool {
+        worth.is_valid()
+            && (self.found.len() < keep
+                || self.found.last().is_some_and(|last| !last.worth.better_than(worth))
+                || self.is_on_front(worth, seconds))
+    }
+
+    fn is_on_front(&self, worth: &Worth, seconds: f64) -> bool {
+        let degree = self.front.first().map_or(usize::MAX, |f| f.worth.degree);
+        worth.degree < degree
+            || worth.degree == degree
+                && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
+    }
+
+    /// Whether an equal one of the front comes later in lexicographic order: then the new one takes its place, so that the
+    /// front does not depend on the order in which sequences come.
+    fn is_before_its_equal(&self, new: &Scored) -> bool {
+        let equal = |f: &&Scored| {
+            f.worth.degree == new.worth.degree && f.seconds == new.seconds && f.worth.value == new.worth.value
+        };
+        self.front.iter().find(equal).is_some_and(|f| new.sequence < f.sequence)
+    }
+
+    pub(crate) fn add(&mut self, keep: usize, new: Scored) {
+        if !new.worth.is_valid() {
+            return;
+        }
+        self.add_to_front(&new);
+        let place = self.found.partition_point(|b| before(b, &new));
+        if place < keep && self.found.get(place).is_none_or(|b| b.sequence != new.sequence) {
+            self.found.insert(place, new);
+            self.found.truncate(keep);
+        }
+    }
+
+    /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion; drops what
+    /// it beats.
+    fn add_to_front(&mut self, new: &Scored) {
+        if self.is_on_front(&new.worth, new.seconds) || self.is_before_its_equal(new) {
+            let beaten = |f: &Scored| {
+                f.worth.degree > new.worth.degree
+                    || f.seconds >= new.seconds && f.worth.value >= new.worth.value
+            };
+            self.front.retain(|f| !beaten(f));
+            let place = self.front.partition_point(|f| f.seconds < new.seconds);
+            self.front.insert(place, new.clone());
+        }
+    }
+
+    /// The largest criterion that may still count where all sequences take the same time: among the best `keep`, or as a tie of
+    /// the first. `known` were found before, of the same worst degree.
+    pub(crate) fn limit(&self, keep: usize, known: &Self) -> f64 {
+        let value = |of: &Self, place: usize| of.found.get(place).map_or(f64::INFINITY, |s| s.worth.value);
+        let least = |place: usize| value(self, place).min(value(known, place));
+        least(keep - 1).max(least(0) * (1.0 + TIE))
+    }
+
+    /// Takes over what another found.
+    pub(crate) fn merge(&mut self, keep: usize, other: Self) {
+        for s in other.found.into_iter().chain(other.front) {
+            self.add(keep, s);
+        }
+        self.ties.merge(other.ties);
+        self.complete &= other.complete;
+        self.examined += other.examined;
+        self.excluded += other.excluded;
+        self.lost += other.lost;
+    }
+}

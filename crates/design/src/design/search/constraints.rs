@@ -1,0 +1,55 @@
+//! Constraints of a scheme besides observability: times, sigmas, degrees.
+
+use obsdeg_evidence::requirements::meets;
+
+use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::stop::Stop;
+
+/// What a scheme must keep besides observability.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Constraints {
+    /// Largest total time with turns, in s.
+    pub total_s: Option<f64>,
+    /// Longest turn between successive positions, in s.
+    pub slew_s: Option<f64>,
+    /// Largest sigmas.
+    pub sigmas: Option<Limits>,
+    /// Largest degree of every required coefficient.
+    pub degrees: Option<Vec<usize>>,
+}
+
+impl Constraints {
+    /// Whether the degrees of the required coefficients are within the caps.
+    pub(crate) fn cap(&self, degrees: &[usize]) -> bool {
+        self.degrees.as_ref().is_none_or(|caps| degrees.iter().zip(caps).all(|(d, cap)| d <= cap))
+    }
+
+    /// How far times and sigmas of a sequence, with `state` behind it, are beyond the limits; 0 when they are kept.
+    pub(crate) fn violation(
+        &self,
+        evaluator: &Evaluator,
+        sequence: &[Stop],
+        state: &State,
+        root: &mut Vec<f64>,
+    ) -> f64 {
+        let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);
+        let slews = sequence.windows(2).map(|w| beyond(slew(w), self.slew_s)).sum::<f64>();
+        let margin = |limits: &Limits| {
+            // a margin has no unit: largest sigma over requirement
+            let over = evaluator.value(state, &Criterion::Margin(limits.clone()), root);
+            if meets(over, 1.0) { 0.0 } else { over - 1.0 }
+        };
+        slews + beyond(state.seconds, self.total_s) + self.sigmas.as_ref().map_or(0.0, margin)
+    }
+
+    /// Whether times and sigmas of a sequence are within the limits.
+    pub(crate) fn keep(&self, evaluator: &Evaluator, sequence: &[Stop]) -> bool {
+        self.violation(evaluator, sequence, &evaluator.state_of(sequence), &mut Vec::new()) == 0.0
+    }
+}
+
+/// How far a limit is passed, as a part of it; 0 for what rounding may do.
+pub(crate) fn beyond(found: f64, limit: Option<f64>) -> f64 {
+    limit.map(|l| found / l - 1.0).filter(|over| *over > 1e-9).unwrap_or(0.0)
+}

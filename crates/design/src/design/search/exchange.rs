@@ -1,0 +1,110 @@
+//! Coordinate exchange, where the space is too large for exhaustion.
+
+use obsdeg_exact::SplitMix64;
+use rayon::prelude::*;
+
+use crate::design::measure::stop::Stop;
+use crate::design::search::best::Best;
+use crate::design::search::progress::{Meter, PATIENCE};
+use crate::design::search::score::{Scored, Worth};
+use crate::design::search::scoring::Search;
+
+/// Rounds of one exchange before it is given up.
+const ROUNDS: usize = 50;
+
+impl Search<'_> {
+    /// What may stand at a place, with the ways there and from there.
+    fn choices(&self, now: &[Stop], place: usize) -> Vec<(Stop, Option<Stop>)> {
+        let last = place.checked_sub(1).map(|p| now[p].candidate);
+        let next = now.get(place + 1).map(|next| next.candidate);
+        let ways = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
+            let Some(next) = next else { return vec![(stop, None)] };
+            self.evaluator.stops(Some(stop.candidate), next).map(|next| (stop, Some(next))).collect()
+        };
+        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
+    }
+
+    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of
+    /// half turns, then any two change places, until none helps. From the sequences given, then from random ones.
+    pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
+        self.exchange_from(k, given, restarts, seed, None)
+    }
+
+    /// The same; with `firsts` the sequences begin with one of them, and what is tried on the way is kept too.
+    pub(crate) fn exchange_from(
+        &self,
+        k: usize,
+        given: &[Vec<Stop>],
+        restarts: u64,
+        seed: u64,
+        firsts: Option<&[usize]>,
+    ) -> Best {
+        let candidates = self.rows.candidates();
+        let total = given.len() + restarts as usize;
+        let meter = Meter::new(self.progress, total);
+        let from = |start: u64| {
+            let mut rng = SplitMix64::new(seed ^ start.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            let mut draw = |n: usize| rng.below(n as u64) as usize;
+            let random = || {
+                let place = |place: usize| match firsts {
+                    Some(firsts) if place == 0 => firsts[draw(firsts.len())],
+                    _ => draw(candidates),
+                };
+                (0..k).map(place).map(Stop::from).collect()
+            };
+            let mut now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
+            let mut best = Best::default();
+            let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
+            // takes what is better; false when the search is stopped
+            let mut try_out = |now: &[Stop], held: &mut Scored| {
+                best.examined += 1;
+                let other = self.worth(now);
+                if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {
+                    let mut other = self.judged(other.clone());
+                    self.evaluator.tidy(&mut other.sequence);
+                    best.add(self.keep, other);
+                }
+                if other.worth.better_than(&held.worth) {
+                    let other = self.judged(other);
+                    if other.worth.better_than(&held.worth) {
+                        *held = other;
+                    }
+                }
+                !best.examined.is_multiple_of(PATIENCE)
+                    || meter.report(0, PATIENCE, Some(&*held).filter(|h| h.worth.is_valid()))
+            };
+            'rounds: for _ in 0..ROUNDS {
+                let round = held.worth;
+                for place in 0..k {
+                    let first = |stop: Stop| place > 0 || firsts.is_none_or(|f| f.contains(&stop.candidate));
+                    for (stop, next) in self.choices(&now, place).into_iter().filter(|c| first(c.0)) {
+                        now[place] = stop;
+                        next.into_iter().for_each(|next| now[place + 1] = next);
+                        if !try_out(&now, &mut held) {
+                            break 'rounds;
+                        }
+                    }
+                    now.copy_from_slice(&held.sequence);
+                }
+                for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                    let first = b > 0 || firsts.is_none_or(|f| f.contains(&now[a].candidate));
+                    if first && self.evaluator.ordered() && now[a].candidate != now[b].candidate {
+                        now.swap(a, b);
+                        if !try_out(&now, &mut held) {
+                            break 'rounds;
+                        }
+                        now.copy_from_slice(&held.sequence);
+                    }
+                }
+                if !held.worth.better_than(&round) {
+                    break;
+                }
+            }
+            self.evaluator.tidy(&mut held.sequence);
+            best.add(self.keep, held);
+            best
+        };
+        let parts = (0..total as u64).into_par_iter().map(|start| meter.part(|| from(start))).collect();
+        meter.gather(self.keep, parts)
+    }
+}

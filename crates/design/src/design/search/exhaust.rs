@@ -1,0 +1,398 @@
+//! Exhaustion: all sequences that begin with some starts, walked over with what their prefixes have in common.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::design::measure::evaluator::State;
+use crate::design::measure::stop::Stop;
+use crate::design::observable::rows::Patience;
+use crate::design::observable::sets::Sets;
+use crate::design::observable::symmetry::Symmetry;
+use crate::design::search::best::Best;
+use crate::design::search::constraints::beyond;
+use crate::design::search::progress::{Meter, PATIENCE};
+use crate::design::search::score::{Scored, Worth};
+use crate::design::search::scoring::{Search, candidates};
+use crate::design::search::screen::{Scratch, Screen};
+
+/// Restarts of the exchange that finds what an exhaustive search is pruned by.
+const KNOWN_RESTARTS: u64 = 24;
+
+/// What an exhaustive search takes at once.
+pub(crate) enum SearchLevel {
+    /// All sequences whose set is one of these, all of this worst degree.
+    Degree(usize, Sets),
+    /// All sets, where order does not matter.
+    Any,
+}
+
+/// What lets an exhaustive search leave out what is worse than sequences that are known beforehand.
+pub(crate) struct Pruning<'a> {
+    screen: Screen<'a>,
+    /// The best sequences and the front known, by worst degree.
+    known: BTreeMap<usize, Best>,
+}
+
+/// The pruning of one walk.
+struct Pruned<'a> {
+    screen: &'a Screen<'a>,
+    known: &'a Best,
+    scratch: Scratch,
+    alive: Vec<bool>,
+}
+
+/// A walk over sequences that shares what their prefixes have in common.
+struct Walk<'a> {
+    search: &'a Search<'a>,
+    meter: &'a Meter<'a>,
+    states: Vec<State>,
+    root: Vec<f64>,
+    sequence: Vec<Stop>,
+    /// Working space.
+    members: Vec<usize>,
+    best: Best,
+    pruned: Option<Pruned<'a>>,
+    /// Positions that were put behind others.
+    pushed: u64,
+    stopped: bool,
+}
+
+impl<'a> Walk<'a> {
+    fn new(search: &'a Search<'a>, meter: &'a Meter<'a>, k: usize) -> Self {
+        Self {
+            search,
+            meter,
+            states: (0..=k).map(|_| search.evaluator.start()).collect(),
+            root: Vec::new(),
+            sequence: Vec::with_capacity(k),
+            members: Vec::with_capacity(k),
+            best: Best::default(),
+            pruned: None,
+            pushed: 0,
+            stopped: false,
+        }
+    }
+
+    /// Whether times are within the limits.
+    fn push(&mut self, stop: Stop) -> bool {
+        let (search, depth) = (self.search, self.sequence.len());
+        self.pushed += 1;
+        if self.pushed.is_multiple_of(PATIENCE) {
+            self.stopped = !self.meter.report(0, 0, None);
+        }
+        let last = self.sequence.last().map(|s| s.candidate);
+        let slew = last.map_or(0.0, |last| search.evaluator.slew_s(last, stop.candidate));
+        let (behind, ahead) = self.states.split_at_mut(depth + 1);
+        search.evaluator.extend(&behind[depth], stop, &mut ahead[0]);
+        self.sequence.push(stop);
+        let c = search.constraints;
+        beyond(slew, c.slew_s) == 0.0 && beyond(ahead[0].seconds, c.total_s) == 0.0
+    }
+
+    /// The sequence as it is; `images` of it are searched.
+    fn score(&mut self, degree: usize, images: usize) {
+        let (search, state) = (self.search, &self.states[self.sequence.len()]);
+        let value = search.evaluator.value(state, search.criterion, &mut self.root);
+        self.best.examined += 1;
+        if self.best.examined.is_multiple_of(PATIENCE) {
+            self.stopped = !self.meter.report(0, PATIENCE, self.best.found.first());
+        }
+        let worth = Worth { violation: 0.0, degree, value };
+        if !worth.is_valid() {
+            self.best.lost += 1;
+            return;
+        }
+        let ties = self.best.ties.wants(&worth);
+        let kept = self.best.wants(search.keep, &worth, state.seconds);
+        if !ties && !kept {
+            return;
+        }
+        if search.constraints.violation(search.evaluator, &self.sequence, state, &mut self.root) > 0.0 {
+            return;
+        }
+        self.best.ties.add(&worth, images, 1);
+        if kept {
+            let scored = Scored { worth, seconds: state.seconds, sequence: self.sequence.clone() };
+            self.best.add(search.keep, scored);
+        }
+    }
+
+    /// All continuations to `k` positions with one of `sets`, all of this worst degree.
+    fn visit(&mut self, sets: &Sets, degree: usize, k: usize) {
+        let left = k - self.sequence.len();
+        if left == 1 {
+            return self.visit_last(sets, degree, |_| true);
+        }
+        if left == 2
+            && let Some(mut pruned) = self.pruned.take()
+        {
+            self.visit_pairs(sets, degree, &mut pruned);
+            self.pruned = Some(pruned);
+            return;
+        }
+        let (rows, evaluator) = (self.search.rows, self.search.evaluator);
+        let before = self.sequence.last().map(|s| s.candidate);
+        for stop in (0..rows.candidates()).flat_map(|c| evaluator.stops(before, c)) {
+            if self.push(stop) {
+                self.visit(sets, degree, k);
+            }
+            self.sequence.pop();
+            if self.stopped {
+                return;
+            }
+        }
+    }
+
+    /// The same of the last position, one of some candidates.
+    fn visit_last(&mut self, sets: &Sets, degree: usize, among: impl Fn(usize) -> bool) {
+        let evaluator = self.search.evaluator;
+        let before = self.sequence.last().map(|s| s.candidate);
+        let mut members = std::mem::take(&mut self.members);
+        set_of(&self.sequence, &mut members);
+        let last = sets.completing(&members).filter(|&c| among(c));
+        for stop in last.flat_map(|c| evaluator.stops(before, c)) {
+            if self.push(stop) {
+                self.score(degree, 1);
+            }
+            self.sequence.pop();
+            if self.stopped {
+                break;
+            }
+        }
+        self.members = members;
+    }
+
+    /// The same of the last two positions, those left out that a bound excludes.
+    fn visit_pairs(&mut self, sets: &Sets, degree: usize, pruned: &mut Pruned<'_>) {
+        let depth = self.sequence.len();
+        let Pruned { screen, known, scratch, alive } = pruned;
+        let candidates = self.search.rows.candidates();
+        alive.clear();
+        alive.resize(candidates * candidates, true);
+        let limit = self.best.limit(self.search.keep, known);
+        screen.pairs(&self.states[depth], limit, alive, scratch);
+        self.best.excluded += alive.iter().filter(|alive| !**alive).count() as u64;
+        for (first, alive) in alive.chunks_exact(candidates).enumerate().filter(|(_, a)| a.contains(&true)) {
+            if self.push(first.into()) {
+                self.visit_last(sets, degree, |second| alive[second]);
+            }
+            self.sequence.pop();
+            if self.stopped {
+                return;
+            }
+        }
+    }
+
+    /// One given sequence; the states of what it has in common with the one before are kept.
+    fn go_to(&mut self, sequence: &[Stop]) -> bool {
+        let common = self.sequence.iter().zip(sequence).take_while(|(a, b)| a == b).count();
+        self.sequence.truncate(common);
+        let mut within = beyond(self.states[common].seconds, self.search.constraints.total_s) == 0.0;
+        for &stop in &sequence[common..] {
+            within &= self.push(stop);
+        }
+        within
+    }
+}
+
+impl Search<'_> {
+    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the first of an
+    /// orbit (where order does not matter: that have one of them as their smallest). As many of the best as are kept:
+    /// worst degrees that are too large for these are not looked at.
+    pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
+        self.exhausted(symmetry, k, None)
+    }
+
+    /// The same, where order matters without those that a bound leaves out: what is kept is the same. The bound is held
+    /// against what an exchange from `seed` finds first.
+    pub fn exhaust_pruned(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Best {
+        let Some(pruning) = self.pruning(symmetry, k, seed) else { return self.exhaust(symmetry, k) };
+        let mut best = self.exhausted(symmetry, k, Some(&pruning));
+        if !best.complete {
+            pruning.known.into_values().for_each(|known| best.merge(self.keep, known));
+        }
+        best
+    }
+
+    fn exhausted(&self, symmetry: &Symmetry, k: usize, pruning: Option<&Pruning<'_>>) -> Best {
+        let Some(levels) = self.levels_of(k) else { return Best::default() };
+        let starts = self.starts(symmetry, k);
+        let mut best = Best { complete: true, ..Best::default() };
+        for level in levels {
+            best.merge(self.keep, self.exhaust_starts(&starts, symmetry, k, &level, pruning));
+            if !best.complete || best.found.len() >= self.keep.max(1) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// What lets a search of `k` positions leave sequences out; `None` where nothing does.
+    pub(crate) fn pruning(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Option<Pruning<'_>> {
+        if k < 3 || self.keep == 0 {
+            return None;
+        }
+        let screen = Screen::new(self.evaluator, self.criterion)?;
+        let firsts = symmetry.representatives();
+        let exchanged = self.exchange_from(k, &[], KNOWN_RESTARTS, seed, Some(&firsts));
+        let mut known: BTreeMap<usize, Best> = BTreeMap::new();
+        for mut scored in exchanged.found.into_iter().chain(exchanged.front) {
+            // as in the sets that are searched
+            if let Some(degree) = self.worst(self.rows.degrees(&candidates(&scored.sequence))) {
+                scored.worth.degree = degree;
+                known.entry(degree).or_default().add(self.keep, scored);
+            }
+        }
+        Some(Pruning { screen, known })
+    }
+
+    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions.
+    pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
+        let ordered = self.evaluator.ordered();
+        let second = |a: usize| {
+            let least = if ordered { 0 } else { a };
+            let stops = (least..self.rows.candidates()).flat_map(move |b| self.evaluator.stops(Some(a), b));
+            stops.map(move |b| vec![a.into(), b])
+        };
+        let firsts = symmetry.representatives();
+        match k {
+            1 => firsts.into_iter().map(|a| vec![a.into()]).collect(),
+            _ => firsts.into_iter().flat_map(second).collect(),
+        }
+    }
+
+    /// How many sequences are behind every start, or in proportion to that.
+    pub(crate) fn work(&self, starts: &[Vec<Stop>], k: usize) -> Vec<f64> {
+        let n = self.rows.candidates();
+        let behind = |start: &Vec<Stop>| {
+            let left = k - start.len();
+            let choices = start.last().map_or(n, |last| n - last.candidate);
+            match self.evaluator.ordered() {
+                true => 1.0,
+                // multisets of so many
+                false => (0..left).map(|i| (choices + i) as f64 / (i + 1) as f64).product(),
+            }
+        };
+        starts.iter().map(behind).collect()
+    }
+
+    /// What is searched one after the other, smallest worst degree first; `None` when the search was stopped.
+    pub(crate) fn levels_of(&self, k: usize) -> Option<Vec<SearchLevel>> {
+        if !self.evaluator.ordered() {
+            return Some(vec![SearchLevel::Any]);
+        }
+        let levels = self.levels(k)?.into_iter().enumerate().filter(|(_, sets)| !sets.is_empty());
+        Some(levels.map(|(degree, sets)| SearchLevel::Degree(degree, sets)).collect())
+    }
+
+    /// The sequences of one level that begin with some of the starts.
+    pub(crate) fn exhaust_starts(
+        &self,
+        starts: &[Vec<Stop>],
+        symmetry: &Symmetry,
+        k: usize,
+        level: &SearchLevel,
+        pruning: Option<&Pruning<'_>>,
+    ) -> Best {
+        let meter = Meter::new(self.progress, starts.len());
+        let from = |start: &Vec<Stop>| match level {
+            SearchLevel::Degree(degree, sets) => {
+                let known = pruning.and_then(|p| Some((&p.screen, p.known.get(degree)?)));
+                self.exhaust_sequences(&meter, start, k, (*degree, sets), known)
+            }
+            SearchLevel::Any => self.exhaust_sets(&meter, start, k, symmetry),
+        };
+        let none = || Best { complete: true, ..Best::default() };
+        let together = |mut best: Best, more: Best| {
+            best.merge(self.keep, more);
+            best
+        };
+        // behind some starts there is more to do than behind others
+        let parts = starts.par_iter().with_max_len(1).map(|start| meter.part(|| from(start)));
+        let best = parts.reduce(none, together);
+        Best { complete: !meter.is_stopped(), ..best }
+    }
+
+    /// The sequences behind a start whose set is one of `sets`, all of this worst degree.
+    fn exhaust_sequences(
+        &self,
+        meter: &Meter<'_>,
+        start: &[Stop],
+        k: usize,
+        (degree, sets): (usize, &Sets),
+        known: Option<(&Screen<'_>, &Best)>,
+    ) -> Best {
+        let mut walk = Walk::new(self, meter, k);
+        walk.pruned = known.map(|(screen, known)| Pruned {
+            screen,
+            known,
+            scratch: screen.scratch(),
+            alive: Vec::new(),
+        });
+        if walk.go_to(start) {
+            if start.len() < k {
+                walk.visit(sets, degree, k);
+            } else {
+                set_of(start, &mut walk.members);
+                if sets.contains(&walk.members) {
+                    walk.score(degree, 1);
+                }
+            }
+        }
+        walk.best
+    }
+
+    /// The sets behind a start, where order does not matter.
+    fn exhaust_sets(&self, meter: &Meter<'_>, start: &[Stop], k: usize, symmetry: &Symmetry) -> Best {
+        let going = || meter.report(0, 0, None);
+        let mut walk = Walk::new(self, meter, k);
+        let mut sequence = Vec::with_capacity(k);
+        self.rows.each(&candidates(start), k, true, &mut Patience::while_going(&going), &mut |set| {
+            let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+            sequence.clear();
+            sequence.extend(set.iter().map(|&c| Stop::from(c)));
+            if let Some(degree) = degree
+                && walk.go_to(&sequence)
+            {
+                walk.score(degree, symmetry.searched_images(set));
+            }
+            !walk.stopped
+        });
+        walk.best
+    }
+
+    /// All observable sets of up to `k` within the caps, by their worst degree; `None` when the search was stopped. They are judged as
+    /// they are found, and none is kept but as a bit.
+    fn levels(&self, k: usize) -> Option<Vec<Sets>> {
+        let meter = Meter::new(self.progress, 1);
+        let going = || meter.report(0, 0, None);
+        let candidates = self.rows.candidates();
+        let levels: Vec<Sets> = (0..=self.rows.last_order()).map(|_| Sets::none(candidates, k)).collect();
+        let judged = |prefix: &[usize], size: usize| {
+            let mut patience = Patience::while_going(&going);
+            self.rows.each(prefix, size, false, &mut patience, &mut |set| {
+                let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+                degree.inspect(|&degree| levels[degree].add(set));
+                true
+            });
+            patience.budget > 0
+        };
+        let behind = |first: usize, size: usize| match size {
+            1 => judged(&[first], size),
+            _ => (first + 1..candidates).into_par_iter().all(|second| judged(&[first, second], size)),
+        };
+        let sizes = 1..=k.min(candidates);
+        let mut all =
+            sizes.map(|size| (0..candidates).into_par_iter().all(|first| going() && behind(first, size)));
+        (all.all(|done| done) && going()).then_some(levels)
+    }
+}
+
+/// The candidates of a sequence, each once and ascending, to `members`.
+fn set_of(sequence: &[Stop], members: &mut Vec<usize>) {
+    members.clear();
+    members.extend(sequence.iter().map(|s| s.candidate));
+    members.sort_unstable();
+    members.dedup();
+}

@@ -1,0 +1,104 @@
+//! How many sequences are as good as the best.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::design::search::score::Worth;
+
+/// Sequences tie when their worst degrees are equal and their criteria differ by less than this part.
+pub(crate) const TIE: f64 = 1e-6;
+
+/// Sequences near the best so far, counted by criterion.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(from = "Counted", into = "Counted")]
+#[schemars(with = "Counted")]
+pub struct Ties {
+    /// Smallest worst degree of the sequences.
+    degree: usize,
+    /// Number of sequences by the bits of the criterion, which order positive numbers, and the searched
+    /// images of a sequence.
+    counts: BTreeMap<(u64, usize), u64>,
+}
+
+/// Sequences near the best so far, counted by criterion, as a list.
+#[derive(Serialize, Deserialize, JsonSchema)]
+struct Counted {
+    /// Smallest worst degree of the sequences.
+    degree: usize,
+    /// Criterion (in the unit of the criterion asked for), number of searched images of a sequence, number of
+    /// sequences.
+    counts: Vec<(f64, usize, u64)>,
+}
+
+impl From<Counted> for Ties {
+    fn from(listed: Counted) -> Self {
+        let counts =
+            listed.counts.into_iter().map(|(value, images, count)| ((value.to_bits(), images), count));
+        Self { degree: listed.degree, counts: counts.collect() }
+    }
+}
+
+impl From<Ties> for Counted {
+    fn from(ties: Ties) -> Self {
+        let counts = ties.counts.into_iter();
+        Self {
+            degree: ties.degree,
+            counts: counts.map(|((bits, images), count)| (f64::from_bits(bits), images, count)).collect(),
+        }
+    }
+}
+
+impl Ties {
+    /// The largest criterion that still ties with the best.
+    fn limit(&self) -> f64 {
+        self.counts.keys().next().map_or(f64::INFINITY, |k| f64::from_bits(k.0) * (1.0 + TIE))
+    }
+
+    /// Whether a sequence of this worth is as good as the best so far, or better.
+    pub(crate) fn wants(&self, worth: &Worth) -> bool {
+        self.counts.is_empty()
+            || worth.degree < self.degree
+            || worth.degree == self.degree && worth.value <= self.limit()
+    }
+
+    /// Adds `count` sequences of this worth, each with so many images among those that are searched.
+    pub(crate) fn add(&mut self, worth: &Worth, images: usize, count: u64) {
+        if !self.wants(worth) {
+            return;
+        }
+        if worth.degree != self.degree {
+            self.counts.clear();
+            self.degree = worth.degree;
+        }
+        *self.counts.entry((worth.value.to_bits(), images)).or_default() += count;
+        // what does not tie with a better one
+        let limit = self.limit();
+        while let Some(last) = self.counts.last_entry().filter(|e| f64::from_bits(e.key().0) > limit) {
+            last.remove();
+        }
+    }
+
+    pub(crate) fn merge(&mut self, other: Self) {
+        for ((bits, images), count) in other.counts {
+            let value = f64::from_bits(bits);
+            self.add(&Worth { violation: 0.0, degree: other.degree, value }, images, count);
+        }
+    }
+
+    /// How many there are of all sequences, where each searched one stands for `order` divided by its searched images.
+    pub fn total(&self, order: usize) -> u64 {
+        let limit = self.limit();
+        let mut by_images: BTreeMap<usize, u128> = BTreeMap::new();
+        for (&(bits, images), &count) in &self.counts {
+            if f64::from_bits(bits) <= limit {
+                *by_images.entry(images).or_default() += u128::from(count) * order as u128;
+            }
+        }
+        // images of one sequence have as many searched images: each sum is a multiple of them but for rounding at the
+        // limit
+        let all = by_images.into_iter().map(|(images, sum)| (sum + images as u128 / 2) / images as u128);
+        u64::try_from(all.sum::<u128>()).unwrap_or(u64::MAX)
+    }
+}

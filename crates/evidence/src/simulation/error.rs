@@ -1,0 +1,116 @@
+//! Why a scheme cannot be simulated.
+
+use obsdeg_core::model::{Carry, SchemeError};
+use obsdeg_ekf::EkfError;
+
+use super::limits::MAX_UNKNOWNS;
+use crate::prediction::PredictionError;
+
+/// Why a scheme cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// A generic angle has no number.
+    #[error("the angle `{name}` is generic; expected numbers for a simulation")]
+    GenericAngle {
+        /// Its name.
+        name: String,
+    },
+    /// Slews carry psi^n.
+    #[error(
+        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or no slew rate)"
+    )]
+    SlewCarry {
+        /// The carry found.
+        carry: Carry,
+    },
+    /// The turn of a slew ends elsewhere.
+    #[error(
+        "the slew to `{name}` does not lead there: expected an axis and angle that turn the position before into it"
+    )]
+    SlewMisses {
+        /// The position.
+        name: String,
+    },
+    /// A filter that does not know of a position knows of no slew to it.
+    #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
+    DroppedSlew,
+    /// The only position cannot be dropped.
+    #[error("the only position cannot be dropped; expected a scheme of at least two positions")]
+    DroppedOnly,
+    /// Whoever asked wanted no more.
+    #[error("interrupted before the runs were done")]
+    Interrupted,
+    /// The accuracy orders of a rotation are not known.
+    #[error("the cross-check takes positions; found a rotating segment")]
+    CrosscheckRotation,
+    /// The exact truth turns an attitude by coefficients.
+    #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
+    ExactDrift,
+    /// Full attitudes have no turns at once.
+    #[error(
+        "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew rate (slew_rate_deg_s, --slew-rate), \
+         or filter = \"linear\" and truth = \"linear\""
+    )]
+    TorquedAtOnce,
+    /// Too many unknowns for a full covariance.
+    #[error("{found} unknowns; expected at most {} for a simulation", MAX_UNKNOWNS)]
+    TooManyUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
+    /// Too many unknowns under a carry that is looked at for comparison.
+    #[error("{found} unknowns under reset carry, which is compared too; expected at most {}", MAX_UNKNOWNS)]
+    ComparedUnknowns {
+        /// Number of unknowns.
+        found: usize,
+    },
+    /// Too many steps.
+    #[error("{found} {what}; expected at most {most} (take longer steps)")]
+    TooManySteps {
+        /// Their number.
+        found: String,
+        /// What is counted.
+        what: &'static str,
+        /// The most.
+        most: usize,
+    },
+    /// Numbers that are admitted, but that doubles cannot tell apart.
+    #[error("not resolvable in double precision: {what}")]
+    Unresolvable {
+        /// What is not.
+        what: String,
+    },
+    /// A condition beyond its range.
+    #[error(transparent)]
+    Range(#[from] obsdeg_core::model::ranges::RangeError),
+    /// A value for something that the scheme does not have.
+    #[error("{what} for `{found}`: no such unknown; {known}")]
+    UnknownName {
+        /// Which list.
+        what: &'static str,
+        /// The name found.
+        found: String,
+        /// What was expected.
+        known: String,
+    },
+    /// The scheme itself.
+    #[error(transparent)]
+    Scheme(#[from] SchemeError),
+    /// No exact verdicts.
+    #[error(transparent)]
+    Prediction(#[from] PredictionError),
+    /// The filter refuses a number.
+    #[error(transparent)]
+    Filter(#[from] EkfError),
+}
+
+impl SimulationError {
+    /// Whether admitted numbers went beyond what doubles resolve.
+    pub fn is_numeric(&self) -> bool {
+        match self {
+            Self::Unresolvable { .. } => true,
+            Self::Filter(e) => e.is_numeric(),
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The conditions and the timeline of a run as they are reported.
+
+use obsdeg_core::model::Scheme;
+use obsdeg_core::model::settings::DriftNoise;
+
+use super::answer::{AccelerometerBias, ConditionsReport, TimelineReport, chosen};
+use super::conditions::Conditions;
+use super::plan::{Plan, SegmentKind};
+
+/// The conditions as they are reported.
+pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
+    let noise = conditions.drift_noise;
+    let given = matches!(noise, DriftNoise::OneStep(_)).then_some(conditions.drift_noise_step_s);
+    // a slew takes as many steps as a position would
+    let steps = plan.segments.iter().map(|s| match s.kind {
+        SegmentKind::Slew(_) => s.dt.min(conditions.step_s),
+        _ => s.dt,
+    });
+    let (shortest, longest) = steps.fold((f64::MAX, 0.0f64), |(l, h), dt| (l.min(dt), h.max(dt)));
+    let density = [shortest, longest].map(|dt| noise.density_deg_sqrt_h(dt));
+    let differs = |step: f64| density.iter().any(|d| (d / noise.density_deg_sqrt_h(step) - 1.0).abs() > 0.01);
+    ConditionsReport {
+        truth: conditions.truth,
+        latitude_deg: plan.platform.scheme().latitude.map_or(0.0, |l| l.degrees()),
+        latitude_by_default: scheme.latitude.is_none(),
+        step_s: conditions.step_s,
+        slew_rate_deg_s: conditions.slew_rate_deg_s,
+        accelerometer_noise_g: conditions.accelerometer_noise_g,
+        accelerometer_bias: AccelerometerBias::of(conditions),
+        drift_noise: noise.to_string(),
+        drift_noise_density_deg_sqrt_h: density,
+        drift_noise_step_s: given,
+        drift_noise_differs: given.is_some_and(differs),
+        gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
+        propagation: conditions.propagation,
+        drift_scale: conditions.drift_scale,
+        by_default: chosen_for_run(scheme, conditions),
+    }
+}
+
+/// Keys of the conditions of a run that nobody states.
+fn chosen_for_run(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
+    let mut out = chosen(scheme, conditions);
+    let own = [
+        ("drift_noise", !conditions.states().drift_noise && conditions.drift_noise.amount() > 0.0),
+        ("values", conditions.stated_values().is_empty()),
+        ("priors", conditions.stated_priors().is_empty()),
+    ];
+    out.extend(own.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()));
+    out
+}
+
+/// The timeline as it is reported.
+pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
+    let positions = &plan.platform.scheme().positions;
+    let mut out: Vec<TimelineReport> = Vec::new();
+    for s in &plan.segments {
+        let (slew, end_s) = (matches!(s.kind, SegmentKind::Slew(_)), s.start_s + s.dt * s.steps as f64);
+        let position = &positions[s.position].name;
+        match out.last_mut() {
+            // a rotation is one segment per step
+            Some(last) if last.position == *position && last.slew == slew => last.end_s = end_s,
+            _ => {
+                let turn = if let SegmentKind::Slew(slew) = &s.kind { Some(slew.turn()) } else { None };
+                out.push(TimelineReport {
+                    position: position.clone(),
+                    slew,
+                    start_s: s.start_s,
+                    end_s,
+                    turn,
+                });
+            }
+        }
+    }
+    out
+}

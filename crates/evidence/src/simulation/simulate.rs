@@ -1,0 +1,191 @@
+//! A scheme simulated once: the run, and its summary.
+
+use obsdeg_core::degree::Status;
+use obsdeg_core::model::Scheme;
+use obsdeg_core::model::settings::FilterKind;
+
+use super::answer::{
+    Estimate, LinearEstimate, Outcome, RunDiffers, RunRequirements, SCHEMA, SigmaRatio, Simulation,
+};
+use super::attained::Attained;
+use super::carries::other_carries;
+use super::conditions::{Conditions, PRIOR, REQUIRED, resolve, shown_unit, si_per_shown};
+use super::consistency::{Consistency, Outcomes};
+use super::error::SimulationError;
+use super::floor::noise_floor;
+use super::plan::Plan;
+use super::record::{Record, run};
+use super::reports::{conditions_report, timeline_report};
+use super::seen::predict_run;
+use super::start::RunStart;
+use crate::prediction::{PredictedCombination, Prediction};
+use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
+
+/// Simulates `scheme` once: the summary and the time series.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn simulate(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<(Simulation, Record), SimulationError> {
+    let plan = Plan::new(scheme, conditions)?;
+    let start = RunStart::new(&plan, conditions)?;
+    let prediction = predict_run(&plan, &start.sigma[..plan.unknowns()], seed)?;
+    let record = run(&plan, conditions, &start, &prediction, seed)?;
+    let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
+    Ok((summary, record))
+}
+
+fn summary(
+    scheme: &Scheme,
+    plan: &Plan,
+    conditions: &Conditions,
+    prediction: &Prediction,
+    record: &Record,
+    seed: u64,
+) -> Result<Simulation, SimulationError> {
+    let n = plan.unknowns();
+    let (names, units) = (plan.platform.names(), plan.platform.units());
+    let requirements = resolve(REQUIRED, &plan.platform, &conditions.requirements, f64::NAN)?;
+    let required = |c: usize| Some(requirements[c]).filter(|r| !r.is_nan());
+    let attained = Attained::new(scheme, conditions, seed)?;
+    let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
+        let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
+        let wanted = [required(c), attained.sigmas[c]];
+        estimate(&names[c], units[c], verdict, c, record, wanted)
+    });
+    let mut quantities: Vec<Estimate> = unknowns.collect();
+    for (q, u) in
+        quantities.iter_mut().zip(&prediction.unknowns).filter(|(q, _)| q.outcome == Outcome::PriorOnly)
+    {
+        let unseen = u.partners.iter().filter(|&&p| !prediction.unknowns[p].determined_at_end);
+        q.prior_of = unseen.map(|&p| names[p].clone()).collect();
+    }
+    let combination = |(i, c): (usize, &PredictedCombination)| -> Result<Estimate, SimulationError> {
+        let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
+        let lead = c.terms[0].0;
+        let predicted = attained.sigma_of(&c.terms)? / si_per_shown(units[lead]);
+        let wanted = [required(lead), c.determined_at_end.then_some(predicted)];
+        Ok(estimate(&c.expression, units[lead], verdict, n + i, record, wanted))
+    };
+    let combinations = prediction.combinations.iter().enumerate();
+    let combinations: Vec<Estimate> = combinations.map(combination).collect::<Result<_, _>>()?;
+    let consistency = Consistency::of(Outcomes {
+        whitened: &record.whitened,
+        outputs: plan.components.len(),
+        error: record.last_error.clone(),
+        covariance: &record.last_covariance,
+        normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
+        resolution: 0.0,
+    })?;
+    let noise_floor = noise_floor(scheme, conditions, prediction)?;
+    Ok(Simulation {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        carry: scheme.carry,
+        conditions: conditions_report(scheme, plan, conditions),
+        timeline: timeline_report(plan),
+        requirements: attained.requirements(conditions)?,
+        run: run_requirements(plan, conditions, &quantities, record)?,
+        other_carries: other_carries(scheme, conditions, seed)?,
+        quantities,
+        combinations,
+        consistency,
+        filter: record.filter,
+        validity: record.validity.clone(),
+        noise_floor,
+        gimbals: scheme.gimbal_report(),
+        seed,
+    })
+}
+
+/// Outcome of the requirements in the run, and the reasons why its sigmas may differ from the predicted ones.
+fn run_requirements(
+    plan: &Plan,
+    conditions: &Conditions,
+    quantities: &[Estimate],
+    record: &Record,
+) -> Result<RunRequirements, SimulationError> {
+    let claims = quantities.iter().map(|q| Claim {
+        name: &q.name,
+        required: q.required_sigma,
+        // what a stated prior bounds counts, as in the prediction
+        sigma: match q.outcome.miss() {
+            Some(Miss::NotObservable) if q.predicted_sigma.is_some() => Ok(q.sigma),
+            Some(why) => Err(why),
+            None => Ok(q.sigma),
+        },
+    });
+    let ratio = |q: &Estimate| {
+        let ratio = q.sigma / q.predicted_sigma?;
+        ratio.is_finite().then(|| SigmaRatio { name: q.name.clone(), ratio })
+    };
+    let by_ratio = |a: &SigmaRatio, b: &SigmaRatio| a.ratio.total_cmp(&b.ratio);
+    let priors = resolve(PRIOR, &plan.platform, conditions.stated_priors(), f64::NAN)?;
+    let differs = [
+        (RunDiffers::RandomDrift, !conditions.states().drift_noise && conditions.drift_noise.amount() > 0.0),
+        (RunDiffers::Prior, priors.iter().any(|p| p.is_nan())),
+        (RunDiffers::FullAttitudes, record.filter.kind != FilterKind::Linear),
+    ];
+    Ok(RunRequirements {
+        requirements: Requirements::of(Basis::Run, claims),
+        largest_ratio: quantities.iter().filter_map(ratio).max_by(by_ratio),
+        smallest_ratio: quantities.iter().filter_map(ratio).min_by(by_ratio),
+        differs: differs.into_iter().filter_map(|(reason, here)| here.then_some(reason)).collect(),
+    })
+}
+
+/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it, the
+/// last are the required and the predicted sigma.
+fn estimate(
+    name: &str,
+    unit: &str,
+    verdict: (Status, Option<usize>, Option<usize>, bool),
+    i: usize,
+    record: &Record,
+    [required_sigma, predicted_sigma]: [Option<f64>; 2],
+) -> Estimate {
+    let (status, degree, accuracy_order, determined) = verdict;
+    let (series, scale) = (&record.traces.series[i], si_per_shown(unit));
+    let last = |v: &[f64]| v.last().map_or(f64::NAN, |x| x / scale);
+    let (truth, estimate, sigma) = (last(&series.truth), last(&series.estimate), last(&series.sigma));
+    let prior_sigma = series.sigma[0] / scale;
+    let linear = record.traces.linear.as_ref().map(|all| {
+        let s = &all[i];
+        LinearEstimate { error: last(&s.estimate) - truth, sigma: last(&s.sigma) }
+    });
+    let error = estimate - truth;
+    let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
+    // from when on sigma meets it to the end
+    let reached = required_sigma.and_then(|r| {
+        let missed = series.sigma.iter().rposition(|s| !meets(s / scale, r));
+        missed.map_or(Some(0), |i| (i + 1 < series.sigma.len()).then_some(i + 1))
+    });
+    Estimate {
+        name: name.into(),
+        unit: shown_unit(unit).into(),
+        status,
+        degree,
+        accuracy_order,
+        truth,
+        estimate,
+        error,
+        sigma,
+        predicted_sigma,
+        error_over_sigma,
+        linear,
+        prior_sigma,
+        required_sigma,
+        time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
+        outcome: Outcome::of(
+            determined,
+            record.filter.kind,
+            error_over_sigma,
+            [prior_sigma, sigma],
+            required_sigma,
+        ),
+        prior_of: Vec::new(),
+    }
+}
