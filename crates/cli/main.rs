@@ -14,6 +14,7 @@ mod files;
 mod help;
 mod input;
 mod interrupt;
+mod licences;
 #[cfg(feature = "symbolica")]
 mod lock;
 mod origin;
@@ -23,6 +24,7 @@ mod progress;
 mod report;
 mod schema;
 mod simulate;
+mod third_party;
 
 use std::process::ExitCode;
 
@@ -76,6 +78,8 @@ enum Command {
     Report(report::Arguments),
     /// Recompute the equations and claims of the paper: what agrees, and what does not
     Paper(paper::Arguments),
+    /// Print what others wrote of this build, and the texts of their licences
+    Licences(licences::Arguments),
     /// Print the completion script of a shell
     Completions(completions::Arguments),
     /// Print a manual page, or write all of them to a folder
@@ -177,6 +181,7 @@ fn run() -> Result<(), ExitCode> {
         Command::Design(a) => design::run(&a),
         Command::Report(a) => report::run(a, given),
         Command::Paper(a) => paper::run(&a),
+        Command::Licences(a) => licences::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man(a) => completions::man(&a),
         Command::Schema(a) => schema::run(&a),

@@ -177,6 +177,7 @@ fn operands(command: &str) -> &'static [&'static str] {
         "calibrate" => &["s.toml"],
         "schema" => &["analysis", "scheme", "model", "comparison", "design", "nothing"],
         "completions" => &["bash", "zsh", "nothing"],
+        "licences" => &["uPlot", "nalgebra", "nothing"],
         _ => &[],
     }
 }
@@ -217,6 +218,7 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
         "paper",
         "schema",
         "completions",
+        "licences",
         "man",
     ];
     let codes = std::thread::scope(|scope| {
@@ -295,7 +297,7 @@ fn a_model_refuses_what_is_about_schemes() {
 fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let mut rng = SplitMix64::new(0x6772_616d ^ stream << 40);
     let options = options(command);
-    let fair = ["man", "schema", "completions"].contains(&command);
+    let fair = ["man", "schema", "completions", "licences"].contains(&command);
     assert!(fair || options.len() > 4, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
     for _ in 0..if fair { 4 } else { DRAWN } {

@@ -3,7 +3,7 @@
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
-const COMMANDS: [(&str, usize); 11] = [
+const COMMANDS: [(&str, usize); 12] = [
     ("analyze", 45),
     ("simulate", 62),
     ("crosscheck", 67),
@@ -12,6 +12,7 @@ const COMMANDS: [(&str, usize); 11] = [
     ("design", 68),
     ("report", 59),
     ("paper", 18),
+    ("licences", 12),
     ("completions", 12),
     ("man", 14),
     ("schema", 10),

@@ -25,6 +25,7 @@ mod help;
 mod hostile;
 mod language;
 mod laws;
+mod licences;
 mod models;
 mod program;
 mod reference_verdicts;

@@ -204,7 +204,10 @@ fn product(left: &Polynomial, right: &Polynomial) -> Option<Polynomial> {
     for (m, &c) in left {
         for (n, &d) in right {
             let mut powers: BTreeMap<usize, u32> = m.iter().copied().collect();
-            n.iter().for_each(|(node, k)| *powers.entry(*node).or_default() += k);
+            for (node, k) in n {
+                let power = powers.entry(*node).or_default();
+                *power = power.checked_add(*k)?;
+            }
             add(&mut out, powers.into_iter().collect(), times(c, d)?)?;
         }
         if out.len() > TERMS {
