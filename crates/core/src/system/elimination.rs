@@ -223,13 +223,15 @@ impl Elimination<'_> {
         Ok(equations)
     }
 
-    /// A polynomial without a divisor that is not zero, as often as it is there.
-    fn without(&mut self, p: Polynomial, divisor: &Polynomial) -> Result<Polynomial, OverLimit> {
+    /// A polynomial without the factors that it shares with what is not zero.
+    fn without(&mut self, p: Polynomial, factors: &Polynomial) -> Result<Polynomial, OverLimit> {
         let mut rest = p;
-        if divisor.as_constant().is_none() && !rest.is_empty() {
-            while let Some(next) = self.s.quotient(&rest, divisor)? {
-                rest = next;
+        while !rest.is_empty() {
+            let common = self.s.divisor(&rest, factors)?;
+            if common.as_constant().is_some() {
+                break;
             }
+            rest = self.s.quotient(&rest, &common)?.ok_or(OverLimit)?;
         }
         Ok(rest)
     }
