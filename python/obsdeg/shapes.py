@@ -473,6 +473,19 @@ class Certainty(Record):
     """Seed of all random choices."""
 
 
+class EngineBusy(Record):
+    """Mark of an answer without the solutions that need the symbolic engine, because other processes held it. The verdicts do not depend
+    on it.
+    """
+
+    __slots__ = ()
+
+    waited_s: int
+    """Time after which the wait for the engine ended, in s."""
+    advice: str
+    """Advice on how to get the missing solutions."""
+
+
 class Analysis(Shape):
     """Analysis of one scheme: verdicts, solutions and remedies."""
 
@@ -524,6 +537,10 @@ class Analysis(Shape):
     """Certainty of the verdicts: method, error bound, primes and seed."""
     notes: list[str]
     """Limitations of this answer, each with its reason."""
+    engine_busy: EngineBusy | None
+    """Mark of an answer without the formulas that need the symbolic engine, because other processes held it for the whole of --engine-
+    wait; null otherwise.
+    """
 
 
 class NumberOfSolutionsCounted(Record):
@@ -593,8 +610,9 @@ class SymmetryReport(Record):
     __slots__ = ()
 
     words: str
-    """Change that leaves every output as it is, for every `c` (every positive one where something is multiplied or divided): `multiply
-    alpha by c; divide gamma by c`. At c = 1, and where nothing is multiplied or divided at c = 0, nothing changes.
+    """Change that leaves every output as it is (if `rests_on_bound`: its derivatives up to the bound at the start), for every `c` (every
+    positive one where something is multiplied or divided): `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is
+    multiplied or divided at c = 0, nothing changes.
     """
     unknowns: list[str]
     """Unknowns that the symmetry changes."""
@@ -649,7 +667,9 @@ class SystemAnalysis(Shape):
     unobservable_directions: int
     """Number of independent directions that change no output."""
     symmetries: list[SymmetryReport]
-    """Scalings, translations and polynomials among the unobservable directions, exactly."""
+    """Scalings, translations and polynomials among the unobservable directions, exactly; up to the bound on the order only if
+    `rests_on_bound`.
+    """
     other_directions: list[list[str]]
     """Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was found describes it."""
     invariants: list[SystemCombination]
@@ -671,7 +691,7 @@ class SystemAnalysis(Shape):
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     note: str | None
-    """Reason why there are no solving expressions; null if there are."""
+    """Reason why solving expressions were not sought, or not all of them; null otherwise."""
     counting_order: int | None
     """Order of the derivatives with which solutions were counted by elimination; null if none were."""
     independent_functions: int | None

@@ -171,7 +171,10 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     );
     let limits = limits(s);
     let filter = match (&s.evidence, limits.is_empty()) {
-        (Ok(e), true) if e.passed => ", and the filter confirms the verdicts",
+        (Ok(e), true) if e.passed && e.counts.not_resolvable == 0 => {
+            ", and the filter agrees with all verdicts"
+        }
+        (Ok(e), true) if e.passed => ", and the filter agrees with the verdicts as far as it shows them",
         (Ok(e), false) if e.passed => "; within these limits a filter agrees with the exact verdicts",
         _ => "",
     };
