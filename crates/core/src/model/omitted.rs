@@ -11,15 +11,13 @@
 //! - magnitude of gravity (true minus stated): the vertical component of the specific force, `(0, 1, 0)` in Z;
 //! - attitude of one position: `psi^n` is `C e_k` larger while the position lasts, axis k of the platform.
 
-use crate::language::nearest;
-
 use super::attitude::{Matrix3, product};
 use super::error_model::{Columns, ErrorModel};
+use super::omitted_names::SITE_FAMILIES;
 use super::platform::{Block, LOCAL, PSI_EPS, Platform, Point, earth_rate_in};
 use super::position::Carry;
 use super::ring::Ring;
 use super::scheme::Scheme;
-use super::settings::is_family;
 use super::terms::{Source, Term, Unknowns};
 
 /// Most positions whose attitudes count one by one.
@@ -58,39 +56,6 @@ pub struct OmittedTerm {
     pub unit: &'static str,
     /// How it enters.
     pub effect: OmittedEffect,
-}
-
-/// Families of errors that are no coefficient, with their units.
-pub const SITE_FAMILIES: [(&str, &str); 5] = [
-    ("latitude", "arcsec"),
-    ("azimuth", "arcsec"),
-    ("earth_rate", "ppm"),
-    ("gravity", "ppm"),
-    ("attitude", "arcsec"),
-];
-
-/// Whether some scheme can have an error or a family of errors of this name.
-pub fn may_be_omitted(name: &str) -> bool {
-    let attitude = |name: &str| {
-        let own = name.split('@').next().unwrap_or(name);
-        matches!(own, "attitude_x" | "attitude_y" | "attitude_z")
-            && name.split_once('@').is_none_or(|(_, i)| i.parse::<usize>().is_ok_and(|i| i > 0))
-    };
-    let site = SITE_FAMILIES.iter().any(|(family, _)| *family == name);
-    let state = ["psi", "eps"].contains(&name);
-    site || attitude(name) || (is_family(name) && !state)
-}
-
-/// What could have been meant by `name`.
-pub fn omitted_meant(name: &str) -> String {
-    let site = SITE_FAMILIES.iter().map(|(family, _)| family.to_string());
-    let all: Vec<String> = Term::ALL.iter().map(|t| t.family().to_string()).chain(site).collect();
-    let expected = "expected an error such as K0_X, a family such as K0, M or GS, or latitude, azimuth, \
-                    earth_rate, gravity, attitude";
-    match nearest(name, &all) {
-        Some(near) => format!("did you mean `{near}`? ({expected})"),
-        None => expected.into(),
-    }
 }
 
 /// All errors that a scheme does not estimate, in a fixed order: coefficients first.

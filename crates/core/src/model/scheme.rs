@@ -11,7 +11,7 @@ use super::error_model::ErrorModel;
 use super::geometry::Geometry;
 use super::gimbals::Gimbals;
 use super::observed::Observed;
-use super::omitted;
+use super::omitted_names;
 use super::path::{self, Path, PathError, PathStep, StepError};
 pub(crate) use super::position::{Carry, CarryError, Position, Station, parse_attitude};
 use super::recording::Recording;
@@ -183,7 +183,7 @@ pub enum SchemeError {
         name: String,
     },
     /// A size for something that no bench has.
-    #[error("`{name}`: no such error; {}", omitted::omitted_meant(name))]
+    #[error("`{name}`: no such error; {}", omitted_names::omitted_meant(name))]
     BenchName {
         /// The key in a scheme file.
         key: String,
@@ -382,7 +382,7 @@ impl Scheme {
                 return Err(SchemeError::UnknownName { key: format!("{key}.{name}"), name: excerpt(name) });
             }
         }
-        if let Some(name) = self.bench.keys().find(|name| !omitted::may_be_omitted(name)) {
+        if let Some(name) = self.bench.keys().find(|name| !omitted_names::may_be_omitted(name)) {
             return Err(SchemeError::BenchName { key: format!("bench.{name}"), name: excerpt(name) });
         }
         let bench = self.bench.iter().map(|(name, x)| (format!("bench.{name}"), *x, ranges::BENCH));

@@ -4,8 +4,6 @@ use obsdeg_core::omitted::{ExactChange, OmittedClass};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::budget::Budget;
-
 /// Effect of everything that a scheme does not estimate: the other terms of the error model, the site, and the
 /// attitudes of the positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -93,3 +91,49 @@ pub struct FamilyEffect {
     /// Smallest size of a single term that uses up the margin of a requirement; null if none does.
     pub uses_up: Option<UsesUp>,
 }
+
+/// Uncertainty budget of one unknown.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Budget {
+    /// Name of the unknown.
+    pub unknown: String,
+    /// Unit of the unknown, of its contributions and of the total.
+    pub unit: String,
+    /// Total standard uncertainty: root of the sum of the squared contributions, in `unit`.
+    pub total: f64,
+    /// Largest standard uncertainty allowed, in `unit`; null if none is required.
+    pub requirement: Option<f64>,
+    /// Sources of uncertainty, the largest contribution first.
+    pub lines: Vec<BudgetLine>,
+}
+
+/// Evaluation of a standard uncertainty, by the GUM.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Evaluation {
+    /// Type A: statistical, from the scatter of the samples that the estimates are computed from.
+    A,
+    /// Type B: by other means, such as a datasheet or an earlier calibration.
+    B,
+}
+
+/// Source of uncertainty in a budget.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BudgetLine {
+    /// Source: the samples (with the random drift and the priors that are stated), or the name of an error.
+    pub source: String,
+    /// Evaluation of its standard uncertainty: type A or B.
+    pub evaluation: Evaluation,
+    /// Standard uncertainty of the source, in `value_unit`.
+    pub value: f64,
+    /// Unit of the standard uncertainty of the source.
+    pub value_unit: String,
+    /// Sensitivity of the unknown to the source, in the unit of the unknown per `value_unit`.
+    pub sensitivity: f64,
+    /// Contribution to the standard uncertainty of the unknown, in its unit: value times sensitivity, positive.
+    pub contribution: f64,
+    /// Part of the squared total, in percent.
+    pub percent: f64,
+}
+
+/// Name of the source that the samples are.
+pub const SAMPLES: &str = "samples";

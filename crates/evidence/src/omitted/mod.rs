@@ -5,24 +5,24 @@
 //! silent, visible) are verdicts of the exact engine ([`obsdeg_core::omitted`]); sizes and sensitivities are figures.
 
 mod answer;
-mod bench;
+pub(crate) mod bench;
 mod budget;
 mod columns;
 mod score;
 #[cfg(test)]
 mod tests;
-mod weights;
+pub(crate) mod weights;
 
 use obsdeg_core::model::{OmittedModel, OmittedTerm};
-use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts, omitted_verdicts};
+use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 
-pub use answer::{FamilyEffect, OmittedEffect, OmittedEffects, Sensitivity, UsesUp};
+pub use answer::{
+    Budget, BudgetLine, Evaluation, FamilyEffect, OmittedEffect, OmittedEffects, SAMPLES, Sensitivity, UsesUp,
+};
 pub use bench::{Bench, BenchError};
-pub use budget::{Budget, BudgetLine, Evaluation, SAMPLES};
 pub use columns::OmittedColumns;
 pub use score::{Explanation, LEVEL, Score, SuspectedChange, SuspectedError, Suspicion};
 pub use weights::Influence;
-pub(crate) use weights::{by_filter, by_information};
 
 use crate::simulation::{
     Attained, Conditions, SimulationError, is_rate, required_sigmas, shown_unit, si_per_shown,
@@ -30,8 +30,6 @@ use crate::simulation::{
 
 /// Sigmas of a visible error that count as seen.
 const SEEN: f64 = 3.0;
-/// Changes below this part of the largest one of their unknown, relative to sigma, are rounding.
-const ROUNDING: f64 = 1e-11;
 
 /// Effects of everything that the scheme of `attained` does not estimate.
 ///
@@ -51,7 +49,7 @@ pub fn omitted_effects(
     };
     let influence = attained.influence(&model)?;
     let bench = Bench::of(&conditions.bench, &model)?;
-    let changes = shown_changes(attained, &model, &influence, verdicts.as_ref());
+    let changes = influence.shown(platform.units(), &attained.sigmas, &model, verdicts.as_ref());
     let required = required_sigmas(platform, conditions)?;
     let totals = bench.totals(&attained.sigmas, &changes);
     let names = platform.names();
@@ -105,39 +103,6 @@ pub fn omitted_effects(
 fn visible_from(term: &OmittedTerm, class: Option<OmittedClass>, information: f64) -> Option<f64> {
     let visible = class.is_none_or(|c| c == OmittedClass::Visible);
     (visible && information > 0.0).then(|| SEEN / information.sqrt() / si_per_shown(term.unit))
-}
-
-/// Changes of every estimate that has a sigma, per unit of every error in shown units (unknowns x errors); zero where
-/// the exact class says so, and where nothing but rounding is left.
-pub(crate) fn shown_changes(
-    attained: &Attained,
-    model: &OmittedModel,
-    influence: &Influence,
-    verdicts: Option<&OmittedVerdicts>,
-) -> Vec<Vec<f64>> {
-    let units = attained.plan.platform.units();
-    let none = |j: usize| verdicts.is_some_and(|v| v.terms[j].class == OmittedClass::NoEffect);
-    let shown = |c: usize, j: usize| {
-        let scale = si_per_shown(model.terms()[j].unit) / si_per_shown(units[c]);
-        let moves_psi = units[c] == "rad" && influence.changes[(c, j)] != 0.0;
-        match attained.sigmas[c] {
-            None => 0.0,
-            Some(_) if none(j) && !moves_psi => 0.0,
-            Some(_) => influence.changes[(c, j)] * scale,
-        }
-    };
-    let m = model.terms().len();
-    let mut out: Vec<Vec<f64>> = (0..units.len()).map(|c| (0..m).map(|j| shown(c, j)).collect()).collect();
-    for j in 0..m {
-        let in_sigmas = |c: usize, x: f64| attained.sigmas[c].map_or(0.0, |s| (x / s).abs());
-        let largest = (0..units.len()).map(|c| in_sigmas(c, out[c][j])).fold(0.0, f64::max);
-        for (c, row) in out.iter_mut().enumerate() {
-            if in_sigmas(c, row[j]) < ROUNDING * largest {
-                row[j] = 0.0;
-            }
-        }
-    }
-    out
 }
 
 /// Family by family, in the order of the terms.

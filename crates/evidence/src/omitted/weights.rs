@@ -2,12 +2,15 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::OmittedModel;
+use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, SquareRootInformation};
 
 use super::columns::OmittedColumns;
-use crate::simulation::{Plan, SimulationError, each_row};
+use crate::simulation::{Plan, SimulationError, each_row, si_per_shown};
 
+/// Changes below this part of the largest one of their unknown, relative to sigma, are rounding.
+const ROUNDING: f64 = 1e-11;
 /// Rows that are reduced at a time.
 const ROWS: usize = 1024;
 
@@ -18,6 +21,42 @@ pub struct Influence {
     pub changes: DMatrix<f64>,
     /// `O_j' R^-1 (O_j - J B_j)` of every error: a record shows an error of k with a chi-square of k^2 times it.
     pub information: Vec<f64>,
+}
+
+impl Influence {
+    /// Changes of every estimate that has a sigma, per unit of every error in shown units (unknowns x errors); zero
+    /// where the exact class says so, and where nothing but rounding is left. `units` and `sigmas` (shown) are those of
+    /// the unknowns.
+    pub(crate) fn shown(
+        &self,
+        units: &[&'static str],
+        sigmas: &[Option<f64>],
+        model: &OmittedModel,
+        verdicts: Option<&OmittedVerdicts>,
+    ) -> Vec<Vec<f64>> {
+        let none = |c: usize, j: usize| {
+            units[c] != "rad" && verdicts.is_some_and(|v| v.terms[j].class == OmittedClass::NoEffect)
+        };
+        let shown = |c: usize, j: usize| match sigmas[c] {
+            Some(_) if !none(c, j) => {
+                self.changes[(c, j)] * si_per_shown(model.terms()[j].unit) / si_per_shown(units[c])
+            }
+            _ => 0.0,
+        };
+        let m = model.terms().len();
+        let mut out: Vec<Vec<f64>> =
+            (0..units.len()).map(|c| (0..m).map(|j| shown(c, j)).collect()).collect();
+        for j in 0..m {
+            let in_sigmas = |c: usize, x: f64| sigmas[c].map_or(0.0, |s| (x / s).abs());
+            let largest = out.iter().enumerate().map(|(c, row)| in_sigmas(c, row[j])).fold(0.0, f64::max);
+            for (c, row) in out.iter_mut().enumerate() {
+                if in_sigmas(c, row[j]) < ROUNDING * largest {
+                    row[j] = 0.0;
+                }
+            }
+        }
+        out
+    }
 }
 
 /// By the information of all samples and independent priors (shape n, SI units):

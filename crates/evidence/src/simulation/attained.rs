@@ -18,7 +18,8 @@ use super::floor::wide_prior;
 use super::plan::Plan;
 use super::seen::{no_prior, predict};
 use super::start::RunStart;
-use crate::omitted::{self, Bench, Influence, shown_changes};
+use crate::omitted::bench::Bench;
+use crate::omitted::weights::{self, Influence};
 use crate::prediction::Prediction;
 use crate::requirements::{Claim, Miss, Requirements, Worst};
 
@@ -127,7 +128,7 @@ impl Attained {
             return Ok(());
         }
         let influence = self.influence(&model)?;
-        let changes = shown_changes(self, &model, &influence, None);
+        let changes = influence.shown(self.plan.platform.units(), &self.sigmas, &model, None);
         self.totals = bench.totals(&self.sigmas, &changes);
         let units = self.plan.platform.units();
         let size = |j: usize| bench.sizes[j].unwrap_or(0.0);
@@ -142,9 +143,9 @@ impl Attained {
     /// [`SimulationError`].
     pub fn influence(&self, model: &OmittedModel) -> Result<Influence, SimulationError> {
         if self.noisy {
-            omitted::by_filter(&self.plan, model, filter_prior(&self.plan, self.prior.clone())?)
+            weights::by_filter(&self.plan, model, filter_prior(&self.plan, self.prior.clone())?)
         } else {
-            omitted::by_information(&self.plan, model, &self.prior)
+            weights::by_information(&self.plan, model, &self.prior)
         }
     }
 
