@@ -393,6 +393,13 @@ fn verdicts_are_those_of_the_time_that_is_said() {
     }
     let without = "name='m'\nparameters=['a']\n[states]\nx='a'\n[outputs]\ny='x'";
     assert!(!table(without).contains("judged at"));
+    // an output of the second segment alone: there the time is generic, whatever the first begins at
+    let late = model("").replace("'a + b*u'", "'c*(a + b*u)'").replace("y='x'", "y='c*x'")
+        + "\n[constants]\nc=0\n[[segment]]\nconstants={c='0'}\n[[segment]]\nconstants={c='1'}";
+    let a = without_solutions(&read(&late)).expect("judged");
+    let of = |name: &str| a.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
+    assert_eq!(["a", "b"].map(of), [Some(2), Some(2)]);
+    assert!(table(&late).replace("\n      ", " ").contains("in later segments at a generic time"));
     for wrong in ["time = 'later'", "time = [1]", "time = nan"] {
         let error = model_file::read(&model(wrong)).expect_err("refused");
         assert!(error.to_string().contains("expected a number or"), "{wrong}: {error}");
