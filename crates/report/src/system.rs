@@ -14,9 +14,12 @@ use crate::{Answer, latex, resolve, words};
 /// Longest solving expression that a reader is shown.
 const READABLE: usize = 240;
 
-fn explanation(q: &SystemQuantity) -> String {
+fn explanation(q: &SystemQuantity, constrained: bool) -> String {
     match (q.status, q.degree) {
-        (Status::Observable, Some(0)) => format!("from the outputs themselves; {}", solutions(q)),
+        (Status::Observable, Some(0)) => {
+            let from = if constrained { "the outputs and the constraints" } else { "the outputs" };
+            format!("from {from} themselves; {}", solutions(q))
+        }
         (Status::Observable, _) => solutions(q),
         (Status::Inseparable, _) => words::not_told_from(&q.partners),
         (Status::NotExcited, _) => "moves no output".into(),
@@ -111,7 +114,7 @@ impl Answer for SystemAnalysis {
                 Status::NotSeen => format!("not seen up to order {}", self.last_order),
                 status => status.to_string(),
             };
-            row.extend([verdict, words::degree(q.degree), explanation(q)]);
+            row.extend([verdict, words::degree(q.degree), explanation(q, !self.constraints.is_empty())]);
             if !q.description.is_empty() {
                 let last = row.len() - 1;
                 row[last] = format!("{} ({})", row[last], q.description);
