@@ -9,8 +9,8 @@ use obsdeg_ekf::{Covariance, SquareRootInformation};
 use super::columns::OmittedColumns;
 use crate::simulation::{Plan, SimulationError, each_row, si_per_shown};
 
-/// Changes below this part of the largest one of their unknown, relative to sigma, are rounding.
-const ROUNDING: f64 = 1e-11;
+/// Changes below this part of what the samples of an error are, both in sigmas, are rounding.
+const ROUNDING: f64 = 1e-9;
 /// Rows that are reduced at a time.
 const ROWS: usize = 1024;
 
@@ -21,6 +21,8 @@ pub struct Influence {
     pub changes: DMatrix<f64>,
     /// `O_j' R^-1 (O_j - J B_j)` of every error: a record shows an error of k with a chi-square of k^2 times it.
     pub information: Vec<f64>,
+    /// `O_j' R^-1 O_j` of every error: what all its samples are, in sigmas of the noise.
+    pub squares: Vec<f64>,
 }
 
 impl Influence {
@@ -48,9 +50,10 @@ impl Influence {
             (0..units.len()).map(|c| (0..m).map(|j| shown(c, j)).collect()).collect();
         for j in 0..m {
             let in_sigmas = |c: usize, x: f64| sigmas[c].map_or(0.0, |s| (x / s).abs());
-            let largest = out.iter().enumerate().map(|(c, row)| in_sigmas(c, row[j])).fold(0.0, f64::max);
+            // a change is at most as many sigmas as the samples of the error are
+            let most = self.squares[j].sqrt() * si_per_shown(model.terms()[j].unit);
             for (c, row) in out.iter_mut().enumerate() {
-                if in_sigmas(c, row[j]) < ROUNDING * largest {
+                if in_sigmas(c, row[j]) < ROUNDING * most {
                     row[j] = 0.0;
                 }
             }
@@ -71,12 +74,13 @@ pub(crate) fn by_information(
 ) -> Result<Influence, SimulationError> {
     let (n, m) = (plan.unknowns(), model.terms().len());
     if m == 0 {
-        return Ok(Influence { changes: DMatrix::zeros(n, 0), information: Vec::new() });
+        return Ok(Influence { changes: DMatrix::zeros(n, 0), information: Vec::new(), squares: Vec::new() });
     }
     let mut reduced = Reduced {
         root: SquareRootInformation::prior(prior)?.root().clone(),
         right: DMatrix::zeros(n, m),
         information: vec![0.0; m],
+        squares: vec![0.0; m],
     };
     let mut columns = OmittedColumns::new(plan, model);
     let (mut left, mut right) = (Vec::with_capacity((ROWS + 8) * n), Vec::with_capacity((ROWS + 8) * m));
@@ -115,7 +119,7 @@ pub(crate) fn by_information(
     while columns.step()?.is_some() {}
     let start = reduced.solve()?;
     let changes = at_the_end(plan, &(to_end * start), &columns);
-    Ok(Influence { changes, information: reduced.information })
+    Ok(Influence { changes, information: reduced.information, squares: reduced.squares })
 }
 
 /// Weighted rows of the next step with outputs, the last output first.
@@ -140,6 +144,7 @@ struct Reduced {
     root: DMatrix<f64>,
     right: DMatrix<f64>,
     information: Vec<f64>,
+    squares: Vec<f64>,
 }
 
 impl Reduced {
@@ -152,6 +157,9 @@ impl Reduced {
         let mut o = DMatrix::zeros(n + rows, m);
         o.view_mut((0, 0), (n, m)).copy_from(&self.right);
         o.view_mut((n, 0), (rows, m)).copy_from(&DMatrix::from_row_slice(rows, m, right));
+        for (sum, column) in self.squares.iter_mut().zip(o.column_iter()) {
+            *sum += column.rows_range(n..).norm_squared();
+        }
         let qr = j.qr();
         qr.q_tr_mul(&mut o);
         self.root = qr.r();
@@ -209,5 +217,12 @@ pub(crate) fn by_filter(
         state_pass(&plan.stages, &gains, &mut x, measure, on_step)?;
         out.column_mut(j).copy_from_slice(&x);
     }
-    Ok(Influence { changes: at_the_end(plan, &out, &columns), information })
+    let weights = plan.stages.iter().flat_map(|s| {
+        std::iter::repeat_n(s.outputs.iter().map(|o| 1.0 / o.r).collect::<Vec<f64>>(), s.steps).flatten()
+    });
+    let mut squares = vec![0.0; m];
+    for (row, weight) in samples.chunks_exact(m.max(1)).zip(weights) {
+        squares.iter_mut().zip(row).for_each(|(sum, x)| *sum += weight * x * x);
+    }
+    Ok(Influence { changes: at_the_end(plan, &out, &columns), information, squares })
 }
