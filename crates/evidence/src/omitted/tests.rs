@@ -43,7 +43,7 @@ fn is_printed(x: f64, like: &str) -> bool {
 
 /// Section 12 of the method: two computations elsewhere, neither of them this program.
 #[test]
-#[ignore = "open: not run since its limits were corrected"]
+#[ignore = "open: the order of the 24 attitudes of the table is not stated; the first line agrees"]
 fn the_reference_table() {
     type Line<'a> = (Vec<&'a str>, Carry, &'a str, [(&'a str, &'a str); 6]);
     let five = vec!["NUE", "USE", "ENU", "EUS", "DSW"];
@@ -378,7 +378,6 @@ fn largest_difference(schemes: usize, seed: u64) -> f64 {
 }
 
 #[test]
-#[ignore = "open: not run since its limits were corrected"]
 fn sensitivities_are_those_of_brute_force() {
     let found = largest_difference(30, 36);
     assert!(found < 1e-6, "{found:e}");
@@ -426,7 +425,7 @@ fn compared_classes(schemes: usize, seed: u64) -> [usize; 4] {
 }
 
 #[test]
-#[ignore = "open: not run since its limits were corrected"]
+#[ignore = "open: GM_XY under reset carry is visible by ranks, and silent within 1e-9 in floating point"]
 fn classes_are_those_of_ranks() {
     let [no_effect, silent, visible, open] = compared_classes(12, 5);
     assert!(no_effect > 20 && silent > 20 && visible > 100, "{no_effect} {silent} {visible}");
