@@ -1748,6 +1748,10 @@ class FilterReport(Record):
     """Number of linearisations of the whole run: 1 except for the iterated filter."""
     converged: bool
     """True if the linearisations converged."""
+    trusted: bool
+    """False if the sigmas are not to be trusted even where one run is consistent: the small-angle model does not hold for the truth, and
+    the filter is linear, or extended and so linearised before drifts are known.
+    """
 
 
 class Simulation(Shape):
@@ -2239,6 +2243,10 @@ class SystemEvidence(Shape):
     """
     passed: bool
     """True if no check of the model failed."""
+    seen_up_to: int | None
+    """Bound on the order of derivatives up to which an unknown that is not seen was looked for; samples may see it by higher ones, which
+    contradicts nothing. Null where the end is proven.
+    """
     time: float | None
     """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
     known inputs hold the time.
