@@ -223,7 +223,7 @@ fn lead(s: &Simulation) -> Vec<String> {
     out.extend(gimbals::lead(s.gimbals.as_ref()));
     out.push(stated::carry(s.carry).into());
     out.extend(stated::other_carries(&s.other_carries));
-    out.extend(stated::by_default_in_run(&s.conditions));
+    out.extend(stated::by_default_in_run(&s.conditions, &s.quantities));
     out.extend(warning(&s.conditions));
     out
 }
