@@ -37,6 +37,30 @@ fn validators() -> BTreeMap<String, Validator> {
     KINDS.map(of).into()
 }
 
+/// The published schemas (`schemas`) are those that the program prints; `UPDATE_SCHEMAS=1` writes them.
+#[test]
+fn published_schemas_are_what_the_program_prints() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas");
+    for kind in KINDS {
+        let (file, printed) = (folder.join(format!("{kind}.json")), stdout(&run(&["schema", kind])));
+        if std::env::var_os("UPDATE_SCHEMAS").is_some() {
+            std::fs::write(&file, &printed).expect("written");
+        }
+        let published = std::fs::read_to_string(&file).expect("a published schema");
+        // the first line that differs: a schema is too long to be shown
+        let differs = published.lines().zip(printed.lines()).position(|(a, b)| a != b);
+        assert!(published == printed, "{kind}: line {differs:?}; UPDATE_SCHEMAS=1 writes the file again");
+    }
+    let mut files: Vec<String> = std::fs::read_dir(folder)
+        .expect("a folder")
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    files.sort();
+    let mut expected: Vec<String> = KINDS.iter().map(|kind| format!("{kind}.json")).collect();
+    expected.sort();
+    assert_eq!(files, expected);
+}
+
 fn check(validators: &BTreeMap<String, Validator>, name: &str, value: &Value, what: &str) {
     let errors: Vec<String> =
         validators[name].iter_errors(value).map(|e| format!("{}: {e}", e.instance_path())).collect();

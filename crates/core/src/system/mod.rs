@@ -11,6 +11,7 @@ mod canonical;
 pub(crate) mod constraints;
 pub(crate) mod dag;
 mod elimination;
+mod evaluation;
 mod fibre;
 mod formula;
 mod functions;
