@@ -1559,7 +1559,8 @@ class ConditionsReport(Record):
     """Factor on the true drifts and their priors, dimensionless."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
-    dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values and other_priors where they are stated for some of the
+    unknowns only.
     """
 
 
