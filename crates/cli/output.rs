@@ -54,7 +54,7 @@ pub(crate) struct Target {
     #[arg(long)]
     pub(crate) force: bool,
 
-    /// Say nothing on stderr but errors
+    /// Say nothing on stderr but errors and what is missing in the answer
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }

@@ -65,6 +65,10 @@ fn help_is_in_lines() {
         }
     }
     assert!(text(&["analyze", "-h"]).contains("left out: generic"));
+    // verdicts of a report are generic without one
+    assert!(text(&["report", "-h"]).contains("28.2 for numbers"));
+    // a held engine is named on stderr, quiet or not (tests/symbolic.rs)
+    assert!(text(&["analyze", "-h"]).contains("nothing on stderr but errors and what is missing"));
 }
 
 /// A model of another tool: the Python package reads it, and the line to type is there; a file of that name

@@ -34,6 +34,7 @@ mod remedies;
 mod report;
 mod report_page;
 mod rotation;
+mod run_sentences;
 mod schemas;
 mod scheme_schema;
 mod schemes;

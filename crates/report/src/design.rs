@@ -63,7 +63,7 @@ fn lead(d: &Design) -> Vec<String> {
     let mut out = Vec::new();
     if let (Some(s), Some(first)) = (&d.search, d.found.first()) {
         let best = if s.proven && !first.refined && first.dwells_s.is_empty() {
-            "Proven best"
+            "Proven best of these candidates"
         } else {
             "Best found"
         };
@@ -71,7 +71,9 @@ fn lead(d: &Design) -> Vec<String> {
         let sigma = sigma.map_or_else(String::new, |(sigma, name)| {
             format!(": worst sigma {}", stated::sigma_of(name, sigma))
         });
-        let by = format!("{best} by the criterion {}", s.criterion);
+        // a scheme with a smaller criterion and a larger worst degree comes later
+        let first_by = if s.degree_floor.is_some() { "worst degree, then " } else { "" };
+        let by = format!("{best} by {first_by}the criterion {}", s.criterion);
         out.push(format!("{by}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
         if first.requirements.any_missed() {
             let margin =

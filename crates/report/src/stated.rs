@@ -209,8 +209,15 @@ pub(crate) fn by_default_in_run(c: &ConditionsReport) -> Option<String> {
         "step_s" => format!("steps of {} s", c.step_s),
         "dwell_s" => "1000 s at a position".into(),
         "drift_noise" => format!("random drift {}", c.drift_noise),
-        "values" => "the paper's drifts (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g)".into(),
-        "priors" => "priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)".into(),
+        "values" => {
+            format!("the paper's drifts{} (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g)", scaled(c))
+        }
+        "priors" => match c.drift_scale == 1.0 {
+            true => "priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)".into(),
+            false => {
+                format!("priors (psi 0.1 deg; of drifts{}: D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)", scaled(c))
+            }
+        },
         "azimuth_noise_deg" => "noise of the azimuth 0.001 deg".into(),
         other => other.to_string(),
     };
@@ -223,11 +230,16 @@ pub(crate) fn drifts_by_default(c: &ConditionsReport) -> bool {
     c.by_default.iter().any(|key| key == "values")
 }
 
-/// The drifts of a run: those that are stated, or the paper's.
-pub(crate) fn drifts(c: &ConditionsReport) -> &'static str {
+/// ` times 0.001`: the factor on drifts; empty where it is one.
+fn scaled(c: &ConditionsReport) -> String {
+    if c.drift_scale == 1.0 { String::new() } else { format!(" times {}", c.drift_scale) }
+}
+
+/// The drifts of a run: those that are stated, or the paper's, with the factor on them.
+pub(crate) fn drifts(c: &ConditionsReport) -> String {
     match drifts_by_default(c) {
-        true => "the drifts of the paper (11 to 13 deg/h; none are stated)",
-        false => "these drifts",
+        true => format!("the drifts of the paper{} (11 to 13 deg/h; none are stated)", scaled(c)),
+        false => "these drifts".into(),
     }
 }
 

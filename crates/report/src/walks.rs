@@ -60,8 +60,12 @@ impl Answer for Walks {
                 "{k} positions that make every required coefficient observable, by turns of at most {} degrees",
                 self.most_turn_deg
             ),
-            None => format!(
+            None if !self.never.is_empty() => format!(
                 "No walk by turns of at most {} degrees makes every required coefficient observable",
+                self.most_turn_deg
+            ),
+            None => format!(
+                "No walk by turns of at most {} degrees was found that makes every required coefficient observable",
                 self.most_turn_deg
             ),
         };

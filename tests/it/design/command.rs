@@ -25,7 +25,7 @@ fn an_answer_says_what_it_rests_on() {
         "half turns are tried in both directions",
         "NUE (-N) NDW (-N) NUE",
         "Best schemes (sigma: information of all samples, no prior, no random drift; psi at the end)",
-        "Proven best by the criterion worst: NUE (-N) NDW (-N) NUE: worst sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
+        "Proven best of these candidates by worst degree, then the criterion worst: NUE (-N) NDW (-N) NUE: worst sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
         "inertial carry: psi goes on in geographic axes from position to position",
         "under the other carries, platform (repositioning at once): not every coefficient is determined",
         "not stated, chosen by the program: latitude 28.2 deg\n",

@@ -308,6 +308,9 @@ pub struct FilterReport {
     pub passes: usize,
     /// True if the linearisations converged.
     pub converged: bool,
+    /// False if the sigmas are not to be trusted even where one run is consistent: the small-angle model does
+    /// not hold for the truth, and the filter is linear, or extended and so linearised before drifts are known.
+    pub trusted: bool,
 }
 
 /// Reason for the choice of a filter.

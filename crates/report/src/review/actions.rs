@@ -11,6 +11,7 @@ use obsdeg_evidence::requirements::Miss;
 use super::fewest_of_all;
 use crate::calibration::is_clock;
 use crate::document::number;
+use crate::simulation::NOT_TRUSTED;
 use crate::{resolve, stated, words};
 
 /// Advice where a run is not consistent.
@@ -56,6 +57,8 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     }
     if !s.simulation.consistency.consistent {
         out.push(INCONSISTENT.into());
+    } else if !s.simulation.filter.trusted {
+        out.push(format!("{NOT_TRUSTED}."));
     }
     match &s.evidence {
         Ok(e) if !e.passed => out.push(FAILING.into()),
