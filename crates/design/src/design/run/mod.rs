@@ -6,6 +6,5 @@ pub(crate) mod driver;
 pub(crate) mod free;
 pub(crate) mod part;
 pub(crate) mod prepared;
-mod resolved;
 pub(crate) mod task;
 pub(crate) mod winner;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::{Assignment, concerns};
-use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, angles_text, c_n_f64};
+use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, angles_text, c_n_f64};
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
 use rayon::prelude::*;
@@ -20,11 +20,8 @@ use crate::design::observable::symmetry::Symmetry;
 use crate::design::polish::{divide, refine};
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
-use crate::design::request::limits::EXHAUSTIVE;
-use crate::design::request::options::DesignOptions;
-use crate::design::run::resolved::{
-    by_orbits, check, criterion, of_all_positions, required, uses_requirements,
-};
+use crate::design::request::limits::{EXHAUSTIVE, MAX_CANDIDATES};
+use crate::design::request::options::{CriterionName, DesignOptions};
 use crate::design::run::winner;
 use crate::design::search::best::Best;
 use crate::design::search::constraints::Constraints;
@@ -89,26 +86,88 @@ impl<'a> Task<'a> {
         options: &'a DesignOptions,
         candidates: Candidates,
     ) -> Result<Self, DesignError> {
-        check(base, conditions, options, &candidates)?;
+        conditions.validate()?;
+        let found = candidates.attitudes.len();
+        if !(1..=MAX_CANDIDATES).contains(&found) {
+            return Err(DesignError::Candidates { found });
+        }
+        let counts = options.positions.iter().chain(&options.front);
+        if let Some(&found) = counts.into_iter().find(|k| !(1..=100).contains(*k)) {
+            return Err(DesignError::Positions { found });
+        }
+        if base.unknowns == Unknowns::Drift {
+            return Err(DesignError::Drift);
+        }
+        for (what, limit) in [("a total time", options.total_s), ("a longest slew", options.slew_s)] {
+            if let Some(found) = limit.filter(|l| !(l.is_finite() && *l > 0.0)) {
+                return Err(DesignError::Limit { what, found });
+            }
+        }
+        if base.path == Some(Path::Gimbals) && conditions.slew_rate_deg_s.is_some() {
+            return Err(DesignError::GimbalPath);
+        }
+        let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
+        if let Some((name, _)) = generic {
+            return Err(DesignError::GenericAngle { name: name.into() });
+        }
         let positions = Scheme::of_angles(candidates.attitudes.iter().take(1).cloned()).positions;
         let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
         let first = platform.names().len() - platform.coefficients();
-        let (required, caps) = required(&platform.names()[first..], options)?;
-        of_all_positions(conditions)?;
+        let all: Vec<(String, usize)> = platform.names()[first..].iter().cloned().zip(0..).collect();
+        let named = |asked: &String| {
+            let known = all.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(", ");
+            let found: Vec<usize> = all.iter().filter(|c| concerns(asked, &c.0)).map(|c| c.1).collect();
+            let unknown = DesignError::UnknownName { found: asked.clone(), known };
+            if found.is_empty() { Err(unknown) } else { Ok(found) }
+        };
+        let mut required = all.clone();
+        if !options.required.is_empty() {
+            let asked = options.required.iter().map(named).collect::<Result<Vec<_>, _>>()?.concat();
+            required.retain(|c| asked.contains(&c.1));
+        }
+        let mut caps = vec![usize::MAX; required.len()];
+        for (name, cap) in &options.degree_caps {
+            let concerned = name.as_ref().map(named).transpose()?;
+            for (slot, c) in caps.iter_mut().zip(&required) {
+                if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
+                    *slot = *cap;
+                }
+            }
+        }
+        for (what, list) in
+            [("requirement", &conditions.requirements[..]), ("prior", conditions.stated_priors())]
+        {
+            if let Some(of_one) = list.iter().find(|a| a.name.contains('@')) {
+                return Err(DesignError::OnePosition { what, found: of_one.name.clone() });
+            }
+        }
         let priors = resolve(PRIOR, &platform, conditions.stated_priors(), f64::INFINITY)?;
         let limits_of = resolve("required sigma", &platform, &conditions.requirements, f64::INFINITY)?;
         let limits = Limits {
             coefficients: required.iter().map(|c| limits_of[first + c.1]).collect(),
             psi: [0, 1, 2].map(|k| limits_of[k]),
         };
-        let criterion = criterion(options, &limits)?;
+        let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
+        if uses_requirements && limits.coefficients.iter().chain(&limits.psi).all(|l| l.is_infinite()) {
+            let what = if options.meet { "--meet" } else { "--criterion margin" };
+            return Err(DesignError::NoRequirement { what });
+        }
+        let criterion = match options.criterion {
+            CriterionName::Worst => Criterion::Worst,
+            CriterionName::A => Criterion::A,
+            CriterionName::D => Criterion::D,
+            CriterionName::E => Criterion::E,
+            CriterionName::Margin => Criterion::Margin(limits.clone()),
+        };
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let walks = is_walk(base);
         // of walks these say which attitudes are the same
         let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
         let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
+        // an attitude counts once
+        let repeated = rows.repeated();
+        let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
         let place = |c: usize| required.iter().position(|r| r.1 == c);
-        let uses_requirements = uses_requirements(options);
         // a turn of the platform axes renames psi as well
         let turned = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
             && priors[..3].iter().all(|p| *p == priors[0]);
@@ -120,7 +179,11 @@ impl<'a> Task<'a> {
             }
             _ => false,
         };
-        let order = by_orbits(&rows, &same);
+        let symmetry = rows.select(&kept).symmetry(&same);
+        // orbit by orbit: a set that begins with a representative stands for all its images
+        let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
+        order.sort_unstable();
+        let order: Vec<usize> = order.into_iter().map(|(_, c)| c).collect();
         let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
         let symmetry = rows.symmetry(&same);
         let constraints = Constraints {
