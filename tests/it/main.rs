@@ -43,6 +43,7 @@ mod sentences;
 mod simulation;
 mod solutions;
 mod structure;
+mod validator;
 mod whole_platform;
 mod workbench;
 mod workbench_page;

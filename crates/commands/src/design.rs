@@ -297,6 +297,10 @@ pub struct Walked {
 }
 
 impl Answer for Searched {
+    fn layout(&self) -> Option<&str> {
+        self.found.layout()
+    }
+
     fn document(&self) -> Document {
         self.found.document()
     }
@@ -311,6 +315,10 @@ impl Answer for Searched {
 }
 
 impl Answer for Walked {
+    fn layout(&self) -> Option<&str> {
+        self.found.layout()
+    }
+
     fn document(&self) -> Document {
         self.found.document()
     }

@@ -483,6 +483,10 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
 }
 
 impl Answer for Design {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         if let Some(s) = &self.search {

@@ -229,6 +229,10 @@ fn lead(s: &Simulation) -> Vec<String> {
 }
 
 impl Answer for Simulation {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut columns = vec![left("unknown"), left("unit")];
         columns.extend(words::ESTIMATE.map(right));
