@@ -15,6 +15,7 @@ mod design;
 mod engines;
 mod examples;
 mod expressions;
+mod ferraris;
 #[cfg(unix)]
 mod files;
 mod formulas;
