@@ -20,6 +20,7 @@
 pub mod audit;
 pub mod compare;
 pub mod crosscheck;
+pub mod omitted;
 pub mod prediction;
 pub mod requirements;
 pub mod simulation;

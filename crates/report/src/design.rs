@@ -9,7 +9,7 @@ use crate::document::{Block, Document, left, number, right};
 use crate::excess::Excess;
 use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
-use crate::{Answer, gimbals, stated, words};
+use crate::{Answer, gimbals, omitted, stated, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -75,6 +75,14 @@ fn lead(d: &Design) -> Vec<String> {
         let first_by = if s.degree_floor.is_some() { "worst degree, then " } else { "" };
         let by = format!("{best} by {first_by}the criterion {}", s.criterion);
         out.push(format!("{by}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
+        let met = first.requirements.all_met();
+        out.extend(d.omitted.as_ref().and_then(|o| omitted::lead(o, first.requirements.with_bench, met)));
+        out.extend(s.ranked.map(|n| {
+            format!(
+                "With the bench, the {n} schemes of least sigma were ranked by their total uncertainty: no bound and no proof counts, and a \
+                 scheme with a larger sigma may have a smaller total."
+            )
+        }));
         if first.requirements.any_missed() {
             let margin =
                 if s.criterion == "margin" { "" } else { "--criterion margin seeks the largest margin; " };
@@ -496,6 +504,7 @@ impl Answer for Design {
             blocks.push(table(&heading, &self.found).without(left_out));
             blocks.extend(self.found.first().map(gimbal_angles));
             blocks.extend(gimbals::block(self.gimbals.as_ref()));
+            blocks.extend(self.omitted.iter().flat_map(|o| omitted::blocks(o, " by the first scheme")));
             blocks.push(Block::list("How", how(self, s)));
             blocks.push(Block::list("How good the best can be", bound(self, s)));
             blocks.push(

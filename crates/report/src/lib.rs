@@ -27,6 +27,7 @@ mod gimbals;
 mod html;
 mod latex;
 mod markdown;
+mod omitted;
 mod panels;
 #[cfg(feature = "pdf")]
 mod pdf;

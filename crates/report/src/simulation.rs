@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, gimbals, stated, words};
+use crate::{Answer, gimbals, omitted, stated, words};
 
 /// What a run assumes, a sentence each.
 pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> Vec<String> {
@@ -222,6 +222,7 @@ fn lead(s: &Simulation) -> Vec<String> {
     }
     out.extend(gimbals::lead(s.gimbals.as_ref()));
     out.push(stated::carry(s.carry).into());
+    out.extend(omitted::lead(&s.omitted, s.requirements.with_bench, s.requirements.all_met()));
     out.extend(stated::other_carries(&s.other_carries));
     out.extend(stated::by_default_in_run(&s.conditions, &s.quantities));
     out.extend(warning(&s.conditions));
@@ -259,6 +260,7 @@ impl Answer for Simulation {
             blocks.push(table("Combinations (psi: of the end)", &self.combinations));
         }
         blocks.extend(Block::list_if_any("Known from the prior only: whose", priors(&self.quantities)));
+        blocks.extend(omitted::blocks(&self.omitted, ""));
         blocks.push(Block::list("Filter", filter(&self.filter)));
         if self.filter.kind != FilterKind::Linear {
             let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);

@@ -61,6 +61,7 @@ pub(crate) fn requirements(r: &Requirements) -> String {
         true => String::new(),
         false => format!("; by the stated prior alone: {}", names(r.on_prior.iter().map(String::as_str))),
     };
+    let basis = if r.with_bench { format!("{basis}with the bench ") } else { basis.into() };
     if r.all_met() {
         return format!("{basis}every requirement is met, {} of {}{margin}{prior}", r.met, r.stated);
     }
@@ -168,7 +169,8 @@ pub(crate) fn predicted(m: &MeasurementReport) -> String {
         _ => "the random drift that is stated",
     };
     let prior = if m.prior.is_some() { "the priors that are stated" } else { "no prior" };
-    format!("sigma: information of all samples, {prior}, {drift}; psi at the end")
+    let bench = if m.bench.is_some() { "; worst sigma: total uncertainty with the bench" } else { "" };
+    format!("sigma: information of all samples, {prior}, {drift}; psi at the end{bench}")
 }
 
 /// The same of several schemes, whose conditions may differ.
@@ -281,6 +283,9 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
     out.extend(m.accelerometer_bias.as_ref().map(accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
     out.extend(m.gyro_noise.as_ref().map(gyro_noise));
+    out.extend(
+        m.bench.as_ref().map(|bench| format!("bench {bench} (1 sigma; ug, ppm, arcsec, ... as stated)")),
+    );
     out.extend(m.prior.as_ref().map(|prior| format!("prior {prior} (deg, deg/h, ... as stated)")));
     out
 }

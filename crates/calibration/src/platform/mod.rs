@@ -14,6 +14,7 @@ mod offset;
 mod reading;
 mod residuals;
 mod run;
+mod suspects;
 mod timeline;
 
 use std::cell::Cell;

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use obsdeg_core::model::{Carry, Geometry, GimbalReport};
+use obsdeg_evidence::omitted::OmittedEffects;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{MeasurementReport, OtherCarry};
 
@@ -47,6 +48,9 @@ pub struct Design {
     /// asked for.
     #[serde(default)]
     pub not_judged: Vec<String>,
+    /// Effect of what the first scheme does not estimate, by the weights of its sigmas; null without a search.
+    #[serde(default)]
+    pub omitted: Option<OmittedEffects>,
     /// Outcome of the first scheme under the other carries; empty if no scheme was searched.
     #[serde(default)]
     pub other_carries: Vec<OtherCarry>,
@@ -134,6 +138,10 @@ pub struct SearchReport {
     pub degree_floor: Option<usize>,
     /// Constraints of the search, in words.
     pub constraints: Vec<String>,
+    /// Number of schemes of least sigma that were ranked by total uncertainty with the bench; left out without a
+    /// bench.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ranked: Option<usize>,
     /// Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial
     /// carry, and where the noise of Z is correlated, information is no sum over positions.
     pub certificate: Option<Certificate>,
@@ -265,7 +273,7 @@ pub struct Found {
     pub dwells_s: Vec<f64>,
     /// Total time with turns, in s.
     pub total_s: f64,
-    /// Criterion of the scheme, in the unit of `unit`; for margin the largest sigma over its requirement, psi
+    /// Criterion of the scheme, in the unit of `unit`, with a bench of its total uncertainties; for margin the largest sigma over its requirement, psi
     /// included where it counts.
     pub value: f64,
     /// Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if

@@ -13,6 +13,7 @@ use super::consistency::{CREDIBLE, Consistency};
 use super::datasheet::GyroNoise;
 use super::floor::NoiseFloor;
 pub use super::validity::Validity;
+use crate::omitted::OmittedEffects;
 use crate::requirements::{Miss, Requirements, meets};
 
 /// Name and version of the JSON layout.
@@ -42,6 +43,8 @@ pub struct Simulation {
     pub run: RunRequirements,
     /// Outcome of the same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
+    /// Effect of what the scheme does not estimate, by the weights of the predicted sigmas.
+    pub omitted: OmittedEffects,
     /// Consistency of errors and innovations with the filter's covariances.
     pub consistency: Consistency,
     /// Filter of the run, and the reason for it.
@@ -192,6 +195,10 @@ pub struct MeasurementReport {
     /// Priors that are stated, as 1 sigma in the units of the unknowns; null if none are.
     #[serde(default)]
     pub prior: Option<String>,
+    /// Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out where
+    /// none is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg.
     #[serde(default)]
@@ -213,6 +220,7 @@ impl MeasurementReport {
             drift_noise: conditions.as_stated().drift_noise_in_words(),
             gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
             prior: conditions.stated_prior_in_words(),
+            bench: conditions.bench_in_words(),
             by_default: chosen(scheme, conditions),
         }
     }

@@ -29,11 +29,13 @@ mod validity;
 
 pub use answer::*;
 pub use attained::Attained;
+pub(crate) use batch::each_row;
 pub use batch::{Batch, batch, diffuse_prior};
 pub use biases::{Bias, Sensor};
 pub use carries::{OtherCarry, other_carries};
 pub use conditions::{
-    Conditions, PRIOR, Stated, general_first, is_rate, latitude_of, resolve, shown_unit, si_per_shown,
+    Conditions, PRIOR, Stated, general_first, is_rate, latitude_of, required_sigmas, resolve, shown_unit,
+    si_per_shown,
 };
 pub use consistency::{Consistency, Doubt};
 pub use datasheet::GyroNoise;

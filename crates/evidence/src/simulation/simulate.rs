@@ -18,6 +18,7 @@ use super::record::{Record, run};
 use super::reports::{conditions_report, timeline_report};
 use super::seen::predict_run;
 use super::start::RunStart;
+use crate::omitted::omitted_effects;
 use crate::prediction::{PredictedCombination, Prediction};
 use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
 
@@ -90,6 +91,7 @@ fn summary(
         requirements: attained.requirements(conditions)?,
         run: run_requirements(plan, conditions, &quantities, record)?,
         other_carries: other_carries(scheme, conditions, seed)?,
+        omitted: omitted_effects(&attained, conditions, seed)?,
         quantities,
         combinations,
         consistency,

@@ -248,6 +248,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             "Calibrate each record alone: the coefficients changed between the runs, or sigmas are too small.".into()
         }
         Finding::SecondPath { .. } => "Do not use the estimates: two ways to compute them do not agree.".into(),
+        Finding::Suspect { errors, .. } => format!(
+            "Add the error to the unknowns: {} would explain the residuals (section Not estimated of the calibration).",
+            errors.join(" with ")
+        ),
         Finding::Known { .. } => {
             "Calibrate without --prior: the earlier knowledge does not agree with these records.".into()
         }

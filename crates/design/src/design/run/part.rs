@@ -74,6 +74,7 @@ fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BT
         measured_azimuth,
         simulation,
         requirements,
+        bench: bench_of_scheme,
         gimbals,
         path,
     } = base;
@@ -117,9 +118,10 @@ fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BT
         estimates,
         priors,
         requirements: required_sigmas,
+        bench,
         stated,
     } = conditions;
-    let of: [(&str, &dyn std::fmt::Debug); 46] = [
+    let of: [(&str, &dyn std::fmt::Debug); 48] = [
         ("version", &env!("CARGO_PKG_VERSION")),
         ("carry", carry),
         ("latitude", latitude),
@@ -128,6 +130,7 @@ fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BT
         ("measured azimuth", measured_azimuth),
         ("settings of the scheme", simulation),
         ("requirements of the scheme", requirements),
+        ("bench of the scheme", bench_of_scheme),
         ("gimbals", gimbals),
         ("path", path),
         ("candidates", &candidates.names),
@@ -165,6 +168,7 @@ fn inputs(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> BT
         ("estimates", estimates),
         ("prior", priors),
         ("requirement", required_sigmas),
+        ("bench", bench),
         ("stated conditions", stated),
     ];
     of.into_iter().map(|(name, value)| (name.into(), format!("{value:?}"))).collect()

@@ -17,6 +17,9 @@ use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
 
+/// Schemes of least sigma that a search with a bench keeps, to be ranked by their total uncertainty.
+const RANKED: usize = 100;
+
 /// A search that can begin: its task, and what evaluates sequences.
 pub(crate) struct Prepared<'a> {
     pub(crate) task: Task<'a>,
@@ -60,7 +63,10 @@ impl<'a> Prepared<'a> {
             evaluator: &self.evaluator,
             criterion: &self.task.criterion,
             constraints: &self.task.constraints,
-            keep: self.task.options.keep,
+            keep: match self.task.has_bench() {
+                true => self.task.options.keep.max(RANKED),
+                false => self.task.options.keep,
+            },
             floor: self.degrees.iter().flatten().max().copied().unwrap_or(0),
             progress,
         }

@@ -99,6 +99,7 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             ..base.simulation.clone()
         },
         requirements: by_name(&conditions.requirements),
+        bench: by_name(&conditions.bench),
         ..base.clone()
     })
 }
