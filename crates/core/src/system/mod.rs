@@ -28,6 +28,7 @@ mod solutions;
 pub(crate) mod symmetry;
 pub(crate) mod taylor;
 pub(crate) mod values;
+pub(crate) mod work;
 
 pub use answer::*;
 pub use dag::{Dag, DagError, Op};
@@ -37,4 +38,5 @@ pub use model::{
     Nominal, Place, PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
 };
 pub use rows::{Layout, Unknown};
+pub use work::WorkLimit;
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
