@@ -37,7 +37,8 @@ fn within_limit(bytes: &[u8]) -> Result<()> {
     {
         use rustix::process::{Resource, getrlimit};
         if let Some(limit) = getrlimit(Resource::Fsize).current.filter(|limit| bytes.len() as u64 > *limit) {
-            let message = format!("{} bytes; the system allows {limit} bytes of a file (ulimit -f)", bytes.len());
+            let message =
+                format!("{} bytes; the system allows {limit} bytes of a file (ulimit -f)", bytes.len());
             return Err(Error::new(ErrorKind::FileTooLarge, message));
         }
     }

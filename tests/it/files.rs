@@ -232,8 +232,7 @@ fn interruptions_leave_nothing(count: u64) {
     let mut random = obsdeg_exact::SplitMix64::new(37);
     let mut interrupted = 0;
     for i in 0..count {
-        let mut child =
-            command(i).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
+        let mut child = command(i).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
         // most of them while files are written
         let part = 0.5 + 0.6 * random.below(1000) as f64 / 1000.0;
         std::thread::sleep(whole.mul_f64(part));

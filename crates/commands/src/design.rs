@@ -672,7 +672,9 @@ fn scheme_file(
     let proven = found.search.as_ref().is_some_and(|s| s.proven) && as_searched;
     let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| as_searched);
     let proven = match (proven, certificate) {
-        (true, _) if found.search.as_ref().and_then(|s| s.parts.as_ref()).is_some_and(|p| !p.is_repeated()) => {
+        (true, _)
+            if found.search.as_ref().and_then(|s| s.parts.as_ref()).is_some_and(|p| !p.is_repeated()) =>
+        {
             "proven best (if the parts were searched as they state)".into()
         }
         (true, _) => "proven best".into(),

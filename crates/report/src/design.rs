@@ -105,7 +105,10 @@ fn parts(p: &PartsReport) -> String {
     let again = match (p.searched_again, p.is_repeated()) {
         (_, true) => format!("all {} blocks of starts were searched again with the same result", p.blocks),
         (0, _) => format!("no block of starts of {} was searched again (--check N)", p.blocks),
-        (n, _) => format!("{n} of {} blocks of starts, chosen at random, were searched again with the same result", p.blocks),
+        (n, _) => format!(
+            "{n} of {} blocks of starts, chosen at random, were searched again with the same result",
+            p.blocks
+        ),
     };
     format!(
         "put together from {} parts, searched by version {}: what they list was evaluated again, their starts and counts add up; {again}",
@@ -197,8 +200,7 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     });
     let mut out = vec![if s.proven {
         let unrefined = searched(d);
-        let if_searched =
-            by_parts(s).map_or("", |_| ", if the parts were searched as they state");
+        let if_searched = by_parts(s).map_or("", |_| ", if the parts were searched as they state");
         format!(
             "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all sequences of {} of them within the constraints none has a \
              smaller worst degree, or the same and a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left open",

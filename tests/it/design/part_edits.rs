@@ -173,7 +173,8 @@ fn every_edit_is_refused_or_changes_nothing(edits: u64) {
     }
     println!("{edits} edits: refused {refused:?} (digest as it was, computed again)");
     let half = edits as usize / 2;
-    assert!(refused[0] > half * 9 / 10 && refused[1] > half / 2, "{refused:?}");
+    // an edit of a list may leave it as it is
+    assert!(refused[0] > half * 2 / 3 && refused[1] > half / 2, "{refused:?}");
 }
 
 #[test]

@@ -38,5 +38,5 @@ pub use model::{
     Nominal, Place, PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
 };
 pub use rows::{Layout, Unknown};
-pub use work::WorkLimit;
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
+pub use work::WorkLimit;

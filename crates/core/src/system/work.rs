@@ -177,7 +177,12 @@ mod tests {
         assert!(!work.spend(1, &large));
         assert_eq!(work.spent(), 400_000_000 + 10 + 28);
         let message = work.refused().expect("refused").to_string();
-        assert!(message.contains("order 1 take 1.2e9 operations, beyond --work-limit 1000 (1.0e9 operations, 5.0e8 bytes)"), "{message}");
+        assert!(
+            message.contains(
+                "order 1 take 1.2e9 operations, beyond --work-limit 1000 (1.0e9 operations, 5.0e8 bytes)"
+            ),
+            "{message}"
+        );
         let work = Work::new(WorkLimit(1000));
         assert!(!work.spend(9, &Cost { fixed: 10_000_000, ..cost(false) }));
         let message = work.refused().expect("refused").to_string();

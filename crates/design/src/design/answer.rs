@@ -147,7 +147,7 @@ pub struct SearchReport {
 /// starts and counts add up to the whole.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PartsReport {
-    /// Number of parts.
+    /// Number of parts put together.
     pub parts: usize,
     /// Versions of the program that searched the parts, each once.
     pub versions: Vec<String>,

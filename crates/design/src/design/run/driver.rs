@@ -34,8 +34,7 @@ pub fn design(
 }
 
 /// What an exhaustive search found in parts, and these.
-pub(crate) type Elsewhere<'a> =
-    &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
+pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
 
 /// The answer; `elsewhere` instead of a search.
 pub(crate) fn answered(

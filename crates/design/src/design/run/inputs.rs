@@ -226,4 +226,3 @@ pub(crate) fn differing(found: &BTreeMap<String, String>, expected: &BTreeMap<St
     let listed: Vec<String> = differs.collect();
     if listed.is_empty() { "its digest is not that of these inputs".into() } else { listed.join("; ") }
 }
-

@@ -167,12 +167,7 @@ impl<'a> Whole<'a> {
     }
 
     /// Why the search of these starts does not list a sequence with this score.
-    fn why_not(
-        &self,
-        scored: &Scored,
-        begins: &BTreeSet<&[Stop]>,
-        level: &SearchLevel,
-    ) -> Option<String> {
+    fn why_not(&self, scored: &Scored, begins: &BTreeSet<&[Stop]>, level: &SearchLevel) -> Option<String> {
         let (sequence, search) = (&scored.sequence, &self.search);
         let evaluator = search.evaluator;
         if sequence.len() != self.k {

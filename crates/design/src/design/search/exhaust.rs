@@ -258,12 +258,12 @@ impl Search<'_> {
         let longer = |start: &[Stop]| -> Vec<Vec<Stop>> {
             let last = start.last().map(|s| s.candidate);
             let least = if ordered { 0 } else { last.unwrap_or(0) };
-            let stops =
-                (least..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).collect::<Vec<_>>();
+            let stops = (least..self.rows.candidates())
+                .flat_map(|c| self.evaluator.stops(last, c))
+                .collect::<Vec<_>>();
             stops.into_iter().map(|stop| [start, &[stop]].concat()).collect()
         };
-        let firsts: Vec<Vec<Stop>> =
-            symmetry.representatives().into_iter().map(|a| vec![a.into()]).collect();
+        let firsts: Vec<Vec<Stop>> = symmetry.representatives().into_iter().map(|a| vec![a.into()]).collect();
         let depth = self.depth(firsts.len(), k);
         (1..depth).fold(firsts, |starts, _| starts.iter().flat_map(|start| longer(start)).collect())
     }
