@@ -371,7 +371,8 @@ def design(
         conditions: a scheme whose conditions hold; as many positions as it has are searched where no number is asked for.
         part: (I, N): only part I of N of all sequences; the answer is a :class:`Part`.
         resume: that part as far as it came.
-        merge: the parts, put together to the answer of the whole; they know the options of their search.
+        merge: the parts, put together to the answer of the whole; they know the options of their search. What they list is evaluated again;
+            that they were searched as they state is believed, but for ``check=N`` blocks that are searched again.
         progress: hears how far the search is; ``True`` for a bar of tqdm. Where it returns False, and on a keyboard interrupt, the search ends
             with the best so far.
         options: the others of ``obsdeg design``.

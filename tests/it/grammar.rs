@@ -76,6 +76,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "table" => &["quantities", "answer", "x"],
         "order" => &["0", "1", "5", "40", "-1", "x"],
         "count-limit" => &["0", "1", "18446744073709551615", "-1"],
+        "work-limit" => &["1", "700", "0", "1000000001", "x"],
+        "check" => &["0", "1", "-1", "x"],
         "solutions" => &["off", "maybe"],
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
@@ -257,7 +259,7 @@ fn record() -> String {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 12] = [
+    const TAKEN: [&str; 13] = [
         "ascii",
         "count-limit",
         "engine-wait",
@@ -270,6 +272,7 @@ fn a_model_refuses_what_is_about_schemes() {
         "solutions",
         "symbolic-limit",
         "table",
+        "work-limit",
     ];
     let folder = folder();
     for command in ["analyze", "simulate", "crosscheck"] {

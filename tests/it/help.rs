@@ -5,8 +5,8 @@ use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 /// The commands, with the most lines that `-h` may have.
 const COMMANDS: [(&str, usize); 12] = [
     ("analyze", 45),
-    ("simulate", 62),
-    ("crosscheck", 67),
+    ("simulate", 64),
+    ("crosscheck", 69),
     ("calibrate", 48),
     ("compare", 46),
     ("design", 68),

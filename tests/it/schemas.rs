@@ -30,7 +30,7 @@ const KINDS: [&str; 15] = [
 fn schemas() -> BTreeMap<String, Value> {
     let of = |kind: &str| {
         let schema = json(&["schema", kind]);
-        let version = if ["comparison", "design", "simulation"].contains(&kind) { 2 } else { 1 };
+        let version = if ["comparison", "design", "part", "simulation"].contains(&kind) { 2 } else { 1 };
         assert_eq!(schema["$id"], format!("urn:obsdeg:{kind}:{version}"));
         (format!("obsdeg.{kind}/{version}"), schema)
     };

@@ -41,6 +41,8 @@ pub struct Judgement {
     /// Functions whose values are proven to be independent of each other, so that random ones stand for them; `None` where true values
     /// were taken.
     pub independent_functions: Option<usize>,
+    /// Operations of the verdicts, at both points.
+    pub work: u64,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
 }
@@ -114,6 +116,8 @@ pub(crate) struct At<S: Values> {
     closed: bool,
     gap: Gap,
     steps: Steps<S>,
+    /// Operations.
+    work: u64,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
@@ -178,6 +182,7 @@ pub(crate) fn climb_at<S: Values>(
         }
         steps.add(order, basis);
     });
+    rows.work().refused().map_or(Ok(()), Err)?;
     let combinations = found
         .into_iter()
         .zip(&gradients)
@@ -190,7 +195,8 @@ pub(crate) fn climb_at<S: Values>(
     let values = rows.values(compiled, layout, model.constants.len());
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
-    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps })
+    let work = rows.work().spent();
+    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps, work })
 }
 
 /// Where the model has no value, in words.
@@ -412,6 +418,7 @@ impl Judgement {
             span: None,
             fields: None,
             independent_functions: None,
+            work: 2 * at.work,
         }
     }
 }

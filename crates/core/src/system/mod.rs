@@ -29,6 +29,7 @@ mod solutions;
 pub(crate) mod symmetry;
 pub(crate) mod taylor;
 pub(crate) mod values;
+pub(crate) mod work;
 
 pub use answer::*;
 pub use dag::{Dag, DagError, Op};
@@ -39,3 +40,4 @@ pub use model::{
 };
 pub use rows::{Layout, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
+pub use work::WorkLimit;
