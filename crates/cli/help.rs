@@ -71,6 +71,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("noise", MEASURED, "White noise of Z per sample and axis, in g (default: 1e-5)"),
     ("azimuth_noise", MEASURED, "Noise of a measured azimuth per sample, in deg (default: 0.001)"),
     ("requirement", MEASURED, "Largest sigma allowed of an unknown or family: D=0.05, K1=5"),
+    ("bench", MEASURED, "Sizes (1 sigma) of errors that are not estimated: K0=20,latitude=10"),
     ("design.prior", MEASURED, "Sigma of an unknown or family that is known beforehand: psi=0.05"),
     ("accelerometer_instability", ACCELEROMETERS, "Bias instability in ug (default: none)"),
     ("accelerometer_correlation_time", ACCELEROMETERS, "Its correlation time, in s (default: 3600)"),

@@ -118,6 +118,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             &["D_FX=11", "psi=0.1", "D=1e200", "D=1e-300", "psi=-1e6", "D_F=nan", "D_QX=1"]
         }
         "prior" => &["D=1", "psi=1e-12", "D=1e-300", "D=1e200", "psi=1e8", "D_F=0", "D_F=-1"],
+        "bench" => &["K0=20", "K0_X=3,latitude=10", "azimuth=0", "K0=-1", "Q=1", "x"],
         "drift-scale" => &["1", "1e-6", "1e6", "1e-300", "0", "nan"],
         "runs" => &["3", "2", "1", "0", "-1", "1e3"],
         "filter-carry" => &["inertial", "reset", "x"],

@@ -5,8 +5,9 @@ use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
 use super::addition::written_apart;
 use super::dag::{Dag, Op};
+use super::error::ModelError;
 use super::independent::independent_functions;
-use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
+use super::model::{Compiled, MAX_UNKNOWNS, Role, SystemModel};
 use super::real_points::has_real_point;
 use super::rows::{Layout, SystemRows, random_field};
 use super::taylor::Singular;

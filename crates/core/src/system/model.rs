@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
+use super::error::ModelError;
 use super::work::WorkLimit;
 use crate::language::{Expression, Function, among, nearest};
 use crate::model::recording::Recording;
@@ -185,18 +186,6 @@ pub struct SystemModel {
     pub recording: Recording,
     /// Limit of the work of a verdict, an option and no part of the model.
     pub work_limit: WorkLimit,
-}
-
-/// Why a model cannot be judged.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{what}: {message}")]
-pub struct ModelError {
-    /// The offender: `the equation of x1`.
-    pub what: String,
-    /// What is wrong, what was expected.
-    pub message: String,
-    /// Byte range in the file, where it is known.
-    pub span: Option<Range<usize>>,
 }
 
 /// Most unknowns of a system.

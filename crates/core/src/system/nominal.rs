@@ -8,7 +8,8 @@ use serde::Deserialize;
 use serde_spanned::Spanned;
 use toml::Value;
 
-use super::model::{ModelError, Named, SystemModel};
+use super::error::ModelError;
+use super::model::{Named, SystemModel};
 use super::reader::Reader;
 use crate::language::{Node, Shapes, nearest};
 

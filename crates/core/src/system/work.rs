@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::model::ModelError;
+use super::error::ModelError;
 
 /// Operations in a unit of the limit.
 const UNIT: u64 = 1_000_000;

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use obsdeg_core::model::{Carry, Geometry, GimbalReport};
-use obsdeg_evidence::omitted::OmittedEffects;
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::omitted::OmittedEffects;
 use obsdeg_evidence::simulation::{MeasurementReport, OtherCarry};
 
 /// Name and version of the JSON layout.

@@ -13,8 +13,8 @@ use super::consistency::{CREDIBLE, Consistency};
 use super::datasheet::GyroNoise;
 use super::floor::NoiseFloor;
 pub use super::validity::Validity;
-use crate::omitted::OmittedEffects;
 use crate::requirements::{Miss, Requirements, meets};
+use crate::simulation::omitted::OmittedEffects;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.simulation/2";

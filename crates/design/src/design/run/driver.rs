@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Euler, Scheme};
-use obsdeg_evidence::omitted::omitted_effects;
+use obsdeg_evidence::simulation::omitted::omitted_effects;
 use obsdeg_evidence::simulation::{Attained, Conditions, MeasurementReport, latitude_of, other_carries};
 
 use crate::design::answer::{Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
