@@ -5,12 +5,12 @@ use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 /// The commands, with the most lines that `-h` may have.
 const COMMANDS: [(&str, usize); 12] = [
     ("analyze", 45),
-    ("simulate", 62),
-    ("crosscheck", 67),
+    ("simulate", 65),
+    ("crosscheck", 70),
     ("calibrate", 48),
     ("compare", 46),
-    ("design", 68),
-    ("report", 59),
+    ("design", 69),
+    ("report", 60),
     ("paper", 18),
     ("licences", 12),
     ("completions", 12),

@@ -67,12 +67,45 @@ fn drifts_are_named_with_their_factor() {
     }
 }
 
+/// First lines name every condition that nothing states, also where it is stated for some unknowns.
+#[test]
+fn what_nothing_states_is_named() {
+    let first = |more: &[&str]| {
+        let arguments = [&["simulate", "-q"], &P1_P2[..], more].concat();
+        let text = said(&arguments);
+        let line = text.split("Estimates at the end").next().expect("first lines").to_string();
+        (line, json(&[&arguments[..], &["--format", "json"]].concat()))
+    };
+    let (line, answer) = first(&["--terms", "F,K0"]);
+    let all = answer["quantities"].as_array().expect("a list");
+    let k0 = all.iter().find(|q| q["name"] == "K0_X").expect("an unknown");
+    assert!(k0["truth"] != 0.0 && k0["prior_sigma"] != 0.0, "{k0}");
+    assert!(line.contains("5 deg/h/g; others too)") && line.contains("10 deg/h/g; others too)"), "{line}");
+    let (line, _) = first(&[]);
+    assert!(!line.contains("others") && !line.contains("of the other unknowns"), "{line}");
+    let (values, priors) = ("true values of the other unknowns", "priors of the other unknowns");
+    for (more, expected) in [
+        (&["--value", "D_FX=0.01"][..], [true, false]),
+        (&["--prior", "D_FX=0.01"], [false, true]),
+        (&["--value", "D_FX=0.01", "--prior", "psi=0.2"], [true, true]),
+        (
+            &["--value", "D=0.01", "--value", "psi=0.1", "--prior", "D=1", "--prior", "psi=0.2"],
+            [false, false],
+        ),
+    ] {
+        let (line, answer) = first(more);
+        assert_eq!([values, priors].map(|w| line.contains(w)), expected, "{more:?}: {line}");
+        let keys = answer["conditions"]["by_default"].to_string();
+        assert_eq!(["other_values", "other_priors"].map(|k| keys.contains(k)), expected, "{keys}");
+    }
+}
+
 /// First lines, JSON and advice say whose sigmas are not to be trusted: single runs of such a filter are
 /// consistent.
 #[test]
 fn filters_that_are_not_to_be_trusted_are_named() {
     let first = "Do not trust the filter's sigmas, although this run is consistent";
-    let decides = "the filter is consistent with this truth";
+    let decides = "this run of the filter is consistent with its truth";
     let mut consistent = 0;
     for (truth, filter, scale, trusted) in [
         ("exact", "extended", "1", false),

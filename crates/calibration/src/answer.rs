@@ -2,8 +2,8 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_evidence::omitted::Suspicion;
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::omitted::Suspicion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -73,7 +73,7 @@ pub struct MeasurementOptions {
 
     /// Standard deviation of an unknown or family beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug:
     /// D_F=0.1, psi=0.05. It counts in sigmas, not in what is observable (default: none in predictions; in
-    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
+    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others by family: prior_sigma in the JSON; 1e-9 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
     #[serde(with = "text::list")]
     pub prior: Vec<Assignment>,

@@ -62,7 +62,7 @@ pub struct OmittedVerdict {
     pub family: String,
     /// Unit of the error: ug, ppm, arcsec, ...
     pub unit: String,
-    /// Exact class of the error.
+    /// Exact class of the error: no effect, silent or visible.
     pub class: OmittedClass,
     /// Unknowns that a silent error changes, among those that the samples determine, by name; empty for other
     /// classes.

@@ -20,7 +20,6 @@
 pub mod audit;
 pub mod compare;
 pub mod crosscheck;
-pub mod omitted;
 pub mod prediction;
 pub mod requirements;
 pub mod simulation;

@@ -98,6 +98,10 @@ fn formula(f: &Formula) -> Typeset {
 }
 
 impl Answer for Analysis {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let [unknowns, combinations] = verdicts(self);
         let mut blocks = vec![positions(&self.positions), unknowns];

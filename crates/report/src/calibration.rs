@@ -492,6 +492,10 @@ fn by_default(a: &Assumed) -> Option<String> {
 }
 
 impl Answer for Calibration {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut lead = vec![match self.consistent {
             true => format!(

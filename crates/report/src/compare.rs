@@ -209,6 +209,10 @@ fn lead(c: &Comparison) -> Vec<String> {
 }
 
 impl Answer for Comparison {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         // where nothing is required there is nothing to be met
         let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);

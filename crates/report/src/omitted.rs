@@ -2,7 +2,7 @@
 
 use obsdeg_calibration::answer::{Omitted, SilentError};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
-use obsdeg_evidence::omitted::{Budget, FamilyEffect, OmittedEffects};
+use obsdeg_evidence::simulation::omitted::{Budget, FamilyEffect, OmittedEffects};
 
 use crate::document::{Block, left, number, right};
 use crate::words;
@@ -37,11 +37,10 @@ fn class(f: &FamilyEffect) -> String {
 
 fn row(f: &FamilyEffect) -> Vec<String> {
     let none = || "-".to_string();
-    let per = |x: f64| format!("{x:.4e}");
     vec![
         format!("{} ({})", f.family, f.terms),
         class(f),
-        f.worst.as_ref().map_or_else(none, |w| format!("{} {}/{}", per(w.per_unit), w.unit, f.unit)),
+        f.worst.as_ref().map_or_else(none, |w| format!("{} {} per {}", number(w.per_unit), w.unit, f.unit)),
         f.worst.as_ref().map_or_else(none, |w| w.unknown.clone()),
         f.worst_in_sigmas.map_or_else(none, |x| format!("{} {}", short(1.0 / x), f.unit)),
         f.visible_from.map_or_else(none, |x| format!("{} {}", short(x), f.unit)),
@@ -54,7 +53,7 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
     let columns = [
         left("family (terms)"),
         left("class"),
-        right("worst change per unit"),
+        right("worst change"),
         left("of"),
         right("as large as sigma at"),
         right("seen from (3 sigma)"),
@@ -101,7 +100,7 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
 fn printed(budgets: &[Budget]) -> Vec<&Budget> {
     let over = |b: &Budget| b.requirement.map_or(0.0, |r| b.total / r);
     let share = |b: &Budget| {
-        let own = b.lines.iter().filter(|l| l.source != obsdeg_evidence::omitted::SAMPLES);
+        let own = b.lines.iter().filter(|l| l.source != obsdeg_evidence::simulation::omitted::SAMPLES);
         own.map(|l| l.percent).sum::<f64>()
     };
     let mut out: Vec<&Budget> = budgets.iter().filter(|b| b.lines.len() > 1).collect();

@@ -224,12 +224,16 @@ fn lead(s: &Simulation) -> Vec<String> {
     out.push(stated::carry(s.carry).into());
     out.extend(omitted::lead(&s.omitted, s.requirements.with_bench, s.requirements.all_met()));
     out.extend(stated::other_carries(&s.other_carries));
-    out.extend(stated::by_default_in_run(&s.conditions));
+    out.extend(stated::by_default_in_run(&s.conditions, &s.quantities));
     out.extend(warning(&s.conditions));
     out
 }
 
 impl Answer for Simulation {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut columns = vec![left("unknown"), left("unit")];
         columns.extend(words::ESTIMATE.map(right));

@@ -3,7 +3,7 @@
 use obsdeg_core::model::Carry;
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements, Worst};
 use obsdeg_evidence::simulation::{
-    ConditionsReport, MeasurementReport, OtherCarry, RunDiffers, RunRequirements, SigmaRatio,
+    ConditionsReport, Estimate, MeasurementReport, OtherCarry, RunDiffers, RunRequirements, SigmaRatio,
 };
 
 use crate::document::number;
@@ -204,7 +204,14 @@ pub(crate) fn by_default(m: &MeasurementReport) -> Option<String> {
 }
 
 /// The conditions of a run that nobody states, in a sentence; `None` where all are stated.
-pub(crate) fn by_default_in_run(c: &ConditionsReport) -> Option<String> {
+pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> Option<String> {
+    // unknowns that the paper does not have, each with a value and a prior of the program
+    let of_paper = |name: &str| {
+        name.starts_with("psi")
+            || ["D_F", "D_I", "D_O", "D_S"].contains(&&name[..name.len().saturating_sub(1)])
+    };
+    let others = unknowns.iter().any(|q| !of_paper(&q.name));
+    let rest = if others { "; others too" } else { "" };
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", c.latitude_deg),
         "accelerometer_noise_g" => format!("noise of Z {:e} g", c.accelerometer_noise_g),
@@ -212,14 +219,20 @@ pub(crate) fn by_default_in_run(c: &ConditionsReport) -> Option<String> {
         "dwell_s" => "1000 s at a position".into(),
         "drift_noise" => format!("random drift {}", c.drift_noise),
         "values" => {
-            format!("the paper's drifts{} (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g)", scaled(c))
+            let of = scaled(c);
+            format!("the paper's drifts{of} (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g{rest})")
         }
         "priors" => match c.drift_scale == 1.0 {
-            true => "priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)".into(),
+            true => format!("priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g{rest})"),
             false => {
-                format!("priors (psi 0.1 deg; of drifts{}: D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)", scaled(c))
+                format!(
+                    "priors (psi 0.1 deg; of drifts{}: D_F 20 deg/h, D_I D_O D_S 10 deg/h/g{rest})",
+                    scaled(c)
+                )
             }
         },
+        "other_values" => "true values of the other unknowns".into(),
+        "other_priors" => "priors of the other unknowns".into(),
         "azimuth_noise_deg" => "noise of the azimuth 0.001 deg".into(),
         other => other.to_string(),
     };

@@ -100,6 +100,10 @@ fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usiz
 }
 
 impl Answer for SystemAnalysis {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let units = self.quantities.iter().any(|q| !q.unit.is_empty());
         let mut order: Vec<_> = self.quantities.iter().collect();
@@ -253,6 +257,10 @@ fn begins_at(time: f64) -> String {
 
 /// One run of the filter.
 impl Answer for SystemRun {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let row = |e: &SystemEstimate| {
             let exact = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
@@ -308,6 +316,10 @@ impl Answer for SystemRun {
 
 /// The exact verdicts against the information of the samples.
 impl Answer for SystemEvidence {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let said = |outcome: Agreement| match outcome {
             Agreement::Disagrees => "DISAGREES",

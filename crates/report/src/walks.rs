@@ -45,6 +45,10 @@ fn examined(w: &Walks) -> Vec<String> {
 }
 
 impl Answer for Walks {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let row = |(i, (name, angles)): (usize, (&String, &String))| {
             vec![format!("p{}", i + 1), name.clone(), angles.clone()]

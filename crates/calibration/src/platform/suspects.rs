@@ -9,7 +9,7 @@ use obsdeg_core::model::OmittedModel;
 use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, EkfError, Form};
-use obsdeg_evidence::omitted::{
+use obsdeg_evidence::simulation::omitted::{
     Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
 };
 use obsdeg_evidence::simulation::{SegmentKind, shown_unit, si_per_shown};

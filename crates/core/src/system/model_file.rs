@@ -8,9 +8,10 @@ use serde::Deserialize;
 use serde_spanned::Spanned;
 use toml::Value;
 
+use super::error::ModelError;
 use super::model::{
-    Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, PlacedExpression,
-    Segment, StartTime, State, StateStart, SystemModel,
+    Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, PlacedExpression, Segment,
+    StartTime, State, StateStart, SystemModel,
 };
 use super::nominal::{SimulationEntry, nominal};
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};

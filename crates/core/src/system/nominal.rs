@@ -8,14 +8,15 @@ use serde::Deserialize;
 use serde_spanned::Spanned;
 use toml::Value;
 
-use super::model::{ModelError, Named, SystemModel};
+use super::error::ModelError;
+use super::model::{Named, SystemModel};
 use super::reader::Reader;
 use crate::language::{Node, Shapes, nearest};
 
 /// Numbers for a simulation, in the units of the model.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SimulationEntry {
+pub(super) struct SimulationEntry {
     /// Duration of every experiment, in the unit of `t`.
     #[schemars(with = "Option<f64>")]
     duration: Option<Spanned<f64>>,

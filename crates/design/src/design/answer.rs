@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use obsdeg_core::model::{Carry, Geometry, GimbalReport};
-use obsdeg_evidence::omitted::OmittedEffects;
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::omitted::OmittedEffects;
 use obsdeg_evidence::simulation::{MeasurementReport, OtherCarry};
 
 /// Name and version of the JSON layout.
@@ -124,8 +124,12 @@ pub struct SearchReport {
     /// their criterion is larger than that of all listed.
     pub excluded: u64,
     /// True if no sequence of candidates within the constraints is better than the first, by exhaustion or by
-    /// a bound: none has a smaller worst degree, or the same and a smaller criterion.
+    /// a bound: none has a smaller worst degree, or the same and a smaller criterion. With `parts` this holds
+    /// if the parts were searched as they state.
     pub proven: bool,
+    /// Parts that the answer was put together from; left out for a search as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<PartsReport>,
     /// Number of sequences as good as the first; null if the search was not exhaustive.
     pub ties: Option<TiesReport>,
     /// True if orders of the same positions count as different schemes.
@@ -145,6 +149,27 @@ pub struct SearchReport {
     /// Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial
     /// carry, and where the noise of Z is correlated, information is no sum over positions.
     pub certificate: Option<Certificate>,
+}
+
+/// Parts of a search that were put together: every sequence that they list was evaluated again, and their
+/// starts and counts add up to the whole.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PartsReport {
+    /// Number of parts put together.
+    pub parts: usize,
+    /// Versions of the program that searched the parts, each once.
+    pub versions: Vec<String>,
+    /// Number of blocks of starts in all parts, at all worst degrees that were searched.
+    pub blocks: usize,
+    /// Number of blocks, chosen at random, that were searched again with the same result (`--check`).
+    pub searched_again: usize,
+}
+
+impl PartsReport {
+    /// True if every block was searched again, so that nothing rests on the parts.
+    pub fn is_repeated(&self) -> bool {
+        self.searched_again == self.blocks
+    }
 }
 
 /// Bound on the criterion of the best scheme of the same number of these candidates, from the optimal weights

@@ -6,9 +6,9 @@ use obsdeg_core::model::{Carry, GimbalReport};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::omitted::OmittedEffects;
 use crate::requirements::{Requirements, Worst};
 use crate::simulation::answer::{MeasurementReport, Validity};
+use crate::simulation::omitted::OmittedEffects;
 use crate::simulation::{NoiseFloor, OtherCarry};
 
 /// Name and version of the JSON layout.

@@ -13,13 +13,13 @@ use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, S
 use obsdeg_exact::interrupt;
 use rayon::prelude::*;
 
-use crate::omitted::omitted_effects;
 use crate::requirements::{Claim, Miss};
 use crate::simulation::answer::MeasurementReport;
 use crate::simulation::carries::under;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::iterated::at_own_drifts;
 use crate::simulation::limits::MAX_UNKNOWNS;
+use crate::simulation::omitted::omitted_effects;
 use crate::simulation::{Attained, SimulationError, noise_floor, other_carries};
 
 /// Latitudes of the sweep, in degrees.

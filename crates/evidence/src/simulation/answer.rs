@@ -13,8 +13,8 @@ use super::consistency::{CREDIBLE, Consistency};
 use super::datasheet::GyroNoise;
 use super::floor::NoiseFloor;
 pub use super::validity::Validity;
-use crate::omitted::OmittedEffects;
 use crate::requirements::{Miss, Requirements, meets};
+use crate::simulation::omitted::OmittedEffects;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.simulation/2";
@@ -133,7 +133,8 @@ pub struct ConditionsReport {
     /// Factor on the true drifts and their priors, dimensionless.
     pub drift_scale: f64,
     /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg,
-    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values and
+    /// other_priors where they are stated for some of the unknowns only.
     pub by_default: Vec<String>,
 }
 

@@ -18,10 +18,10 @@ use super::floor::wide_prior;
 use super::plan::Plan;
 use super::seen::{no_prior, predict};
 use super::start::RunStart;
-use crate::omitted::bench::Bench;
-use crate::omitted::weights::{self, Influence};
 use crate::prediction::Prediction;
 use crate::requirements::{Claim, Miss, Requirements, Worst};
+use crate::simulation::omitted::bench::Bench;
+use crate::simulation::omitted::weights::{self, Influence};
 
 /// Factor by which a second diffuse prior is narrower: an unknown whose sigma it narrows is bounded by
 /// nothing else.

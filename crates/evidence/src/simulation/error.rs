@@ -95,7 +95,7 @@ pub enum SimulationError {
     },
     /// A size for an error that no scheme has.
     #[error(transparent)]
-    Bench(#[from] crate::omitted::bench::BenchError),
+    Bench(#[from] crate::simulation::omitted::bench::BenchError),
     /// The scheme itself.
     #[error(transparent)]
     Scheme(#[from] SchemeError),

@@ -16,6 +16,7 @@ mod gyro_noise;
 pub(crate) mod iterated;
 pub(crate) mod limits;
 mod noise;
+pub mod omitted;
 pub(crate) mod plan;
 pub(crate) mod record;
 mod reports;

@@ -18,9 +18,9 @@ use super::record::{Record, run};
 use super::reports::{conditions_report, timeline_report};
 use super::seen::predict_run;
 use super::start::RunStart;
-use crate::omitted::omitted_effects;
 use crate::prediction::{PredictedCombination, Prediction};
 use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
+use crate::simulation::omitted::omitted_effects;
 
 /// Simulates `scheme` once: the summary and the time series.
 ///

@@ -4,10 +4,10 @@ use std::sync::atomic::Ordering;
 
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Euler, Scheme};
-use obsdeg_evidence::omitted::omitted_effects;
+use obsdeg_evidence::simulation::omitted::omitted_effects;
 use obsdeg_evidence::simulation::{Attained, Conditions, MeasurementReport, latitude_of, other_carries};
 
-use crate::design::answer::{Design, Found, SCHEMA, SearchReport, TiesReport};
+use crate::design::answer::{Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::PROOF;
 use crate::design::request::options::DesignOptions;
@@ -34,8 +34,8 @@ pub fn design(
     answered(base, conditions, options, progress, None)
 }
 
-/// What an exhaustive search found elsewhere.
-pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<Best, DesignError>;
+/// What an exhaustive search found in parts, and these.
+pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
 
 /// The answer; `elsewhere` instead of a search.
 pub(crate) fn answered(
@@ -88,8 +88,9 @@ pub(crate) fn answered(
         let evaluator = &prepared.evaluator;
         let search = prepared.search(progress);
         let bound = task.bound(evaluator, k, &going);
-        let (best, exhaustive) = match (elsewhere, &free) {
-            (Some(elsewhere), _) => (elsewhere(&prepared, k)?, task.space(k, evaluator)),
+        let (merged, parts) = elsewhere.map(|parts| parts(&prepared, k)).transpose()?.unzip();
+        let (best, exhaustive) = match (merged, &free) {
+            (Some(merged), _) => (merged, task.space(k, evaluator)),
             (None, Some(free)) => free.searched(&prepared, &search, k)?,
             (None, None) => prepared.searched(&search, k, bound.as_ref()),
         };
@@ -184,6 +185,7 @@ pub(crate) fn answered(
             lost: best.lost,
             sequences: task.space(k, evaluator).map(|s| s.1).filter(|_| !all && free.is_none()),
             proven: all && out.error_bound < PROOF && !task.is_noisy(),
+            parts,
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),
             interrupted: stopped.load(Ordering::Relaxed),

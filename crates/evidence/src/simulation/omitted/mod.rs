@@ -17,7 +17,8 @@ use obsdeg_core::model::{OmittedModel, OmittedTerm};
 use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 
 pub use answer::{
-    Budget, BudgetLine, Evaluation, FamilyEffect, OmittedEffect, OmittedEffects, SAMPLES, Sensitivity, UsesUp,
+    Budget, BudgetLine, ChangePerUnit, Evaluation, FamilyEffect, OmittedEffect, OmittedEffects, SAMPLES,
+    UsesUp,
 };
 pub use bench::{Bench, BenchError};
 pub use columns::OmittedColumns;
@@ -57,7 +58,7 @@ pub fn omitted_effects(
         let verdict = verdicts.as_ref().map(|v| &v.terms[j]);
         let class = verdict.map(|v| v.class);
         let size = bench.sizes[j];
-        let sensitivities = (0..names.len()).filter(|&c| changes[c][j] != 0.0).map(|c| Sensitivity {
+        let sensitivities = (0..names.len()).filter(|&c| changes[c][j] != 0.0).map(|c| ChangePerUnit {
             unknown: names[c].clone(),
             unit: shown_unit(platform.units()[c]).into(),
             per_unit: changes[c][j],
@@ -65,8 +66,10 @@ pub fn omitted_effects(
         let used = (0..names.len()).filter_map(|c| {
             let (change, own) = (changes[c][j], changes[c][j] * size.unwrap_or(0.0));
             let rest = (totals[c]? * totals[c]? - own * own).max(0.0);
-            let left = (required[c]? * required[c]? - rest).max(0.0).sqrt();
-            (change != 0.0).then(|| UsesUp { unknown: names[c].clone(), size: left / change.abs() })
+            let left = required[c]? * required[c]? - rest;
+            // no margin is left without this error: nothing for it to use up
+            (change != 0.0 && left > 0.0)
+                .then(|| UsesUp { unknown: names[c].clone(), size: left.sqrt() / change.abs() })
         });
         OmittedEffect {
             name: t.name.clone(),
@@ -135,7 +138,7 @@ fn families(
             terms: own.len(),
             no_effect: count(OmittedClass::NoEffect),
             silent: count(OmittedClass::Silent),
-            worst: worst.map(|c| Sensitivity {
+            worst: worst.map(|c| ChangePerUnit {
                 unknown: names[c].clone(),
                 unit: units[c].into(),
                 per_unit: rss(c),

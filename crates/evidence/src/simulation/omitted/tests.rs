@@ -273,8 +273,9 @@ impl Basis {
     fn of(columns: &[DVector<f64>]) -> Self {
         let mut out = Self { q: Vec::new(), used: Vec::new() };
         for (c, column) in columns.iter().enumerate() {
+            // of coefficients, whose columns are up to 1e5 s long: sines of right angles are not exactly zero
             let length = column.norm();
-            if length == 0.0 {
+            if length < 1e-9 {
                 continue;
             }
             let (rest, mut along) = out.project(&(column / length));
@@ -359,7 +360,7 @@ fn largest_difference(schemes: usize, seed: u64) -> f64 {
                 let printed = term.sensitivities.iter().find(|s| s.unknown == *name);
                 let printed = printed.map_or(0.0, |s| s.per_unit);
                 // relative to the largest change of the term, in sigmas
-                let scale_of = |s: &super::Sensitivity| {
+                let scale_of = |s: &super::ChangePerUnit| {
                     let k = platform.names().iter().position(|n| *n == s.unknown).expect("an unknown");
                     (s.per_unit / attained.sigmas[k].expect("a sigma")).abs()
                 };
@@ -425,7 +426,6 @@ fn compared_classes(schemes: usize, seed: u64) -> [usize; 4] {
 }
 
 #[test]
-#[ignore = "open: GM_XY under reset carry is visible by ranks, and silent within 1e-9 in floating point"]
 fn classes_are_those_of_ranks() {
     let [no_effect, silent, visible, open] = compared_classes(12, 5);
     assert!(no_effect > 20 && silent > 20 && visible > 100, "{no_effect} {silent} {visible}");
@@ -547,24 +547,26 @@ fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
     (counts.map(|n| n as f64 / count as f64), power)
 }
 
-fn check_shares(count: usize, seed: u64) {
+/// `least`: share of the records with an error of twice the visible size in which it must be found.
+fn check_shares(count: usize, seed: u64, least: f64) {
     let ([none, twice, once], power) = shares(count, seed);
     println!(
         "suspicion without an error {none}, found at twice the visible size {twice}, at once {once} of {power}"
     );
     let band = |p: f64| 3.3 * (p * (1.0 - p) / count as f64).sqrt();
     assert!(none <= 0.01 + band(0.01), "{none}");
-    assert!(twice >= 0.95, "{twice}");
+    assert!(twice >= least, "{twice}");
     assert!((once - power).abs() < band(power), "{once} instead of {power}");
 }
 
 #[test]
 fn the_score_test_finds_what_is_there() {
-    check_shares(150, 7);
+    // 95 % within the 95 % band of 150 records
+    check_shares(150, 7, 0.92);
 }
 
 #[test]
 #[ignore = "500 records: .ci/run release"]
 fn the_score_test_at_length() {
-    check_shares(500, 77);
+    check_shares(500, 77, 0.95);
 }

@@ -3,7 +3,9 @@
 //! With `r` the residuals and `w_j` the part of column j that no change of the unknowns imitates (both whitened),
 //! `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom where the error is zero: the fall of
 //! chi-square with the error among the unknowns. Its estimate is `(w_j r) / (w_j w_j)` (Rao 1948,
-//! doi:10.1017/S0305004100023987). The number of errors tried counts by Bonferroni's bound.
+//! doi:10.1017/S0305004100023987). Where residuals are larger than their sigmas even with the error among the
+//! unknowns, the fall counts in units of what is left per degree of freedom: noise that is larger than stated
+//! is no error of the bench. The number of errors tried counts by Bonferroni's bound.
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::consistency::{chi_square_quantile, chi_square_tail};
@@ -69,22 +71,22 @@ pub struct SuspectedError {
     pub name: String,
     /// Unit of its estimate and sigma.
     pub unit: String,
-    /// Estimate of the error from the residuals, in `unit`.
+    /// Estimate of the error from the residuals, in the unit of `unit`.
     pub estimate: f64,
-    /// Standard deviation of the estimate, in `unit`.
+    /// Standard deviation of the estimate by the stated noise, in the unit of `unit`.
     pub sigma: f64,
 }
 
 /// Estimate without and with suspected errors among the unknowns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SuspectedChange {
-    /// Name of the unknown.
+    /// Name of the unknown that is estimated.
     pub unknown: String,
-    /// Unit of both estimates.
+    /// Unit of both estimates of the unknown.
     pub unit: String,
-    /// Estimate of the fit, in `unit`.
+    /// Estimate of the fit, in the unit of `unit`.
     pub estimate: f64,
-    /// Estimate with the suspected errors among the unknowns, in `unit`.
+    /// Estimate with the suspected errors among the unknowns, in the unit of `unit`.
     pub with: f64,
 }
 
@@ -99,6 +101,11 @@ impl Score {
     /// Fall of chi-square with one error among the unknowns.
     pub fn fall(&self, j: usize) -> f64 {
         self.against[j] * self.against[j] / self.products[(j, j)]
+    }
+
+    /// Chi-square that is left per degree of freedom after a fall by `unknowns` more, if it is more than one.
+    fn left_over(&self, fall: f64, unknowns: f64) -> f64 {
+        ((self.chi_square - fall) / (self.degrees_of_freedom - unknowns).max(1.0)).max(1.0)
     }
 
     /// Estimates, with their standard deviations, and the fall of chi-square with a pair.
@@ -117,10 +124,11 @@ impl Score {
 
     /// Errors whose columns the residuals do not distinguish from that of `j` at the size found.
     fn group(&self, j: usize, tried: &[usize]) -> Vec<usize> {
+        let fall = self.fall(j) / self.left_over(self.fall(j), 1.0);
         let differs = |&&k: &&usize| {
             let product = self.products[(j, k)];
             let alike = product * product / (self.products[(j, j)] * self.products[(k, k)]);
-            k != j && self.fall(j) * (1.0 - alike) < SAME
+            k != j && fall * (1.0 - alike) < SAME
         };
         tried.iter().filter(differs).copied().collect()
     }
@@ -131,7 +139,8 @@ impl Score {
         let tried = self.tried();
         let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;
         let fall = self.fall(best);
-        let probability = (chi_square_tail(1.0, fall) * tried.len() as f64).min(1.0);
+        let counted = fall / self.left_over(fall, 1.0);
+        let probability = (chi_square_tail(1.0, counted) * tried.len() as f64).min(1.0);
         let own = self.products[(best, best)];
         let single = Explanation {
             errors: vec![best],
@@ -152,8 +161,9 @@ impl Score {
         let found = pairs.filter_map(|p| self.pair(p).map(|(estimates, fall)| (p, estimates, fall)));
         let (mut errors, mut estimates, fall) = found.max_by(|a, b| a.2.total_cmp(&b.2))?;
         let count = (tried.len() * tried.len().saturating_sub(1) / 2) as f64;
-        let probability = (chi_square_tail(2.0, fall) * count).min(1.0);
-        let more = chi_square_tail(1.0, fall - single) * tried.len() as f64;
+        let left_over = self.left_over(fall, 2.0);
+        let probability = (chi_square_tail(2.0, fall / left_over) * count).min(1.0);
+        let more = chi_square_tail(1.0, (fall - single) / left_over) * tried.len() as f64;
         if probability >= LEVEL || more >= LEVEL {
             return None;
         }

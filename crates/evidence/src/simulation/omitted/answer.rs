@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct OmittedEffects {
     /// Effects family by family: all terms of a family have the same size, and their changes add up as squares.
     pub families: Vec<FamilyEffect>,
-    /// Effects term by term.
+    /// Effects term by term, in the order of the error model.
     pub terms: Vec<OmittedEffect>,
     /// Uncertainty budgets of the unknowns that have a sigma; empty without a bench.
     pub budgets: Vec<Budget>,
@@ -35,12 +35,12 @@ pub struct OmittedEffect {
     pub class: Option<OmittedClass>,
     /// Exact changes by a silent error, in SI units; null if they have no exact form, or for other classes.
     pub exact: Option<Vec<ExactChange>>,
-    /// Size that a record of this scheme shows at three sigma, in `unit`; null unless the error is visible.
+    /// Size that a record of this scheme shows at three sigma, in the unit of `unit`; null unless the error is visible.
     pub visible_from: Option<f64>,
-    /// Size stated by the bench (one sigma), in `unit`; null where the bench states none.
+    /// Size stated by the bench (one sigma), in the unit of `unit`; null where the bench states none.
     pub size: Option<f64>,
     /// Changes of the estimates per unit of the error; estimates that it does not change are left out.
-    pub sensitivities: Vec<Sensitivity>,
+    pub sensitivities: Vec<ChangePerUnit>,
     /// Size at which the error uses up the margin of a requirement; null if there is no requirement, or none that
     /// it affects.
     pub uses_up: Option<UsesUp>,
@@ -48,10 +48,10 @@ pub struct OmittedEffect {
 
 /// Change of one estimate per unit of an error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Sensitivity {
+pub struct ChangePerUnit {
     /// Name of the unknown whose estimate changes.
     pub unknown: String,
-    /// Unit of the unknown.
+    /// Unit of the unknown whose estimate changes.
     pub unit: String,
     /// Estimate minus truth, in the unit of the unknown per unit of the error.
     pub per_unit: f64,
@@ -63,7 +63,7 @@ pub struct UsesUp {
     /// Name of the unknown with this requirement.
     pub unknown: String,
     /// Size (one sigma) of the error at which the total uncertainty reaches the requirement, in the unit of the
-    /// error; 0 if the requirement is missed without it.
+    /// error; a requirement that is missed without the error has no such size.
     pub size: f64,
 }
 
@@ -82,11 +82,12 @@ pub struct FamilyEffect {
     pub silent: Option<usize>,
     /// Largest change of a drift coefficient per unit size of all terms (root of the sum of squares); null if no
     /// drift coefficient changes.
-    pub worst: Option<Sensitivity>,
+    pub worst: Option<ChangePerUnit>,
     /// Largest change of a drift coefficient per unit size in its own sigma (dimensionless per unit of the error);
     /// null if no drift coefficient changes.
     pub worst_in_sigmas: Option<f64>,
-    /// Smallest size of a single term that a record shows at three sigma, in `unit`; null if none is visible.
+    /// Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none is
+    /// visible.
     pub visible_from: Option<f64>,
     /// Smallest size of a single term that uses up the margin of a requirement; null if none does.
     pub uses_up: Option<UsesUp>,
@@ -95,13 +96,13 @@ pub struct FamilyEffect {
 /// Uncertainty budget of one unknown.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Budget {
-    /// Name of the unknown.
+    /// Name of the unknown of the budget.
     pub unknown: String,
     /// Unit of the unknown, of its contributions and of the total.
     pub unit: String,
-    /// Total standard uncertainty: root of the sum of the squared contributions, in `unit`.
+    /// Total standard uncertainty: root of the sum of the squared contributions, in the unit of `unit`.
     pub total: f64,
-    /// Largest standard uncertainty allowed, in `unit`; null if none is required.
+    /// Largest standard uncertainty allowed, in the unit of `unit`; null if none is required.
     pub requirement: Option<f64>,
     /// Sources of uncertainty, the largest contribution first.
     pub lines: Vec<BudgetLine>,
@@ -123,11 +124,11 @@ pub struct BudgetLine {
     pub source: String,
     /// Evaluation of its standard uncertainty: type A or B.
     pub evaluation: Evaluation,
-    /// Standard uncertainty of the source, in `value_unit`.
+    /// Standard uncertainty of the source, in the unit of `value_unit`.
     pub value: f64,
     /// Unit of the standard uncertainty of the source.
     pub value_unit: String,
-    /// Sensitivity of the unknown to the source, in the unit of the unknown per `value_unit`.
+    /// ChangePerUnit of the unknown to the source, in the unit of the unknown per `value_unit`.
     pub sensitivity: f64,
     /// Contribution to the standard uncertainty of the unknown, in its unit: value times sensitivity, positive.
     pub contribution: f64,

@@ -118,7 +118,9 @@ pub(crate) fn by_information(
     }
     while columns.step()?.is_some() {}
     let start = reduced.solve()?;
-    let changes = at_the_end(plan, &(to_end * start), &columns);
+    // column by column: a product of whole matrices takes other instructions, and other bits, on other processors
+    let ended: Vec<_> = start.column_iter().map(|column| &to_end * column).collect();
+    let changes = at_the_end(plan, &DMatrix::from_columns(&ended), &columns);
     Ok(Influence { changes, information: reduced.information, squares: reduced.squares })
 }
 
