@@ -8,6 +8,7 @@ mod faults;
 mod formats;
 mod handheld;
 mod models;
+mod omitted;
 mod round_trip;
 mod simulator;
 mod spoil;

@@ -1,0 +1,74 @@
+//! Records with an error in their truth that the scheme does not estimate: is it named, and what is said without one?
+
+use obsdeg_calibration::answer::Finding;
+use obsdeg_calibration::{Calibration, Options, calibrate, record::Record};
+
+use crate::round_trip::{conditions, scheme};
+use crate::simulator::{Bench, attitude, turned};
+
+/// Five cardinal attitudes under inertial carry: NUE USE ENU EUS DSW.
+fn five(k0_y_ug: f64, seed: u64) -> Bench {
+    let attitudes = [
+        ("NUE", [0.0, 0.0, 0.0]),
+        ("USE", [0.0, 0.0, -90.0]),
+        ("ENU", [90.0, 0.0, 90.0]),
+        ("EUS", [0.0, 90.0, 0.0]),
+        ("DSW", [180.0, 0.0, -90.0]),
+    ];
+    Bench {
+        seed,
+        positions: attitudes.map(|(n, a)| (n, a, 1000.0)).into(),
+        psi: [1e-4, -2e-4, 1.5e-4],
+        drift: [[0.05, -0.03, 0.04], [0.03, 0.02, -0.028], [0.01, -0.02, 0.015], [-0.04, 0.025, 0.02]],
+        accelerometers: [[0.0, k0_y_ug * 1e-6, 0.0], [0.0; 3], [0.0; 3]],
+        ..Bench::default()
+    }
+}
+
+/// Z1 and Z3 of the record of a bench, `C_c^n f - (0, 1, 0)`.
+fn calibrated(bench: &Bench) -> Calibration {
+    let mut text = String::from("t [s],position,Z1 [g],Z3 [g]\n");
+    for s in bench.record() {
+        let angles = bench.positions.iter().find(|p| p.0 == s.label).expect("a position").1;
+        let z = turned(&attitude(&angles), &s.f);
+        text += &format!("{},{},{},{}\n", s.t, s.label, z[0], z[2]);
+    }
+    let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
+    calibrate(&scheme(bench, "F,I,O,S"), &conditions(bench), vec![record], &Options::default(), &|_| true)
+        .expect("calibrated")
+}
+
+/// A zero of 15 ug of accelerometer Y: chi-square of the fit is within its band, D_IZ is many sigmas off, and the
+/// score test names the error and what D_IZ is with it.
+#[test]
+fn an_accelerometer_zero_is_named() {
+    let c = calibrated(&five(15.0, 3));
+    println!("{:#?}\n{:?}", c.omitted, c.findings);
+    let d_iz = c.quantities.iter().find(|q| q.name == "D_IZ").expect("D_IZ");
+    let (estimate, sigma) = (d_iz.estimate.expect("an estimate"), d_iz.sigma.expect("a sigma"));
+    assert!((estimate + 0.028).abs() > 5.0 * sigma, "{estimate} +- {sigma}");
+    let found = c.omitted.suspicion.as_ref().expect("a suspicion");
+    let named = found.errors.iter().map(|e| e.name.as_str());
+    let group = found.indistinguishable.iter().map(String::as_str);
+    assert!(named.chain(group).any(|n| n == "K0_Y"), "{found:?}");
+    assert_eq!(found.errors.len(), 1, "{found:?}");
+    let with = found.changes.iter().find(|s| s.unknown == "D_IZ").expect("D_IZ changes");
+    assert_eq!(with.estimate, estimate);
+    if found.errors[0].name == "K0_Y" {
+        assert!((found.errors[0].estimate - 15.0).abs() < 4.0 * found.errors[0].sigma, "{found:?}");
+        assert!((with.with + 0.028).abs() < 4.0 * sigma, "{with:?}");
+    }
+    assert!(c.findings.iter().any(|f| matches!(f, Finding::Suspect { .. })), "{:?}", c.findings);
+    assert!(!c.consistent);
+}
+
+/// Without an error nothing is suspected, in these ten records.
+#[test]
+fn nothing_is_suspected_without_an_error() {
+    for seed in 0..10 {
+        let c = calibrated(&five(0.0, seed));
+        assert!(c.omitted.suspicion.is_none(), "{seed}: {:?}", c.omitted);
+        assert!(c.consistent, "{seed}: {:?}", c.findings);
+        assert!(c.omitted.tried > 20, "{}", c.omitted.tried);
+    }
+}
