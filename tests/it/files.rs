@@ -222,6 +222,7 @@ fn an_interrupt_ends_with_its_code() {
 }
 
 /// Runs that are interrupted at random times leave what was there, or the whole file, and nothing else.
+#[expect(clippy::print_stderr, reason = "what was measured")]
 fn interruptions_leave_nothing(count: u64) {
     let (folder, at) = folder();
     let scheme = at("scheme.toml");
@@ -243,7 +244,7 @@ fn interruptions_leave_nothing(count: u64) {
         let hidden: Vec<String> = names.filter(|name| name.starts_with('.')).collect();
         assert!(hidden.is_empty(), "{i}: {hidden:?}");
     }
-    println!("{interrupted} of {count} interrupted");
+    eprintln!("{interrupted} of {count} interrupted");
     assert!(interrupted > 0);
 }
 

@@ -110,6 +110,7 @@ fn ended(text: &str) -> Result<bool, String> {
     }
 }
 
+#[expect(clippy::print_stderr, reason = "what was measured")]
 fn all_end(seeds: std::ops::Range<u64>) {
     let (mut judged, mut wrong) = (0, Vec::new());
     let count = seeds.end - seeds.start;
@@ -120,7 +121,7 @@ fn all_end(seeds: std::ops::Range<u64>) {
             Err(why) => wrong.push(format!("seed {seed}: {why}\n{text}")),
         }
     }
-    println!("{judged} of {count} models judged, {} neither judged nor refused", wrong.len());
+    eprintln!("{judged} of {count} models judged, {} neither judged nor refused", wrong.len());
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(judged > count / 4, "{judged}");
 }
