@@ -3,11 +3,12 @@
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
-const COMMANDS: [(&str, usize); 12] = [
+const COMMANDS: [(&str, usize); 13] = [
     ("analyze", 45),
     ("simulate", 62),
     ("crosscheck", 67),
     ("calibrate", 48),
+    ("allan", 24),
     ("compare", 46),
     ("design", 68),
     ("report", 59),

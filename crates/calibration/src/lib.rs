@@ -25,6 +25,7 @@
 pub mod answer;
 pub mod bins;
 pub mod least_squares;
+pub mod noise;
 pub mod platform;
 pub mod record;
 mod setup;

@@ -100,7 +100,8 @@ fn rates(c: &Clock) -> String {
 pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
-        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up".into(),
+        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up. Check the times and attitudes of the scheme against the run (--dry-run shows how the record is read); state priors of the drifts under [simulation]; add positions".into(),
+        Finding::Bends { kappa, refits, failed } => bends(*kappa, *refits, *failed),
         Finding::Force { record, length_g, alike, least, most, causes } => {
             let of = of(record, records);
             if *alike {
@@ -205,15 +206,37 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// From this factor of sigma on, what is held shows.
+/// What is wrong with estimates that bend.
+fn bends(kappa: Option<f64>, refits: usize, failed: usize) -> String {
+    let size = kappa.map_or_else(
+        || "the run cannot be followed over what the records leave open".to_string(),
+        |k| {
+            format!(
+                "over what the records leave open the run differs from its linear model by {} sigma",
+                number(k)
+            )
+        },
+    );
+    let failed = if failed > 0 {
+        format!(", and {failed} of {refits} repeated estimates did not settle")
+    } else {
+        String::new()
+    };
+    format!(
+        "the records and priors do NOT determine the estimates: {size}{failed}. Do not use estimates and sigmas; state smaller priors under [simulation] or add positions"
+    )
+}
+
+/// From this factor of sigma on, what is left open shows.
 const HELD: f64 = 1.05;
 
 /// Why there is no estimate, or what is to be said of it.
 fn verdict(e: &Estimated) -> String {
-    let held = e.held_factor.filter(|f| e.determined && *f > HELD);
+    let bent = e.open_sigma.filter(|_| e.determined && e.held_factor.is_some_and(|f| f > HELD));
     match (e.determined, e.degree) {
-        (true, _) if held.is_some() => {
-            format!("estimated; sigma x{} by what is HELD (see there)", number(held.unwrap_or(1.0)))
+        (true, _) if e.from_prior => "estimated from a stated prior and the record".into(),
+        (true, _) if bent.is_some() => {
+            format!("estimated; +-{} {} by what is left open", number(bent.unwrap_or(0.0)), e.unit)
         }
         (true, Some(_)) => "estimated".into(),
         (true, None) => "estimated; not by derivatives alone".into(),
@@ -390,34 +413,52 @@ fn moment(records: &[RecordReport]) -> String {
     }
 }
 
-/// What nothing determines, and which sigmas that is in.
-fn held(c: &Calibration) -> Vec<String> {
-    let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
-    let all: Vec<&Estimated> = c.quantities.iter().chain(&c.combinations).filter(shows).collect();
-    if c.assumed.held.is_empty() {
-        return Vec::new();
-    }
-    let widths: Vec<String> = c
-        .assumed
-        .held
-        .iter()
-        .map(|(name, width, unit)| format!("{name} {} {unit}", number(*width)))
-        .collect();
-    let mut out = vec![format!(
-        "what nothing determines is held within ten times its prior about its first estimate: {}",
-        widths.join(", ")
-    )];
-    out.push(if all.is_empty() {
-        format!("were it known, no sigma would be smaller by more than {:.0} %", 100.0 * (HELD - 1.0))
+/// The mode of the estimates: data alone or priors as stated, the box of what is left open and its effect, the curvature.
+fn mode(c: &Calibration) -> Vec<String> {
+    let listed = |of: &[(String, f64, String)]| {
+        of.iter()
+            .map(|(name, width, unit)| format!("{name} {} {unit}", number(*width)))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let mut out = vec![if c.assumed.priors.is_empty() {
+        "Data alone: no prior is stated, so none is in an estimate that the record determines.".to_string()
     } else {
-        let each: Vec<String> = all
-            .iter()
-            .map(|e| format!("{} {} times", e.name, number(e.held_factor.unwrap_or(1.0))))
-            .collect();
         format!(
-            "of the linear model it is in no estimate; where attitudes are off by degrees the nonlinear terms take it into some, and their sigmas are larger than were it known: {}. A smaller prior of what is held ([simulation.priors]) or more positions make them smaller",
-            each.join(", ")
+            "Priors as stated: estimates are the most probable values by the record and these priors (1 sigma): {}.",
+            listed(&c.assumed.priors)
         )
+    }];
+    if !c.assumed.held.is_empty() {
+        out.push(format!(
+            "Left open: {} (box of 1 sigma about the first estimate).",
+            listed(&c.assumed.held)
+        ));
+        let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
+        let all: Vec<String> = c
+            .quantities
+            .iter()
+            .chain(&c.combinations)
+            .filter(shows)
+            .map(|e| format!("{} +-{} {}", e.name, number(e.open_sigma.unwrap_or(0.0)), e.unit))
+            .collect();
+        out.push(if all.is_empty() {
+            format!("What is left open adds at most {:.0} % to any sigma.", 100.0 * (HELD - 1.0))
+        } else {
+            format!(
+                "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors under [simulation] or more positions make it smaller.",
+                all.join(", ")
+            )
+        });
+    }
+    out.push(match c.curvature.kappa {
+        Some(k) if c.curvature.from_refits => format!(
+            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from data and priors with errors drawn anew.",
+            number(k),
+            c.curvature.refits - c.curvature.failed
+        ),
+        Some(k) => format!("Curvature {} sigma (the linear covariance holds below 1).", number(k)),
+        None => "Curvature: the run cannot be followed over what is left open.".into(),
     });
     out
 }
@@ -510,7 +551,7 @@ impl Answer for Calibration {
             left("status"),
         ];
         let mut blocks = vec![Block::table(
-            "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the scheme would do, in sigma and to sigma)",
+            "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the program would do, in sigma and to sigma, where none is stated)",
             columns.clone(),
             self.quantities.iter().map(row),
         )];
@@ -522,10 +563,7 @@ impl Answer for Calibration {
                 rows,
             ));
         }
-        let held = held(self);
-        if !held.is_empty() {
-            blocks.push(Block::list("Held", held));
-        }
+        blocks.push(Block::list("Mode", mode(self)));
         blocks.push(Block::list("Fit", fit(self)));
         let each = self.positions.len() / self.records.len().max(1);
         let force = self.positions.iter().any(|p| p.force_g.is_some());

@@ -1,6 +1,7 @@
 //! A torquing scheme calibrated from the records of its runs.
 
 mod clock;
+mod curvature;
 mod diagnose;
 mod earth;
 mod estimate;
@@ -14,11 +15,13 @@ mod offset;
 mod reading;
 mod residuals;
 mod run;
+mod shooting;
 mod timeline;
 
 use std::cell::Cell;
 
 use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::{Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
 use obsdeg_ekf::consistency::chi_square_quantile;
@@ -38,6 +41,7 @@ use offset::Offset;
 use run::Run;
 
 pub use mistaken::Mistaken;
+pub(crate) use observe::TIMES;
 pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
 
 /// Why a scheme cannot be calibrated.
@@ -293,15 +297,30 @@ pub fn calibrate(
     let start = RunStart::new(&planned, &own)?;
     let (n, coefficients, biases) =
         (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
-    let unknowns = Unknowns::new(
+    let stated: Vec<bool> = planned
+        .platform
+        .names()
+        .iter()
+        .map(|name| own.stated_priors().iter().any(|a| concerns(&a.name, name)))
+        .chain(std::iter::repeat_n(false, biases))
+        .collect();
+    let mut unknowns = Unknowns::new(
         runs.len(),
         [n - coefficients, coefficients, biases],
         &start.sigma,
         &start.estimate,
         &prediction.null_space,
+        &stated,
     );
     let known = before.map(|b| known(&b.estimates, &planned, &prediction, &unknowns)).transpose()?;
     let (known, known_names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
+    let mut prior = unknowns.stated_rows();
+    if let Some((rows, _)) = &known {
+        let above = prior.nrows();
+        prior = prior.resize_vertically(above + rows.nrows(), 0.0);
+        prior.rows_mut(above, rows.nrows()).copy_from(rows);
+    }
+    unknowns.determined_by(&prior);
     let mut x: Vec<PlatformState> =
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
     let (mut round, mut passes, mut too_many) = (0, 0, None);
@@ -315,6 +334,7 @@ pub fn calibrate(
             unknowns: &unknowns,
             sigmas: sigmas.clone(),
             known: known.clone(),
+            draw: None,
             going,
             passes: Cell::new(passes),
             stopped: Cell::new(false),
@@ -363,6 +383,11 @@ pub fn calibrate(
             }
         }
         if last || (settled && !leave_out) {
+            let linear = estimate.solution.clone();
+            let bent = problem.bent(&estimate, options.seed)?;
+            if let Some((_, root)) = &bent.found {
+                estimate.solution.inverse_root.clone_from(root);
+            }
             for o in offsets.iter().flatten() {
                 let root = &mut estimate.solution.inverse_root;
                 let columns = root.ncols();
@@ -377,12 +402,14 @@ pub fn calibrate(
                 prediction: &prediction,
                 problem: &problem,
                 estimate: &estimate,
+                linear: &linear,
+                bent: &bent,
                 found: &found,
                 offsets: &offsets,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
                 rests_on,
-                interrupted,
+                interrupted: problem.stopped.get(),
             };
             return parts.answer();
         }

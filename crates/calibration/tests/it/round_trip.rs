@@ -171,7 +171,7 @@ fn accelerometers_too() {
 }
 
 /// The seven quarter turns of examples/self-calibration, with errors of everything: 33 coefficients.
-fn whole(seed: u64) -> Bench {
+pub(crate) fn whole(seed: u64) -> Bench {
     let attitudes = [
         [0.0, 0.0, 90.0],
         [0.0, 0.0, 180.0],
