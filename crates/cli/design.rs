@@ -28,7 +28,7 @@ Examples:
   obsdeg design --positions 8 --carry platform --within 0
   obsdeg design --positions 5 --carry inertial --divide
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
-  obsdeg design --merge part-*.json
+  obsdeg design --merge part-*.json --check 3
   obsdeg design scheme.toml --candidates grid:45        with carry, dwell, noise, requirements and gimbals of the file
 
 Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random \
@@ -53,7 +53,8 @@ pub(crate) struct Arguments {
     asked: Search,
 
     /// Put the parts of a search together to the answer of the whole (under reset carry: that of --within 0).
-    /// No other option is needed: the parts know theirs
+    /// No other option is needed: the parts know theirs. What they list is evaluated again, and what they
+    /// count must add up; that they were searched as they state is believed, but for --check N
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = "Parts", conflicts_with_all = ["minimum", "part"])]
     merge: Vec<PathBuf>,
 

@@ -7,7 +7,7 @@ use clap::builder::styling::AnsiColor;
 use obsdeg_commands::{Kind, Place, Problem};
 use obsdeg_report::{ReportError, in_ascii, visible};
 
-use crate::output::plain_messages;
+use crate::terminal::plain_messages;
 
 /// A check failed.
 const CHECK: u8 = 1;

@@ -19,12 +19,30 @@ fn staging() -> MutexGuard<'static, Option<PathBuf>> {
     STAGING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits until no file is being put in place and removes what was not: the program is about to end.
+/// Waits until no file is being put in place and removes what was not: the program is about to end. Nothing is
+/// written beside a destination from now on: whoever wants to waits for the end.
 pub(crate) fn abandon() {
-    if let Some(folder) = staging().take() {
+    let mut held = staging();
+    if let Some(folder) = held.take() {
         // the next run removes what cannot be removed now
         let _ = fs::remove_dir_all(folder);
     }
+    std::mem::forget(held);
+}
+
+/// Refuses a file beyond the limit that the system sets (`ulimit -f`): the signal of a write beyond it ends the
+/// program with the folder left there.
+fn within_limit(bytes: &[u8]) -> Result<()> {
+    #[cfg(unix)]
+    {
+        use rustix::process::{Resource, getrlimit};
+        if let Some(limit) = getrlimit(Resource::Fsize).current.filter(|limit| bytes.len() as u64 > *limit) {
+            let message =
+                format!("{} bytes; the system allows {limit} bytes of a file (ulimit -f)", bytes.len());
+            return Err(Error::new(ErrorKind::FileTooLarge, message));
+        }
+    }
+    Ok(())
 }
 
 /// Where a file goes: through symbolic links to the file behind them.
@@ -82,6 +100,9 @@ pub(crate) fn place(target: &Path, files: &[(PathBuf, &[u8])]) -> std::result::R
         .iter()
         .map(|(path, _)| destination(path).map_err(at(path)))
         .collect::<std::result::Result<_, _>>()?;
+    for (path, bytes) in files {
+        within_limit(bytes).map_err(at(path))?;
+    }
     // behind a link, so that moving stays within one file system
     let beside = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
     let new = Staging::beside(&beside).map_err(at(target))?;
@@ -119,22 +140,25 @@ impl Staging {
             let mut builder = fs::DirBuilder::new();
             #[cfg(unix)]
             std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+            // an interrupt finds the folder as soon as it is there
+            let mut held = staging();
             match builder.create(&folder) {
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
                 made => made?,
             }
+            *held = Some(folder.clone());
             // until it is locked, another run may take it for left over
             let lock = match File::create_new(folder.join(LOCK)) {
                 Err(e) if e.kind() == ErrorKind::NotFound => continue,
                 lock => lock?,
             };
+            drop(held);
             match lock.try_lock() {
                 Err(TryLockError::WouldBlock) => continue,
                 // a file system without locks: nobody removes the folder either
                 Ok(()) | Err(TryLockError::Error(_)) => {}
             }
             if folder.join(LOCK).exists() {
-                *staging() = Some(folder.clone());
                 return Ok(Self { folder, _lock: lock });
             }
         }
@@ -142,7 +166,10 @@ impl Staging {
 
     /// The file that will replace `end`.
     fn write(&self, i: usize, bytes: &[u8], end: &Path) -> Result<()> {
+        // no file comes into a folder that an interrupt removes
+        let held = staging();
         let mut file = File::create_new(self.folder.join(i.to_string()))?;
+        drop(held);
         file.write_all(bytes)?;
         if let Ok(replaced) = fs::metadata(end) {
             file.set_permissions(replaced.permissions())?;
@@ -153,9 +180,10 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        *staging() = None;
+        let mut held = staging();
         // the next run removes what cannot be removed now
         let _ = fs::remove_dir_all(&self.folder);
+        *held = None;
     }
 }
 

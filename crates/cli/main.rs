@@ -25,6 +25,7 @@ mod progress;
 mod report;
 mod schema;
 mod simulate;
+mod terminal;
 mod third_party;
 
 use std::process::ExitCode;
@@ -160,7 +161,7 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
         }
         let message = e.render().to_string();
         let text = message.lines().all(|line| visible(line) == line);
-        if !e.use_stderr() || text && (message.is_ascii() || !output::plain_messages()) {
+        if !e.use_stderr() || text && (message.is_ascii() || !terminal::plain_messages()) {
             // in colour, where there is any; nobody listens if that fails
             let _ = e.print();
         } else {

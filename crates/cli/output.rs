@@ -1,6 +1,6 @@
 //! Where results go: to stdout, to a file or into a folder, whole or not at all.
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
@@ -9,10 +9,8 @@ use obsdeg_report::{Answer, File, Format, Layout, csv, written};
 use crate::failure::Failure;
 use crate::files;
 use crate::progress::Spinner;
+use crate::terminal::{PIPE, layout};
 use obsdeg_commands::{Word, one_of};
-
-/// Columns of a table that does not go to a terminal.
-const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false };
 
 /// The words of `--format`.
 const FORMATS: [Word<Format>; 5] = [
@@ -56,7 +54,7 @@ pub(crate) struct Target {
     #[arg(long)]
     pub(crate) force: bool,
 
-    /// Say nothing on stderr but errors
+    /// Say nothing on stderr but errors and what is missing in the answer
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }
@@ -82,39 +80,6 @@ pub(crate) fn to_a_folder(arg: Arg) -> Arg {
         _ => return arg,
     };
     arg.help_heading("Output")
-}
-
-/// What a table on stdout looks like.
-fn layout(ascii: bool) -> Layout {
-    let stdout = std::io::stdout();
-    let terminal = stdout.is_terminal();
-    let ascii = ascii || plain(terminal, said);
-    if !terminal {
-        return Layout { ascii, ..PIPE };
-    }
-    Layout {
-        width: terminal_size::terminal_size().map(|(w, _)| w.0),
-        color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
-        ascii,
-    }
-}
-
-/// A variable of the environment that says something.
-fn said(name: &str) -> Option<String> {
-    std::env::var(name).ok().filter(|v| !v.is_empty())
-}
-
-/// Whether a stream takes nothing but ASCII. Without a locale that is the C locale, whose characters are those of ASCII: a terminal is believed
-/// to be of it, but what goes into pipes is read as files are, as UTF-8 (and Windows knows no such variables).
-fn plain(terminal: bool, said: impl Fn(&str) -> Option<String>) -> bool {
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&said);
-    let utf8 = locale.map(|l| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u)));
-    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && said("TERM").is_some_and(|t| t == "dumb")
-}
-
-/// Whether messages are ASCII: asked on the command line, which may be wrong otherwise, or by what stderr is.
-pub(crate) fn plain_messages() -> bool {
-    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), said)
 }
 
 impl Output {
@@ -319,28 +284,5 @@ pub(crate) fn print(text: &[u8]) -> Result<(), Failure> {
             Err(Failure::input(format!("cannot write to stdout: {e}")))
         }
         _ => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ascii_follows_the_locale_and_the_terminal() {
-        let of = |terminal: bool, set: &[(&str, &str)]| {
-            plain(terminal, |name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string()))
-        };
-        assert_eq!(of(true, &[]), !cfg!(windows));
-        assert!(!of(false, &[]));
-        for terminal in [true, false] {
-            assert!(of(terminal, &[("LANG", "C")]) && of(terminal, &[("LC_CTYPE", "de_DE.ISO-8859-1")]));
-            assert!(!of(terminal, &[("LANG", "C.UTF-8")]) && !of(terminal, &[("LANG", "en_US.utf8")]));
-            // the first of them wins
-            assert!(of(terminal, &[("LC_ALL", "POSIX"), ("LANG", "C.UTF-8")]));
-            assert!(!of(terminal, &[("LC_CTYPE", "C.UTF-8"), ("LANG", "C")]));
-        }
-        let dumb = [("TERM", "dumb"), ("LANG", "C.UTF-8")];
-        assert!(of(true, &dumb) && !of(false, &dumb));
     }
 }

@@ -85,7 +85,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let name = a.kind.to_possible_value();
     let name = name.as_ref().map_or("", |v| v.get_name());
     // layouts of which keys have changed since the first
-    let version = if ["comparison", "design", "simulation"].contains(&name) { 2 } else { 1 };
+    let version = if ["comparison", "design", "part", "simulation"].contains(&name) { 2 } else { 1 };
     schema.insert("$id".into(), format!("urn:obsdeg:{name}:{version}").into());
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
     output::print((text + "\n").as_bytes())

@@ -15,7 +15,6 @@ from __future__ import annotations
 import importlib
 import operator
 import os
-import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -169,10 +168,8 @@ def _ask(kinds: tuple[type[Answer], ...], command: str, request: str, progress: 
 def _as(kinds: tuple[type[Answer], ...], rust: _obsdeg.Answer, asked: Any) -> Any:
     if len(kinds) == 1:
         return kinds[0](rust, asked)
-    answer = Answer(rust, asked)
-    schema = re.match(r'\s*\{\s*"schema":\s*"([^"]*)"', answer.json())
-    answer.__class__ = KINDS[schema[1]] if schema else Judgements
-    return answer
+    kind = Judgements if rust.layout is None else KINDS[rust.layout]
+    return kind(rust, asked)
 
 
 def _kinds(what: tuple[Judged, ...], of_scheme: type[Answer], of_model: type[Answer]) -> tuple[type[Answer], ...]:
@@ -376,7 +373,8 @@ def design(
         conditions: a scheme whose conditions hold; as many positions as it has are searched where no number is asked for.
         part: (I, N): only part I of N of all sequences; the answer is a :class:`Part`.
         resume: that part as far as it came.
-        merge: the parts, put together to the answer of the whole; they know the options of their search.
+        merge: the parts, put together to the answer of the whole; they know the options of their search. What they list is evaluated again;
+            that they were searched as they state is believed, but for ``check=N`` blocks that are searched again.
         progress: hears how far the search is; ``True`` for a bar of tqdm. Where it returns False, and on a keyboard interrupt, the search ends
             with the best so far.
         options: the others of ``obsdeg design``.

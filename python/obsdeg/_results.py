@@ -302,7 +302,7 @@ KINDS: dict[str, type[Answer]] = {
     "obsdeg.comparison/2": Comparison,
     "obsdeg.design/2": Design,
     "obsdeg.walks/1": Walks,
-    "obsdeg.part/1": Part,
+    "obsdeg.part/2": Part,
     "obsdeg.simulation/2": Simulation,
     "obsdeg.system-run/1": SystemRun,
     "obsdeg.crosscheck/1": CrossCheck,

@@ -138,16 +138,19 @@ def design(
     executor: Executors = processes,
     retries: int = 2,
     checkpoint: float = CHECKPOINT,
+    check: int = 0,
     heard: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> obsdeg.Design:
-    """Searches in parts, and puts them together: the answer of ``obsdeg.design(**options)``, byte for byte.
+    """Searches in parts, and puts them together: the answer of ``obsdeg.design(**options)`` and, under
+    ``search.parts``, what it was put together from.
 
     Args:
         folder: holds the parts; the same search in the same folder goes on with them.
         parts: how many.
         checkpoint: seconds after which a part that is not complete is written as far as it is: most of the
             work of a part that a kill costs.
+        check: number of blocks of the parts, chosen at random, that are searched again at the end.
         heard: told how many parts are done, of how many.
         options: those of :func:`obsdeg.design`.
 
@@ -181,7 +184,7 @@ def design(
         if heard is not None:
             heard(done, parts)
     found = [file.read_text(encoding="utf-8") for file in files.values()]
-    merged: obsdeg.Design = obsdeg.design(**options, merge=found)
+    merged: obsdeg.Design = obsdeg.design(**options, **({"check": check} if check else {}), merge=found)
     return merged
 
 

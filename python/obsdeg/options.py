@@ -57,6 +57,8 @@ class Positions(Assumed, Terms, total=False):
     """How the platform is turned from one position to the next: the shortest way, or alpha, beta, gamma one after another."""
     measured_azimuth: bool
     """The azimuth psi_y^n is measured too."""
+    work_limit: int
+    """Limit of the work of a verdict on a model, in millions of operations, with half as many bytes [default: 400]."""
 
 
 class GyroNoise(TypedDict, total=False):
@@ -208,6 +210,8 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     """Divide the total time among the positions of the best scheme."""
     front: Sequence[int]
     """Other numbers of positions for the front of total time against the criterion."""
+    check: int
+    """With ``merge``: number of blocks of the parts, chosen at random, that are searched again [default: 0]."""
     observable: Names
     """Coefficients or families that must be observable and that the criterion is about [default: all]."""
     max_degree: int | ByName

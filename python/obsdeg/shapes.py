@@ -1079,6 +1079,23 @@ class Minimum(Record):
     """
 
 
+class PartsReport(Record):
+    """Parts of a search that were put together: every sequence that they list was evaluated again, and their starts and counts add up to
+    the whole.
+    """
+
+    __slots__ = ()
+
+    parts: int
+    """Number of parts put together."""
+    versions: list[str]
+    """Versions of the program that searched the parts, each once."""
+    blocks: int
+    """Number of blocks of starts in all parts, at all worst degrees that were searched."""
+    searched_again: int
+    """Number of blocks, chosen at random, that were searched again with the same result (`--check`)."""
+
+
 class TiesReport(Record):
     """Number of sequences that are as good as the best."""
 
@@ -1231,8 +1248,10 @@ class SearchReport(Record):
     """
     proven: bool
     """True if no sequence of candidates within the constraints is better than the first, by exhaustion or by a bound: none has a smaller
-    worst degree, or the same and a smaller criterion.
+    worst degree, or the same and a smaller criterion. With `parts` this holds if the parts were searched as they state.
     """
+    parts: PartsReport | None
+    """Parts that the answer was put together from; left out for a search as a whole."""
     ties: TiesReport | None
     """Number of sequences as good as the first; null if the search was not exhaustive."""
     order_matters: bool
@@ -1478,6 +1497,19 @@ class Best(Record):
     """
 
 
+class Block(Record):
+    """Block of successive starts, and what its search found."""
+
+    __slots__ = ()
+
+    starts: tuple[int, int]
+    """Starts of the block: index of the first, index behind the last (both from 0)."""
+    counts: tuple[int, int, int]
+    """Number of sequences examined, excluded by a bound, and lost to rounding."""
+    digest: str
+    """SHA-256 over the best sequences, the front, the ties and the counts of the block."""
+
+
 class Level(Record):
     """Sequences found with one worst degree."""
 
@@ -1487,19 +1519,23 @@ class Level(Record):
     """Index of the first start that is not yet searched."""
     best: Best
     """Best sequences, the front and the counts at this worst degree."""
+    blocks: list[Block]
+    """Blocks of starts that were searched, in order: any can be searched again by itself."""
 
 
 class Part(Shape):
     """Part of an exhaustive search, done or interrupted."""
 
     schema: str
-    """Layout of this answer: `obsdeg.part/1`."""
+    """Layout of this answer: `obsdeg.part/2`."""
     version: str
     """Version of the program that wrote it."""
     digest: str
     """SHA-256 of all inputs: the parts of one search have the same."""
     inputs: dict[str, str]
-    """Inputs of the search by name, as the library writes them; they show the difference if digests differ."""
+    """Inputs of the search as a user writes them: options by name, and lines of the scheme file that states all conditions as
+    `section.key`. They show the difference if digests differ.
+    """
     asked: str | None
     """Options and files of the command that wrote it, as the JSON text that the command reads: its merge needs no others; null if no
     command did.
@@ -1512,6 +1548,8 @@ class Part(Shape):
     """Sequences found, by worst degree, smallest first (under reset carry all degrees together)."""
     complete: bool
     """True if all of its starts were searched, at as many worst degrees as the whole may need."""
+    seal: str
+    """SHA-256 over all other fields: a part that was changed after it was written is refused."""
 
 Truth = Literal["linear", "exact"]
 """Model that generates the truth of a simulated run. linear: Linear model of the filter: (2), (6). exact: Direction cosines: the drift
@@ -1559,7 +1597,8 @@ class ConditionsReport(Record):
     """Factor on the true drifts and their priors, dimensionless."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
-    dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values and other_priors where they are stated for some of the
+    unknowns only.
     """
 
 
@@ -1748,6 +1787,10 @@ class FilterReport(Record):
     """Number of linearisations of the whole run: 1 except for the iterated filter."""
     converged: bool
     """True if the linearisations converged."""
+    trusted: bool
+    """False if the sigmas are not to be trusted even where one run is consistent: the small-angle model does not hold for the truth, and
+    the filter is linear, or extended and so linearised before drifts are known.
+    """
 
 
 class Simulation(Shape):
@@ -2239,6 +2282,10 @@ class SystemEvidence(Shape):
     """
     passed: bool
     """True if no check of the model failed."""
+    seen_up_to: int | None
+    """Bound on the order of derivatives up to which an unknown that is not seen was looked for; samples may see it by higher ones, which
+    contradicts nothing. Null where the end is proven.
+    """
     time: float | None
     """Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the equations nor the
     known inputs hold the time.

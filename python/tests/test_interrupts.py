@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import obsdeg
@@ -32,13 +35,28 @@ def transcendental() -> obsdeg.Model:
     return obsdeg.Model.from_text(text.replace('- x0"', '- sin(x0)"'))
 
 
+def oscillator(rows: int) -> tuple[obsdeg.Model, str]:
+    """A model and a record that it fits in half a minute."""
+    text = (
+        'name = "oscillator"\n[states]\nx = "v"\nv = "-k*x - c*v"\n[parameters]\nk = {}\nc = {}\n[outputs]\ny = "x"\n'
+        "[simulation]\nvalues = { x = 1, v = 0, k = 9, c = 0.1 }\nnoise = { y = 0.01 }\n"
+    )
+    file = Path(tempfile.mkdtemp()) / "record.csv"
+    times = [i / 1000 for i in range(rows)]
+    lines = [f"{t},{math.exp(-0.05 * t) * math.cos(3 * t):.9f}\n" for t in times]
+    file.write_text("t,y\n" + "".join(lines), encoding="utf-8")
+    return obsdeg.Model.from_text(text), str(file)
+
+
+OSCILLATOR = oscillator(200_000)
 SCHEMES = [obsdeg.Scheme(PAIR * 10, name=str(i)) for i in range(9)]
 LONG: dict[str, Callable[..., Any]] = {
-    "analyze": lambda **more: obsdeg.analyze(chain(400), **more),
-    "analyze in digits": lambda **more: obsdeg.analyze(transcendental(), **more),
+    "analyze": lambda **more: obsdeg.analyze(chain(400), work_limit=1_000_000, **more),
+    "analyze in digits": lambda **more: obsdeg.analyze(transcendental(), work_limit=1_000_000, **more),
     "simulate": lambda: obsdeg.simulate(angles=PAIR * 20, dwell=36000),
     "compare": lambda: obsdeg.compare(*SCHEMES, dwell=36000),
     "crosscheck": lambda **more: obsdeg.crosscheck(angles=PAIR, runs=2000, dwell=36000, **more),
+    "calibrate": lambda **more: obsdeg.calibrate(*OSCILLATOR, **more),
     "design": lambda **more: obsdeg.design(9, carry="inertial", restarts=100_000, **more),
 }
 
@@ -82,7 +100,7 @@ def test_progress_is_called_and_ends_the_work(name: str) -> None:
 
 def test_errors_of_progress_are_raised() -> None:
     with pytest.raises(ZeroDivisionError):
-        obsdeg.analyze(chain(400), progress=lambda *_: bool(1 // 0))
+        obsdeg.analyze(chain(400), work_limit=1_000_000, progress=lambda *_: bool(1 // 0))
 
 
 def test_progress_may_ask_for_other_work() -> None:
@@ -93,7 +111,7 @@ def test_progress_may_ask_for_other_work() -> None:
         return len(ranks) < 2
 
     with pytest.raises(KeyboardInterrupt):
-        obsdeg.analyze(chain(400), progress=other)
+        obsdeg.analyze(chain(400), work_limit=1_000_000, progress=other)
     assert ranks == [8, 8]
 
 

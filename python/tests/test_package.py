@@ -87,7 +87,13 @@ def test_parts_are_the_whole() -> None:
     whole = obsdeg.design(3, carry="inertial", observable=["D_F"])
     parts = [obsdeg.design(3, carry="inertial", observable=["D_F"], part=(i, 3)) for i in (1, 2, 3)]
     assert all(p.passed for p in parts)
-    assert obsdeg.design(3, carry="inertial", observable=["D_F"], merge=reversed(parts)).json() == whole.json()
+    merged = obsdeg.design(3, carry="inertial", observable=["D_F"], merge=reversed(parts), check=1).to_dict()
+    assert merged["search"].pop("parts")["searched_again"] == 1
+    assert merged == whole.to_dict()
+    forged = parts[1].to_dict()
+    forged["levels"][0]["best"]["found"][0]["worth"]["value"] = 0.001
+    with pytest.raises(obsdeg.ProblemError, match="part 2: it was changed after it was written"):
+        obsdeg.design(3, carry="inertial", observable=["D_F"], merge=[parts[0], json.dumps(forged), parts[2]])
     with pytest.raises(obsdeg.ProblemError, match="part"):
         obsdeg.design(3, carry="inertial", observable=["D_F"], merge=parts[:2])
 

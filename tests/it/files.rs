@@ -220,3 +220,58 @@ fn an_interrupt_ends_with_its_code() {
     }
     assert_eq!(below(folder.path()).len(), 1);
 }
+
+/// Runs that are interrupted at random times leave what was there, or the whole file, and nothing else.
+fn interruptions_leave_nothing(count: u64) {
+    let (folder, at) = folder();
+    let scheme = at("scheme.toml");
+    let command = |i: u64| obsdeg(&["simulate", "--scheme", &scheme, "-q", "-o", &at(&format!("run-{i}"))]);
+    let begun = std::time::Instant::now();
+    assert!(command(count).output().expect("it runs").status.success());
+    let whole = begun.elapsed();
+    let mut random = obsdeg_exact::SplitMix64::new(37);
+    let mut interrupted = 0;
+    for i in 0..count {
+        let mut child = command(i).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
+        // most of them while files are written
+        let part = 0.5 + 0.6 * random.below(1000) as f64 / 1000.0;
+        std::thread::sleep(whole.mul_f64(part));
+        Command::new("kill").args(["-INT", &child.id().to_string()]).output().expect("kill");
+        interrupted += u64::from(!child.wait().expect("it ends").success());
+        let left = fs::read_dir(folder.path()).expect("a folder");
+        let names = left.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
+        let hidden: Vec<String> = names.filter(|name| name.starts_with('.')).collect();
+        assert!(hidden.is_empty(), "{i}: {hidden:?}");
+    }
+    println!("{interrupted} of {count} interrupted");
+    assert!(interrupted > 0);
+}
+
+#[test]
+fn interruptions_leave_no_litter() {
+    interruptions_leave_nothing(15);
+}
+
+#[test]
+#[ignore = "full length, for `.ci/run release`"]
+fn three_hundred_interruptions_leave_no_litter() {
+    interruptions_leave_nothing(300);
+}
+
+/// A limit on the size of files (SIGXFSZ) ends in a message, with nothing left.
+#[test]
+fn a_limit_on_files_leaves_no_litter() {
+    let (folder, at) = folder();
+    for (blocks, command) in [
+        (0, "analyze --scheme SCHEME --solutions off -o DIR/a.json"),
+        (1, "analyze --scheme SCHEME --solutions off -o DIR/b.json --format json"),
+        (8, "simulate --scheme SCHEME -o DIR/simulated"),
+        (16, "report SCHEME --runs 2 -o DIR/review.html"),
+    ] {
+        let command = command.replace("SCHEME", &at("scheme.toml")).replace("DIR", &at(""));
+        let output = shell(&format!("ulimit -f {blocks}; exec \"$0\" {command} -q 2>&1 | cat >&2"));
+        let said = stderr(&output);
+        assert!(said.contains("the system allows") && said.contains("ulimit -f"), "{command}: {said}");
+        assert_eq!(below(folder.path()).len(), 1, "{command}");
+    }
+}

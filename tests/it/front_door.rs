@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use obsdeg::error::MatricesError;
 use obsdeg::{AnalysisOptions, Angle, Carry, Scheme, analyze, earth_rates, platform_matrices, read_scheme};
+use obsdeg_ekf::decomposition::singular_values;
 
 fn scheme(angles: &[[i32; 3]], carry: Carry) -> Scheme {
     Scheme { carry, ..Scheme::of_angles(angles.iter().map(|a| a.map(Angle::from_degrees))) }
@@ -22,7 +23,9 @@ fn rank(scheme: &Scheme, orders: u32) -> usize {
         all.rows_mut(at, b.nrows()).copy_from(b);
         at += b.nrows();
     }
-    all.rank(1e-9)
+    let tall = if all.nrows() < all.ncols() { all.transpose() } else { all };
+    let (values, _) = singular_values(&tall).expect("finite entries");
+    values.iter().filter(|&&v| v > 1e-9).count()
 }
 
 #[test]
@@ -37,7 +40,7 @@ fn ranks_of_the_matrices_are_those_of_the_engine() {
     for set in sets {
         for carry in Carry::ALL {
             let scheme = scheme(set, carry);
-            let answer = analyze(&scheme, options.clone(), None).expect("a scheme");
+            let answer = analyze(&scheme, options, None).expect("a scheme");
             assert_eq!(rank(&scheme, 6), answer.rank, "{set:?}, {carry}");
         }
     }

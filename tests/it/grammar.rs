@@ -76,6 +76,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "table" => &["quantities", "answer", "x"],
         "order" => &["0", "1", "5", "40", "-1", "x"],
         "count-limit" => &["0", "1", "18446744073709551615", "-1"],
+        "work-limit" => &["1", "700", "0", "1000000001", "x"],
+        "check" => &["0", "1", "-1", "x"],
         "solutions" => &["off", "maybe"],
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
@@ -116,6 +118,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             &["D_FX=11", "psi=0.1", "D=1e200", "D=1e-300", "psi=-1e6", "D_F=nan", "D_QX=1"]
         }
         "prior" => &["D=1", "psi=1e-12", "D=1e-300", "D=1e200", "psi=1e8", "D_F=0", "D_F=-1"],
+        "bench" => &["K0=20", "K0_X=3,latitude=10", "azimuth=0", "K0=-1", "Q=1", "x"],
         "drift-scale" => &["1", "1e-6", "1e6", "1e-300", "0", "nan"],
         "runs" => &["3", "2", "1", "0", "-1", "1e3"],
         "filter-carry" => &["inertial", "reset", "x"],
@@ -273,7 +276,7 @@ fn record() -> String {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 12] = [
+    const TAKEN: [&str; 13] = [
         "ascii",
         "count-limit",
         "engine-wait",
@@ -286,6 +289,7 @@ fn a_model_refuses_what_is_about_schemes() {
         "solutions",
         "symbolic-limit",
         "table",
+        "work-limit",
     ];
     let folder = folder();
     for command in ["analyze", "simulate", "crosscheck"] {

@@ -154,3 +154,42 @@ fn the_first_page() {
     let long: Vec<&str> = readme.lines().filter(|l| l.chars().count() > 100).collect();
     assert!(long.is_empty(), "{long:#?}");
 }
+
+/// Sources of Rust below a folder.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
+    let below = |path: PathBuf| if path.is_dir() { sources(&path) } else { vec![path] };
+    entries.flat_map(below).filter(|p| p.extension().is_some_and(|e| e == "rs")).collect()
+}
+
+/// Tests that are too long for every day stand in CONTRIBUTING.md, and those of the release run there.
+#[test]
+fn long_tests_are_listed() {
+    let ignored = Regex::new(r"\n *#\[ignore = [^\n]*\n *(?:#\[[^\n]*\n *)*fn (\w+)").expect("a pattern");
+    let row = Regex::new(r"(?m)^\| `(\w+)` \|.*\| (release|by hand) \|$").expect("a pattern");
+    let texts: Vec<String> =
+        ["tests", "crates"].iter().flat_map(|f| sources(&root().join(f))).map(read).collect();
+    let found: BTreeSet<&str> = texts
+        .iter()
+        .flat_map(|t| ignored.captures_iter(t))
+        .filter_map(|c| Some(c.get(1)?.as_str()))
+        .collect();
+    let (list, gate) = (read("CONTRIBUTING.md"), read(".ci/run"));
+    let rows: Vec<(&str, &str)> =
+        row.captures_iter(&list).map(|c| c.extract()).map(|(_, [name, place])| (name, place)).collect();
+    assert_eq!(rows.iter().map(|(name, _)| *name).collect::<BTreeSet<_>>(), found);
+    // the gate names a test, or the module that it stands in
+    let module = |name: &str| {
+        let file = texts.iter().position(|t| t.contains(&format!("fn {name}("))).expect("a test");
+        let file =
+            ["tests", "crates"].iter().flat_map(|f| sources(&root().join(f))).nth(file).expect("a file");
+        file.file_stem().expect("a name").to_string_lossy().into_owned()
+    };
+    let long = gate.lines().filter_map(|l| l.split("--ignored").nth(1)?.split(';').next());
+    let words: Vec<&str> = long.flat_map(str::split_whitespace).collect();
+    for (name, place) in rows {
+        let part = |part: &str| !part.is_empty() && (name.starts_with(part) || part == module(name));
+        let runs = words.iter().any(|word| word.split("::").any(part));
+        assert_eq!(runs, place == "release", "{name}");
+    }
+}

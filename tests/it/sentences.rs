@@ -327,6 +327,16 @@ fn first_lines_say_local() {
     }
 }
 
+/// A constraint that determines an unknown is named beside the outputs: no output holds y.
+#[test]
+fn constraints_are_named_beside_the_outputs() {
+    let text = table("name='m'\nconstraints=['x + y = 3']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'");
+    assert!(text.contains("are determined by the outputs and the constraints themselves"), "{text}");
+    assert!(text.contains("from the outputs and the constraints themselves; "), "{text}");
+    let text = table("name='m'\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'\nw='y'");
+    assert!(text.contains("are determined by the outputs themselves"), "{text}");
+}
+
 /// Beyond the bound on the order outputs may change: from t = 0 on, y = (a + b) t + a t^71/71 does.
 #[test]
 fn beyond_the_bound_no_output_is_said_to_stay() {
@@ -393,6 +403,13 @@ fn verdicts_are_those_of_the_time_that_is_said() {
     }
     let without = "name='m'\nparameters=['a']\n[states]\nx='a'\n[outputs]\ny='x'";
     assert!(!table(without).contains("judged at"));
+    // an output of the second segment alone: there the time is generic, whatever the first begins at
+    let late = model("").replace("'a + b*u'", "'c*(a + b*u)'").replace("y='x'", "y='c*x'")
+        + "\n[constants]\nc=0\n[[segment]]\nconstants={c='0'}\n[[segment]]\nconstants={c='1'}";
+    let a = without_solutions(&read(&late)).expect("judged");
+    let of = |name: &str| a.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
+    assert_eq!(["a", "b"].map(of), [Some(2), Some(2)]);
+    assert!(table(&late).replace("\n      ", " ").contains("in later segments at a generic time"));
     for wrong in ["time = 'later'", "time = [1]", "time = nan"] {
         let error = model_file::read(&model(wrong)).expect_err("refused");
         assert!(error.to_string().contains("expected a number or"), "{wrong}: {error}");
@@ -488,7 +505,7 @@ fn constraints_have_real_points() {
     let vector =
         "name='m'\nconstraints=['norm(q) = -1']\n[states]\n'q[4]'='[0, 0, 0, 0]'\n[outputs]\nz='q[1]'";
     let error = model_file::read(vector).expect_err("refused").to_string();
-    assert!(error.contains("not negative"), "{error}");
+    assert!(error.contains("not negative") && !error.contains("end of the expression"), "{error}");
     for constraint in ["x^2 + y^2 = 1", "x^100 + y^100 + x*y = 3", "x^3 + y^3 = -1", "sqrt(x^2 + y^2) = 2"] {
         let a = judged(constraint, "").unwrap_or_else(|e| panic!("{constraint}: {e}"));
         assert_eq!(a.rank, 2, "{constraint}");

@@ -1,4 +1,4 @@
-//! The house: crates and the modules in them import only from what lies below them, as crates/README.md draws it.
+//! Crates, their modules and files import only from what lies below them, as crates/README.md draws it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -63,8 +63,8 @@ fn modules() -> Imports {
     ["core", "evidence", "calibration", "design"].into_iter().flat_map(modules_of).collect()
 }
 
-/// Crates of the workspace and what they import from it.
-fn crates() -> Imports {
+/// Crates of the workspace and where their sources are.
+fn all_crates() -> Vec<(&'static str, PathBuf)> {
     let names = [
         "exact",
         "ekf",
@@ -80,13 +80,22 @@ fn crates() -> Imports {
         "cli",
         "web",
     ];
-    let imports = |name: &&str| {
+    let place = |name: &'static str| {
         let place = root().join("crates").join(name);
-        let place = if place.join("src").is_dir() { place.join("src") } else { place };
-        let all = named(&place, "obsdeg_").into_iter().filter(|m| names.contains(&m.as_str()) && m != name);
-        ((*name).to_string(), all.collect())
+        (name, if place.join("src").is_dir() { place.join("src") } else { place })
     };
-    names.iter().map(imports).collect()
+    names.into_iter().map(place).collect()
+}
+
+/// Crates of the workspace and what they import from it.
+fn crates() -> Imports {
+    let all = all_crates();
+    let known: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+    let imports = |(name, place): &(&str, PathBuf)| {
+        let named = named(place, "obsdeg_").into_iter();
+        ((*name).to_string(), named.filter(|m| known.contains(&m.as_str()) && m != name).collect())
+    };
+    all.iter().map(imports).collect()
 }
 
 /// A way from a place back to it.
@@ -139,4 +148,124 @@ fn the_drawing_is_what_is_there() {
     let found: BTreeSet<String> = crates().into_iter().chain(modules()).map(line).collect();
     let drawn: BTreeSet<String> = drawn.lines().map(String::from).collect();
     assert_eq!(drawn, found, "crates/README.md draws other imports than there are");
+}
+
+/// Files of a crate by the path of their module: their text without comments and unit tests.
+type Files = BTreeMap<Vec<String>, String>;
+
+fn files_of(folder: &Path) -> Files {
+    let module = |file: &Path| -> Vec<String> {
+        let inside = file.strip_prefix(folder).expect("a file of the folder").with_extension("");
+        let mut out: Vec<String> = inside.iter().map(|s| s.to_string_lossy().into_owned()).collect();
+        if out.last().is_some_and(|l| ["mod", "lib", "main"].contains(&l.as_str())) {
+            out.pop();
+        }
+        out
+    };
+    let text = |file: &Path| -> String {
+        let text = fs::read_to_string(file).expect("readable");
+        let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        text.lines().map(|l| l.split("//").next().unwrap_or_default().to_string() + "\n").collect()
+    };
+    sources(folder).iter().map(|file| (module(file), text(file))).collect()
+}
+
+/// The identifier at the start of a text, which may be empty.
+fn identifier(text: &str) -> &str {
+    &text[..text.find(|c: char| c != '_' && !c.is_alphanumeric()).unwrap_or(text.len())]
+}
+
+/// Paths that a text of a module names by `crate::`, `super::` or `self::`, from the root of the crate.
+fn paths(module: &[String], text: &str) -> Vec<Vec<String>> {
+    let mut out = Vec::new();
+    for root in ["crate::", "super::", "self::"] {
+        for (at, _) in text.match_indices(root) {
+            if text[..at].ends_with(|c: char| c == '_' || c == ':' || c.is_alphanumeric()) {
+                continue;
+            }
+            let mut path = if root == "crate::" { Vec::new() } else { module.to_vec() };
+            let mut rest = &text[at + if root == "super::" { 0 } else { root.len() }..];
+            while let Some(above) = rest.strip_prefix("super::") {
+                path.pop();
+                rest = above;
+            }
+            loop {
+                let name = identifier(rest);
+                rest = &rest[name.len()..];
+                match rest.strip_prefix("::") {
+                    Some(below) if !name.is_empty() => {
+                        path.push(name.to_string());
+                        rest = below;
+                    }
+                    _ if name.is_empty() && rest.starts_with('{') => {
+                        let list = &rest[1..rest.find('}').expect("an end of the list")];
+                        assert!(!list.contains('{'), "{module:?}: lists in lists are not read here: {list}");
+                        let names = list.split(',').map(str::trim).filter(|name| !name.is_empty());
+                        let segments =
+                            |name: &str| name.split("::").map(|s| identifier(s).to_string()).collect();
+                        out.extend(names.map(|name| [path.clone(), segments(name)].concat()));
+                        break;
+                    }
+                    _ => {
+                        path.push(name.to_string());
+                        out.push(path);
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The module whose file defines what a path names: the longest module of the path, or one below from which
+/// that exports the name.
+fn defined_in(files: &Files, path: &[String]) -> Option<Vec<String>> {
+    let module = (0..=path.len()).rev().map(|n| &path[..n]).find(|m| files.contains_key(*m))?;
+    let Some(name) = path.get(module.len()) else { return Some(module.to_vec()) };
+    let defines = |text: &str| {
+        ["fn", "struct", "enum", "trait", "type", "const", "static"].iter().any(|kind| {
+            let start = format!("{kind} {name}");
+            text.match_indices(&start).any(|(at, _)| identifier(&text[at + kind.len() + 1..]) == name)
+        })
+    };
+    if defines(&files[module]) {
+        return Some(module.to_vec());
+    }
+    // `super::` in a module that is written out in its file may mean that file: what its module does not name is no import
+    let exports = |(at, _): (usize, &str)| identifier(&files[module][at..]) == name;
+    if !files[module].match_indices(name.as_str()).any(exports) {
+        return None;
+    }
+    let below = files.iter().find(|(m, text)| m.starts_with(module) && defines(text));
+    Some(below.map_or_else(|| module.to_vec(), |(m, _)| m.clone()))
+}
+
+/// What every file of a crate imports from the others.
+fn imports_of_files(files: &Files) -> Imports {
+    let imports = |(module, text): (&Vec<String>, &String)| {
+        let all = paths(module, text).into_iter().filter_map(|path| defined_in(files, &path));
+        (module.join("/"), all.filter(|m| m != module).map(|m| m.join("/")).collect())
+    };
+    files.iter().map(imports).collect()
+}
+
+#[test]
+fn no_files_import_each_other() {
+    for (name, place) in all_crates() {
+        assert_eq!(circle(&imports_of_files(&files_of(&place))), None, "of {name}");
+    }
+    // the search finds a circle through a list, a re-export and a path in an expression
+    let file =
+        |module: &[&str], text: &str| (module.iter().map(|m| (*m).to_string()).collect(), text.to_string());
+    let mut files = Files::from([
+        file(&[], "mod a; mod b;"),
+        file(&["a"], "use crate::b::{Other, Made};\npub struct Seen;"),
+        file(&["b"], "mod c; pub use c::Made;\npub struct Other;"),
+        file(&["b", "c"], "pub struct Made; fn f() { super::super::a::Seen::new(); }"),
+    ]);
+    let found = circle(&imports_of_files(&files));
+    assert_eq!(found, Some(["a", "b/c", "a"].map(String::from).to_vec()));
+    files.insert(vec!["b".into(), "c".into()], "pub struct Made;".into());
+    assert_eq!(circle(&imports_of_files(&files)), None);
 }

@@ -455,5 +455,13 @@ fn fewest_positions_of_walks() {
     }
     let hidden = Scheme { unknowns: unknowns("F,GS,K1,K3"), ..base };
     let none = walks(&hidden, &options, &|| true).expect("walks");
+    let title = |w: &obsdeg_design::design::Walks| {
+        let text = obsdeg_report::written(w, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    // a tour of all turns proves that there is none; a search that ends does not
+    assert!(!none.never.is_empty() && title(&none).contains("degrees makes every required"), "{none:?}");
+    let sought = obsdeg_design::design::Walks { never: Vec::new(), ..none.clone() };
+    assert!(title(&sought).contains("degrees was found that makes every required"), "{sought:?}");
     assert!(none.positions.is_none() && none.never.contains(&"K1_X".to_string()) && !none.proven, "{none:?}");
 }

@@ -13,7 +13,8 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The page, built from what is there now; none where there is no target or no browser.
+/// The page, built from what is there now; none where it was never built here (`cargo run -p obsdeg-web`, minutes of
+/// compilation for another target), or where there is no target or no browser.
 #[expect(clippy::print_stderr, reason = "a skipped test says why")]
 pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
     static PAGE: OnceLock<Option<PathBuf>> = OnceLock::new();
@@ -25,19 +26,26 @@ pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
         if !Path::new(String::from_utf8_lossy(&libraries.stdout).trim()).is_dir() {
             return None;
         }
-        let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("workbench.html");
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        if !root().join("target/workbench.html").is_file() {
+            return None;
+        }
+        let page = folder.join("workbench.html");
+        // with the features of the whole workspace, so that nothing is compiled again
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let built = Command::new(cargo)
-            .args(["run", "-q", "-p", "obsdeg-web", "--bin", "workbench", "--"])
-            .arg(&page)
+            .args(["build", "-q", "--workspace", "--bin", "workbench"])
             .current_dir(root())
             .status();
-        assert!(built.expect("cargo runs").success(), "the page is built");
+        assert!(built.expect("cargo runs").success(), "the builder of the page is built");
+        let builder = Path::new(env!("CARGO_BIN_EXE_obsdeg")).with_file_name("workbench");
+        let built = Command::new(builder).arg(&page).current_dir(root()).status();
+        assert!(built.expect("it runs").success(), "the page is built");
         Some(page)
     });
     let Some(page) = built.as_deref() else {
         eprintln!(
-            "skipped: the target wasm32-unknown-unknown is not installed (rustup target add wasm32-unknown-unknown)"
+            "skipped: the page is not built (rustup target add wasm32-unknown-unknown, cargo run -p obsdeg-web)"
         );
         return None;
     };

@@ -3,6 +3,7 @@
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::omitted::Suspicion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +55,9 @@ pub struct Calibration {
     pub records: Vec<RecordReport>,
     /// Assumptions of the estimates: conditions, noise, priors and gate.
     pub assumed: Assumed,
+    /// Errors that the scheme does not estimate: suspicion in these records, and what they cannot show.
+    #[serde(default)]
+    pub omitted: Omitted,
     /// Scheme, geometry and carry that were calibrated.
     pub setup: Setup,
     /// Records that the estimates rest on, including those of the calibration before.
@@ -200,11 +204,38 @@ pub enum Finding {
         /// Largest difference of both, in sigma, dimensionless.
         difference: f64,
     },
+    /// Error that is not among the unknowns and explains the residuals: see `omitted`.
+    Suspect {
+        /// Names of the errors: one, or a pair where no single one explains the residuals.
+        errors: Vec<String>,
+        /// Fall of chi-square with them among the unknowns, dimensionless.
+        chi_square_fall: f64,
+    },
     /// Prior knowledge that does not agree with the records.
     Known {
         /// Chi-square per degree of freedom, dimensionless; 1 is expected.
         chi_square: f64,
     },
+}
+
+/// Errors that a calibration does not estimate.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Omitted {
+    /// Number of errors that were tried, each by a score test on the residuals.
+    pub tried: usize,
+    /// Error or pair that explains the residuals; null where chance is enough.
+    pub suspicion: Option<Suspicion>,
+    /// Errors that no record of this scheme shows and that change a coefficient.
+    pub silent: Vec<SilentError>,
+}
+
+/// Error that no record of a scheme shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SilentError {
+    /// Name of the error, such as `K0_X`.
+    pub name: String,
+    /// Names of the unknowns whose estimates it changes.
+    pub changes: Vec<String>,
 }
 
 /// Kind of cells that hold one value again and again.

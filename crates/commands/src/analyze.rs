@@ -86,6 +86,13 @@ pub enum Judged {
 }
 
 impl Answer for Judged {
+    fn layout(&self) -> Option<&str> {
+        match self {
+            Self::Scheme(a) => a.layout(),
+            Self::Model(a) => a.layout(),
+        }
+    }
+
     fn document(&self) -> Document {
         match self {
             Self::Scheme(a) => a.document(),
@@ -112,6 +119,13 @@ pub enum Judgements {
 }
 
 impl Answer for Judgements {
+    fn layout(&self) -> Option<&str> {
+        match self {
+            Self::One(one) => one.layout(),
+            Self::Several(_) => None,
+        }
+    }
+
     fn document(&self) -> Document {
         match self {
             Self::One(one) => one.document(),

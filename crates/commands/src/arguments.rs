@@ -10,6 +10,7 @@ use clap::{Arg, Args, Command};
 use obsdeg_core::model::{
     Carry, DefinedBy, Euler, Latitude, Path, Rotation, Scheme, TermError, Unknowns, parse_attitude,
 };
+use obsdeg_core::system::WorkLimit;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::Problem;
@@ -42,7 +43,7 @@ const OF_BOTH: [&str; 18] = [
 ];
 
 /// Options that concern models alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 4] = ["order", "count_limit", "starts", "profile"];
+const OF_MODELS: [&str; 5] = ["order", "count_limit", "work_limit", "starts", "profile"];
 
 /// The options on the command line that concern one kind of file only, as they are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -131,11 +132,19 @@ pub struct InputOptions {
     #[arg(long, help_heading = "Assumptions")]
     pub measured_azimuth: bool,
 
+    /// Limit of the work of a verdict on a model at a random point, in millions of operations, with half as many
+    /// bytes: what takes more is refused before it is computed (default: 400, some seconds)
+    #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(WORK))]
+    pub work_limit: Option<u64>,
+
     /// Which options were given
     #[arg(skip)]
     #[serde(skip)]
     pub given: Given,
 }
+
+/// Limits of the work of a verdict, in millions of operations.
+const WORK: RangeInclusive<u64> = 1..=1_000_000_000;
 
 /// The words of `--path`.
 const PATHS: [Word<Path>; 2] = [
@@ -341,6 +350,14 @@ impl InputOptions {
             return Err(Problem::input("found --angles beside a file; expected one of them"));
         }
         self.given.concern(&read)?;
+        if let Some(limit) = self.work_limit {
+            check_whole("--work-limit", limit, &WORK)?;
+            for (_, input) in &mut read {
+                if let Input::Model(file) = input {
+                    file.model.work_limit = WorkLimit(limit);
+                }
+            }
+        }
         let terms = self.terms.unknowns()?;
         for (_, input) in &mut read {
             let Input::Scheme(scheme) = input else { continue };

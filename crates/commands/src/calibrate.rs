@@ -154,6 +154,14 @@ pub enum Calibrated {
 }
 
 impl Answer for Calibrated {
+    fn layout(&self) -> Option<&str> {
+        match self {
+            Self::Platform(a) => a.layout(),
+            Self::Model(a) => a.layout(),
+            Self::Read(a) => a.layout(),
+        }
+    }
+
     fn document(&self) -> Document {
         match self {
             Self::Platform(a) => a.document(),

@@ -28,6 +28,9 @@ pub const COMMANDS: [&str; 9] =
 
 /// An answer, whatever it is of.
 pub trait Rendered: Send + Sync {
+    /// Name and version of the layout of the JSON (`obsdeg.analysis/1`); none of lists of answers and of texts.
+    fn layout(&self) -> Option<&str>;
+
     /// What the command line prints with `--format`, byte for byte; a report is a page in any format.
     ///
     /// # Errors
@@ -82,6 +85,10 @@ where
     A: Answer + Send + Sync,
     F: Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync,
 {
+    fn layout(&self) -> Option<&str> {
+        self.answer.layout()
+    }
+
     fn written(&self, format: Format) -> Result<String, Problem> {
         Ok(written(&self.answer, format, Layout::default())?)
     }
@@ -103,6 +110,10 @@ where
 struct Text(String);
 
 impl Rendered for Text {
+    fn layout(&self) -> Option<&str> {
+        None
+    }
+
     fn written(&self, _: Format) -> Result<String, Problem> {
         Ok(self.0.clone())
     }

@@ -7,7 +7,7 @@ use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{
     Assignment, AssignmentError, DriftNoise, FilterKind, Propagation, Settings, Truth, concerns, known,
 };
-use obsdeg_core::model::{PerGyro, Platform, Scheme};
+use obsdeg_core::model::{PerGyro, Platform, Scheme, may_be_omitted};
 use obsdeg_evidence::simulation::{Conditions, general_first};
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +73,7 @@ pub struct MeasurementOptions {
 
     /// Standard deviation of an unknown or family beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug:
     /// D_F=0.1, psi=0.05. It counts in sigmas, not in what is observable (default: none in predictions; in
-    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others 1; 1e-9 to 1e9)
+    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others by family: prior_sigma in the JSON; 1e-9 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
     #[serde(with = "text::list")]
     pub prior: Vec<Assignment>,
@@ -83,6 +83,22 @@ pub struct MeasurementOptions {
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
     #[serde(with = "text::list")]
     pub requirement: Vec<Assignment>,
+
+    /// Bench: sizes (one sigma) of errors that the scheme does not estimate, by error or family:
+    /// K0=20,latitude=10. Units: ug (K0), ppm (K1, GS, earth_rate, gravity), arcsec (M, GM, latitude, azimuth,
+    /// attitude). Requirements are then judged by the total uncertainty (default: none counts; 0 to 1e9)
+    #[arg(long, value_name = "NAME=X", value_delimiter = ',', value_parser = benched)]
+    #[serde(with = "text::list")]
+    pub bench: Vec<Assignment>,
+}
+
+/// Reads a size of a bench: `K0=20`.
+fn benched(text: &str) -> Result<Assignment, String> {
+    let a = assigned(ranges::BENCH)(text)?;
+    if may_be_omitted(&a.name) {
+        return Ok(a);
+    }
+    Err("expected an error such as K0, K0_X, M, GS, latitude, azimuth, earth_rate, gravity, attitude".into())
 }
 
 /// The datasheet of the gyros; a scheme file may give it too.
@@ -253,6 +269,7 @@ impl MeasurementOptions {
             ("--drift-noise", self.drift_noise.is_some()),
             ("--prior", !self.prior.is_empty()),
             ("--requirement", !self.requirement.is_empty()),
+            ("--bench", !self.bench.is_empty()),
         ];
         all.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
@@ -272,6 +289,7 @@ impl MeasurementOptions {
         });
         out.priors.extend(general_first(self.prior.clone()));
         out.requirements.extend(general_first(self.requirement.clone()));
+        out.bench.extend(general_first(self.bench.clone()));
         out
     }
 }

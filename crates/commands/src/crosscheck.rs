@@ -88,6 +88,13 @@ impl Evidence {
 }
 
 impl Answer for Evidence {
+    fn layout(&self) -> Option<&str> {
+        match self {
+            Self::Scheme(a) => a.layout(),
+            Self::Model(a) => a.layout(),
+        }
+    }
+
     fn document(&self) -> Document {
         match self {
             Self::Scheme(a) => a.document(),

@@ -29,6 +29,8 @@ use crate::text;
 const POSITIONS: RangeInclusive<u64> = 1..=100;
 /// Numbers of schemes that are listed.
 const KEPT: RangeInclusive<u64> = 1..=1000;
+/// Blocks of parts that are searched again.
+const CHECKED: RangeInclusive<u64> = 0..=1_000_000_000;
 /// Restarts of the exchange.
 const RESTARTS: RangeInclusive<u64> = 1..=1_000_000;
 
@@ -126,6 +128,11 @@ pub struct Search {
     #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
     pub part: Option<[usize; 2]>,
 
+    /// With --merge: search N blocks of the parts again, chosen at random, and refuse a part whose block gives
+    /// something else (default: 0; a block is at most 16 of the starts)
+    #[arg(long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED), conflicts_with_all = ["minimum", "part"])]
+    pub check: Option<u64>,
+
     /// What a scheme must be.
     #[command(flatten)]
     #[serde(flatten)]
@@ -199,6 +206,7 @@ impl Default for Search {
             divide: false,
             front: Vec::new(),
             part: None,
+            check: None,
             wanted: WantedOptions::default(),
             measurement: MeasurementOptions::default(),
         }
@@ -297,6 +305,10 @@ pub struct Walked {
 }
 
 impl Answer for Searched {
+    fn layout(&self) -> Option<&str> {
+        self.found.layout()
+    }
+
     fn document(&self) -> Document {
         self.found.document()
     }
@@ -311,6 +323,10 @@ impl Answer for Searched {
 }
 
 impl Answer for Walked {
+    fn layout(&self) -> Option<&str> {
+        self.found.layout()
+    }
+
     fn document(&self) -> Document {
         self.found.document()
     }
@@ -354,6 +370,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     }
     a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
     a.restarts.map_or(Ok(()), |restarts| check_whole("--restarts", restarts, &RESTARTS))?;
+    a.check.map_or(Ok(()), |blocks| check_whole("--check", blocks, &CHECKED))?;
     let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
     if let Some(file) = &files.conditions_file {
         base = file.scheme()?;
@@ -417,12 +434,13 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         let going_on = files.resume.as_ref().map(read_part).transpose()?;
         let mut done = design_part(&base, &conditions, &options, number, going_on, &progress)?;
         done.asked = Some(Asked::of(a, files)?);
-        return Ok(Designed::Part(Box::new(done)));
+        return Ok(Designed::Part(Box::new(done.sealed())));
     }
     let found = if parts.is_empty() {
         obsdeg_design::design::design(&base, &conditions, &options, &progress)
     } else {
-        design_merged(&base, &conditions, &options, &parts, &progress)
+        let check = a.check.map_or(0, |blocks| usize::try_from(blocks).unwrap_or(usize::MAX));
+        design_merged(&base, &conditions, &options, &parts, check, &progress)
     }?;
     let conditions = asked_conditions(&base, &conditions, &options.required)?;
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions })))
@@ -523,6 +541,7 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
         }
     }
     let others = [
+        ("--check", a.check.is_some() && !merged, "--merge with it, whose parts are checked"),
         ("--round", a.round.is_some() && !free, "--candidates free with it"),
         (
             "--within",
@@ -558,12 +577,15 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
     }
 }
 
-/// A part of a search from its file.
+/// A part of a search from its file, unchanged since it was written.
 fn read_part(part: &Source) -> Result<Part, Problem> {
-    serde_json::from_str(&part.text).map_err(|e| {
+    let named = |why: String| Problem::input(format!("{}: {why}", part.name));
+    let read: Part = serde_json::from_str(&part.text).map_err(|e| {
         let expected = "expected the file that `obsdeg design --part` wrote";
-        Problem::input(format!("{}: it is no part of a search ({e}); {expected}", part.name))
-    })
+        named(format!("it is no part of a search ({e}); {expected}"))
+    })?;
+    read.unchanged().map_err(|why| named(why.to_string()))?;
+    Ok(read)
 }
 
 /// The fewest positions where the way between them counts.
@@ -658,6 +680,11 @@ fn scheme_file(
     let proven = found.search.as_ref().is_some_and(|s| s.proven) && as_searched;
     let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| as_searched);
     let proven = match (proven, certificate) {
+        (true, _)
+            if found.search.as_ref().and_then(|s| s.parts.as_ref()).is_some_and(|p| !p.is_repeated()) =>
+        {
+            "proven best (if the parts were searched as they state)".into()
+        }
         (true, _) => "proven best".into(),
         (false, Some(c)) => {
             let excess = Excess::new(best.value, c.best_possible, c.within_percent);

@@ -60,6 +60,13 @@ impl Run {
 }
 
 impl Answer for Run {
+    fn layout(&self) -> Option<&str> {
+        match self {
+            Self::Scheme(a) => a.layout(),
+            Self::Model(a) => a.layout(),
+        }
+    }
+
     fn document(&self) -> Document {
         match self {
             Self::Scheme(a) => a.document(),

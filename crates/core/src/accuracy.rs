@@ -145,7 +145,7 @@ impl Accuracy {
 }
 
 /// The dwells as whole multiples of a common unit; those not given are equal.
-fn dwell_ratios(scheme: &Scheme) -> Vec<u64> {
+pub(crate) fn dwell_ratios(scheme: &Scheme) -> Vec<u64> {
     let given: Vec<u64> =
         scheme.positions.iter().map(|p| p.dwell.unwrap_or(Dwell::PAPER).nanoseconds()).collect();
     let unit = given.iter().fold(0, |a, &b| gcd(a, b));
@@ -194,11 +194,11 @@ fn module(
 }
 
 /// A functional of the unknowns in a ring.
-type Row<R> = Vec<<R as Ring>::Element>;
+pub(crate) type Row<R> = Vec<<R as Ring>::Element>;
 
 /// The rows `T^j H F^j S_i Phi_{i-1} ... Phi_1` in a ring: `power` gives `T^j`, `phi` the three rows of
 /// `Phi_i` for `psi^n` as functionals of the local unknowns (all but psi^n are constant). With them psi in the carried axes at the end.
-fn dwell_rows<R: LiftField>(
+pub(crate) fn dwell_rows<R: LiftField>(
     ring: &R,
     blocks: &[Block<R::Element>],
     chain: &[LocalRow],

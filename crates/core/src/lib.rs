@@ -44,6 +44,7 @@ pub mod engine;
 pub mod findings;
 pub mod language;
 pub mod model;
+pub mod omitted;
 pub mod remedies;
 pub mod solution;
 pub mod system;

@@ -27,6 +27,9 @@ pub enum EkfError {
         /// Column, from 0.
         column: usize,
     },
+    /// Work that ended because nobody waits for it.
+    #[error("interrupted")]
+    Interrupted,
     /// A state with NaN or infinity.
     #[error("{what} is not finite")]
     StateNotFinite {

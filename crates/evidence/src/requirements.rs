@@ -109,6 +109,9 @@ pub struct Requirements {
     pub worst: Option<Margin>,
     /// Unknowns that miss their requirement, in model order.
     pub missed: Vec<Missed>,
+    /// True if the sigmas are total uncertainties, with the errors of a stated bench.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub with_bench: bool,
     /// Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated
     /// priors alone.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -118,8 +121,15 @@ pub struct Requirements {
 impl Requirements {
     /// Decides about `claims`, in their order.
     pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = Claim<'a>>) -> Self {
-        let mut out =
-            Self { basis, stated: 0, met: 0, worst: None, missed: Vec::new(), on_prior: Vec::new() };
+        let mut out = Self {
+            basis,
+            stated: 0,
+            met: 0,
+            worst: None,
+            missed: Vec::new(),
+            with_bench: false,
+            on_prior: Vec::new(),
+        };
         for claim in claims {
             let Some(required) = claim.required else { continue };
             out.stated += 1;

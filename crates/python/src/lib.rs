@@ -39,6 +39,12 @@ impl Answer {
         self.0.passed
     }
 
+    /// Name and version of the layout of the JSON; None of several answers, of a page and of a part of a search.
+    #[getter]
+    fn layout(&self) -> Option<&str> {
+        self.0.answer.layout()
+    }
+
     /// What the command line prints: `format` is table, json, markdown, csv or latex.
     fn written(&self, py: Python<'_>, format: &str) -> PyResult<String> {
         let format: Format = format.parse().map_err(|e| PyValueError::new_err(format!("{e}")))?;

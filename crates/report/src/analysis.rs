@@ -5,7 +5,7 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::solution::Formula;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
-use crate::{Answer, gimbals, latex, resolve, words};
+use crate::{Answer, gimbals, latex, omitted, resolve, words};
 
 fn positions(positions: &[PositionReport]) -> Block {
     let turned = positions.iter().any(|p| !p.turns.is_empty());
@@ -98,6 +98,10 @@ fn formula(f: &Formula) -> Typeset {
 }
 
 impl Answer for Analysis {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let [unknowns, combinations] = verdicts(self);
         let mut blocks = vec![positions(&self.positions), unknowns];
@@ -119,6 +123,7 @@ impl Answer for Analysis {
             self.formulas.iter().flatten().map(formula),
         ));
         blocks.extend(Block::list_if_any("Under the other carries", words::carries(self)));
+        blocks.extend(self.omitted.as_ref().map(|o| Block::list("Not estimated", omitted::classes(o))));
         blocks.extend(gimbals::block(self.gimbals.as_ref()));
         blocks.push(Block::list("Assumed", words::assumptions(self)));
         let notes = self.notes.iter().map(|n| format!("note: {n}"));

@@ -15,6 +15,10 @@ fn word(f: Finding) -> &'static str {
 }
 
 impl Answer for Audit {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let all = [Finding::Agree, Finding::Conditional, Finding::Disagree, Finding::NotCovered];
         let count = |f| self.lines.iter().filter(|l| l.finding == f).count();

@@ -9,7 +9,7 @@ use obsdeg_calibration::answer::{
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
-use crate::{Answer, ReportError, Table, stated, words};
+use crate::{Answer, ReportError, Table, omitted, stated, words};
 
 /// How many outliers are listed.
 const LISTED: usize = 20;
@@ -198,6 +198,11 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
         Finding::SecondPath { difference } => format!(
             "filter and least squares differ by {} sigma: these numbers are not resolved in double precision",
             number(*difference)
+        ),
+        Finding::Suspect { errors, chi_square_fall } => format!(
+            "{} would explain the residuals (chi-square falls by {}) and is not among the unknowns: see Not estimated",
+            errors.join(" with "),
+            number(*chi_square_fall)
         ),
         Finding::Known { chi_square } => format!(
             "the calibration before does not agree with these records (chi-square {} per degree of freedom)",
@@ -528,9 +533,16 @@ fn by_default(a: &Assumed) -> Option<String> {
 }
 
 impl Answer for Calibration {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut lead = vec![match self.consistent {
-            true => "consistent: the model and its sigmas explain the record".to_string(),
+            true => format!(
+                "consistent: the model and its sigmas explain the record, as far as it can tell{}",
+                omitted::silent(&self.omitted)
+            ),
             false => "NOT consistent: sigmas are not to be relied upon as they are".into(),
         }];
         lead.extend(self.requirements.as_ref().map(|r| {
@@ -565,6 +577,7 @@ impl Answer for Calibration {
         }
         blocks.push(Block::list("Mode", mode(self)));
         blocks.push(Block::list("Fit", fit(self)));
+        blocks.push(Block::list("Not estimated", omitted::calibration(&self.omitted)));
         let each = self.positions.len() / self.records.len().max(1);
         let force = self.positions.iter().any(|p| p.force_g.is_some());
         let mut columns = vec![

@@ -5,7 +5,7 @@ use obsdeg_evidence::requirements::{Requirements, Worst};
 use obsdeg_evidence::simulation::CoefficientFloor;
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, gimbals, resolve, stated, words};
+use crate::{Answer, gimbals, omitted, resolve, stated, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
@@ -189,6 +189,8 @@ fn lead(c: &Comparison) -> Vec<String> {
             |w| format!("worst sigma {}", stated::worst_sigma(w)),
         );
         out.push(of(format!("{}; {sigma}.", stated::requirements(&r.requirements)), r));
+        let lead = omitted::lead(&r.omitted, r.requirements.with_bench, r.requirements.all_met());
+        out.extend(lead.map(|t| of(t, r)));
     }
     let beyond = c.schemes.iter().filter_map(|r| Some((r, gimbals::lead(r.gimbals.as_ref())?)));
     out.extend(beyond.map(|(r, text)| format!("{}: {text}", r.name)));
@@ -207,6 +209,10 @@ fn lead(c: &Comparison) -> Vec<String> {
 }
 
 impl Answer for Comparison {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         // where nothing is required there is nothing to be met
         let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);
@@ -253,6 +259,10 @@ impl Answer for Comparison {
             [left("condition"), left("scheme"), right("rank with dwell"), left("worst sigma(D)")],
             rows,
         ));
+        for r in &self.schemes {
+            let whose = if self.schemes.len() > 1 { format!(" by {}", r.name) } else { String::new() };
+            blocks.extend(omitted::blocks(&r.omitted, &whose));
+        }
         let floors = || self.schemes.iter().filter_map(|r| Some((r, r.noise_floor.as_ref()?)));
         if floors().next().is_some() {
             let mut columns = vec![left("coefficient"), left("scheme"), left("unit")];

@@ -219,6 +219,10 @@ fn lead(c: &CrossCheck) -> Vec<String> {
 }
 
 impl Answer for CrossCheck {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         if !self.quantities.is_empty() {

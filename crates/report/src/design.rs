@@ -1,7 +1,7 @@
 //! Schemes that were found.
 
 use obsdeg_core::model::Carry;
-use obsdeg_design::design::{Certificate, Design, Found, SearchReport, Weight};
+use obsdeg_design::design::{Certificate, Design, Found, PartsReport, SearchReport, Weight};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
@@ -9,7 +9,7 @@ use crate::document::{Block, Document, left, number, right};
 use crate::excess::Excess;
 use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
 use crate::figures::{File, picture};
-use crate::{Answer, gimbals, stated, words};
+use crate::{Answer, gimbals, omitted, stated, words};
 
 fn criterion(name: &str) -> &'static str {
     match name {
@@ -62,17 +62,27 @@ fn margin(r: &Requirements) -> String {
 fn lead(d: &Design) -> Vec<String> {
     let mut out = Vec::new();
     if let (Some(s), Some(first)) = (&d.search, d.found.first()) {
-        let best = if s.proven && !first.refined && first.dwells_s.is_empty() {
-            "Proven best"
-        } else {
-            "Best found"
+        let best = match s.proven && !first.refined && first.dwells_s.is_empty() {
+            true if by_parts(s).is_some() => "Best, proven if the parts were searched as they state,",
+            true => "Proven best of these candidates",
+            false => "Best found",
         };
         let sigma = first.worst_sigma_dph.zip(first.worst.as_ref());
         let sigma = sigma.map_or_else(String::new, |(sigma, name)| {
             format!(": worst sigma {}", stated::sigma_of(name, sigma))
         });
-        let by = format!("{best} by the criterion {}", s.criterion);
+        // a scheme with a smaller criterion and a larger worst degree comes later
+        let first_by = if s.degree_floor.is_some() { "worst degree, then " } else { "" };
+        let by = format!("{best} by {first_by}the criterion {}", s.criterion);
         out.push(format!("{by}: {}{sigma}; {}.", route(first), stated::requirements(&first.requirements)));
+        let met = first.requirements.all_met();
+        out.extend(d.omitted.as_ref().and_then(|o| omitted::lead(o, first.requirements.with_bench, met)));
+        out.extend(s.ranked.map(|n| {
+            format!(
+                "With the bench, the {n} schemes of least sigma were ranked by their total uncertainty: no bound and no proof counts, and a \
+                 scheme with a larger sigma may have a smaller total."
+            )
+        }));
         if first.requirements.any_missed() {
             let margin =
                 if s.criterion == "margin" { "" } else { "--criterion margin seeks the largest margin; " };
@@ -93,6 +103,28 @@ fn lead(d: &Design) -> Vec<String> {
     out.extend(stated::other_carries(&d.other_carries));
     out.extend(d.search.as_ref().and_then(|s| stated::by_default(&s.conditions)));
     out
+}
+
+/// The parts of a search, unless every block of them was searched again.
+fn by_parts(s: &SearchReport) -> Option<&PartsReport> {
+    s.parts.as_ref().filter(|parts| !parts.is_repeated())
+}
+
+/// The parts that an answer was put together from, and what was checked of them.
+fn parts(p: &PartsReport) -> String {
+    let again = match (p.searched_again, p.is_repeated()) {
+        (_, true) => format!("all {} blocks of starts were searched again with the same result", p.blocks),
+        (0, _) => format!("no block of starts of {} was searched again (--check N)", p.blocks),
+        (n, _) => format!(
+            "{n} of {} blocks of starts, chosen at random, were searched again with the same result",
+            p.blocks
+        ),
+    };
+    format!(
+        "put together from {} parts, searched by version {}: what they list was evaluated again, their starts and counts add up; {again}",
+        p.parts,
+        p.versions.join(", ")
+    )
 }
 
 /// ` (900, 1100 s)`: dwells that are not equal.
@@ -178,8 +210,9 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     });
     let mut out = vec![if s.proven {
         let unrefined = searched(d);
+        let if_searched = by_parts(s).map_or("", |_| ", if the parts were searched as they state");
         format!(
-            "{unrefined} is proven to be the best of these {} candidates, by {}: of all sequences of {} of them within the constraints none has a \
+            "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all sequences of {} of them within the constraints none has a \
              smaller worst degree, or the same and a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left open",
             d.candidates.len(),
             if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
@@ -207,6 +240,7 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             s.sequences.map_or_else(String::new, |n| format!("; --within 0 searches all {n} sequences"));
         format!("not proven: {by}, {} sequences examined{known}{all}", s.examined)
     }];
+    out.extend(s.parts.as_ref().map(parts));
     if d.found.iter().any(|f| f.image_of.is_some()) {
         out.push(
             "images of a scheme listed before them are that scheme in other platform axes (coefficients renamed): what is true of one is true of all"
@@ -481,6 +515,10 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
 }
 
 impl Answer for Design {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         if let Some(s) = &self.search {
@@ -490,6 +528,7 @@ impl Answer for Design {
             blocks.push(table(&heading, &self.found).without(left_out));
             blocks.extend(self.found.first().map(gimbal_angles));
             blocks.extend(gimbals::block(self.gimbals.as_ref()));
+            blocks.extend(self.omitted.iter().flat_map(|o| omitted::blocks(o, " by the first scheme")));
             blocks.push(Block::list("How", how(self, s)));
             blocks.push(Block::list("How good the best can be", bound(self, s)));
             blocks.push(

@@ -27,6 +27,7 @@ mod gimbals;
 mod html;
 mod latex;
 mod markdown;
+mod omitted;
 mod panels;
 #[cfg(feature = "pdf")]
 mod pdf;
@@ -177,6 +178,11 @@ pub enum ReportError {
 
 /// A result that can be written in every text format.
 pub trait Answer: serde::Serialize {
+    /// Name and version of the layout of its JSON (`obsdeg.analysis/1`); none of a list of answers.
+    fn layout(&self) -> Option<&str> {
+        None
+    }
+
     /// What it says, in no format.
     fn document(&self) -> Document;
 

@@ -235,6 +235,7 @@ pub fn position_figure(scheme: &Scheme) -> File {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{UnitQuaternion, Vector3};
     use obsdeg_core::model::{cardinal_names, parse_attitude};
 
     fn scheme(attitudes: &[&str], latitude: &str) -> Scheme {
@@ -270,31 +271,10 @@ mod tests {
             .collect()
     }
 
-    type Quaternion = [f64; 4];
-
-    fn product(a: Quaternion, b: Quaternion) -> Quaternion {
-        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a, b);
-        [
-            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-            a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
-            a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
-        ]
-    }
-
     /// Platform axis `j` in n: a passive matrix Mx(a) turns what it multiplies by -a about x, and so for y and z.
     fn by_quaternions(angles_deg: [f64; 3], j: usize) -> [f64; 3] {
-        let about = |k: usize| {
-            let half = -angles_deg[k].to_radians() / 2.0;
-            let mut q = [half.cos(), 0.0, 0.0, 0.0];
-            q[k + 1] = half.sin();
-            q
-        };
-        let q = product(product(about(0), about(1)), about(2));
-        let mut v = [0.0; 4];
-        v[j + 1] = 1.0;
-        let [_, n, u, e] = product(product(q, v), [q[0], -q[1], -q[2], -q[3]]);
-        [n, u, e]
+        let about = |k: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(k, -angles_deg[k].to_radians()));
+        (about(0) * about(1) * about(2) * Vector3::ith(j, 1.0)).into()
     }
 
     #[test]

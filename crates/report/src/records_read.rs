@@ -46,6 +46,10 @@ fn read(r: &RecordRead) -> Vec<String> {
 }
 
 impl Answer for RecordsRead {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         for r in &self.records {

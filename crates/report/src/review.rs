@@ -389,9 +389,10 @@ fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
             all.witness.join(", ")
         ),
         (None, false) => format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", ")),
+        // of larger sets nothing is known
         (None, true) => format!(
-            "no {} cardinal attitudes determine every coefficient",
-            all.none_of.last().map_or_else(|| "few".into(), |n| n[0].to_string())
+            "no set of {} of the 24 cardinal attitudes determines every coefficient",
+            all.none_of.last()?[0]
         ),
     })
 }

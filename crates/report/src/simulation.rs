@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
-use crate::{Answer, gimbals, stated, words};
+use crate::{Answer, gimbals, omitted, stated, words};
 
 /// What a run assumes, a sentence each.
 pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> Vec<String> {
@@ -117,7 +117,7 @@ pub(crate) fn validity(v: &Validity, c: &ConditionsReport) -> Vec<String> {
 }
 
 /// Which filter ran, and why.
-pub(crate) fn filter(f: &FilterReport, validity: &Validity) -> Vec<String> {
+pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
     let (what, passes) = match f.kind {
         FilterKind::Linear => ("linear: small angles, gains known beforehand".into(), String::new()),
         FilterKind::Extended => {
@@ -138,13 +138,16 @@ pub(crate) fn filter(f: &FilterReport, validity: &Validity) -> Vec<String> {
     if f.kind != FilterKind::Linear {
         out.push("verdicts and degrees are those of small angles; what a filter learns beyond them comes of the attitudes that drift reached".into());
     }
-    if f.kind == FilterKind::Extended && !validity.holds {
-        out.push(
-            "do not trust the sigmas of this filter where the small-angle model does not hold: it is linearised before the drifts are known; \
+    if !f.trusted {
+        let why = match f.kind {
+            FilterKind::Linear => "its model leaves out what the large angles do",
+            _ => "it is linearised before the drifts are known",
+        };
+        out.push(format!(
+            "do not trust the sigmas of this filter where the small-angle model does not hold: {why}; \
              one run that is consistent does not show that they are right; the iterated filter (--filter iterated) is linearised along the \
              whole run"
-                .into(),
-        );
+        ));
     }
     out
 }
@@ -196,6 +199,10 @@ fn priors(quantities: &[Estimate]) -> Vec<String> {
     groups.into_iter().map(line).collect()
 }
 
+/// Advice where one run is consistent and says little.
+pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the small-angle model does not hold, and the \
+     filter is not linearised along the whole run. Use the iterated filter (--filter iterated)";
+
 /// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody
 /// states.
 fn lead(s: &Simulation) -> Vec<String> {
@@ -210,15 +217,23 @@ fn lead(s: &Simulation) -> Vec<String> {
         };
         out.push(format!("Do not use the filter's sigmas: its run is inconsistent with the truth{whose}."));
     }
+    if s.consistency.consistent && !s.filter.trusted {
+        out.push(format!("{NOT_TRUSTED}."));
+    }
     out.extend(gimbals::lead(s.gimbals.as_ref()));
     out.push(stated::carry(s.carry).into());
+    out.extend(omitted::lead(&s.omitted, s.requirements.with_bench, s.requirements.all_met()));
     out.extend(stated::other_carries(&s.other_carries));
-    out.extend(stated::by_default_in_run(&s.conditions));
+    out.extend(stated::by_default_in_run(&s.conditions, &s.quantities));
     out.extend(warning(&s.conditions));
     out
 }
 
 impl Answer for Simulation {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut columns = vec![left("unknown"), left("unit")];
         columns.extend(words::ESTIMATE.map(right));
@@ -245,14 +260,21 @@ impl Answer for Simulation {
             blocks.push(table("Combinations (psi: of the end)", &self.combinations));
         }
         blocks.extend(Block::list_if_any("Known from the prior only: whose", priors(&self.quantities)));
-        blocks.push(Block::list("Filter", filter(&self.filter, &self.validity)));
+        blocks.extend(omitted::blocks(&self.omitted, ""));
+        blocks.push(Block::list("Filter", filter(&self.filter)));
         if self.filter.kind != FilterKind::Linear {
             let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
             let columns: Vec<_> = [left("unknown"), left("unit")].into_iter().chain(numbers).collect();
             let rows = self.quantities.iter().chain(&self.combinations).filter_map(linear);
             blocks.push(Block::table("Beside it, the linear filter on the same measurements", columns, rows));
         }
-        blocks.push(Block::list("Consistency", words::consistency(&self.consistency)));
+        let mut consistency = words::consistency(&self.consistency);
+        if self.consistency.consistent && !self.filter.trusted {
+            consistency[0] = "this run is consistent with its truth, which says little of this filter (see Filter): the errors of many runs \
+                              decide (obsdeg crosscheck)"
+                .into();
+        }
+        blocks.push(Block::list("Consistency", consistency));
         blocks.push(Block::list(
             "Validity of the small-angle model",
             validity(&self.validity, &self.conditions),

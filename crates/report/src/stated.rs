@@ -3,7 +3,7 @@
 use obsdeg_core::model::Carry;
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements, Worst};
 use obsdeg_evidence::simulation::{
-    ConditionsReport, MeasurementReport, OtherCarry, RunDiffers, RunRequirements, SigmaRatio,
+    ConditionsReport, Estimate, MeasurementReport, OtherCarry, RunDiffers, RunRequirements, SigmaRatio,
 };
 
 use crate::document::number;
@@ -61,6 +61,7 @@ pub(crate) fn requirements(r: &Requirements) -> String {
         true => String::new(),
         false => format!("; by the stated prior alone: {}", names(r.on_prior.iter().map(String::as_str))),
     };
+    let basis = if r.with_bench { format!("{basis}with the bench ") } else { basis.into() };
     if r.all_met() {
         return format!("{basis}every requirement is met, {} of {}{margin}{prior}", r.met, r.stated);
     }
@@ -168,7 +169,8 @@ pub(crate) fn predicted(m: &MeasurementReport) -> String {
         _ => "the random drift that is stated",
     };
     let prior = if m.prior.is_some() { "the priors that are stated" } else { "no prior" };
-    format!("sigma: information of all samples, {prior}, {drift}; psi at the end")
+    let bench = if m.bench.is_some() { "; worst sigma: total uncertainty with the bench" } else { "" };
+    format!("sigma: information of all samples, {prior}, {drift}; psi at the end{bench}")
 }
 
 /// The same of several schemes, whose conditions may differ.
@@ -202,15 +204,35 @@ pub(crate) fn by_default(m: &MeasurementReport) -> Option<String> {
 }
 
 /// The conditions of a run that nobody states, in a sentence; `None` where all are stated.
-pub(crate) fn by_default_in_run(c: &ConditionsReport) -> Option<String> {
+pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> Option<String> {
+    // unknowns that the paper does not have, each with a value and a prior of the program
+    let of_paper = |name: &str| {
+        name.starts_with("psi")
+            || ["D_F", "D_I", "D_O", "D_S"].contains(&&name[..name.len().saturating_sub(1)])
+    };
+    let others = unknowns.iter().any(|q| !of_paper(&q.name));
+    let rest = if others { "; others too" } else { "" };
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", c.latitude_deg),
         "accelerometer_noise_g" => format!("noise of Z {:e} g", c.accelerometer_noise_g),
         "step_s" => format!("steps of {} s", c.step_s),
         "dwell_s" => "1000 s at a position".into(),
         "drift_noise" => format!("random drift {}", c.drift_noise),
-        "values" => "the paper's drifts (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g)".into(),
-        "priors" => "priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g)".into(),
+        "values" => {
+            let of = scaled(c);
+            format!("the paper's drifts{of} (D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g{rest})")
+        }
+        "priors" => match c.drift_scale == 1.0 {
+            true => format!("priors (psi 0.1 deg, D_F 20 deg/h, D_I D_O D_S 10 deg/h/g{rest})"),
+            false => {
+                format!(
+                    "priors (psi 0.1 deg; of drifts{}: D_F 20 deg/h, D_I D_O D_S 10 deg/h/g{rest})",
+                    scaled(c)
+                )
+            }
+        },
+        "other_values" => "true values of the other unknowns".into(),
+        "other_priors" => "priors of the other unknowns".into(),
         "azimuth_noise_deg" => "noise of the azimuth 0.001 deg".into(),
         other => other.to_string(),
     };
@@ -223,11 +245,16 @@ pub(crate) fn drifts_by_default(c: &ConditionsReport) -> bool {
     c.by_default.iter().any(|key| key == "values")
 }
 
-/// The drifts of a run: those that are stated, or the paper's.
-pub(crate) fn drifts(c: &ConditionsReport) -> &'static str {
+/// ` times 0.001`: the factor on drifts; empty where it is one.
+fn scaled(c: &ConditionsReport) -> String {
+    if c.drift_scale == 1.0 { String::new() } else { format!(" times {}", c.drift_scale) }
+}
+
+/// The drifts of a run: those that are stated, or the paper's, with the factor on them.
+pub(crate) fn drifts(c: &ConditionsReport) -> String {
     match drifts_by_default(c) {
-        true => "the drifts of the paper (11 to 13 deg/h; none are stated)",
-        false => "these drifts",
+        true => format!("the drifts of the paper{} (11 to 13 deg/h; none are stated)", scaled(c)),
+        false => "these drifts".into(),
     }
 }
 
@@ -256,6 +283,9 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
     out.extend(m.accelerometer_bias.as_ref().map(accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
     out.extend(m.gyro_noise.as_ref().map(gyro_noise));
+    out.extend(
+        m.bench.as_ref().map(|bench| format!("bench {bench} (1 sigma; ug, ppm, arcsec, ... as stated)")),
+    );
     out.extend(m.prior.as_ref().map(|prior| format!("prior {prior} (deg, deg/h, ... as stated)")));
     out
 }

@@ -14,9 +14,12 @@ use crate::{Answer, latex, resolve, words};
 /// Longest solving expression that a reader is shown.
 const READABLE: usize = 240;
 
-fn explanation(q: &SystemQuantity) -> String {
+fn explanation(q: &SystemQuantity, constrained: bool) -> String {
     match (q.status, q.degree) {
-        (Status::Observable, Some(0)) => format!("from the outputs themselves; {}", solutions(q)),
+        (Status::Observable, Some(0)) => {
+            let from = if constrained { "the outputs and the constraints" } else { "the outputs" };
+            format!("from {from} themselves; {}", solutions(q))
+        }
         (Status::Observable, _) => solutions(q),
         (Status::Inseparable, _) => words::not_told_from(&q.partners),
         (Status::NotExcited, _) => "moves no output".into(),
@@ -83,15 +86,24 @@ fn counting(a: &SystemAnalysis) -> Vec<String> {
     out
 }
 
-fn combinations(heading: &str, list: &[SystemCombination]) -> Block {
+/// Combinations with their verdicts; `unproven` is the order up to which was looked, where no end is proven.
+fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usize>) -> Block {
     let row = |c: &SystemCombination| {
-        let verdict = if c.degree.is_some() { "observable" } else { "not observable" };
-        vec![c.expression.clone(), verdict.into(), words::degree(c.degree)]
+        let verdict = match (c.degree, unproven) {
+            (Some(_), _) => "observable".into(),
+            (None, None) => "not observable".into(),
+            (None, Some(order)) => format!("not seen up to order {order}"),
+        };
+        vec![c.expression.clone(), verdict, words::degree(c.degree)]
     };
     Block::table(heading, [left("combination"), left("status"), right("degree")], list.iter().map(row))
 }
 
 impl Answer for SystemAnalysis {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let units = self.quantities.iter().any(|q| !q.unit.is_empty());
         let mut order: Vec<_> = self.quantities.iter().collect();
@@ -106,7 +118,7 @@ impl Answer for SystemAnalysis {
                 Status::NotSeen => format!("not seen up to order {}", self.last_order),
                 status => status.to_string(),
             };
-            row.extend([verdict, words::degree(q.degree), explanation(q)]);
+            row.extend([verdict, words::degree(q.degree), explanation(q, !self.constraints.is_empty())]);
             if !q.description.is_empty() {
                 let last = row.len() - 1;
                 row[last] = format!("{} ({})", row[last], q.description);
@@ -130,11 +142,12 @@ impl Answer for SystemAnalysis {
             Some(Typeset { text: format!("{} = {text}", q.name), latex })
         });
         blocks.extend(Block::formulas("Solved by", solved));
+        let unproven = self.rests_on_bound.then_some(self.last_order);
         if !self.combinations.is_empty() {
-            blocks.push(combinations("Combinations asked for", &self.combinations));
+            blocks.push(combinations("Combinations asked for", &self.combinations, unproven));
         }
         if !self.invariants.is_empty() {
-            blocks.push(combinations("Identifiable combinations", &self.invariants));
+            blocks.push(combinations("Identifiable combinations", &self.invariants, unproven));
         }
         if self.unobservable_directions > 0 {
             let mut lines: Vec<String> = self.symmetries.iter().map(|s| s.words.clone()).collect();
@@ -244,6 +257,10 @@ fn begins_at(time: f64) -> String {
 
 /// One run of the filter.
 impl Answer for SystemRun {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let row = |e: &SystemEstimate| {
             let exact = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
@@ -267,7 +284,8 @@ impl Answer for SystemRun {
         );
         let mut consistency = words::consistency(&self.consistency);
         // a state whose start is known has no verdict
-        let unobservable = |e: &SystemEstimate| e.status.is_some_and(|s| s != Status::Observable);
+        let unobservable =
+            |e: &SystemEstimate| matches!(e.status, Some(Status::Inseparable | Status::NotExcited));
         let beyond = |e: &&SystemEstimate| unobservable(e) && e.error_over_sigma.abs() > 4.0;
         let beyond: Vec<&str> = self.quantities.iter().filter(beyond).map(|e| e.name.as_str()).collect();
         if !beyond.is_empty() {
@@ -298,6 +316,10 @@ impl Answer for SystemRun {
 
 /// The exact verdicts against the information of the samples.
 impl Answer for SystemEvidence {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let said = |outcome: Agreement| match outcome {
             Agreement::Disagrees => "DISAGREES",
@@ -350,13 +372,20 @@ impl Answer for SystemEvidence {
                 format!("{}: seen with {seen} of the best direction, {}", s.words, said(s.seen.outcome))
             })
             .collect();
+        let (heading, by) = match self.seen_up_to {
+            Some(order) => (
+                format!("Directions that no derivative up to order {order} sees"),
+                format!("up to order {order}"),
+            ),
+            None => ("Directions that no output sees".into(), "exact".into()),
+        };
         null.push(format!(
-            "unobservable directions: {} exact, {} singular values vanish, {}",
+            "unobservable directions: {} {by}, {} singular values vanish, {}",
             self.defect.predicted,
             self.defect.measured,
             said(self.defect.outcome)
         ));
-        blocks.push(Block::list("Directions that no output sees", null));
+        blocks.push(Block::list(heading, null));
         let mut how = vec![
             format!(
                 "slope: of log sigma against the log of a short horizon, -(degree + 1/2) at a fixed sampling rate; - where jumps or rounding hide it, or where it still changes with the horizon (up to {} long)",
@@ -366,6 +395,11 @@ impl Answer for SystemEvidence {
             "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is observable and leaves more than a hundredth of its diffuse prior, and directions seen with less than 1e-9 of the best and more than 1e-12".into(),
             certainty(self.error_bound, self.digits, self.seed),
         ];
+        how.extend(self.seen_up_to.map(|order| {
+            format!(
+                "not seen: by no derivative up to order {order}; samples that see it by higher ones speak neither for nor against the verdict"
+            )
+        }));
         how.extend(self.time.map(begins_at));
         blocks.push(Block::list("How", how));
         let open = self.orders.measured < self.orders.of || self.not_resolvable > 0;

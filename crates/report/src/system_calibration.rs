@@ -61,6 +61,10 @@ fn row(e: &SystemEstimated) -> Vec<String> {
 }
 
 impl Answer for SystemCalibration {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let mut lead = vec![match (self.consistent, self.findings.is_empty()) {
             (Some(true), _) => "consistent: the model and its noise explain the data".to_string(),

@@ -45,6 +45,10 @@ fn examined(w: &Walks) -> Vec<String> {
 }
 
 impl Answer for Walks {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
     fn document(&self) -> Document {
         let row = |(i, (name, angles)): (usize, (&String, &String))| {
             vec![format!("p{}", i + 1), name.clone(), angles.clone()]
@@ -56,8 +60,12 @@ impl Answer for Walks {
                 "{k} positions that make every required coefficient observable, by turns of at most {} degrees",
                 self.most_turn_deg
             ),
-            None => format!(
+            None if !self.never.is_empty() => format!(
                 "No walk by turns of at most {} degrees makes every required coefficient observable",
+                self.most_turn_deg
+            ),
+            None => format!(
+                "No walk by turns of at most {} degrees was found that makes every required coefficient observable",
                 self.most_turn_deg
             ),
         };

@@ -516,7 +516,7 @@ pub(crate) fn band((low, high): (f64, f64)) -> String {
 pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
     vec![
         if c.consistent {
-            "the filter is consistent with this truth".into()
+            "this run of the filter is consistent with its truth".into()
         } else {
             format!("the filter is NOT consistent with this truth: {}", doubts(c))
         },

@@ -27,10 +27,17 @@ async function openFile(file) {
   await openText(await file.text(), file.name);
 }
 
+// a scheme of a thousand positions has half as many
+const LONGEST_LINK = 400_000;
+
 /** Reads the scheme that an address holds. */
 async function openLink() {
   const held = new URLSearchParams(location.hash.slice(1)), part = held.get('scheme') ?? held.get('text');
   if (!part) return false;
+  if (part.length > LONGEST_LINK) {
+    say(`This link holds ${part.length} characters; expected at most ${LONGEST_LINK}: open a file instead.`);
+    return false;
+  }
   const text = unpacked(part);
   if (text === null) { say('This link is damaged: expected an address that this page made.'); return false; }
   if (held.has('text')) {

@@ -25,7 +25,7 @@ fn an_answer_says_what_it_rests_on() {
         "half turns are tried in both directions",
         "NUE (-N) NDW (-N) NUE",
         "Best schemes (sigma: information of all samples, no prior, no random drift; psi at the end)",
-        "Proven best by the criterion worst: NUE (-N) NDW (-N) NUE: worst sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
+        "Proven best of these candidates by worst degree, then the criterion worst: NUE (-N) NDW (-N) NUE: worst sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
         "inertial carry: psi goes on in geographic axes from position to position",
         "under the other carries, platform (repositioning at once): not every coefficient is determined",
         "not stated, chosen by the program: latitude 28.2 deg\n",
@@ -220,6 +220,13 @@ fn the_winner_is_a_scheme_file() {
     }
 }
 
+/// The answer without the parts that it was put together from.
+fn without_parts(answer: &str) -> serde_json::Value {
+    let mut answer: serde_json::Value = serde_json::from_str(answer).expect("JSON");
+    answer["search"].as_object_mut().expect("a search").remove("parts");
+    answer
+}
+
 /// Parts are files; together they give what the command gives, and what is wrong with one is said with its name.
 #[test]
 fn parts_are_files() {
@@ -239,18 +246,37 @@ fn parts_are_files() {
         // done already
         assert_eq!(stdout(&with(&["--part", &format!("{i}/2"), "-o", path])), said);
     }
-    assert_eq!(stdout(&with(&["--merge", &two, &one])), stdout(&with(&[])));
+    let whole = stdout(&with(&[]));
+    let merged = stdout(&with(&["--merge", &two, &one]));
+    assert_eq!(without_parts(&merged), without_parts(&whole));
     // the parts know what they were asked, a file of candidates too
-    assert_eq!(stdout(&run(&["design", "--merge", &one, &two, "--format", "json"])), stdout(&with(&[])));
+    assert_eq!(stdout(&run(&["design", "--merge", &one, &two, "--format", "json"])), merged);
+    let said = stdout(&run(&["design", "--merge", &one, &two]));
+    assert!(said.contains("proven if the parts were searched as they state"), "{said}");
+    let wanted = "put together from 2 parts, searched by version 0.1.0: what they list was evaluated again";
+    assert!(said.split_whitespace().collect::<Vec<_>>().join(" ").contains(wanted), "{said}");
+    let said = stdout(&run(&["design", "--merge", &one, &two, "--check", "100"]));
+    assert!(said.contains("Proven best"), "{said}");
     let candidates = file("candidates.toml");
     std::fs::copy("examples/six-positions/scheme.toml", &candidates).expect("copied");
-    let asked =
-        ["design", "--positions", "4", "--candidates", &candidates, "--carry", "reset", "--within", "0"];
+    let mut asked = vec![
+        "design",
+        "--positions",
+        "4",
+        "--candidates",
+        &candidates,
+        "--carry",
+        "platform",
+        "--within",
+        "0",
+    ];
+    asked.extend(["--observable", "D_F"]);
     let part = file("whole.json");
     assert!(run(&[&asked[..], &["--part", "1/1", "-o", &part]].concat()).status.success());
-    let whole = stdout(&run(&asked));
+    let whole = stdout(&run(&[&asked[..], &["--format", "json"]].concat()));
     std::fs::remove_file(&candidates).expect("removed");
-    assert_eq!(stdout(&run(&["design", "--merge", &part])), whole);
+    let merged = stdout(&run(&["design", "--merge", &part, "--format", "json"]));
+    assert_eq!(without_parts(&merged), without_parts(&whole));
     for (arguments, expected) in [
         (vec!["--merge", &one], "missing of 2 parts: 2"),
         (vec!["--merge", &one, &two, &one], "is in"),
@@ -260,6 +286,7 @@ fn parts_are_files() {
         (vec!["--part", "3/2", "-o", "x"], "expected a part such as 2/7"),
         (vec!["--part", "1/2"], "--output"),
         (vec!["--merge", &one, &two, "--within", "1"], "--within does nothing here"),
+        (vec!["--check", "3"], "--check does nothing here: expected --merge"),
     ] {
         let output = with(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

@@ -8,6 +8,7 @@ mod divide;
 mod free;
 mod gimbals;
 mod orders;
+mod part_edits;
 mod parts;
 mod prior;
 mod search;

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignError, DesignOptions, Part, PartError, design, design_merged,
-    design_part, design_starts,
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Part, PartError, PartsReport, design,
+    design_merged, design_part, design_starts,
 };
 
 use super::*;
@@ -15,6 +15,14 @@ fn json<T: serde::Serialize>(what: &T) -> String {
 
 fn read(part: &Part) -> Part {
     serde_json::from_str(&json(part)).expect("a part")
+}
+
+/// The answer as that of a search as a whole, and its parts.
+fn without_parts(merged: &Design) -> (Design, PartsReport) {
+    let mut rest = merged.clone();
+    let parts = rest.search.as_mut().and_then(|s| s.parts.take()).expect("parts");
+    assert_eq!(parts.versions, [env!("CARGO_PKG_VERSION")]);
+    (rest, parts)
 }
 
 /// Searches whose answers have fronts, ties and several worst degrees.
@@ -73,10 +81,16 @@ fn parts_together_are_the_whole() {
                     2 => parts.rotate_left(of / 3),
                     _ => {}
                 }
-                let merged =
-                    on_threads(1 + turn % 2, || design_merged(base, conditions, options, &parts, &on));
+                let merged = on_threads(1 + turn % 2, || {
+                    design_merged(base, conditions, options, &parts, of % 3, &on)
+                });
                 match (&whole, &merged) {
-                    (Ok(whole), Ok(merged)) => assert_eq!(json(whole), json(merged), "{i} {of} {turn}"),
+                    (Ok(whole), Ok(merged)) => {
+                        let (rest, parts) = without_parts(merged);
+                        assert_eq!(json(whole), json(&rest), "{i} {of} {turn}");
+                        assert_eq!(parts.parts, of);
+                        assert_eq!(parts.searched_again, (of % 3).min(parts.blocks));
+                    }
                     (Err(a), Err(b)) => assert_eq!(a, b, "{i} {of} {turn}"),
                     _ => panic!("{i} {of} {turn}: {whole:?} {merged:?}"),
                 }
@@ -113,8 +127,8 @@ fn an_interrupted_part_goes_on() {
     }
     assert!(interruptions > 5, "{interruptions}");
     // it is not taken for the whole part meanwhile
-    let unfinished = Part { complete: false, ..whole };
-    let error = design_merged(base, conditions, options, &[("a.json".into(), unfinished)], &on);
+    let unfinished = Part { complete: false, ..whole }.sealed();
+    let error = design_merged(base, conditions, options, &[("a.json".into(), unfinished)], 0, &on);
     assert!(error.expect_err("unfinished").to_string().starts_with("a.json: part 2 of 3 was interrupted"));
 }
 
@@ -126,7 +140,7 @@ fn what_does_not_belong_is_refused_by_name() {
         list.iter().map(|(name, part)| (name.to_string(), (*part).clone())).collect()
     };
     let refused = |list: &[(&str, &Part)]| {
-        design_merged(base, conditions, options, &named(list), &on).expect_err("refused").to_string()
+        design_merged(base, conditions, options, &named(list), 0, &on).expect_err("refused").to_string()
     };
     let [one, two, three] = [1, 2, 3].map(|i| part(i, 3));
     assert_eq!(refused(&[("a", &one), ("c", &three)]), "missing of 3 parts: 2");
@@ -141,53 +155,48 @@ fn what_does_not_belong_is_refused_by_name() {
             base.clone(),
             Conditions { dwell_s: 999.0, ..conditions.clone() },
             options.clone(),
-            "dwell is 999.0, here 1000.0",
+            "simulation.dwell_s is 999, here 1000",
         ),
         (
             base.clone(),
             conditions.clone(),
             DesignOptions { keep: 11, ..options.clone() },
-            "keep is 11, here 12",
+            "--keep is 11, here 12",
         ),
         (
             base.clone(),
             conditions.clone(),
             DesignOptions { criterion: CriterionName::E, seed: 3, ..options.clone() },
-            "criterion is E, here Worst; seed is 3, here 1",
+            "--criterion is e, here worst; --seed is 3, here 1",
         ),
         (
             Scheme { latitude: "30".parse().ok(), ..base.clone() },
             conditions.clone(),
             options.clone(),
-            "latitude differ",
+            "latitude_deg is 30, here 28.2",
         ),
     ];
     for (base, conditions, options, why) in others {
         let foreign = design_part(&base, &conditions, &options, [2, 3], None, &on).expect("a part");
         let message = refused(&[("a", &one), ("b", &foreign), ("c", &three)]);
-        let expected = format!("b: it is a part of another search: {why}");
-        assert!(message.starts_with(expected.trim_end_matches("differ")), "{message}");
+        assert_eq!(message, format!("b: it is a part of another search: {why}"));
     }
-    // a digest that is not of the inputs
+    // changed by hand, and with a digest that was computed again
     let tampered = Part { digest: two.digest.replace(|c: char| c.is_ascii_digit(), "0"), ..two.clone() };
     let message = refused(&[("a", &one), ("b", &tampered), ("c", &three)]);
-    assert_eq!(message, "b: it is a part of another search: its inputs are not those of its digest");
-    // and what was tampered with
-    let tampered = Part { starts: [one.starts[0], one.starts[1] + 1, one.starts[2]], ..one.clone() };
+    assert!(message.starts_with("b: it was changed after it was written"), "{message}");
+    let message = refused(&[("a", &one), ("b", &tampered.sealed()), ("c", &three)]);
+    assert_eq!(message, "b: it is a part of another search: its digest is not that of these inputs");
+    let tampered = Part { starts: [one.starts[0], one.starts[1] + 1, one.starts[2]], ..one.clone() }.sealed();
     assert!(refused(&[("a", &tampered), ("b", &two), ("c", &three)]).starts_with("a: it has the starts"));
     let mut tampered = two.clone();
     tampered.levels[0].next -= 1;
-    assert!(
-        refused(&[("a", &one), ("b", &tampered), ("c", &three)])
-            .starts_with("b: part 2 of 3 was interrupted")
-    );
-    let tampered = Part { levels: Vec::new(), ..two.clone() };
-    assert!(
-        refused(&[("a", &one), ("b", &tampered), ("c", &three)])
-            .starts_with("b: part 2 of 3 was interrupted")
-    );
+    let unfinished = "b: part 2 of 3 was interrupted";
+    assert!(refused(&[("a", &one), ("b", &tampered.sealed()), ("c", &three)]).starts_with(unfinished));
+    let tampered = Part { levels: Vec::new(), ..two.clone() }.sealed();
+    assert!(refused(&[("a", &one), ("b", &tampered), ("c", &three)]).starts_with(unfinished));
     for wrong in [[0, 3], [4, 3], [1, 0]] {
-        let tampered = Part { part: wrong, ..two.clone() };
+        let tampered = Part { part: wrong, ..two.clone() }.sealed();
         assert!(
             refused(&[("a", &one), ("b", &tampered), ("c", &three)]).starts_with("b: it is no part"),
             "{wrong:?}"
@@ -215,4 +224,83 @@ fn parts_share_the_work() {
         let (least, most) = (examined.iter().min(), examined.iter().max());
         assert!(most.zip(least).is_some_and(|(most, least)| *most < 2 * least), "{examined:?}");
     }
+}
+
+/// Parts whose contents were changed and whose digest was computed again: what they list is evaluated again,
+/// what they count must add up, and a block that is searched again gives what it gives.
+#[test]
+fn what_no_search_writes_is_refused() {
+    let (base, conditions, options) = &tasks()[0];
+    let part = |number| design_part(base, conditions, options, [number, 3], None, &on).expect("a part");
+    let [one, two, three] = [1, 2, 3].map(part);
+    let merged = |changed: &Part, check: usize| {
+        let named =
+            [("a", &one), ("b", changed), ("c", &three)].map(|(name, part)| (name.into(), part.clone()));
+        design_merged(base, conditions, options, &named, check, &on)
+    };
+    let whole = merged(&two, 0).expect("the whole");
+    assert!(!whole.search.as_ref().and_then(|s| s.parts.as_ref()).expect("parts").is_repeated());
+    let repeated = merged(&two, usize::MAX).expect("the whole");
+    assert!(repeated.search.as_ref().and_then(|s| s.parts.as_ref()).expect("parts").is_repeated());
+    assert_eq!(without_parts(&repeated).0, without_parts(&whole).0);
+    type Change = fn(&mut Part);
+    let changes: [(Change, &str); 16] = [
+        // as it was in a report: two positions of the first changed, a criterion that none has
+        (
+            |p| {
+                p.levels[0].best.found[0].sequence.swap(1, 2);
+                p.levels[0].best.found[0].worth.value = 0.001;
+            },
+            "b: it lists ",
+        ),
+        (|p| p.levels[0].best.found[0].worth.value = 0.001, "; evaluated again: "),
+        (|p| p.levels[0].best.found[0].worth.degree = 0, "judged again: "),
+        (|p| p.levels[0].best.found[0].worth.violation = 1.0, "a constraint that is not kept"),
+        (|p| p.levels[0].best.found[0].seconds -= 1.0, " s in all; evaluated again: "),
+        (|p| p.levels[0].best.found[0].sequence.truncate(3), "3 positions; expected 4"),
+        (|p| p.levels[0].best.found[0].sequence[3].candidate = 9999, "candidate 9999; expected 0 to 5"),
+        (|p| p.levels[0].best.found.clear(), "part 2 of 3 was interrupted"),
+        (|p| p.levels[0].best.found.reverse(), "not in the order"),
+        (|p| drop(p.levels[0].best.front.pop()), ""),
+        (|p| p.levels[0].best.examined += 1, "blocks up to start"),
+        (|p| p.levels[0].best.excluded += 1, "blocks up to start"),
+        (
+            |p| {
+                p.levels[0].best.excluded += 1;
+                p.levels[0].blocks[0].counts[1] += 1;
+            },
+            "excluded by a bound that is not used",
+        ),
+        (
+            |p| {
+                p.levels[0].best.examined += 1_000_000;
+                p.levels[0].blocks[0].counts[0] += 1_000_000;
+            },
+            " exist",
+        ),
+        (|p| drop(p.levels[0].blocks.pop()), ""),
+        (|p| p.levels[0].best.ties = Default::default(), "tie with the first"),
+    ];
+    for (change, expected) in changes {
+        let mut changed = two.clone();
+        change(&mut changed);
+        let unsealed = merged(&changed, 0).expect_err("changed").to_string();
+        assert!(unsealed.starts_with("b: it was changed after it was written"), "{unsealed}");
+        let message = merged(&changed.sealed(), 0).expect_err(expected).to_string();
+        assert!(message.starts_with("b: ") && message.contains(expected), "{message}; {expected}");
+    }
+    // what no check but a search finds: sequences that were never searched
+    let mut forged = two.clone();
+    let best = &mut forged.levels[0].best;
+    let left_out = best.examined / 2;
+    best.examined -= left_out;
+    forged.levels[0].blocks[0].counts[0] -= left_out;
+    let forged = forged.sealed();
+    let believed = merged(&forged, 0).expect("believed, as the answer says");
+    assert!(!believed.search.as_ref().and_then(|s| s.parts.as_ref()).expect("parts").is_repeated());
+    let message = merged(&forged, usize::MAX).expect_err("searched again").to_string();
+    assert!(
+        message.starts_with("b: its starts ") && message.contains("sequences were examined"),
+        "{message}"
+    );
 }

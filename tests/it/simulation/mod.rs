@@ -246,8 +246,9 @@ fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
     );
     for carry in [Carry::Platform, Carry::Inertial] {
         let s = simulated(carry, &chosen);
-        let FilterReport { kind, reason, passes, converged } = s.filter;
+        let FilterReport { kind, reason, passes, converged, trusted } = s.filter;
         assert_eq!((kind, reason, converged), (FilterKind::Iterated, FilterReason::NotValid, true));
+        assert!(trusted);
         assert!(s.consistency.consistent && passes > 1, "{carry}: {:?}", s.consistency);
         let d_fy = of(&s, "D_FY");
         assert!(d_fy.error_over_sigma.abs() < 3.0 && (0.5..1.0).contains(&d_fy.sigma), "{carry}: {d_fy:?}");

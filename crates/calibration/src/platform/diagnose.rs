@@ -18,6 +18,7 @@ use super::gross::Why;
 use super::observe::{By, channel_name};
 use super::offset::Offset;
 use super::run::Key;
+use super::suspects::omitted;
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, Fit, Moved, Outlier,
@@ -334,12 +335,15 @@ impl Parts<'_> {
         let records = self.records();
         let repeatability = self.repeatability(&fit);
         let outliers = self.outliers();
+        let quantities: Vec<Estimated> = unknowns.iter().map(estimated).collect();
+        let omitted = omitted(self.problem, self.estimate, &quantities, self.options.seed)?;
         let mut out = Calibration {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             consistent: true,
             findings: Vec::new(),
-            quantities: unknowns.iter().map(estimated).collect(),
+            quantities,
+            omitted,
             requirements: None,
             combinations: combinations.iter().map(estimated).collect(),
             covariance,

@@ -65,6 +65,10 @@ impl Parts<'_> {
         if let Some(chi_square) = self.known_misfit() {
             out.push(Finding::Known { chi_square });
         }
+        out.extend(c.omitted.suspicion.as_ref().map(|s| Finding::Suspect {
+            errors: s.errors.iter().map(|e| e.name.clone()).collect(),
+            chi_square_fall: s.chi_square_fall,
+        }));
         let difference = c.second_path.difference.max(c.second_path.sigma_difference);
         if difference.is_nan() || difference > AGREE {
             out.push(Finding::SecondPath { difference });

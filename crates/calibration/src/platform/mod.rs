@@ -16,6 +16,7 @@ mod reading;
 mod residuals;
 mod run;
 mod shooting;
+mod suspects;
 mod timeline;
 
 use std::cell::Cell;

@@ -12,6 +12,10 @@ use crate::least_squares::{Rows, Solution};
 
 /// Most iterations from a start.
 const PASSES: usize = 200;
+/// Rows of a long evaluation between two questions whether to go on.
+const OFTEN: usize = 256;
+/// Steps of integration from which on an evaluation takes long.
+pub(super) const LONG: f64 = 20_000.0;
 /// An iteration has settled when it moves by less than this, in standard deviations as the fit has them.
 const SETTLED: f64 = 1e-5;
 /// A pull is weak: so many times wider than an unknown is large.
@@ -29,6 +33,8 @@ pub(super) struct Problem<'a> {
     pub(super) longest: f64,
     /// Rows and values of what was known before of the free unknowns, with unit errors.
     pub(super) known: (DMatrix<f64>, DVector<f64>),
+    /// True if an evaluation takes long: then it is asked on the way too, and may end there.
+    pub(super) long: bool,
     /// Hears of every evaluation; where it says no, iterations end.
     pub(super) going: &'a dyn Fn(Going<'_>) -> bool,
     /// How many there were.
@@ -114,6 +120,11 @@ impl Problem<'_> {
                 let (x, by) = self.numeric.carry(row.experiment * segments, 0.0, &start);
                 now = (row.run, 0.0, x, by * &to_start);
                 segment = 0;
+            }
+            let asked = self.long && k.is_multiple_of(OFTEN);
+            if asked && !(self.going)(Going::Passes(self.passes)) {
+                self.stopped = true;
+                return Err(EkfError::Interrupted);
             }
             let part = row.experiment * segments + segment;
             // what was held until here, then what is held from here on

@@ -9,6 +9,8 @@ mod outliers;
 mod search;
 mod units;
 
+use std::cell::Cell;
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
@@ -30,7 +32,7 @@ use crate::record::Record;
 use crate::setup::Basis;
 use before::said_before;
 use data::{Read, read};
-use fit::{At, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size, step};
+use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size, step};
 
 /// Name and version of the JSON layout.
 const SCHEMA: &str = "obsdeg.system-calibration/1";
@@ -78,7 +80,14 @@ pub fn calibrate_system(
         return Err(SystemCalibrationError::SameRecord { record: basis.record, other });
     }
     let numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
-    Calibrating::new(model, &compiled, numeric, &data, options, going)?.run()
+    let stopped = Cell::new(false);
+    let going = |now: Going<'_>| {
+        stopped.set(!going(now) || stopped.get());
+        !stopped.get()
+    };
+    let found = Calibrating::new(model, &compiled, numeric, &data, options, &going)?.run();
+    // an evaluation that ended on its way leaves no numbers
+    found.map_err(|e| if stopped.get() { SystemCalibrationError::Interrupted } else { e })
 }
 
 /// The digest of a model: of what its verdicts depend on.
@@ -161,8 +170,9 @@ impl<'a> Calibrating<'a> {
             return Err(SystemCalibrationError::TooLong { record, last, found, longest, most });
         }
         let known = (DMatrix::zeros(0, free.len()), DVector::zeros(0));
+        let long = found + data.rows.len() as f64 > LONG;
         let mut problem =
-            Problem { numeric, data, free, noise, longest, known, going, passes: 0, stopped: false };
+            Problem { numeric, data, free, noise, longest, known, long, going, passes: 0, stopped: false };
         if let Some(before) = &options.prior {
             let names: Vec<&str> = problem.free.iter().map(|&i| problem.numeric.names[i].as_str()).collect();
             problem.known = said_before(&before.estimates, &names, &problem, &base)?;

@@ -9,6 +9,7 @@ use crate::engine::EngineBusy;
 use crate::model::geometry::Geometry;
 use crate::model::slew::Turn;
 use crate::model::{Carry, GimbalReport};
+use crate::omitted::OmittedVerdicts;
 use crate::remedies::Remedies;
 use crate::solution::formulas::Formula;
 use crate::solution::loci::Locus;
@@ -54,6 +55,9 @@ pub struct Analysis {
     pub null_space: Vec<Vec<Component>>,
     /// Verdicts under the other carries, where they differ.
     pub carries: Vec<CarryReport>,
+    /// Exact classes of the errors that the scheme does not estimate; null where none are computed (rotating
+    /// segments, the drift as unknown, very many columns).
+    pub omitted: Option<OmittedVerdicts>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
     /// Conditions on generic angles under which a verdict changes; null if they were not computed.

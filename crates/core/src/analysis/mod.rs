@@ -21,7 +21,8 @@ use crate::model::path::TurnAt;
 use crate::model::platform::{Platform, Point};
 use crate::model::ring::Float;
 use crate::model::slew::{Slew, Turn};
-use crate::model::{Angle, Carry, Position, Scheme, SchemeError, Source, Term, Unknowns};
+use crate::model::{Angle, Carry, OmittedModel, Position, Scheme, SchemeError, Source, Term, Unknowns};
+use crate::omitted::omitted_verdicts;
 use crate::solution::FoundBy;
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
@@ -85,6 +86,8 @@ pub fn analyze(
     let (carries, untold) = carry_reports(&platform, &findings.verdicts)?;
     let to_resolve = remedies::remedies(&platform, verdicts, &findings.verdicts, &carries);
     printer.notes.extend(untold);
+    let model = OmittedModel::new(&platform);
+    let omitted = omitted_verdicts(&platform, &model, options.seed).ok().filter(|o| !o.terms.is_empty());
     if scheme.slews() && !scheme.torquers_act() {
         printer.notes.push(
             "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at once, and with slews of \
@@ -123,6 +126,7 @@ pub fn analyze(
         combinations,
         null_space: findings.null_space.iter().map(|v| null_report(&platform, v)).collect(),
         carries,
+        omitted,
         to_resolve,
         degenerate_loci: found.loci,
         formulas,

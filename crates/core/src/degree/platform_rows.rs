@@ -21,14 +21,21 @@ pub struct LocalRow {
 /// The rows of `H F^k` that raise the rank of one position, order by order until it stalls.
 /// `V_{k+1} = V_k + V_k F`, so only rows that were new at order k need a derivative.
 pub fn local_chain(field: &Field, w_n: u64, w_u: u64, observed: Observed) -> Vec<LocalRow> {
+    chain_of(field, [w_n, w_u], local_output(field, observed), observed.locals())
+}
+
+/// The same for any outputs (component and row), over the first `locals` local unknowns.
+pub(crate) fn chain_of(
+    field: &Field,
+    [w_n, w_u]: [u64; 2],
+    outputs: Vec<(usize, [u64; LOCAL])>,
+    locals: usize,
+) -> Vec<LocalRow> {
     let f = local_dynamics(field, &w_n, &w_u);
-    let locals = observed.locals();
     let mut basis = Echelon::new(*field, locals);
     let mut chain: Vec<LocalRow> = Vec::new();
-    let mut candidates: Vec<LocalRow> = local_output(field, observed)
-        .into_iter()
-        .map(|(component, row)| LocalRow { component, order: 0, row })
-        .collect();
+    let mut candidates: Vec<LocalRow> =
+        outputs.into_iter().map(|(component, row)| LocalRow { component, order: 0, row }).collect();
     while !candidates.is_empty() {
         candidates.retain(|r| basis.insert(&r.row[..locals]));
         chain.extend_from_slice(&candidates);

@@ -418,6 +418,8 @@ pub fn parse_equation(text: &str, shapes: &Shapes) -> Result<Components, Express
         if symbol(input, "=").is_none() {
             return wrong(input, "an operator or `=`");
         }
+        skip_blanks(input);
+        let start = input.checkpoint();
         let right = sum(input)?;
         let root = match (left.shape, &input.state.expression.nodes[left.entries[0]]) {
             (Shape::SCALAR, Node::Call { function: Function::Sqrt, argument }) => Some(*argument),
@@ -429,6 +431,7 @@ pub fn parse_equation(text: &str, shapes: &Shapes) -> Result<Components, Express
         let own = component(&input.state.expression, right.entries[0]);
         let size = evaluate_f64(&own, &|_| f64::NAN);
         if size < 0.0 {
+            input.reset(&start);
             return wrong(input, "a root or norm equal to what is not negative");
         }
         input.state.vectors = true;

@@ -11,6 +11,8 @@ mod gimbal_turns;
 pub(crate) mod gimbals;
 mod matrices;
 pub(crate) mod observed;
+pub(crate) mod omitted;
+pub(crate) mod omitted_names;
 pub(crate) mod path;
 pub(crate) mod per_gyro;
 pub(crate) mod platform;
@@ -39,6 +41,8 @@ pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
 pub use gimbals::{GimbalError, Gimbals};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use observed::{LOCAL, Observed, PSI_EPS};
+pub use omitted::{OmittedEffect, OmittedModel, OmittedTerm};
+pub use omitted_names::{SITE_FAMILIES, may_be_omitted, omitted_meant};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{

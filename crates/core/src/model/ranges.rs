@@ -45,6 +45,8 @@ pub const DRIFT_SCALE: Range = range(1e-6, 1e6, "");
 pub const PRIOR: Range = range(1e-9, 1e9, "");
 /// A true value, or an initial estimate.
 pub const VALUE: Range = range(-1e6, 1e6, "");
+/// A size (one sigma) of an error that is not estimated, in the unit of the error.
+pub const BENCH: Range = range(0.0, 1e9, "");
 /// A required standard deviation.
 pub const REQUIREMENT: Range = range(1e-12, 1e9, "");
 

@@ -11,6 +11,7 @@ use super::error_model::ErrorModel;
 use super::geometry::Geometry;
 use super::gimbals::Gimbals;
 use super::observed::Observed;
+use super::omitted_names;
 use super::path::{self, Path, PathError, PathStep, StepError};
 pub(crate) use super::position::{Carry, CarryError, Position, Station, parse_attitude};
 use super::recording::Recording;
@@ -104,6 +105,8 @@ pub struct Scheme {
     pub simulation: Settings,
     /// The largest sigma allowed, by unknown or family, in deg, deg/h, deg/h/g.
     pub requirements: BTreeMap<String, f64>,
+    /// Sizes (one sigma) of errors that are not estimated, by error or family, in ug, ppm, arcsec, deg/h/g^2.
+    pub bench: BTreeMap<String, f64>,
     /// How far the gimbals turn.
     pub gimbals: Gimbals,
     /// How the platform is turned from one position to the next, where a position does not say.
@@ -174,6 +177,14 @@ pub enum SchemeError {
     /// A number for something that no gyro model has.
     #[error("`{name}`: no such unknown; {}", settings::meant(name))]
     UnknownName {
+        /// The key in a scheme file.
+        key: String,
+        /// The name, or its first characters.
+        name: String,
+    },
+    /// A size for something that no bench has.
+    #[error("`{name}`: no such error; {}", omitted_names::omitted_meant(name))]
+    BenchName {
         /// The key in a scheme file.
         key: String,
         /// The name, or its first characters.
@@ -265,7 +276,9 @@ impl SchemeError {
             Self::DuplicateName { index, .. } | Self::PositionName { index, .. } => {
                 Some(format!("position.{index}.name"))
             }
-            Self::LongText { key, .. } | Self::UnknownName { key, .. } => Some(key.clone()),
+            Self::LongText { key, .. } | Self::UnknownName { key, .. } | Self::BenchName { key, .. } => {
+                Some(key.clone())
+            }
             Self::Combinations { .. } => Some("combinations".into()),
             Self::Range(e) => Some(e.what.clone()),
             Self::DriftPositions { .. } | Self::Terms(_) => Some("terms".into()),
@@ -369,13 +382,18 @@ impl Scheme {
                 return Err(SchemeError::UnknownName { key: format!("{key}.{name}"), name: excerpt(name) });
             }
         }
+        if let Some(name) = self.bench.keys().find(|name| !omitted_names::may_be_omitted(name)) {
+            return Err(SchemeError::BenchName { key: format!("bench.{name}"), name: excerpt(name) });
+        }
+        let bench = self.bench.iter().map(|(name, x)| (format!("bench.{name}"), *x, ranges::BENCH));
         let required = self.requirements.iter();
         let required = required.map(|(name, x)| (format!("requirements.{name}"), *x, ranges::REQUIREMENT));
         let slews = self.positions.iter().enumerate().filter_map(|(i, p)| {
             let rate = p.slew.as_ref()?.rate_deg_s?;
             Some((format!("position.{i}.slew.rate_deg_s"), rate, ranges::SLEW_RATE_DEG_S))
         });
-        for (key, x, range) in self.simulation.numbers().into_iter().chain(required).chain(slews) {
+        for (key, x, range) in self.simulation.numbers().into_iter().chain(required).chain(bench).chain(slews)
+        {
             range.check(key, x)?;
         }
         Ok(())

@@ -14,6 +14,7 @@ pub(crate) mod solver;
 pub(crate) mod substitution;
 pub(crate) mod support;
 pub(crate) mod tables;
+mod term;
 pub(crate) mod turning;
 
 pub use combinations::NullVector;
@@ -21,5 +22,6 @@ pub use formulas::Formula;
 pub use loci::Locus;
 pub use print::{Group, Grouped, SolutionTerm, StationLabel, group};
 pub use requested::CombinationError;
-pub use solve::{FoundBy, Solved, Term, Verification};
+pub use solve::{FoundBy, Solved, Verification};
 pub use solver::{Frame, Functional, Solver, Sparse};
+pub use term::Term;

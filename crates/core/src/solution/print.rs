@@ -5,8 +5,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::solve::{Solved, Term};
+use super::solve::Solved;
 use super::solver::Frame;
+use super::term::Term;
 use crate::degree::coefficient::{Coefficient, product};
 use crate::model::Scheme;
 

@@ -10,6 +10,7 @@ use super::problem::{Motion, Problem};
 use super::solver::{Frame, Functional, MAX_SYMBOLIC_ANGLES, PRINTABLE, Solver, float_point, tidy};
 use super::substitution::{Substitution, binomial};
 use super::support::short_support;
+use super::term::Term;
 use super::turning::attitude_derivative;
 use crate::degree::coefficient::{Coefficient, Form, Number, READABLE, Rates, power, readable};
 use crate::model::platform::{AZIMUTH, Point};
@@ -42,23 +43,6 @@ pub enum Verification {
     Modular,
     /// Substitution in floating point: residual below 1e-9 of the sum of magnitudes.
     Numeric,
-}
-
-/// `coefficient * w^turns * Z_component^(order) @ station`, w being the rate at which the platform turns there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Term {
-    /// Index of the station.
-    pub station: usize,
-    /// 1, 2, 3: component in n or platform axis; of a measured azimuth its number.
-    pub component: usize,
-    /// Whether this is the measured azimuth.
-    pub azimuth: bool,
-    /// Derivative order; at a rotation, of the platform that turns.
-    pub order: usize,
-    /// The power of the rate of turning.
-    pub turns: usize,
-    /// The coefficient, without it.
-    pub coefficient: Coefficient,
 }
 
 /// An observable quantity as a sum of derivatives of Z.

@@ -1,7 +1,7 @@
 //! Printed terms with the derivatives of Z put in: what they add up to, as a functional of the unknowns.
 
-use super::solve::Term;
 use super::solver::Frame;
+use super::term::Term;
 use super::turning::{attitude_derivative, drift_derivative};
 use crate::model::Platform;
 use crate::model::attitude::Matrix3;

@@ -5,10 +5,11 @@ use serde::Serialize;
 
 use super::constraints::slots_of;
 use super::dag::Op;
+use super::error::ModelError;
 use super::fibre::{Count, values_taken};
 use super::functions::gcd;
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
-use super::model::{Compiled, ModelError, Role, StartTime, StateStart, SystemModel};
+use super::model::{Compiled, Role, StartTime, StateStart, SystemModel};
 use super::remedies::remedies;
 use super::rows::Unknown;
 use super::solutions::solutions;

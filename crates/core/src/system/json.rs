@@ -7,9 +7,10 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
+use super::error::ModelError;
 use super::model::{
-    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, Place, PlacedExpression, Segment,
-    State, StateStart, SystemModel,
+    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, Place, PlacedExpression, Segment, State,
+    StateStart, SystemModel,
 };
 use crate::language::file_error::{json_kind, words};
 use crate::language::{Names, parse_with};

@@ -5,8 +5,9 @@ use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
 use super::addition::written_apart;
 use super::dag::{Dag, Op};
+use super::error::ModelError;
 use super::independent::independent_functions;
-use super::model::{Compiled, MAX_UNKNOWNS, ModelError, Role, SystemModel};
+use super::model::{Compiled, MAX_UNKNOWNS, Role, SystemModel};
 use super::real_points::has_real_point;
 use super::rows::{Layout, SystemRows, random_field};
 use super::taylor::Singular;
@@ -41,6 +42,8 @@ pub struct Judgement {
     /// Functions whose values are proven to be independent of each other, so that random ones stand for them; `None` where true values
     /// were taken.
     pub independent_functions: Option<usize>,
+    /// Operations of the verdicts, at both points.
+    pub work: u64,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
 }
@@ -114,6 +117,8 @@ pub(crate) struct At<S: Values> {
     closed: bool,
     gap: Gap,
     steps: Steps<S>,
+    /// Operations.
+    work: u64,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
@@ -178,6 +183,7 @@ pub(crate) fn climb_at<S: Values>(
         }
         steps.add(order, basis);
     });
+    rows.work().refused().map_or(Ok(()), Err)?;
     let combinations = found
         .into_iter()
         .zip(&gradients)
@@ -190,7 +196,8 @@ pub(crate) fn climb_at<S: Values>(
     let values = rows.values(compiled, layout, model.constants.len());
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
-    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps })
+    let work = rows.work().spent();
+    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps, work })
 }
 
 /// Where the model has no value, in words.
@@ -412,6 +419,7 @@ impl Judgement {
             span: None,
             fields: None,
             independent_functions: None,
+            work: 2 * at.work,
         }
     }
 }

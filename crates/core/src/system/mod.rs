@@ -11,6 +11,8 @@ mod canonical;
 pub(crate) mod constraints;
 pub(crate) mod dag;
 mod elimination;
+mod error;
+mod evaluation;
 mod fibre;
 mod formula;
 mod functions;
@@ -28,13 +30,16 @@ mod solutions;
 pub(crate) mod symmetry;
 pub(crate) mod taylor;
 pub(crate) mod values;
+pub(crate) mod work;
 
 pub use answer::*;
 pub use dag::{Dag, DagError, Op};
+pub use error::ModelError;
 pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
 pub use model::{
-    Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, ModelError, Named,
-    Nominal, Place, PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
+    Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, Named, Nominal, Place,
+    PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
 };
 pub use rows::{Layout, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
+pub use work::WorkLimit;

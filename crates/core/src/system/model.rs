@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
+use super::error::ModelError;
+use super::work::WorkLimit;
 use crate::language::{Expression, Function, among, nearest};
 use crate::model::recording::Recording;
 
@@ -182,18 +184,8 @@ pub struct SystemModel {
     pub simulation: Nominal,
     /// How its records are read.
     pub recording: Recording,
-}
-
-/// Why a model cannot be judged.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{what}: {message}")]
-pub struct ModelError {
-    /// The offender: `the equation of x1`.
-    pub what: String,
-    /// What is wrong, what was expected.
-    pub message: String,
-    /// Byte range in the file, where it is known.
-    pub span: Option<Range<usize>>,
+    /// Limit of the work of a verdict, an option and no part of the model.
+    pub work_limit: WorkLimit,
 }
 
 /// Most unknowns of a system.
@@ -202,6 +194,8 @@ pub(crate) const MAX_UNKNOWNS: usize = 4000;
 pub(crate) const MAX_EXPERIMENTS: usize = 20;
 /// Highest degree of an input that is a polynomial in time.
 pub(crate) const MAX_DEGREE: usize = 50;
+/// Most characters of a name.
+pub(crate) const MAX_NAME: usize = 256;
 /// Most operations of a system.
 pub(crate) const MAX_NODES: usize = 200_000;
 
@@ -451,6 +445,12 @@ impl SystemModel {
         let mut seen: HashSet<String> = HashSet::new();
         let names = self.roles().into_iter().filter(|r| r.1 != Role::Time).map(|r| r.0);
         for name in names.chain(self.definitions.iter().map(|d| d.0.clone())) {
+            if let Some((cut, _)) = name.char_indices().nth(MAX_NAME) {
+                let shown: String = name[..cut].chars().take(20).collect();
+                let found = name.chars().count();
+                let message = format!("a name of {found} characters; expected at most {MAX_NAME}");
+                return refuse(format!("`{shown}...`"), message);
+            }
             if Function::named(name.split('[').next().unwrap_or_default()).is_some() {
                 return refuse(
                     format!("`{name}`"),

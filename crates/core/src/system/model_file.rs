@@ -8,11 +8,12 @@ use serde::Deserialize;
 use serde_spanned::Spanned;
 use toml::Value;
 
+use super::error::ModelError;
 use super::model::{
-    Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelError, Named, PlacedExpression,
-    Segment, StartTime, State, StateStart, SystemModel,
+    Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, PlacedExpression, Segment,
+    StartTime, State, StateStart, SystemModel,
 };
-use super::nominal::nominal;
+use super::nominal::{SimulationEntry, nominal};
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
@@ -93,37 +94,6 @@ pub struct ModelFile {
     /// Reading of the record of `obsdeg calibrate --model`: columns, known values and intervals at rest.
     #[schemars(with = "Option<ModelRecord>")]
     record: Option<Spanned<ModelRecord>>,
-}
-
-/// Numbers for a simulation, in the units of the model.
-#[derive(Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SimulationEntry {
-    /// Duration of every experiment, in the unit of `t`.
-    #[schemars(with = "Option<f64>")]
-    pub(super) duration: Option<Spanned<f64>>,
-    /// Time between two samples, in the unit of `t`.
-    #[schemars(with = "Option<f64>")]
-    pub(super) step: Option<Spanned<f64>>,
-    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants, in
-    /// their units; of a vector a list, or one number for all entries; `x` in all experiments, or `"x@2"` in
-    /// the second.
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    pub(super) values: BTreeMap<String, Spanned<Value>>,
-    /// Standard deviations of the initial estimates, in the units of the unknowns; as large as the value when
-    /// left out (1 for zero).
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    pub(super) priors: BTreeMap<String, Spanned<Value>>,
-    /// Standard deviation of the noise of a sample, by output, in its unit.
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    pub(super) noise: BTreeMap<String, Spanned<Value>>,
-    /// Generic known inputs as functions of the time t.
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
-    pub(super) inputs: BTreeMap<String, Spanned<Value>>,
 }
 
 /// Experiment with constants or known inputs of its own.

@@ -1,13 +1,48 @@
 //! The numbers for a simulation in a model file.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_spanned::Spanned;
 use toml::Value;
 
-use super::model::{ModelError, Named, SystemModel};
-use super::model_file::SimulationEntry;
+use super::error::ModelError;
+use super::model::{Named, SystemModel};
 use super::reader::Reader;
 use crate::language::{Node, Shapes, nearest};
+
+/// Numbers for a simulation, in the units of the model.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SimulationEntry {
+    /// Duration of every experiment, in the unit of `t`.
+    #[schemars(with = "Option<f64>")]
+    duration: Option<Spanned<f64>>,
+    /// Time between two samples, in the unit of `t`.
+    #[schemars(with = "Option<f64>")]
+    step: Option<Spanned<f64>>,
+    /// True values of states at the start, parameters, unknown inputs (w, w', ...) and generic constants, in
+    /// their units; of a vector a list, or one number for all entries; `x` in all experiments, or `"x@2"` in
+    /// the second.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    values: BTreeMap<String, Spanned<Value>>,
+    /// Standard deviations of the initial estimates, in the units of the unknowns; as large as the value when
+    /// left out (1 for zero).
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    priors: BTreeMap<String, Spanned<Value>>,
+    /// Standard deviation of the noise of a sample, by output, in its unit.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    noise: BTreeMap<String, Spanned<Value>>,
+    /// Generic known inputs as functions of the time t.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    inputs: BTreeMap<String, Spanned<Value>>,
+}
 
 /// The numbers in a value, row by row; `None` where there is something else.
 fn numbers(value: &Value) -> Option<Vec<f64>> {

@@ -6,7 +6,8 @@ use std::ops::Range;
 use serde_spanned::Spanned;
 use toml::Value;
 
-use super::model::{ModelError, Named, Place, PlacedExpression};
+use super::error::ModelError;
+use super::model::{Named, Place, PlacedExpression};
 use crate::language::vectors::{Mismatch, stacked};
 use crate::language::{Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_components, parse_equation};
 use crate::model::angle::excerpt;

@@ -2,7 +2,8 @@
 
 use obsdeg_exact::Reals;
 
-use super::model::{Compiled, ModelError, Role, StateStart, SystemModel};
+use super::error::ModelError;
+use super::model::{Compiled, Role, StateStart, SystemModel};
 use super::rows::{Layout, Maker};
 use super::values::Values;
 

@@ -62,7 +62,10 @@ pub(super) fn remedies(
     }
     let n = unknowns.len().max(UNKNOWNS);
     let in_digits = judged.digits().map_or(MOST_VERDICTS, |_| MOST_IN_DIGITS);
+    // all together take no more than one verdict may
+    let affordable = model.work_limit.operations() / judged.work.max(1);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
+    let budget = budget.min(usize::try_from(affordable).unwrap_or(usize::MAX));
     let out = Remedies::default();
     let mut search = Search { model, judged, seed, order, open, roles, budget, out };
     match (judged.fields, &judged.span) {

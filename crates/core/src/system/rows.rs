@@ -7,6 +7,7 @@ use super::adjoint::Adjoint;
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
+use super::work::{Cost, Work};
 use crate::degree::rows::DerivativeRows;
 
 /// Orders that are followed where no end is proven, at least.
@@ -107,6 +108,8 @@ pub(crate) struct SystemRows<'a, S: Values> {
     lanes: usize,
     runs: Vec<Run<'a, S>>,
     bound: usize,
+    /// Work of all rows so far.
+    work: Work,
     /// Of the ranks at generic points.
     gap: Gap,
 }
@@ -408,6 +411,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         point: &Point<S>,
         known: &[Vec<S::Element>],
         rng: &mut SplitMix64,
+        work: &Work,
     ) -> Option<(usize, Gap)> {
         let f = &self.field;
         let unknowns = self.layout.unknowns.len();
@@ -440,7 +444,11 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             for row in known {
                 seen.insert(row);
             }
+            let cost = cost_of(&taylor, adjoint.is_some(), self.compiled.outputs(point.experiment).len());
             for order in 0..=lanes {
+                if !work.spend(order, &cost) {
+                    return None;
+                }
                 let mut grew = false;
                 for row in
                     rows_of(&mut taylor, adjoint.as_mut(), self.compiled.outputs(point.experiment), order)
@@ -462,6 +470,21 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             return Some((seen.rank(), whole.gap().and(seen.gap())));
         }
         None
+    }
+}
+
+/// What the rows of a run cost.
+fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: bool, outputs: usize) -> Cost {
+    let [fixed, growing, nodes, products] = taylor.operations();
+    Cost {
+        fixed,
+        growing,
+        nodes,
+        products,
+        backwards,
+        outputs: outputs as u64,
+        lanes: taylor.lanes() as u64,
+        words: (size_of::<S::Element>() as u64).div_ceil(8),
     }
 }
 
@@ -530,7 +553,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         let whole = [CompiledSegment::default()];
         let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
-        let (mut runs, mut gap) = (Vec::new(), Gap::OPEN);
+        let (mut runs, mut gap, work) = (Vec::new(), Gap::OPEN, Work::new(model.work_limit));
         let any_time = model.time == StartTime::Generic;
         let time = match model.time {
             StartTime::Zero => f.zero(),
@@ -572,7 +595,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
                     () if arbitrary => End::Open,
                     () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => End::Stagnation,
                     () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
-                    () => match maker.generic_rank(&point, &known, rng) {
+                    () => match maker.generic_rank(&point, &known, rng, &work) {
                         None => End::Open,
                         Some((rank, clear)) => {
                             gap = gap.and(clear);
@@ -587,12 +610,17 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
             }
         }
-        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, gap })
+        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, work, gap })
     }
 
     /// The gradients of the combinations at the start of the first run.
     pub(crate) fn combinations(&self) -> &[Vec<S::Element>] {
         self.runs.first().map_or(&[], |r| &r.combinations)
+    }
+
+    /// Work of the rows so far, and whether more was refused.
+    pub(crate) fn work(&self) -> &Work {
+        &self.work
     }
 
     /// How clear the ranks of single runs were.
@@ -675,6 +703,9 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
         }
         let single = self.runs.len() == 1;
         for run in self.runs.iter_mut().filter(|r| !r.done) {
+            if !self.work.spend(order, &cost_of(&run.taylor, run.adjoint.is_some(), run.outputs.len())) {
+                return false;
+            }
             let mut grew = false;
             // a constraint is an output of which only the start is known
             for row in run.known.iter().filter(|_| order == 0) {

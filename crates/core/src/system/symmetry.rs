@@ -3,9 +3,10 @@
 
 use obsdeg_exact::{Reals, RowSpace};
 
+use super::error::ModelError;
 use super::functions::gcd;
 use super::judge::{At, Judgement, climb_at};
-use super::model::{Compiled, ModelError, SystemModel};
+use super::model::{Compiled, SystemModel};
 use super::values::Values;
 use crate::degree::sparse::{extend_by_short_vectors, support_in};
 

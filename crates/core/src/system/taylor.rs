@@ -495,6 +495,31 @@ impl<'a, S: Values> Taylor<'a, S> {
         })
     }
 
+    /// Products and sums of the next order, by lanes: those that do not grow with it, and those for each order
+    /// before it; and the numbers of nodes that take part, and of products of two series among them.
+    pub(super) fn operations(&self) -> [u64; 4] {
+        let mut out = [0u64; 4];
+        for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
+            out[2] += 1;
+            if self.constant[i] {
+                continue;
+            }
+            let width = if self.differentiated[i] { self.support[i].len() as u64 + 1 } else { 1 };
+            out[0] += width;
+            let product = match *op {
+                Op::Multiply(a, b) => !self.constant[a] && !self.constant[b],
+                Op::Divide(_, b) => !self.constant[b],
+                Op::Primitive { .. } => true,
+                _ => false,
+            };
+            if product {
+                out[1] += 2 * width;
+                out[3] += 1;
+            }
+        }
+        out
+    }
+
     /// Computes the coefficient of the next order of all nodes.
     pub(crate) fn advance(&mut self) {
         let k = self.length;

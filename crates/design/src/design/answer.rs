@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use obsdeg_core::model::{Carry, Geometry, GimbalReport};
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::omitted::OmittedEffects;
 use obsdeg_evidence::simulation::{MeasurementReport, OtherCarry};
 
 /// Name and version of the JSON layout.
@@ -47,6 +48,9 @@ pub struct Design {
     /// asked for.
     #[serde(default)]
     pub not_judged: Vec<String>,
+    /// Effect of what the first scheme does not estimate, by the weights of its sigmas; null without a search.
+    #[serde(default)]
+    pub omitted: Option<OmittedEffects>,
     /// Outcome of the first scheme under the other carries; empty if no scheme was searched.
     #[serde(default)]
     pub other_carries: Vec<OtherCarry>,
@@ -120,8 +124,12 @@ pub struct SearchReport {
     /// their criterion is larger than that of all listed.
     pub excluded: u64,
     /// True if no sequence of candidates within the constraints is better than the first, by exhaustion or by
-    /// a bound: none has a smaller worst degree, or the same and a smaller criterion.
+    /// a bound: none has a smaller worst degree, or the same and a smaller criterion. With `parts` this holds
+    /// if the parts were searched as they state.
     pub proven: bool,
+    /// Parts that the answer was put together from; left out for a search as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<PartsReport>,
     /// Number of sequences as good as the first; null if the search was not exhaustive.
     pub ties: Option<TiesReport>,
     /// True if orders of the same positions count as different schemes.
@@ -134,9 +142,34 @@ pub struct SearchReport {
     pub degree_floor: Option<usize>,
     /// Constraints of the search, in words.
     pub constraints: Vec<String>,
+    /// Number of schemes of least sigma that were ranked by total uncertainty with the bench; left out without a
+    /// bench.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ranked: Option<usize>,
     /// Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial
     /// carry, and where the noise of Z is correlated, information is no sum over positions.
     pub certificate: Option<Certificate>,
+}
+
+/// Parts of a search that were put together: every sequence that they list was evaluated again, and their
+/// starts and counts add up to the whole.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PartsReport {
+    /// Number of parts put together.
+    pub parts: usize,
+    /// Versions of the program that searched the parts, each once.
+    pub versions: Vec<String>,
+    /// Number of blocks of starts in all parts, at all worst degrees that were searched.
+    pub blocks: usize,
+    /// Number of blocks, chosen at random, that were searched again with the same result (`--check`).
+    pub searched_again: usize,
+}
+
+impl PartsReport {
+    /// True if every block was searched again, so that nothing rests on the parts.
+    pub fn is_repeated(&self) -> bool {
+        self.searched_again == self.blocks
+    }
 }
 
 /// Bound on the criterion of the best scheme of the same number of these candidates, from the optimal weights
@@ -265,7 +298,7 @@ pub struct Found {
     pub dwells_s: Vec<f64>,
     /// Total time with turns, in s.
     pub total_s: f64,
-    /// Criterion of the scheme, in the unit of `unit`; for margin the largest sigma over its requirement, psi
+    /// Criterion of the scheme, in the unit of `unit`, with a bench of its total uncertainties; for margin the largest sigma over its requirement, psi
     /// included where it counts.
     pub value: f64,
     /// Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::requirements::{Requirements, Worst};
 use crate::simulation::answer::{MeasurementReport, Validity};
+use crate::simulation::omitted::OmittedEffects;
 use crate::simulation::{NoiseFloor, OtherCarry};
 
 /// Name and version of the JSON layout.
@@ -57,6 +58,8 @@ pub struct ComparedScheme {
     pub requirements: Requirements,
     /// Outcome of the same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
+    /// Effect of what the scheme does not estimate, by the weights of the predicted sigmas.
+    pub omitted: OmittedEffects,
     /// True if accuracy orders are computed. They are not for rotating segments.
     pub has_accuracy_orders: bool,
     /// Validity of the small-angle model at the drifts that are stated; null where none are (`values`), or
@@ -107,7 +110,10 @@ pub struct Quantity {
     pub sigma_extended: Option<f64>,
     /// Largest sigma allowed, in the unit of `unit`; null if none is required.
     pub requirement: Option<f64>,
-    /// Requirement over sigma, dimensionless: met from 1; null if there is no requirement or no sigma.
+    /// Total uncertainty with the errors of the bench, in the unit of `unit`; null without a bench or a sigma.
+    pub total: Option<f64>,
+    /// Requirement over sigma (total uncertainty with a bench), dimensionless: met from 1; null if there is no
+    /// requirement or no sigma.
     pub margin: Option<f64>,
     /// Factors by which the unknown enters the drift, position by position, dimensionless: products of
     /// components of g (1 for D_F), root mean square over the arc of a rotating segment. Empty for psi.

@@ -19,6 +19,7 @@ use crate::simulation::carries::under;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::iterated::at_own_drifts;
 use crate::simulation::limits::MAX_UNKNOWNS;
+use crate::simulation::omitted::omitted_effects;
 use crate::simulation::{Attained, SimulationError, noise_floor, other_carries};
 
 /// Latitudes of the sweep, in degrees.
@@ -151,6 +152,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         meets_requirements: requirements.all_met(),
         requirements,
         other_carries: other_carries(scheme, conditions, seed)?,
+        omitted: omitted_effects(&judged, conditions, seed)?,
         has_accuracy_orders: judged.prediction.has_accuracy_orders,
         quantities,
         worst: judged.worst_of(&|_| true),
@@ -190,7 +192,9 @@ fn quantities(
             by_prior: judged.by_prior[c],
             sigma_extended: None,
             requirement,
-            margin: Claim { name, required: requirement, sigma: sigma.ok_or(Miss::NotObservable) }.margin(),
+            total: judged.totals[c].filter(|_| !conditions.bench.is_empty()),
+            margin: Claim { name, required: requirement, sigma: judged.totals[c].ok_or(Miss::NotObservable) }
+                .margin(),
             excitation: excitation(c),
             carried_by: carries.map(|d| d.position.clone()).collect(),
         }

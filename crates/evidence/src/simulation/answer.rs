@@ -14,6 +14,7 @@ use super::datasheet::GyroNoise;
 use super::floor::NoiseFloor;
 pub use super::validity::Validity;
 use crate::requirements::{Miss, Requirements, meets};
+use crate::simulation::omitted::OmittedEffects;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.simulation/2";
@@ -42,6 +43,8 @@ pub struct Simulation {
     pub run: RunRequirements,
     /// Outcome of the same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
+    /// Effect of what the scheme does not estimate, by the weights of the predicted sigmas.
+    pub omitted: OmittedEffects,
     /// Consistency of errors and innovations with the filter's covariances.
     pub consistency: Consistency,
     /// Filter of the run, and the reason for it.
@@ -130,7 +133,8 @@ pub struct ConditionsReport {
     /// Factor on the true drifts and their priors, dimensionless.
     pub drift_scale: f64,
     /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg,
-    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors.
+    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values and
+    /// other_priors where they are stated for some of the unknowns only.
     pub by_default: Vec<String>,
 }
 
@@ -191,6 +195,10 @@ pub struct MeasurementReport {
     /// Priors that are stated, as 1 sigma in the units of the unknowns; null if none are.
     #[serde(default)]
     pub prior: Option<String>,
+    /// Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out where
+    /// none is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg.
     #[serde(default)]
@@ -212,6 +220,7 @@ impl MeasurementReport {
             drift_noise: conditions.as_stated().drift_noise_in_words(),
             gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
             prior: conditions.stated_prior_in_words(),
+            bench: conditions.bench_in_words(),
             by_default: chosen(scheme, conditions),
         }
     }
@@ -308,6 +317,9 @@ pub struct FilterReport {
     pub passes: usize,
     /// True if the linearisations converged.
     pub converged: bool,
+    /// False if the sigmas are not to be trusted even where one run is consistent: the small-angle model does
+    /// not hold for the truth, and the filter is linear, or extended and so linearised before drifts are known.
+    pub trusted: bool,
 }
 
 /// Reason for the choice of a filter.

@@ -7,7 +7,7 @@
 //! has a psi of its own).
 
 use nalgebra::{DMatrix, RowDVector};
-use obsdeg_core::model::Scheme;
+use obsdeg_core::model::{OmittedModel, Scheme};
 use obsdeg_ekf::linear::last_covariance;
 use obsdeg_ekf::{Covariance, EkfError, Form, SquareRootInformation};
 
@@ -20,6 +20,8 @@ use super::seen::{no_prior, predict};
 use super::start::RunStart;
 use crate::prediction::Prediction;
 use crate::requirements::{Claim, Miss, Requirements, Worst};
+use crate::simulation::omitted::bench::Bench;
+use crate::simulation::omitted::weights::{self, Influence};
 
 /// Factor by which a second diffuse prior is narrower: an unknown whose sigma it narrows is bounded by
 /// nothing else.
@@ -37,9 +39,18 @@ pub struct Attained {
     /// Sigma of every unknown in its shown unit (deg, deg/h, ...); `None` where neither samples nor stated
     /// priors bound it.
     pub sigmas: Vec<Option<f64>>,
+    /// Total uncertainty of every unknown in its shown unit: sigma, and what the errors of the bench add. Sigma where
+    /// no bench is stated.
+    pub totals: Vec<Option<f64>>,
     /// True for an unknown that the samples do not determine and stated priors bound.
     pub by_prior: Vec<bool>,
     known: Known,
+    /// Standard deviations of the unknowns beforehand, in SI units: stated, or so wide that they say nothing.
+    prior: Vec<f64>,
+    /// True if random drift or biases make a filter of it.
+    noisy: bool,
+    /// Changes of the estimates by one sigma of every error of the bench (n x errors, SI units); no columns without.
+    contributions: DMatrix<f64>,
 }
 
 /// Covariance of the unknowns at the end in SI units, as a root: what is not bounded has huge variances,
@@ -77,8 +88,11 @@ impl Attained {
         let stated = stated_prior(&plan, &conditions)?;
         let noisy = conditions.drift_noise.amount() > 0.0 || plan.is_noisy();
         let wide = if noisy { wide_prior(&plan, &conditions)? } else { no_prior(&plan)? };
+        let prior = |narrower: f64| -> Vec<f64> {
+            stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect()
+        };
         let with = |narrower: f64| -> Result<Known, SimulationError> {
-            let sigma = stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect();
+            let sigma = prior(narrower);
             if noisy { filtered(&plan, sigma) } else { by_information(&plan, sigma) }
         };
         let known = with(1.0)?;
@@ -97,7 +111,42 @@ impl Attained {
         for c in (0..n).filter(|&c| determined[c] || by_prior[c]) {
             sigmas[c] = Some(known.variance(&[(c, 1.0)])?.max(0.0).sqrt() / si_per_shown(units[c]));
         }
-        Ok(Self { plan, prediction, sigmas, by_prior, known })
+        let (totals, prior) = (sigmas.clone(), prior(1.0));
+        let contributions = DMatrix::zeros(n, 0);
+        let mut out = Self { prior, plan, prediction, sigmas, totals, by_prior, known, noisy, contributions };
+        if !conditions.bench.is_empty() {
+            out.add_bench(&conditions)?;
+        }
+        Ok(out)
+    }
+
+    /// Total uncertainties with the bench of `conditions`.
+    fn add_bench(&mut self, conditions: &Conditions) -> Result<(), SimulationError> {
+        let model = OmittedModel::new(&self.plan.platform);
+        let bench = Bench::of(&conditions.bench, &model)?;
+        if bench.is_empty() {
+            return Ok(());
+        }
+        let influence = self.influence(&model)?;
+        let changes = influence.shown(self.plan.platform.units(), &self.sigmas, &model, None);
+        self.totals = bench.totals(&self.sigmas, &changes);
+        let units = self.plan.platform.units();
+        let size = |j: usize| bench.sizes[j].unwrap_or(0.0);
+        let entry = |c: usize, j: usize| changes[c][j] * size(j) * si_per_shown(units[c]);
+        self.contributions = DMatrix::from_fn(units.len(), bench.sizes.len(), entry);
+        Ok(())
+    }
+
+    /// Changes of the estimates by what the scheme does not estimate, by the weights of the sigmas.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    pub fn influence(&self, model: &OmittedModel) -> Result<Influence, SimulationError> {
+        if self.noisy {
+            weights::by_filter(&self.plan, model, filter_prior(&self.plan, self.prior.clone())?)
+        } else {
+            weights::by_information(&self.plan, model, &self.prior)
+        }
     }
 
     /// Sigma of a combination of unknowns, `(unknown, coefficient)` in SI units, in SI units.
@@ -108,7 +157,7 @@ impl Attained {
         Ok(self.known.variance(terms)?.max(0.0).sqrt())
     }
 
-    /// Covariance of some unknowns in SI units, in their order.
+    /// Covariance of some unknowns in SI units, in their order, with the errors of a stated bench.
     ///
     /// # Errors
     /// [`EkfError`] for what is no unknown.
@@ -118,7 +167,8 @@ impl Attained {
         for (i, &a) in unknowns.iter().enumerate() {
             for (j, &b) in unknowns.iter().enumerate() {
                 let [sum, difference] = [1.0, -1.0].map(|k| self.known.variance(&[(a, 0.5), (b, 0.5 * k)]));
-                out[(i, j)] = sum? - difference?;
+                let bench = self.contributions.row(a).dot(&self.contributions.row(b));
+                out[(i, j)] = sum? - difference? + bench;
             }
         }
         Ok(out)
@@ -136,21 +186,22 @@ impl Attained {
         let claims = (0..names.len()).map(|c| Claim {
             name: &names[c],
             required: Some(required[c]).filter(|r| !r.is_nan()),
-            sigma: self.sigmas[c].ok_or(Miss::NotObservable),
+            sigma: self.totals[c].ok_or(Miss::NotObservable),
         });
         let mut out = Requirements::of(conditions.basis(), claims);
+        out.with_bench = !conditions.bench.is_empty();
         let rests = |c: &usize| self.by_prior[*c] && !required[*c].is_nan();
         out.on_prior = (0..names.len()).filter(rests).map(|c| names[c].clone()).collect();
         Ok(out)
     }
 
-    /// The largest sigma of a drift coefficient that counts, if all of these have one: other coefficients
+    /// The largest sigma (total uncertainty with a bench) of a drift coefficient that counts, if all of these have one: other coefficients
     /// have other units.
     pub fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
         let (units, names) = (self.plan.platform.units(), self.plan.platform.names());
         let mut worst: Option<Worst> = None;
         for c in (0..units.len()).filter(|c| is_rate(units[*c]) && counts(&names[*c])) {
-            let sigma_dph = self.sigmas[c]?;
+            let sigma_dph = self.totals[c]?;
             if worst.as_ref().is_none_or(|w| sigma_dph > w.sigma_dph) {
                 worst = Some(Worst { name: names[c].clone(), sigma_dph });
             }
@@ -178,8 +229,12 @@ fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<Known, SimulationError
 }
 
 /// Covariance at the end of a filter, with random drift and biases.
-fn filtered(plan: &Plan, mut sigma: Vec<f64>) -> Result<Known, SimulationError> {
+fn filtered(plan: &Plan, sigma: Vec<f64>) -> Result<Known, SimulationError> {
+    Ok(Known::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma)?)?))
+}
+
+/// Covariance of a filter at its start, biases behind the unknowns.
+fn filter_prior(plan: &Plan, mut sigma: Vec<f64>) -> Result<Covariance, SimulationError> {
     sigma.extend(plan.bias_sigmas());
-    let prior = RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)?;
-    Ok(Known::Filter(last_covariance(&plan.stages, prior)?))
+    RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)
 }

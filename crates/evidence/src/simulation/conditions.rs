@@ -55,6 +55,8 @@ pub struct Conditions {
     pub priors: Vec<Assignment>,
     /// The largest standard deviations allowed: those that are stated, since the program has none of its own.
     pub requirements: Vec<Assignment>,
+    /// Sizes (one sigma) of errors that are not estimated, in their units: none counts unless it is stated.
+    pub bench: Vec<Assignment>,
     /// Conditions that a file or an option states, whatever their values are: see [`Self::states`].
     pub stated: Stated,
 }
@@ -128,6 +130,7 @@ impl Default for Conditions {
                 .chain(others.map(|(name, _, prior)| assign(name, prior)))
                 .collect(),
             requirements: Vec::new(),
+            bench: Vec::new(),
             stated: Stated::default(),
         }
     }
@@ -197,6 +200,7 @@ impl Conditions {
         let mut out = Self::default();
         out.apply(&scheme.simulation);
         out.requirements.extend(by_family(&scheme.requirements));
+        out.bench.extend(by_family(&scheme.bench));
         out
     }
 
@@ -224,6 +228,12 @@ impl Conditions {
         let listed: Vec<String> =
             self.stated_priors().iter().map(|a| format!("{} {}", a.name, a.value)).collect();
         (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
+    }
+
+    /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error; `None` where none is stated.
+    pub fn bench_in_words(&self) -> Option<String> {
+        let listed: Vec<String> = self.bench.iter().map(|a| format!("{} {}", a.name, a.value)).collect();
+        (!listed.is_empty()).then(|| listed.join(", "))
     }
 
     /// The random drift with its unit; `None` where there is none.
@@ -301,6 +311,9 @@ impl Conditions {
             for a in list {
                 range.check(format!("the {what} of {}", a.name), a.value)?;
             }
+        }
+        for a in &self.bench {
+            ranges::BENCH.check(format!("the size of {} in the bench", a.name), a.value)?;
         }
         Ok(())
     }
@@ -388,6 +401,18 @@ pub fn resolve(
         }
     }
     Ok(out)
+}
+
+/// Largest sigma allowed of every unknown in its shown unit; `None` where nothing is required.
+///
+/// # Errors
+/// [`SimulationError::UnknownName`], as [`resolve`].
+pub fn required_sigmas(
+    platform: &Platform,
+    conditions: &Conditions,
+) -> Result<Vec<Option<f64>>, SimulationError> {
+    let required = resolve(REQUIRED, platform, &conditions.within(platform).requirements, f64::NAN)?;
+    Ok(required.into_iter().map(|r| Some(r).filter(|r| !r.is_nan())).collect())
 }
 
 /// The unit in which an unknown is given and reported: degrees for psi.

@@ -93,6 +93,9 @@ pub enum SimulationError {
         /// What was expected.
         known: String,
     },
+    /// A size for an error that no scheme has.
+    #[error(transparent)]
+    Bench(#[from] crate::simulation::omitted::bench::BenchError),
     /// The scheme itself.
     #[error(transparent)]
     Scheme(#[from] SchemeError),

@@ -16,6 +16,7 @@ mod gyro_noise;
 pub(crate) mod iterated;
 pub(crate) mod limits;
 mod noise;
+pub mod omitted;
 pub(crate) mod plan;
 pub(crate) mod record;
 mod reports;
@@ -29,11 +30,13 @@ mod validity;
 
 pub use answer::*;
 pub use attained::Attained;
+pub(crate) use batch::each_row;
 pub use batch::{Batch, batch, diffuse_prior};
 pub use biases::{Bias, Sensor};
 pub use carries::{OtherCarry, other_carries};
 pub use conditions::{
-    Conditions, PRIOR, Stated, general_first, is_rate, latitude_of, resolve, shown_unit, si_per_shown,
+    Conditions, PRIOR, Stated, general_first, is_rate, latitude_of, required_sigmas, resolve, shown_unit,
+    si_per_shown,
 };
 pub use consistency::{Consistency, Doubt};
 pub use datasheet::GyroNoise;

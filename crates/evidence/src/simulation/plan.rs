@@ -573,7 +573,7 @@ impl Plan {
     }
 
     /// The rate with which the gyros are torqued where `C_c^n` is `c`, in the axes of c (rad/s).
-    pub(super) fn torqued_rate(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [f64; 3] {
+    pub(crate) fn torqued_rate(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [f64; 3] {
         let earth = earth_rate_in(&Float, c, &self.point.w_n, &self.point.w_u);
         std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
     }
@@ -630,7 +630,7 @@ impl Plan {
     }
 
     /// Integration steps per step of a segment: psi turns with the earth rate, and the platform with what is commanded.
-    pub(super) fn substeps(&self, segment: usize) -> usize {
+    pub(crate) fn substeps(&self, segment: usize) -> usize {
         let s = &self.segments[segment];
         let turn = match &s.kind {
             SegmentKind::Dwell => W_IE * s.dt,

@@ -333,7 +333,13 @@ pub fn run(
         whitened: filtered.whitened.clone(),
         last_covariance: filtered.covariance.clone(),
         last_error: filtered.error.clone(),
-        filter: FilterReport { kind, reason, passes, converged },
+        filter: FilterReport {
+            kind,
+            reason,
+            passes,
+            converged,
+            trusted: trusted(kind, conditions, &validity),
+        },
         validity,
         traces: Traces { series: series(filtered), ..traces },
     })
@@ -357,6 +363,13 @@ pub(crate) fn choose(
         None if steps > MAX_ITERATED_STEPS => Ok((FilterKind::Extended, FilterReason::NotValid)),
         None => Ok((FilterKind::Iterated, FilterReason::NotValid)),
     }
+}
+
+/// Whether sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose model
+/// is that of the truth.
+fn trusted(kind: FilterKind, conditions: &Conditions, validity: &Validity) -> bool {
+    let own_model = kind == FilterKind::Linear && conditions.truth == Truth::Linear;
+    validity.holds || own_model || kind == FilterKind::Iterated
 }
 
 /// The number of the first step of every segment.

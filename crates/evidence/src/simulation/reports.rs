@@ -1,7 +1,7 @@
 //! The conditions and the timeline of a run as they are reported.
 
 use obsdeg_core::model::Scheme;
-use obsdeg_core::model::settings::DriftNoise;
+use obsdeg_core::model::settings::{Assignment, DriftNoise, concerns};
 
 use super::answer::{AccelerometerBias, ConditionsReport, TimelineReport, chosen};
 use super::conditions::Conditions;
@@ -34,17 +34,23 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
         propagation: conditions.propagation,
         drift_scale: conditions.drift_scale,
-        by_default: chosen_for_run(scheme, conditions),
+        by_default: chosen_for_run(scheme, plan.platform.names(), conditions),
     }
 }
 
 /// Keys of the conditions of a run that nobody states.
-fn chosen_for_run(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
+fn chosen_for_run(scheme: &Scheme, unknowns: &[String], conditions: &Conditions) -> Vec<String> {
     let mut out = chosen(scheme, conditions);
+    let some_left = |stated: &[Assignment]| {
+        let left = unknowns.iter().any(|name| !stated.iter().any(|a| concerns(&a.name, name)));
+        !stated.is_empty() && left
+    };
     let own = [
         ("drift_noise", !conditions.states().drift_noise && conditions.drift_noise.amount() > 0.0),
         ("values", conditions.stated_values().is_empty()),
+        ("other_values", some_left(conditions.stated_values())),
         ("priors", conditions.stated_priors().is_empty()),
+        ("other_priors", some_left(conditions.stated_priors())),
     ];
     out.extend(own.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()));
     out

@@ -20,6 +20,7 @@ use super::seen::predict_run;
 use super::start::RunStart;
 use crate::prediction::{PredictedCombination, Prediction};
 use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
+use crate::simulation::omitted::omitted_effects;
 
 /// Simulates `scheme` once: the summary and the time series.
 ///
@@ -90,6 +91,7 @@ fn summary(
         requirements: attained.requirements(conditions)?,
         run: run_requirements(plan, conditions, &quantities, record)?,
         other_carries: other_carries(scheme, conditions, seed)?,
+        omitted: omitted_effects(&attained, conditions, seed)?,
         quantities,
         combinations,
         consistency,

@@ -67,6 +67,9 @@ pub struct SystemEvidence {
     pub not_resolvable: usize,
     /// True if no check of the model failed.
     pub passed: bool,
+    /// Bound on the order of derivatives up to which an unknown that is not seen was looked for; samples may
+    /// see it by higher ones, which contradicts nothing. Null where the end is proven.
+    pub seen_up_to: Option<usize>,
     /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
     /// equations nor the known inputs hold the time.
     pub time: Option<f64>,
@@ -230,6 +233,8 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     for (&c, _) in columns.iter().zip(&rounded).filter(|(_, rounded)| **rounded) {
         whole.column_mut(c).fill(0.0);
     }
+    // beyond the bound a derivative may see what no verdict speaks of
+    let open = judged.rests_on_bound;
     let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
     // with jumps, dwell may see earlier what derivatives see late: slopes are those of accuracy orders then
     let slopes =
@@ -245,7 +250,8 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
             let Verdict { status, degree } = judged.verdict_on(c);
             let (inflated, left) = inflated[c];
             let mut inflation = rules::LINEARISED.check(degree.is_some(), Some(inflated));
-            if inflation.fails() && (rounded[c] || (degree.is_some() && left > LEFT)) {
+            let faint = rounded[c] || (degree.is_some() && left > LEFT);
+            if inflation.fails() && (faint || status == Status::NotSeen) {
                 inflation.outcome = Agreement::NotResolvable;
             }
             // of what has no degree nothing is measured that could be learnt
@@ -272,6 +278,9 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     {
         defect.outcome = Agreement::NotResolvable;
     }
+    if open && defect.measured < defect.predicted {
+        defect.outcome = Agreement::NotResolvable;
+    }
     let directions = found
         .found
         .iter()
@@ -285,7 +294,11 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
             }
             let seen = (&m * &v).norm() / (v.norm() * largest);
             // the derivatives are integrated by Runge-Kutta: what a symmetry leaves alone, its error does not
-            SymmetryEvidence { words: report.words, seen: Check::new(0.0, Some(seen), |x| x <= 1e-6) }
+            let mut seen = Check::new(0.0, Some(seen), |x| x <= 1e-6);
+            if open && seen.fails() {
+                seen.outcome = Agreement::NotResolvable;
+            }
+            SymmetryEvidence { words: report.words, seen }
         })
         .collect();
     let measured = quantities.iter().flat_map(|q| [q.slope.outcome, q.inflation.outcome]);
@@ -303,6 +316,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         checks: counts.agree + counts.disagree,
         not_resolvable: counts.not_resolvable,
         passed: counts.disagree == 0,
+        seen_up_to: open.then(|| judged.findings.degrees.rank_profile.len().saturating_sub(1)),
         time: compiled.uses_time().then(|| model.time.number()),
         duration: setup.duration,
         error_bound: judged.error_bound(),

@@ -96,7 +96,7 @@ pub struct SystemEstimate {
 }
 
 impl SystemEstimate {
-    /// Whether the outputs determine it.
+    /// True if the exact verdict is that the outputs determine it; false also where no order up to the bound does.
     pub fn is_determined(&self) -> bool {
         is_determined(self.status)
     }
@@ -372,7 +372,8 @@ fn estimates(
         let error = estimate - truth;
         let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
         let status = verdict.map(|v| v.status);
-        let determined = is_determined(status);
+        // what no derivative up to the bound shows a run may show
+        let determined = is_determined(status) || status == Some(Status::NotSeen);
         SystemEstimate {
             name: name.clone(),
             unit: unit(model, &numeric.states[c]),

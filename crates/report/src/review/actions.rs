@@ -11,6 +11,7 @@ use obsdeg_evidence::requirements::Miss;
 use super::fewest_of_all;
 use crate::calibration::is_clock;
 use crate::document::number;
+use crate::simulation::NOT_TRUSTED;
 use crate::{resolve, stated, words};
 
 /// Advice where a run is not consistent.
@@ -56,6 +57,8 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     }
     if !s.simulation.consistency.consistent {
         out.push(INCONSISTENT.into());
+    } else if !s.simulation.filter.trusted {
+        out.push(format!("{NOT_TRUSTED}."));
     }
     match &s.evidence {
         Ok(e) if !e.passed => out.push(FAILING.into()),
@@ -248,6 +251,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             "Calibrate each record alone: the coefficients changed between the runs, or sigmas are too small.".into()
         }
         Finding::SecondPath { .. } => "Do not use the estimates: two ways to compute them do not agree.".into(),
+        Finding::Suspect { errors, .. } => format!(
+            "Add the error to the unknowns: {} would explain the residuals (section Not estimated of the calibration).",
+            errors.join(" with ")
+        ),
         Finding::Known { .. } => {
             "Calibrate without --prior: the earlier knowledge does not agree with these records.".into()
         }

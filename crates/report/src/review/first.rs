@@ -293,6 +293,7 @@ mod tests {
             degree: Some(1),
             accuracy_order: Some(1),
             sigma,
+            total: None,
             by_prior: false,
             sigma_extended: None,
             requirement,

@@ -4,7 +4,7 @@ use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
 use obsdeg_design::review::ModelReview;
 use obsdeg_evidence::simulation::Outcome;
-use obsdeg_evidence::system::SystemEvidence;
+use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
 use super::{derivatives, is_list, pictures, section};
 use crate::document::{Block, Finding, Grade, Status};
@@ -89,7 +89,8 @@ fn by_prior(m: &ModelReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
     let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
     // a start that is known rests on nothing else
-    let unknown = estimates.filter(|e| e.status.is_some() && (!e.is_determined() || rests(e.outcome)));
+    let never = |e: &SystemEstimate| matches!(e.status, Some(Exact::Inseparable | Exact::NotExcited));
+    let unknown = estimates.filter(|e| e.status.is_some() && (never(e) || rests(e.outcome)));
     unknown.map(|e| e.name.as_str()).collect()
 }
 

@@ -80,6 +80,8 @@ fn limits(s: &SchemeReview) -> Vec<String> {
             "the run of the filter is NOT consistent with its truth ({})",
             words::doubts(&s.simulation.consistency)
         ));
+    } else if !s.simulation.filter.trusted {
+        out.push("the sigmas of the filter are not to be trusted at these drifts".into());
     }
     match evidence(s) {
         (Grade::Good, _) => {}
@@ -234,11 +236,13 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
             ),
             row(
                 "Filter, one run",
-                grade(consistency.consistent),
-                if consistency.consistent {
-                    "consistent with its truth".into()
-                } else {
-                    format!("NOT consistent with its truth: {}", words::doubts(consistency))
+                grade(consistency.consistent && s.simulation.filter.trusted),
+                match (consistency.consistent, s.simulation.filter.trusted) {
+                    (true, true) => "consistent with its truth".into(),
+                    (true, false) => {
+                        "consistent with its truth, which says little: its sigmas are not to be trusted at these drifts".into()
+                    }
+                    (false, _) => format!("NOT consistent with its truth: {}", words::doubts(consistency)),
                 },
             ),
             row("Filter and exact verdicts", checks, agreement),

@@ -231,6 +231,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         measured_azimuth: file.measured_azimuth,
         simulation: r.settings(&file.simulation)?,
         requirements: r.numbers("requirements", &file.requirements),
+        bench: r.numbers("bench", &file.bench),
         ..Scheme::default()
     };
     if let Some(record) = &file.record {

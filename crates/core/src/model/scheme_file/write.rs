@@ -48,6 +48,7 @@ pub fn write(scheme: &Scheme) -> String {
     }
     settings(&mut out, &scheme.simulation);
     numbers(&mut out, "requirements", &scheme.requirements);
+    numbers(&mut out, "bench", &scheme.bench);
     let mut gimbals = String::new();
     for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(scheme.gimbals.limits) {
         if let Some(ends) = limit {
@@ -326,6 +327,7 @@ mod tests {
                 combinations: if combination && !alone { vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()] } else { Vec::new() },
                 simulation,
                 requirements,
+                bench: if mirrored { [("K0".into(), 20.0), ("latitude".into(), 0.5)].into() } else { [].into() },
                 gimbals: Gimbals { limits: [None, limits, None] },
                 recording: if combination { recording } else { Recording::default() },
             }

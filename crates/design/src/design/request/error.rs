@@ -225,6 +225,31 @@ pub enum PartError {
         /// What is wrong.
         why: String,
     },
+    /// Changed after it was written.
+    #[error("it was changed after it was written: its contents do not have the digest in its field `seal`")]
+    Changed,
+    /// Counts that no search of its starts gives.
+    #[error("its counts do not add up: {why}")]
+    Counts {
+        /// Which of them.
+        why: String,
+    },
+    /// Listed sequence that no search of its starts lists.
+    #[error("it lists {sequence}: {why}")]
+    Listed {
+        /// Names of the candidates, or their indices.
+        sequence: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// Searched again, with another result.
+    #[error("its starts {} to {} (from 0) were searched again, and {why}", .starts[0], .starts[1].saturating_sub(1))]
+    Block {
+        /// Index of the first start, index behind the last.
+        starts: [usize; 2],
+        /// What differs.
+        why: String,
+    },
     /// Of other inputs.
     #[error("it is a part of another search: {why}")]
     Foreign {

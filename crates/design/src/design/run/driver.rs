@@ -4,15 +4,16 @@ use std::sync::atomic::Ordering;
 
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Euler, Scheme};
-use obsdeg_evidence::simulation::{Conditions, MeasurementReport, latitude_of, other_carries};
+use obsdeg_evidence::simulation::omitted::omitted_effects;
+use obsdeg_evidence::simulation::{Attained, Conditions, MeasurementReport, latitude_of, other_carries};
 
-use crate::design::answer::{Design, Found, SCHEMA, SearchReport, TiesReport};
+use crate::design::answer::{Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::PROOF;
 use crate::design::request::options::DesignOptions;
 use crate::design::run::free::Free;
 use crate::design::run::prepared::Prepared;
-use crate::design::run::task::asked;
+use crate::design::run::task::{Task, asked};
 use crate::design::run::{alternatives, certify, winner};
 use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
@@ -33,8 +34,8 @@ pub fn design(
     answered(base, conditions, options, progress, None)
 }
 
-/// What an exhaustive search found elsewhere.
-pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<Best, DesignError>;
+/// What an exhaustive search found in parts, and these.
+pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
 
 /// The answer; `elsewhere` instead of a search.
 pub(crate) fn answered(
@@ -73,6 +74,7 @@ pub(crate) fn answered(
             search: None,
             found: Vec::new(),
             front: Vec::new(),
+            omitted: None,
             other_carries: Vec::new(),
             not_judged: not_judged(stated, conditions),
             gimbals: None,
@@ -86,8 +88,9 @@ pub(crate) fn answered(
         let evaluator = &prepared.evaluator;
         let search = prepared.search(progress);
         let bound = task.bound(evaluator, k, &going);
-        let (best, exhaustive) = match (elsewhere, &free) {
-            (Some(elsewhere), _) => (elsewhere(&prepared, k)?, task.space(k, evaluator)),
+        let (merged, parts) = elsewhere.map(|parts| parts(&prepared, k)).transpose()?.unzip();
+        let (best, exhaustive) = match (merged, &free) {
+            (Some(merged), _) => (merged, task.space(k, evaluator)),
             (None, Some(free)) => free.searched(&prepared, &search, k)?,
             (None, None) => prepared.searched(&search, k, bound.as_ref()),
         };
@@ -100,17 +103,20 @@ pub(crate) fn answered(
         if task.is_noisy() {
             out.found.sort_by(|a, b| a.worst_degree.cmp(&b.worst_degree).then(a.value.total_cmp(&b.value)));
         }
+        if task.has_bench() {
+            out.found.truncate(options.keep.max(1));
+        }
         task.mark_images(&mut out.found, evaluator.ordered());
         let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
             let (positions, wanted) = (k, task.wanted());
             let error = match (best.complete, exhaustive) {
                 (false, _) => return Err(DesignError::Interrupted),
-                (true, Some(_)) => DesignError::Impossible {
+                (true, Some(_)) if !task.has_bench() => DesignError::Impossible {
                     positions,
                     wanted,
                     why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
                 },
-                (true, None) => DesignError::NotFound { positions, wanted, examined: best.examined },
+                (true, _) => DesignError::NotFound { positions, wanted, examined: best.examined },
             };
             if !options.meet {
                 return Err(error);
@@ -143,18 +149,23 @@ pub(crate) fn answered(
         if options.refine && going() {
             let refined = task.refined(evaluator, first, &going)?;
             out.front.extend(refined.iter().cloned());
+            let refined = refined.filter(|f| improves(task, f, out.found.first()));
             put_first(&mut out.found, refined);
         }
         if options.divide && going() {
             let divided = task.divided(evaluator, first, &going)?;
             out.front.extend(divided.iter().cloned());
+            let divided = divided.filter(|f| improves(task, f, out.found.first()));
             put_first(&mut out.found, divided);
         }
         out.front = pareto(std::mem::take(&mut out.front));
         out.other_carries = match out.found.first() {
             Some(best) => {
                 let scheme = winner::scheme(best, base, conditions)?;
-                other_carries(&scheme, &Conditions::of(&scheme), options.seed)?
+                let own = Conditions::of(&scheme);
+                let attained = Attained::new(&scheme, &own, options.seed)?;
+                out.omitted = Some(omitted_effects(&attained, &own, options.seed)?);
+                other_carries(&scheme, &own, options.seed)?
             }
             None => Vec::new(),
         };
@@ -174,11 +185,13 @@ pub(crate) fn answered(
             lost: best.lost,
             sequences: task.space(k, evaluator).map(|s| s.1).filter(|_| !all && free.is_none()),
             proven: all && out.error_bound < PROOF && !task.is_noisy(),
+            parts,
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),
             interrupted: stopped.load(Ordering::Relaxed),
             degree_floor: (!task.walks).then_some(search.floor),
             constraints: task.constraints_in_words(),
+            ranked: task.has_bench().then_some(best.found.len()),
             certificate,
         });
         winner::within_gimbals(&mut out, base, conditions)?;
@@ -207,6 +220,11 @@ fn examined(lost: u64, slews: bool) -> String {
              tells"
         ),
     }
+}
+
+/// True if a polished scheme may stand first: polishing knows of no bench, and may make the total larger.
+fn improves(task: &Task<'_>, polished: &Found, first: Option<&Found>) -> bool {
+    !task.has_bench() || first.is_none_or(|f| polished.value < f.value)
 }
 
 /// Puts a scheme before others, if there is one.

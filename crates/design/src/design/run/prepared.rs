@@ -16,6 +16,10 @@ use crate::design::search::exhaust::Pruning;
 use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
+use crate::design::search::screen::Screen;
+
+/// Schemes of least sigma that a search with a bench keeps, to be ranked by their total uncertainty.
+const RANKED: usize = 100;
 
 /// A search that can begin: its task, and what evaluates sequences.
 pub(crate) struct Prepared<'a> {
@@ -60,7 +64,10 @@ impl<'a> Prepared<'a> {
             evaluator: &self.evaluator,
             criterion: &self.task.criterion,
             constraints: &self.task.constraints,
-            keep: self.task.options.keep,
+            keep: match self.task.has_bench() {
+                true => self.task.options.keep.max(RANKED),
+                false => self.task.options.keep,
+            },
             floor: self.degrees.iter().flatten().max().copied().unwrap_or(0),
             progress,
         }
@@ -91,6 +98,12 @@ impl<'a> Prepared<'a> {
     pub(crate) fn pruning<'s>(&self, search: &'s Search<'_>, k: usize) -> Option<Pruning<'s>> {
         let (_, sequences) = self.task.space(k, &self.evaluator)?;
         (sequences >= MANY).then(|| search.pruning(&self.task.symmetry, k, self.task.options.seed))?
+    }
+
+    /// True if an exhaustive search may leave sequences out.
+    pub(crate) fn prunes(&self, k: usize) -> bool {
+        let many = self.task.space(k, &self.evaluator).is_some_and(|space| space.1 >= MANY);
+        many && k >= 3 && Screen::new(&self.evaluator, &self.task.criterion).is_some()
     }
 
     /// The best sequences: all are searched, with the number of sets and sequences, unless they are too many or `bound` shows that those

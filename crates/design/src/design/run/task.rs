@@ -429,9 +429,17 @@ impl<'a> Task<'a> {
         Ok(Some(Found { requirements, worst, worst_sigma_dph, value, ..found }))
     }
 
-    /// True if random drift is stated: the search leaves it out, and what it finds is evaluated with it.
+    /// True if random drift or a bench is stated: the search leaves them out, and what it finds is evaluated with
+    /// them.
     pub(crate) fn is_noisy(&self) -> bool {
-        !self.conditions.gyro_noise.is_none() || self.conditions.as_stated().drift_noise.amount() > 0.0
+        self.has_bench()
+            || !self.conditions.gyro_noise.is_none()
+            || self.conditions.as_stated().drift_noise.amount() > 0.0
+    }
+
+    /// True if a bench is stated.
+    pub(crate) fn has_bench(&self) -> bool {
+        !self.conditions.bench.is_empty()
     }
 
     /// What is found at other dwells and numbers of positions.

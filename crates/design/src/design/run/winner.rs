@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::model::ranges::DWELL_S;
 use obsdeg_core::model::settings::{Assignment, Settings, concerns};
-use obsdeg_core::model::{Angle, Dwell, Scheme, SchemeError, SlewAxis, SlewTo, angles_text, parse_attitude};
+use obsdeg_core::model::{
+    Angle, Dwell, Position, Scheme, SchemeError, SlewAxis, SlewTo, angles_text, parse_attitude,
+};
 use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 
 use crate::design::answer::{Design, Found};
@@ -71,10 +73,20 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             p.slew = Some(half_turn(&turn.about));
         }
     }
-    let priors = by_name(conditions.stated_priors());
+    let dwell_s = Some(found.dwell_s).filter(|s| found.dwells_s.is_empty() && DWELL_S.admits(*s));
+    Ok(under(base, conditions, positions, dwell_s))
+}
+
+/// Positions as a scheme that states all conditions of a search.
+pub(crate) fn under(
+    base: &Scheme,
+    conditions: &Conditions,
+    positions: Vec<Position>,
+    dwell_s: Option<f64>,
+) -> Scheme {
     let bias = AccelerometerBias::of(conditions);
     let gyros = (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise);
-    Ok(Scheme {
+    Scheme {
         name: String::new(),
         description: String::new(),
         positions,
@@ -82,10 +94,10 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
         combinations: Vec::new(),
         simulation: Settings {
             step_s: Some(conditions.step_s),
-            dwell_s: Some(found.dwell_s).filter(|s| found.dwells_s.is_empty() && DWELL_S.admits(*s)),
+            dwell_s,
             slew_rate_deg_s: conditions.slew_rate_deg_s,
             accelerometer_noise_g: Some(conditions.accelerometer_noise_g),
-            priors,
+            priors: by_name(conditions.stated_priors()),
             accelerometer_bias_instability_ug: bias.map(|b| b.instability_ug),
             accelerometer_correlation_time_s: bias.map(|b| b.correlation_time_s),
             azimuth_noise_deg: base.measured_azimuth.then_some(conditions.azimuth_noise_deg),
@@ -99,8 +111,9 @@ pub fn scheme(found: &Found, base: &Scheme, conditions: &Conditions) -> Result<S
             ..base.simulation.clone()
         },
         requirements: by_name(&conditions.requirements),
+        bench: by_name(&conditions.bench),
         ..base.clone()
-    })
+    }
 }
 
 /// Assignments as a file states them: there what is of one unknown counts before what is of its family,

@@ -18,6 +18,10 @@ use crate::design::search::screen::{Scratch, Screen};
 
 /// Restarts of the exchange that finds what an exhaustive search is pruned by.
 const KNOWN_RESTARTS: u64 = 24;
+/// Most sequences behind a start, as long as there are not too many starts.
+const MOST_BEHIND: f64 = 2e8;
+/// Most starts of more than two positions.
+const MOST_STARTS: f64 = 1e6;
 
 /// What an exhaustive search takes at once.
 pub(crate) enum SearchLevel {
@@ -247,19 +251,37 @@ impl Search<'_> {
         Some(Pruning { screen, known })
     }
 
-    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions.
+    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions, or more
+    /// where order matters and too many sequences would be behind a start to be searched at once.
     pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
         let ordered = self.evaluator.ordered();
-        let second = |a: usize| {
-            let least = if ordered { 0 } else { a };
-            let stops = (least..self.rows.candidates()).flat_map(move |b| self.evaluator.stops(Some(a), b));
-            stops.map(move |b| vec![a.into(), b])
+        let longer = |start: &[Stop]| -> Vec<Vec<Stop>> {
+            let last = start.last().map(|s| s.candidate);
+            let least = if ordered { 0 } else { last.unwrap_or(0) };
+            let stops = (least..self.rows.candidates())
+                .flat_map(|c| self.evaluator.stops(last, c))
+                .collect::<Vec<_>>();
+            stops.into_iter().map(|stop| [start, &[stop]].concat()).collect()
         };
-        let firsts = symmetry.representatives();
-        match k {
-            1 => firsts.into_iter().map(|a| vec![a.into()]).collect(),
-            _ => firsts.into_iter().flat_map(second).collect(),
+        let firsts: Vec<Vec<Stop>> = symmetry.representatives().into_iter().map(|a| vec![a.into()]).collect();
+        let depth = self.depth(firsts.len(), k);
+        (1..depth).fold(firsts, |starts, _| starts.iter().flat_map(|start| longer(start)).collect())
+    }
+
+    /// Number of positions of a start, of so many first ones.
+    fn depth(&self, firsts: usize, k: usize) -> usize {
+        let n = self.rows.candidates() as f64;
+        let mut depth = k.min(2);
+        let behind = |depth: usize| n.powi((k - depth) as i32);
+        let starts = |depth: usize| firsts as f64 * n.powi(depth as i32 - 1);
+        while self.evaluator.ordered()
+            && depth + 2 < k
+            && behind(depth) > MOST_BEHIND
+            && starts(depth + 1) <= MOST_STARTS
+        {
+            depth += 1;
         }
+        depth
     }
 
     /// How many sequences are behind every start, or in proportion to that.

@@ -80,6 +80,23 @@ impl Ties {
         }
     }
 
+    /// Smallest worst degree, the smallest criterion and the number of searched sequences, if there are any.
+    pub(crate) fn first(&self) -> Option<(usize, f64, u64)> {
+        let least = f64::from_bits(self.counts.keys().next()?.0);
+        Some((self.degree, least, self.counts.values().fold(0, |sum, count| sum.saturating_add(*count))))
+    }
+
+    /// True if all criteria tie with the smallest and sequences have from 1 to `order` searched images, as
+    /// after any search.
+    pub(crate) fn are_tidy(&self, order: usize) -> bool {
+        let limit = self.limit();
+        let tidy = |(&(bits, images), &count): (&(u64, usize), &u64)| {
+            let value = f64::from_bits(bits);
+            value > 0.0 && value <= limit && (1..=order).contains(&images) && count > 0
+        };
+        self.counts.iter().all(tidy)
+    }
+
     pub(crate) fn merge(&mut self, other: Self) {
         for ((bits, images), count) in other.counts {
             let value = f64::from_bits(bits);

@@ -5,6 +5,8 @@ use astro_float_num::{BigFloat, Consts, RoundingMode, WORD_BIT_SIZE};
 /// A number of many digits.
 pub(in super::super) type Real = BigFloat;
 pub(super) type Vector = Vec<Real>;
+/// A functional: `(unknown, coefficient)`, drifts in units of the earth rate.
+pub(in super::super) type Functional = Vec<(usize, Real)>;
 
 /// Arithmetic of so many bits.
 #[derive(Debug, Clone, Copy)]

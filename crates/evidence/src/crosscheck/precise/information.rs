@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::digits::{Digits, Real, Vector};
+use super::digits::{Digits, Functional, Real, Vector};
 use super::model::{LOCAL, Model, Moments};
-use super::seen::Functional;
 
 /// What becomes of psi between the start of one position and that of the next, besides the carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

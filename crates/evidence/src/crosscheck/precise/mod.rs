@@ -11,11 +11,11 @@ mod model;
 mod posterior;
 mod seen;
 
-pub(super) use digits::{Digits, add_up, double};
+pub(super) use digits::{Digits, Functional, add_up, double};
 pub(super) use information::{Between, Information};
 pub(super) use model::Model;
 pub(super) use posterior::Posterior;
-pub(super) use seen::{Functional, Seen};
+pub(super) use seen::Seen;
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,8 +1,8 @@
 //! What a filter's covariance is in many digits.
 
-use super::digits::{Digits, ROUNDING, Vector, double};
+use super::digits::{Digits, Functional, ROUNDING, Vector, double};
 use super::information::Information;
-use super::seen::{Functional, at_start};
+use super::seen::at_start;
 
 /// The covariance at the end, by its inverse: samples and prior.
 pub(in super::super) struct Posterior {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::digits::{Digits, ROUNDING, Real, Vector, log2};
+use super::digits::{Digits, Functional, ROUNDING, Real, Vector, log2};
 use super::information::Information;
 
 /// A pivot is seen above the first of these parts of the digits, relative to the diagonal; the errors that
@@ -83,9 +83,6 @@ impl Information {
         Some(Seen { digits: d, pivots, columns, sizes, excited, own, psi_at_end: self.psi_at_end })
     }
 }
-
-/// A functional: `(unknown, coefficient)`, drifts in units of the earth rate.
-pub(in super::super) type Functional = Vec<(usize, Real)>;
 
 /// A functional of psi at the end and the coefficients as one of the unknowns at the start; `psi` is psi of
 /// the end.

@@ -1,0 +1,64 @@
+//! Terminals and pipes: width, colours, and characters that stdout and stderr take.
+
+use std::io::IsTerminal;
+
+use obsdeg_report::Layout;
+
+/// Columns of a table that does not go to a terminal.
+pub(crate) const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false };
+
+/// Width, colours and characters of a table on stdout.
+pub(crate) fn layout(ascii: bool) -> Layout {
+    let stdout = std::io::stdout();
+    let terminal = stdout.is_terminal();
+    let ascii = ascii || plain(terminal, said);
+    if !terminal {
+        return Layout { ascii, ..PIPE };
+    }
+    Layout {
+        width: terminal_size::terminal_size().map(|(w, _)| w.0),
+        color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
+        ascii,
+    }
+}
+
+/// Value of an environment variable; none if it is empty.
+fn said(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|v| !v.is_empty())
+}
+
+/// True if a stream takes nothing but ASCII. Without a locale that is the C locale, whose characters are those of ASCII: a terminal is believed
+/// to be of it, but what goes into pipes is read as files are, as UTF-8 (and Windows knows no such variables).
+fn plain(terminal: bool, said: impl Fn(&str) -> Option<String>) -> bool {
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&said);
+    let utf8 = locale.map(|l| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u)));
+    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && said("TERM").is_some_and(|t| t == "dumb")
+}
+
+/// True if messages are ASCII: asked on the command line, which may be wrong otherwise, or by what stderr is.
+pub(crate) fn plain_messages() -> bool {
+    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), said)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ascii_follows_the_locale_and_the_terminal() {
+        let of = |terminal: bool, set: &[(&str, &str)]| {
+            plain(terminal, |name| set.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string()))
+        };
+        assert_eq!(of(true, &[]), !cfg!(windows));
+        assert!(!of(false, &[]));
+        for terminal in [true, false] {
+            assert!(of(terminal, &[("LANG", "C")]) && of(terminal, &[("LC_CTYPE", "de_DE.ISO-8859-1")]));
+            assert!(!of(terminal, &[("LANG", "C.UTF-8")]) && !of(terminal, &[("LANG", "en_US.utf8")]));
+            // the first of them wins
+            assert!(of(terminal, &[("LC_ALL", "POSIX"), ("LANG", "C.UTF-8")]));
+            assert!(!of(terminal, &[("LC_CTYPE", "C.UTF-8"), ("LANG", "C")]));
+        }
+        let dumb = [("TERM", "dumb"), ("LANG", "C.UTF-8")];
+        assert!(of(true, &dumb) && !of(false, &dumb));
+    }
+}

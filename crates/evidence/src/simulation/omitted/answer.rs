@@ -1,0 +1,140 @@
+//! Sensitivities to what a scheme does not estimate, as plain data.
+
+use obsdeg_core::omitted::{ExactChange, OmittedClass};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Effect of everything that a scheme does not estimate: the other terms of the error model, the site, and the
+/// attitudes of the positions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OmittedEffects {
+    /// Effects family by family: all terms of a family have the same size, and their changes add up as squares.
+    pub families: Vec<FamilyEffect>,
+    /// Effects term by term, in the order of the error model.
+    pub terms: Vec<OmittedEffect>,
+    /// Uncertainty budgets of the unknowns that have a sigma; empty without a bench.
+    pub budgets: Vec<Budget>,
+    /// True if torquer errors (GS, GM) act in the stated turns; otherwise they act at the earth rate alone.
+    pub torquers_in_turns: bool,
+    /// Bound on the probability that a class is wrong, dimensionless; null where no classes were computed.
+    pub error_bound: Option<f64>,
+    /// Reason why there are no exact classes; null if there are.
+    pub not_classified: Option<String>,
+}
+
+/// Effect of one error that is not estimated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OmittedEffect {
+    /// Name of the error, such as `K0_X`, `latitude` or `attitude_x@2`.
+    pub name: String,
+    /// Family of the error, such as `K0`, `latitude` or `attitude`.
+    pub family: String,
+    /// Unit of its sizes: ug, ppm, arcsec, ...
+    pub unit: String,
+    /// Exact class: no effect, silent or visible; null where none was computed.
+    pub class: Option<OmittedClass>,
+    /// Exact changes by a silent error, in SI units; null if they have no exact form, or for other classes.
+    pub exact: Option<Vec<ExactChange>>,
+    /// Size that a record of this scheme shows at three sigma, in the unit of `unit`; null unless the error is visible.
+    pub visible_from: Option<f64>,
+    /// Size stated by the bench (one sigma), in the unit of `unit`; null where the bench states none.
+    pub size: Option<f64>,
+    /// Changes of the estimates per unit of the error; estimates that it does not change are left out.
+    pub sensitivities: Vec<ChangePerUnit>,
+    /// Size at which the error uses up the margin of a requirement; null if there is no requirement, or none that
+    /// it affects.
+    pub uses_up: Option<UsesUp>,
+}
+
+/// Change of one estimate per unit of an error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChangePerUnit {
+    /// Name of the unknown whose estimate changes.
+    pub unknown: String,
+    /// Unit of the unknown whose estimate changes.
+    pub unit: String,
+    /// Estimate minus truth, in the unit of the unknown per unit of the error.
+    pub per_unit: f64,
+}
+
+/// Size of an error at which a requirement is just met.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UsesUp {
+    /// Name of the unknown with this requirement.
+    pub unknown: String,
+    /// Size (one sigma) of the error at which the total uncertainty reaches the requirement, in the unit of the
+    /// error; a requirement that is missed without the error has no such size.
+    pub size: f64,
+}
+
+/// Effect of a family of errors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FamilyEffect {
+    /// Name of the family, such as `K0` or `latitude`.
+    pub family: String,
+    /// Unit of its sizes: ug, ppm, arcsec, ...
+    pub unit: String,
+    /// Number of terms of the family that the scheme does not estimate.
+    pub terms: usize,
+    /// Number of terms without effect; null where no classes were computed.
+    pub no_effect: Option<usize>,
+    /// Number of terms that no record can show; null where no classes were computed.
+    pub silent: Option<usize>,
+    /// Largest change of a drift coefficient per unit size of all terms (root of the sum of squares); null if no
+    /// drift coefficient changes.
+    pub worst: Option<ChangePerUnit>,
+    /// Largest change of a drift coefficient per unit size in its own sigma (dimensionless per unit of the error);
+    /// null if no drift coefficient changes.
+    pub worst_in_sigmas: Option<f64>,
+    /// Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none is
+    /// visible.
+    pub visible_from: Option<f64>,
+    /// Smallest size of a single term that uses up the margin of a requirement; null if none does.
+    pub uses_up: Option<UsesUp>,
+}
+
+/// Uncertainty budget of one unknown.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Budget {
+    /// Name of the unknown of the budget.
+    pub unknown: String,
+    /// Unit of the unknown, of its contributions and of the total.
+    pub unit: String,
+    /// Total standard uncertainty: root of the sum of the squared contributions, in the unit of `unit`.
+    pub total: f64,
+    /// Largest standard uncertainty allowed, in the unit of `unit`; null if none is required.
+    pub requirement: Option<f64>,
+    /// Sources of uncertainty, the largest contribution first.
+    pub lines: Vec<BudgetLine>,
+}
+
+/// Evaluation of a standard uncertainty, by the GUM.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Evaluation {
+    /// Type A: statistical, from the scatter of the samples that the estimates are computed from.
+    A,
+    /// Type B: by other means, such as a datasheet or an earlier calibration.
+    B,
+}
+
+/// Source of uncertainty in a budget.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BudgetLine {
+    /// Source: the samples (with the random drift and the priors that are stated), or the name of an error.
+    pub source: String,
+    /// Evaluation of its standard uncertainty: type A or B.
+    pub evaluation: Evaluation,
+    /// Standard uncertainty of the source, in the unit of `value_unit`.
+    pub value: f64,
+    /// Unit of the standard uncertainty of the source.
+    pub value_unit: String,
+    /// ChangePerUnit of the unknown to the source, in the unit of the unknown per `value_unit`.
+    pub sensitivity: f64,
+    /// Contribution to the standard uncertainty of the unknown, in its unit: value times sensitivity, positive.
+    pub contribution: f64,
+    /// Part of the squared total, in percent.
+    pub percent: f64,
+}
+
+/// Name of the source that the samples are.
+pub const SAMPLES: &str = "samples";

@@ -1,0 +1,152 @@
+//! What is not in the model: how errors that a scheme does not estimate change its estimates.
+//!
+//! With x the unknowns and k the omitted errors, `Z = J x + O k + n`: estimates change by `B k`,
+//! `B = (J' R^-1 J + P^-1)^-1 J' R^-1 O`, with the noise and the priors that the sigmas rest on. The classes (no effect,
+//! silent, visible) are verdicts of the exact engine ([`obsdeg_core::omitted`]); sizes and sensitivities are figures.
+
+mod answer;
+pub(crate) mod bench;
+mod budget;
+mod columns;
+mod score;
+#[cfg(test)]
+mod tests;
+pub(crate) mod weights;
+
+use obsdeg_core::model::{OmittedModel, OmittedTerm};
+use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
+
+pub use answer::{
+    Budget, BudgetLine, ChangePerUnit, Evaluation, FamilyEffect, OmittedEffect, OmittedEffects, SAMPLES,
+    UsesUp,
+};
+pub use bench::{Bench, BenchError};
+pub use columns::OmittedColumns;
+pub use score::{Explanation, LEVEL, Score, SuspectedChange, SuspectedError, Suspicion};
+pub use weights::Influence;
+
+use crate::simulation::{
+    Attained, Conditions, SimulationError, is_rate, required_sigmas, shown_unit, si_per_shown,
+};
+
+/// Sigmas of a visible error that count as seen.
+const SEEN: f64 = 3.0;
+
+/// Effects of everything that the scheme of `attained` does not estimate.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn omitted_effects(
+    attained: &Attained,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<OmittedEffects, SimulationError> {
+    let platform = &attained.plan.platform;
+    let model = OmittedModel::new(platform);
+    let classified = omitted_verdicts(platform, &model, seed);
+    let (verdicts, not_classified) = match classified {
+        Ok(verdicts) => (Some(verdicts), None),
+        Err(e) => (None, Some(e.to_string())),
+    };
+    let influence = attained.influence(&model)?;
+    let bench = Bench::of(&conditions.bench, &model)?;
+    let changes = influence.shown(platform.units(), &attained.sigmas, &model, verdicts.as_ref());
+    let required = required_sigmas(platform, conditions)?;
+    let totals = bench.totals(&attained.sigmas, &changes);
+    let names = platform.names();
+    let terms = model.terms().iter().enumerate().map(|(j, t)| {
+        let verdict = verdicts.as_ref().map(|v| &v.terms[j]);
+        let class = verdict.map(|v| v.class);
+        let size = bench.sizes[j];
+        let sensitivities = (0..names.len()).filter(|&c| changes[c][j] != 0.0).map(|c| ChangePerUnit {
+            unknown: names[c].clone(),
+            unit: shown_unit(platform.units()[c]).into(),
+            per_unit: changes[c][j],
+        });
+        let used = (0..names.len()).filter_map(|c| {
+            let (change, own) = (changes[c][j], changes[c][j] * size.unwrap_or(0.0));
+            let rest = (totals[c]? * totals[c]? - own * own).max(0.0);
+            let left = required[c]? * required[c]? - rest;
+            // no margin is left without this error: nothing for it to use up
+            (change != 0.0 && left > 0.0)
+                .then(|| UsesUp { unknown: names[c].clone(), size: left.sqrt() / change.abs() })
+        });
+        OmittedEffect {
+            name: t.name.clone(),
+            family: t.family.into(),
+            unit: t.unit.into(),
+            class,
+            exact: verdict.and_then(|v| v.exact.clone()),
+            visible_from: visible_from(t, class, influence.information[j]),
+            size,
+            sensitivities: sensitivities.collect(),
+            uses_up: used.min_by(|a, b| a.size.total_cmp(&b.size)),
+        }
+    });
+    let terms: Vec<OmittedEffect> = terms.collect();
+    let families = families(attained, &model, &changes, &terms);
+    let budget = |c: usize| {
+        let (name, unit) = (names[c].as_str(), shown_unit(platform.units()[c]));
+        Some(budget::budget((name, unit), attained.sigmas[c]?, required[c], &terms))
+    };
+    let budgets = if bench.is_empty() { Vec::new() } else { (0..names.len()).filter_map(budget).collect() };
+    Ok(OmittedEffects {
+        families,
+        budgets,
+        terms,
+        torquers_in_turns: model.turning().is_some()
+            || attained.plan.slews().next().is_some()
+            || platform.scheme().rotates(),
+        error_bound: verdicts.map(|v| v.error_bound),
+        not_classified,
+    })
+}
+
+/// Size at which a record shows a visible error at three sigma, in its unit.
+fn visible_from(term: &OmittedTerm, class: Option<OmittedClass>, information: f64) -> Option<f64> {
+    let visible = class.is_none_or(|c| c == OmittedClass::Visible);
+    (visible && information > 0.0).then(|| SEEN / information.sqrt() / si_per_shown(term.unit))
+}
+
+/// Family by family, in the order of the terms.
+fn families(
+    attained: &Attained,
+    model: &OmittedModel,
+    changes: &[Vec<f64>],
+    terms: &[OmittedEffect],
+) -> Vec<FamilyEffect> {
+    let (names, units) = (attained.plan.platform.names(), attained.plan.platform.units());
+    let mut known: Vec<&str> = Vec::new();
+    for t in model.terms() {
+        if !known.contains(&t.family) {
+            known.push(t.family);
+        }
+    }
+    let family = |family: &str| {
+        let own: Vec<usize> = (0..terms.len()).filter(|&j| terms[j].family == family).collect();
+        let rss = |c: usize| own.iter().map(|&j| changes[c][j] * changes[c][j]).sum::<f64>().sqrt();
+        let rates = (0..names.len()).filter(|&c| is_rate(units[c]) && rss(c) > 0.0);
+        let worst = rates.clone().max_by(|&a, &b| rss(a).total_cmp(&rss(b)));
+        let count = |class: OmittedClass| {
+            let classes: Option<Vec<OmittedClass>> = own.iter().map(|&j| terms[j].class).collect();
+            classes.map(|c| c.into_iter().filter(|c| *c == class).count())
+        };
+        let used = own.iter().filter_map(|&j| terms[j].uses_up.clone());
+        FamilyEffect {
+            family: family.into(),
+            unit: terms[own[0]].unit.clone(),
+            terms: own.len(),
+            no_effect: count(OmittedClass::NoEffect),
+            silent: count(OmittedClass::Silent),
+            worst: worst.map(|c| ChangePerUnit {
+                unknown: names[c].clone(),
+                unit: units[c].into(),
+                per_unit: rss(c),
+            }),
+            worst_in_sigmas: rates.filter_map(|c| Some(rss(c) / attained.sigmas[c]?)).reduce(f64::max),
+            visible_from: own.iter().filter_map(|&j| terms[j].visible_from).reduce(f64::min),
+            uses_up: used.min_by(|a, b| a.size.total_cmp(&b.size)),
+        }
+    };
+    known.into_iter().map(family).collect()
+}

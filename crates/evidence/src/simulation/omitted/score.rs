@@ -1,0 +1,183 @@
+//! Score test: which omitted error explains the residuals of a fit.
+//!
+//! With `r` the residuals and `w_j` the part of column j that no change of the unknowns imitates (both whitened),
+//! `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom where the error is zero: the fall of
+//! chi-square with the error among the unknowns. Its estimate is `(w_j r) / (w_j w_j)` (Rao 1948,
+//! doi:10.1017/S0305004100023987). Where residuals are larger than their sigmas even with the error among the
+//! unknowns, the fall counts in units of what is left per degree of freedom: noise that is larger than stated
+//! is no error of the bench. The number of errors tried counts by Bonferroni's bound.
+
+use nalgebra::DMatrix;
+use obsdeg_ekf::consistency::{chi_square_quantile, chi_square_tail};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Probability of any suspicion where nothing is wrong.
+pub const LEVEL: f64 = 0.01;
+/// Confidence of the bound on chi-square above which a single error does not explain the residuals.
+const UNEXPLAINED: f64 = 0.999;
+/// Fall of chi-square, of the size found, by which errors of a group differ at most: three sigma.
+const SAME: f64 = 9.0;
+/// Part of a column that counts as rounding, squared.
+const ROUNDING: f64 = 1e-20;
+
+/// Sums over the whitened residuals of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Score {
+    /// `w_j w_k` (errors x errors).
+    pub products: DMatrix<f64>,
+    /// `w_j r` of every error.
+    pub against: Vec<f64>,
+    /// `r r`: chi-square of the fit.
+    pub chi_square: f64,
+    /// Degrees of freedom of the fit.
+    pub degrees_of_freedom: f64,
+}
+
+/// One error or a pair that explains residuals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// One or two errors, by number.
+    pub errors: Vec<usize>,
+    /// Estimate and standard deviation of each, in SI units.
+    pub estimates: Vec<[f64; 2]>,
+    /// Fall of chi-square with them among the unknowns.
+    pub fall: f64,
+    /// Bound on the probability that chance alone gives such a fall to any that was tried.
+    pub probability: f64,
+    /// Other errors whose columns these residuals do not distinguish from the first, by number.
+    pub group: Vec<usize>,
+}
+
+/// Suspicion that errors that are not estimated are in a record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Suspicion {
+    /// One error, or a pair where no single one explains the residuals.
+    pub errors: Vec<SuspectedError>,
+    /// Other errors that this record does not distinguish from the first one, by name.
+    pub indistinguishable: Vec<String>,
+    /// Fall of chi-square with the errors among the unknowns, dimensionless.
+    pub chi_square_fall: f64,
+    /// Bound on the probability that chance gives such a fall to any of the errors that were tried.
+    pub probability: f64,
+    /// Estimates that the errors change most in their own sigma, the largest change first.
+    pub changes: Vec<SuspectedChange>,
+}
+
+/// Error that explains residuals, with its estimate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SuspectedError {
+    /// Name of the error, such as `K0_Y`.
+    pub name: String,
+    /// Unit of its estimate and sigma.
+    pub unit: String,
+    /// Estimate of the error from the residuals, in the unit of `unit`.
+    pub estimate: f64,
+    /// Standard deviation of the estimate by the stated noise, in the unit of `unit`.
+    pub sigma: f64,
+}
+
+/// Estimate without and with suspected errors among the unknowns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SuspectedChange {
+    /// Name of the unknown that is estimated.
+    pub unknown: String,
+    /// Unit of both estimates of the unknown.
+    pub unit: String,
+    /// Estimate of the fit, in the unit of `unit`.
+    pub estimate: f64,
+    /// Estimate with the suspected errors among the unknowns, in the unit of `unit`.
+    pub with: f64,
+}
+
+impl Score {
+    /// Errors that these residuals can show.
+    pub fn tried(&self) -> Vec<usize> {
+        let m = self.against.len();
+        let largest = (0..m).map(|j| self.products[(j, j)]).fold(0.0, f64::max);
+        (0..m).filter(|&j| self.products[(j, j)] > ROUNDING * largest).collect()
+    }
+
+    /// Fall of chi-square with one error among the unknowns.
+    pub fn fall(&self, j: usize) -> f64 {
+        self.against[j] * self.against[j] / self.products[(j, j)]
+    }
+
+    /// Chi-square that is left per degree of freedom after a fall by `unknowns` more, if it is more than one.
+    fn left_over(&self, fall: f64, unknowns: f64) -> f64 {
+        ((self.chi_square - fall) / (self.degrees_of_freedom - unknowns).max(1.0)).max(1.0)
+    }
+
+    /// Estimates, with their standard deviations, and the fall of chi-square with a pair.
+    fn pair(&self, [i, j]: [usize; 2]) -> Option<([[f64; 2]; 2], f64)> {
+        let (a, b, c) = (self.products[(i, i)], self.products[(i, j)], self.products[(j, j)]);
+        let determinant = a * c - b * b;
+        // what the residuals do not distinguish is no pair
+        if determinant <= 1e-6 * a * c {
+            return None;
+        }
+        let (u, v) = (self.against[i], self.against[j]);
+        let [x, y] = [(c * u - b * v) / determinant, (a * v - b * u) / determinant];
+        let sigmas = [(c / determinant).sqrt(), (a / determinant).sqrt()];
+        Some(([[x, sigmas[0]], [y, sigmas[1]]], x * u + y * v))
+    }
+
+    /// Errors whose columns the residuals do not distinguish from that of `j` at the size found.
+    fn group(&self, j: usize, tried: &[usize]) -> Vec<usize> {
+        let fall = self.fall(j) / self.left_over(self.fall(j), 1.0);
+        let differs = |&&k: &&usize| {
+            let product = self.products[(j, k)];
+            let alike = product * product / (self.products[(j, j)] * self.products[(k, k)]);
+            k != j && fall * (1.0 - alike) < SAME
+        };
+        tried.iter().filter(differs).copied().collect()
+    }
+
+    /// What explains the residuals best: a single error, or a pair where no single one does; nothing where chance is
+    /// enough.
+    pub fn explanation(&self) -> Option<Explanation> {
+        let tried = self.tried();
+        let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;
+        let fall = self.fall(best);
+        let counted = fall / self.left_over(fall, 1.0);
+        let probability = (chi_square_tail(1.0, counted) * tried.len() as f64).min(1.0);
+        let own = self.products[(best, best)];
+        let single = Explanation {
+            errors: vec![best],
+            estimates: vec![[self.against[best] / own, 1.0 / own.sqrt()]],
+            fall,
+            probability,
+            group: self.group(best, &tried),
+        };
+        let left = self.chi_square - fall;
+        let explained = left <= chi_square_quantile((self.degrees_of_freedom - 1.0).max(1.0), UNEXPLAINED);
+        let pair = if explained { None } else { self.best_pair(&tried, fall) };
+        pair.or_else(|| (probability < LEVEL).then_some(single))
+    }
+
+    /// The best pair, if it explains more than the best single error by more than chance.
+    fn best_pair(&self, tried: &[usize], single: f64) -> Option<Explanation> {
+        let pairs = tried.iter().enumerate().flat_map(|(k, &i)| tried[..k].iter().map(move |&j| [i, j]));
+        let found = pairs.filter_map(|p| self.pair(p).map(|(estimates, fall)| (p, estimates, fall)));
+        let (mut errors, mut estimates, fall) = found.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let count = (tried.len() * tried.len().saturating_sub(1) / 2) as f64;
+        let left_over = self.left_over(fall, 2.0);
+        let probability = (chi_square_tail(2.0, fall / left_over) * count).min(1.0);
+        let more = chi_square_tail(1.0, (fall - single) / left_over) * tried.len() as f64;
+        if probability >= LEVEL || more >= LEVEL {
+            return None;
+        }
+        // the one that explains more by itself first
+        if self.fall(errors[0]) < self.fall(errors[1]) {
+            errors.reverse();
+            estimates.reverse();
+        }
+        Some(Explanation {
+            errors: errors.into(),
+            estimates: estimates.into(),
+            fall,
+            probability,
+            group: Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,251 @@
+//! Effects of errors that a scheme does not estimate, as tables and sentences.
+
+use obsdeg_calibration::answer::{Omitted, SilentError};
+use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
+use obsdeg_evidence::simulation::omitted::{Budget, FamilyEffect, OmittedEffects};
+
+use crate::document::{Block, left, number, right};
+use crate::words;
+
+/// Most budgets that a document prints in full: those with the least margin, or the largest share of the bench.
+const BUDGETS: usize = 3;
+/// Lines of a printed budget; the rest is in the JSON.
+const LINES: usize = 6;
+
+/// A number with two significant digits: sizes need no more.
+fn short(x: f64) -> String {
+    if x == 0.0 || !(1e-3..1e5).contains(&x.abs()) {
+        return if x == 0.0 { "0".into() } else { format!("{x:.1e}") };
+    }
+    let decimals = (1 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{x:.decimals$}")
+}
+
+/// Class of a family in words: the classes of its terms.
+fn class(f: &FamilyEffect) -> String {
+    let (Some(no_effect), Some(silent)) = (f.no_effect, f.silent) else { return "-".into() };
+    let counts = [(no_effect, "no effect"), (silent, "silent"), (f.terms - no_effect - silent, "visible")];
+    let all = counts.iter().find(|(n, _)| *n == f.terms);
+    match all {
+        Some((_, word)) => (*word).into(),
+        None => {
+            let some = counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}"));
+            some.collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
+fn row(f: &FamilyEffect) -> Vec<String> {
+    let none = || "-".to_string();
+    vec![
+        format!("{} ({})", f.family, f.terms),
+        class(f),
+        f.worst.as_ref().map_or_else(none, |w| format!("{} {} per {}", number(w.per_unit), w.unit, f.unit)),
+        f.worst.as_ref().map_or_else(none, |w| w.unknown.clone()),
+        f.worst_in_sigmas.map_or_else(none, |x| format!("{} {}", short(1.0 / x), f.unit)),
+        f.visible_from.map_or_else(none, |x| format!("{} {}", short(x), f.unit)),
+        f.uses_up.as_ref().map_or_else(none, |u| format!("{} {} ({})", short(u.size), f.unit, u.unknown)),
+    ]
+}
+
+/// The blocks of a document: the families, and the budgets where a bench is stated.
+pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
+    let columns = [
+        left("family (terms)"),
+        left("class"),
+        right("worst change"),
+        left("of"),
+        right("as large as sigma at"),
+        right("seen from (3 sigma)"),
+        right("uses up a margin at"),
+    ];
+    let judged = of.terms.iter().any(|t| t.uses_up.is_some());
+    let left_out: &[&str] = if judged { &[] } else { &["uses up a margin at"] };
+    let heading = format!("Not estimated{whose}: effect on the estimates");
+    let mut out = vec![Block::table(heading, columns, of.families.iter().map(row)).without(left_out)];
+    out.push(Block::list(format!("Not estimated{whose}: conditions"), conditions(of)));
+    for b in printed(&of.budgets) {
+        let columns = [
+            left("source"),
+            left("type"),
+            right("standard uncertainty"),
+            right("sensitivity"),
+            right("contribution"),
+            right("percent"),
+        ];
+        let rows = b.lines.iter().take(LINES).map(|l| {
+            vec![
+                l.source.clone(),
+                format!("{:?}", l.evaluation),
+                format!("{} {}", number(l.value), l.value_unit),
+                number(l.sensitivity),
+                number(l.contribution),
+                format!("{:.1}", l.percent),
+            ]
+        });
+        let required = b.requirement.map_or_else(String::new, |r| format!(", required {}", number(r)));
+        let heading = format!(
+            "Uncertainty budget of {}{whose}: total {} {}{required}",
+            b.unknown,
+            number(b.total),
+            b.unit
+        );
+        out.push(Block::table(heading, columns, rows));
+    }
+    out
+}
+
+/// Budgets that are printed: the largest totals over requirement first, then those in which the samples have the
+/// smallest share.
+fn printed(budgets: &[Budget]) -> Vec<&Budget> {
+    let over = |b: &Budget| b.requirement.map_or(0.0, |r| b.total / r);
+    let share = |b: &Budget| {
+        let own = b.lines.iter().filter(|l| l.source != obsdeg_evidence::simulation::omitted::SAMPLES);
+        own.map(|l| l.percent).sum::<f64>()
+    };
+    let mut out: Vec<&Budget> = budgets.iter().filter(|b| b.lines.len() > 1).collect();
+    out.sort_by(|a, b| over(b).total_cmp(&over(a)).then(share(b).total_cmp(&share(a))));
+    out.truncate(BUDGETS);
+    out
+}
+
+/// Conditions and meaning of the figures.
+fn conditions(of: &OmittedEffects) -> Vec<String> {
+    let mut out = vec![
+        "worst change: of a drift coefficient, all terms of the family one unit large (root of the sum of squares), \
+         by the weights of the predicted sigmas; term by term in the JSON"
+            .into(),
+        "no effect: enters no sample; silent: no record of this scheme shows it; visible: a record shows it from the \
+         size given (exact classes, by ranks)"
+            .into(),
+        "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each position by itself, \
+         about each platform axis"
+            .into(),
+    ];
+    if !of.torquers_in_turns {
+        out.push("GS and GM act at the earth rate alone: the turns between positions are not stated".into());
+    }
+    out.extend(of.not_classified.as_ref().map(|why| format!("no exact classes: {why}")));
+    let silent = of.terms.iter().filter(|t| t.class == Some(OmittedClass::Silent));
+    for t in silent.filter(|t| !t.sensitivities.is_empty()).take(LINES) {
+        if let Some(exact) = t.exact.as_ref().filter(|e| !e.is_empty()) {
+            let changes: Vec<String> =
+                exact.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect();
+            out.push(format!("{} is silent and changes {} (rad, rad/s, g)", t.name, changes.join(", ")));
+        }
+    }
+    out
+}
+
+/// The sentence of the first lines: what would use up the margin without a bench, or that the bench counts.
+pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
+    if bench || !all_met {
+        return None;
+    }
+    let limit = |f: &FamilyEffect| {
+        let used = f.uses_up.as_ref()?;
+        Some(format!("|{}| < {} {}", f.family, short(used.size), f.unit))
+    };
+    let listed: Vec<String> = of.families.iter().filter_map(limit).collect();
+    (!listed.is_empty())
+        .then(|| format!("No bench is stated (--bench). Met while, each by itself: {}.", listed.join(", ")))
+}
+
+/// The silent errors of a calibration, as the condition of "consistent"; nothing where none changes a coefficient.
+pub(crate) fn silent(of: &Omitted) -> String {
+    if of.silent.is_empty() {
+        return String::new();
+    }
+    let one = |s: &SilentError| format!("{} ({})", s.name, s.changes.join(", "));
+    let more = of.silent.len().saturating_sub(LINES);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let listed: Vec<String> = of.silent.iter().take(LINES).map(one).collect();
+    format!("; it cannot show, with the unknowns that change: {}{more}", listed.join("; "))
+}
+
+/// What a calibration says of errors that it does not estimate.
+pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
+    let mut out = vec![format!(
+        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has a chance of at most 1 % \
+         where nothing is wrong",
+        of.tried
+    )];
+    let Some(s) = &of.suspicion else {
+        out.push("no suspicion: chance explains the residuals as well as any of them".into());
+        return out;
+    };
+    let errors: Vec<String> = s
+        .errors
+        .iter()
+        .map(|e| format!("{} = {} +- {} {}", e.name, number(e.estimate), number(e.sigma), e.unit))
+        .collect();
+    let verb = if errors.len() > 1 { "explain" } else { "explains" };
+    out.push(format!(
+        "{} {verb} the residuals: chi-square falls by {} (probability by chance at most {:.1e})",
+        errors.join(" and "),
+        number(s.chi_square_fall),
+        s.probability
+    ));
+    if !s.indistinguishable.is_empty() {
+        out.push(format!("this record does not distinguish it from {}", s.indistinguishable.join(", ")));
+    }
+    for c in &s.changes {
+        out.push(format!(
+            "with it, {} is {} {}, not {}",
+            c.unknown,
+            number(c.with),
+            c.unit,
+            number(c.estimate)
+        ));
+    }
+    out
+}
+
+/// The exact classes of an analysis, a line per class; silent errors with the unknowns that they change.
+pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
+    let mut out = Vec::new();
+    let means = [
+        (OmittedClass::NoEffect, "no effect, whatever the weights"),
+        (OmittedClass::Silent, "silent, no record of this scheme shows it"),
+        (OmittedClass::Visible, "visible in a record, if it is large enough"),
+    ];
+    for (class, words) in means {
+        let own: Vec<_> = of.terms.iter().filter(|t| t.class == class).collect();
+        let mut families: Vec<(&str, Vec<&str>, usize)> = Vec::new();
+        for t in own {
+            match families.iter_mut().find(|f| f.0 == t.family) {
+                Some(f) => f.1.push(&t.name),
+                None => {
+                    let all = of.terms.iter().filter(|o| o.family == t.family).count();
+                    families.push((&t.family, vec![&t.name], all));
+                }
+            }
+        }
+        // a whole family by its name
+        let named = families.into_iter().map(|(family, names, all)| match names.len() == all {
+            true => family.to_string(),
+            false => names.join(", "),
+        });
+        let named: Vec<String> = named.collect();
+        if !named.is_empty() {
+            out.push(format!("{words}: {}", named.join(", ")));
+        }
+    }
+    let silent = of.terms.iter().filter(|t| t.changes.iter().any(|c| !c.starts_with("psi")));
+    for t in silent.take(LINES) {
+        let exact = t.exact.as_ref().map(|e| {
+            e.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect::<Vec<_>>().join(", ")
+        });
+        let exact = exact.unwrap_or_else(|| t.changes.join(", "));
+        out.push(format!("{} changes {exact} (rad, rad/s, g)", t.name));
+    }
+    out.push(format!(
+        "classes: exact ranks modulo two random primes, wrong with probability below {}; {}",
+        words::at_most(of.error_bound),
+        match of.torquers_in_turns {
+            true => "GS and GM act in the stated turns too",
+            false => "GS and GM act at the earth rate alone",
+        }
+    ));
+    out
+}

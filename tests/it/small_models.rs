@@ -1,0 +1,167 @@
+//! Small random models: none takes more than 10 s of processor time or 1 GB of memory unless the answer refuses it and
+//! says why. A debug build has twice the time.
+
+use std::io::Write;
+use std::process::Command;
+
+use obsdeg_exact::SplitMix64;
+
+/// Models of everyday runs; `.ci/run release` judges ten thousand.
+const DAILY: u64 = 25;
+const RELEASE: u64 = 10_000;
+/// Processor time in s.
+const SECONDS: u64 = if cfg!(debug_assertions) { 20 } else { 10 };
+/// Address space in KiB: 1 GB and what a process has without work.
+const KIB: u64 = 1_500_000;
+
+/// One of some texts.
+fn one<'a>(random: &mut SplitMix64, of: &[&'a str]) -> &'a str {
+    of[random.below(of.len() as u64) as usize]
+}
+
+fn chance(random: &mut SplitMix64, percent: u64) -> bool {
+    random.below(100) < percent
+}
+
+/// An expression in some names.
+fn expression(random: &mut SplitMix64, names: &[String], depth: u64) -> String {
+    let kind = random.below(12);
+    if depth == 0 || kind < 3 {
+        return match random.below(10) {
+            0 => "t".into(),
+            1..=3 => one(random, &["1", "2", "3", "10", "1000", "0.1", "1e9"]).into(),
+            _ => names[random.below(names.len() as u64) as usize].clone(),
+        };
+    }
+    let [a, b] = [0, 1].map(|_| expression(random, names, depth - 1));
+    match kind {
+        3 | 4 => format!("({a} + {b})"),
+        5..=7 => format!("{a}*{b}"),
+        8 => format!("({a})/({b} + 1)"),
+        9 => format!("({a})^{}", one(random, &["2", "3", "5", "20", "100", "1000"])),
+        10 => format!("{}({a})", one(random, &["sin", "exp", "sqrt", "tanh", "log", "abs"])),
+        _ => format!("({a} - {b})"),
+    }
+}
+
+/// A model of a vector or a matrix.
+fn of_vectors(random: &mut SplitMix64) -> String {
+    let n = one(random, &["2", "3", "4", "5"]);
+    let (shape, entry, rate) = match chance(random, 60) {
+        true => {
+            let rates = ["A*A", "A*transpose(A)", "inverse(A)", "A*A*A", "-A", "det(A)*A"];
+            (format!("{n},{n}"), "1,1", one(random, &rates))
+        }
+        false => (n.to_string(), "1", one(random, &["-A", "A*norm(A)", "dot(A,A)*A", "p*A"])),
+    };
+    format!("[states]\n\"A[{shape}]\" = \"{rate}\"\n[parameters]\np = {{}}\n[outputs]\ny = \"A[{entry}]\"\n")
+}
+
+/// Any small model.
+fn model(random: &mut SplitMix64) -> String {
+    let mut out = String::from("name = \"m\"\n");
+    if chance(random, 15) {
+        out += &format!("experiments = {}\n", one(random, &["2", "5", "20"]));
+    }
+    if chance(random, 20) {
+        out += &of_vectors(random);
+        return out;
+    }
+    let states: Vec<String> = (0..=random.below(5)).map(|i| format!("x{i}")).collect();
+    let parameters: Vec<String> = (0..random.below(6)).map(|i| format!("p{i}")).collect();
+    let input = one(random, &["", "", "known_inputs", "unknown_inputs"]);
+    let mut names = [states.clone(), parameters.clone()].concat();
+    names.extend((!input.is_empty()).then(|| "u".to_string()));
+    let depth = 1 + random.below(5);
+    out += "[states]\n";
+    for state in &states {
+        out += &format!("{state} = \"{}\"\n", expression(random, &names, depth));
+    }
+    if !parameters.is_empty() {
+        out += "[parameters]\n";
+        parameters.iter().for_each(|p| out += &format!("{p} = {{}}\n"));
+    }
+    if !input.is_empty() {
+        out += &format!("[{input}]\nu = {{}}\n");
+    }
+    out += "[outputs]\n";
+    for i in 0..=random.below(2) {
+        let depth = random.below(3);
+        out += &format!("y{i} = \"{}\"\n", expression(random, &names, depth));
+    }
+    out
+}
+
+/// How a model ended: judged, or refused in a sentence.
+fn ended(text: &str) -> Result<bool, String> {
+    let mut file = tempfile::NamedTempFile::new().expect("a file");
+    file.write_all(text.as_bytes()).expect("written");
+    let limits = format!("ulimit -t {SECONDS}; ulimit -v {KIB}; exec \"$0\" analyze --model \"$1\"");
+    let done = Command::new("sh")
+        .args(["-c", &limits, env!("CARGO_BIN_EXE_obsdeg")])
+        .arg(file.path())
+        .output()
+        .expect("a shell");
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    match done.status.code() {
+        Some(0) if !done.stdout.is_empty() => Ok(true),
+        Some(2) if stderr.starts_with("error: ") => Ok(false),
+        _ => Err(format!("{:?}: {stderr}", done.status)),
+    }
+}
+
+fn all_end(seeds: std::ops::Range<u64>) {
+    let (mut judged, mut wrong) = (0, Vec::new());
+    let count = seeds.end - seeds.start;
+    for seed in seeds {
+        let text = model(&mut SplitMix64::of(seed, "small models", &["any"]));
+        match ended(&text) {
+            Ok(answered) => judged += u64::from(answered),
+            Err(why) => wrong.push(format!("seed {seed}: {why}\n{text}")),
+        }
+    }
+    println!("{judged} of {count} models judged, {} neither judged nor refused", wrong.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(judged > count / 4, "{judged}");
+}
+
+#[test]
+fn small_models_end() {
+    all_end(0..DAILY);
+}
+
+#[test]
+#[ignore = "ten thousand models, for `.ci/run release`"]
+fn ten_thousand_small_models_end() {
+    all_end(0..RELEASE);
+}
+
+/// What an adversary wrote: each is refused with what was too much.
+#[test]
+fn small_texts_that_ask_for_too_much_are_refused() {
+    let powers = (0..12).fold("p".to_string(), |inner, _| format!("({inner})^1000"));
+    let long = "n".repeat(1_000_000);
+    for (text, expected) in [
+        (
+            format!(
+                "name = \"m\"\n[states]\nx = \"-({powers})*x\"\n[parameters]\np = {{}}\n[outputs]\ny = \"x\"\n"
+            ),
+            "the powers in it are too high",
+        ),
+        (
+            format!("name = \"m\"\n[states]\n{long} = \"-{long}\"\n[outputs]\ny = \"{long}\"\n"),
+            "a name of 1000000 characters; expected at most 256",
+        ),
+    ] {
+        let mut file = tempfile::NamedTempFile::new().expect("a file");
+        file.write_all(text.as_bytes()).expect("written");
+        let done = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
+            .args(["analyze", "--model"])
+            .arg(file.path())
+            .output()
+            .expect("runs");
+        let stderr = String::from_utf8_lossy(&done.stderr);
+        let beginning: String = stderr.chars().take(400).collect();
+        assert!(done.status.code() == Some(2) && stderr.contains(expected), "{expected}: {beginning}");
+    }
+}
