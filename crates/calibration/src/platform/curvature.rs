@@ -23,6 +23,10 @@ const BENT: f64 = 1.0;
 pub(crate) const MOST: f64 = 20.0;
 /// Fewest repeated estimates, and how many for each unknown.
 const REFITS: (usize, usize) = (80, 4);
+/// Rounds in which a lower minimum is looked for, starts along an axis in standard deviations, and by how much a sum of squares is lower.
+const DESCENTS: usize = 3;
+const AWAY: [f64; 4] = [1.0, -1.0, 3.0, -3.0];
+const LOWER: f64 = 1e-2;
 /// Most products of bins, squared unknowns and repeated estimates.
 const WORK: f64 = 2e9;
 
@@ -126,8 +130,8 @@ impl Problem<'_> {
         Draw { noise: all, held, known }
     }
 
-    /// The largest curvature along the longest axes of the posterior, both ways.
-    fn kappa(&self, estimate: &Estimate) -> Result<f64, CalibrationError> {
+    /// The longest axes of the posterior that can bend a run, one standard deviation long.
+    fn axes(&self, estimate: &Estimate) -> Vec<DVector<f64>> {
         let (n, prior) = (self.unknowns.n, &self.unknowns.prior);
         let root = &estimate.solution.inverse_root;
         let scaled = DMatrix::from_fn(n, root.ncols(), |i, j| root[(i, j)] / prior[i]);
@@ -136,18 +140,56 @@ impl Problem<'_> {
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         let outputs = estimate.at.runs.iter().flat_map(|(run, _)| &run.stages).flat_map(|s| &s.outputs);
         let least = SEEN / outputs.map(|o| 1.0 / o.r).sum::<f64>().sqrt();
-        let mut kappa: f64 = 0.0;
-        for &k in order.iter().take(AXES) {
+        let axis = |&k: &usize| {
             let length = eigen.eigenvalues[k].max(0.0).sqrt();
-            let axis = DVector::from_fn(n, |i, _| eigen.eigenvectors[(i, k)] * length * prior[i]);
-            if self.turn(&estimate.at, &axis).powi(2) <= least {
-                continue;
-            }
+            DVector::from_fn(n, |i, _| eigen.eigenvectors[(i, k)] * length * prior[i])
+        };
+        let all = order.iter().take(AXES).map(axis);
+        all.filter(|a| self.turn(&estimate.at, a).powi(2) > least).collect()
+    }
+
+    /// The largest curvature along these axes, both ways.
+    fn kappa(&self, estimate: &Estimate) -> Result<f64, CalibrationError> {
+        let mut kappa: f64 = 0.0;
+        for axis in self.axes(estimate) {
             for a in [axis.clone(), -axis] {
                 kappa = kappa.max(self.bend(estimate, &a)?);
             }
         }
         Ok(kappa)
+    }
+
+    /// The lowest of the minima about an estimate that bends: from starts that are moved along the axes of its posterior, both ways. A bent sum of squares has
+    /// several minima, and the first that is found need not be the most probable one.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn lowest(&self, estimate: Estimate) -> Result<Estimate, CalibrationError> {
+        let mut best = estimate;
+        for _ in 0..DESCENTS {
+            if self.stopped.get() || self.kappa(&best)? < BENT {
+                return Ok(best);
+            }
+            let before = best.at.cost;
+            let from = best.at.x.clone();
+            let axes = self.axes(&best);
+            for a in axes.iter().flat_map(|a| AWAY.map(|by| a * by)) {
+                if self.stopped.get() {
+                    return Ok(best);
+                }
+                // a start that cannot be followed is none
+                if let Ok(e) = self.settle(self.moved(&from, &a))
+                    && (e.converged || !best.converged)
+                    && e.at.cost < best.at.cost - LOWER
+                {
+                    best = e;
+                }
+            }
+            if best.at.cost > before - LOWER {
+                return Ok(best);
+            }
+        }
+        Ok(best)
     }
 
     /// The length in sigma of what a start moved by `a` leaves of the measurements beside the linear model.

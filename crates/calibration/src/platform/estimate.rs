@@ -418,22 +418,30 @@ impl Problem<'_> {
     /// [`CalibrationError`] when a number is none.
     pub(crate) fn estimate(&self, x: Vec<PlatformState>, first: bool) -> Result<Estimate, CalibrationError> {
         let before = self.passes.get();
-        let shot = if first { self.shoot(&x).ok().flatten() } else { None };
+        if !first {
+            return self.settle(x);
+        }
+        let found = self.lowest(self.first(x)?)?;
+        Ok(Estimate { passes: self.passes.get() - before, ..found })
+    }
+
+    /// The same without a search for a lower minimum.
+    fn first(&self, x: Vec<PlatformState>) -> Result<Estimate, CalibrationError> {
+        let shot = self.shoot(&x).ok().flatten();
         let Some(start) = shot else { return self.settle(x) };
         let found = self.settle(start);
         let poor = |e: &Estimate| !e.converged || e.at.cost > POOR * self.rows(e);
         if found.as_ref().is_ok_and(|e| !poor(e)) || self.stopped.get() {
-            return found.map(|e| Estimate { passes: self.passes.get() - before, ..e });
+            return found;
         }
-        let found = match (found, self.settle(x)) {
+        match (found, self.settle(x)) {
             (Ok(a), Ok(b)) => {
                 let better = (b.converged, -b.at.cost) > (a.converged, -a.at.cost);
-                if better { b } else { a }
+                Ok(if better { b } else { a })
             }
-            (Ok(e), Err(_)) | (Err(_), Ok(e)) => e,
-            (Err(e), Err(_)) => return Err(e),
-        };
-        Ok(Estimate { passes: self.passes.get() - before, ..found })
+            (Ok(e), Err(_)) | (Err(_), Ok(e)) => Ok(e),
+            (Err(e), Err(_)) => Err(e),
+        }
     }
 
     /// The number of measurements.

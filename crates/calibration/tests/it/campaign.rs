@@ -187,7 +187,7 @@ fn right(only: impl Fn(&Case) -> bool, records: u64) {
         let answers = o.nees.len();
         let mean = o.nees.iter().sum::<f64>() / answers.max(1) as f64;
         let (low, high) = chi_square_band(o.estimates.max(1) as f64, answers.max(1) as f64, 0.999);
-        let in_band = answers == 0 || (low..=high).contains(&mean);
+        let in_band = answers * o.estimates == 0 || (low..=high).contains(&mean);
         let alarms = o.flagged as u64 > 1.max(records / 100);
         if o.unsettled + o.refused > 0 || alarms || !in_band {
             wrong.push(format!("{}: mean NEES {mean:.2} ({low:.2} to {high:.2}): {o:?}", case.name()));
