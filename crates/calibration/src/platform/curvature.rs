@@ -23,17 +23,20 @@ const BENT: f64 = 1.0;
 pub(crate) const MOST: f64 = 20.0;
 /// Fewest repeated estimates, and how many for each unknown.
 const REFITS: (usize, usize) = (80, 4);
-/// Rounds in which a lower minimum is looked for, starts along an axis in standard deviations, and by how much a sum of squares is lower.
-const DESCENTS: usize = 3;
-const AWAY: [f64; 4] = [1.0, -1.0, 3.0, -3.0];
+/// Starts along an axis, in standard deviations, and first estimates that are drawn, where a lower minimum is looked for; by how much a sum of squares is lower.
+const AWAY: [f64; 4] = [3.0, -3.0, 10.0, -10.0];
+const DRAWS: usize = 12;
 const LOWER: f64 = 1e-2;
+/// Another minimum is a rival where its sum of squares is within this, a probability of one in a thousand, and it is further apart than so many sigma.
+const RIVAL: f64 = 14.0;
+const APART: f64 = 5.0;
 /// Most products of bins, squared unknowns and repeated estimates.
 const WORK: f64 = 2e9;
 
 /// How an estimate bends.
 #[derive(Debug, Clone)]
 pub(crate) struct Bent {
-    /// Curvature in sigma; infinite where the run cannot be followed along an axis.
+    /// Curvature in sigma; infinite where the run cannot be followed along an axis, or another minimum is nearly as low.
     pub kappa: f64,
     /// Repeated estimates, and how many of them did not settle.
     pub refits: usize,
@@ -48,7 +51,7 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] when a number is none.
     pub(super) fn bent(&self, estimate: &Estimate, seed: u64) -> Result<Bent, CalibrationError> {
-        let kappa = self.kappa(estimate)?;
+        let kappa = if estimate.rivals > 0 { f64::INFINITY } else { self.kappa(estimate)? };
         let mut out = Bent { kappa, refits: 0, failed: 0, found: None };
         let n = self.unknowns.n;
         let refits = REFITS.0.max(REFITS.1 * n);
@@ -159,36 +162,47 @@ impl Problem<'_> {
         Ok(kappa)
     }
 
-    /// The lowest of the minima about an estimate that bends: from starts that are moved along the axes of its posterior, both ways. A bent sum of squares has
-    /// several minima, and the first that is found need not be the most probable one.
+    /// The lowest of the minima about an estimate that bends: from starts that are moved along the axes of its posterior, both ways, and from first estimates
+    /// drawn from the priors. A bent sum of squares has several minima, and the first that is found need not be the most probable one. Others that are nearly
+    /// as low are counted as rivals.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is none.
-    pub(super) fn lowest(&self, estimate: Estimate) -> Result<Estimate, CalibrationError> {
+    pub(super) fn lowest(&self, estimate: Estimate, seed: u64) -> Result<Estimate, CalibrationError> {
+        if self.stopped.get() || self.kappa(&estimate)? < BENT {
+            return Ok(estimate);
+        }
+        let axes = self.axes(&estimate);
+        let from = estimate.at.x.clone();
+        let mut starts: Vec<Vec<PlatformState>> =
+            axes.iter().flat_map(|a| AWAY.map(|by| self.moved(&from, &(a * by)))).collect();
+        let mut noise = Noise::new(seed, 1);
+        for _ in 0..DRAWS {
+            let d = DVector::from_fn(self.unknowns.n, |i, _| self.unknowns.prior[i] * noise.normal());
+            // a start that cannot be followed is none
+            starts.extend(self.shoot(&self.moved(&self.at_rest(), &d)).ok().flatten());
+        }
         let mut best = estimate;
-        for _ in 0..DESCENTS {
-            if self.stopped.get() || self.kappa(&best)? < BENT {
-                return Ok(best);
+        let mut others: Vec<Estimate> = Vec::new();
+        for start in starts {
+            if self.stopped.get() {
+                break;
             }
-            let before = best.at.cost;
-            let from = best.at.x.clone();
-            let axes = self.axes(&best);
-            for a in axes.iter().flat_map(|a| AWAY.map(|by| a * by)) {
-                if self.stopped.get() {
-                    return Ok(best);
-                }
-                // a start that cannot be followed is none
-                if let Ok(e) = self.settle(self.moved(&from, &a))
-                    && (e.converged || !best.converged)
-                    && e.at.cost < best.at.cost - LOWER
-                {
-                    best = e;
-                }
+            let Ok(e) = self.settle(start) else { continue };
+            if !e.converged && best.converged {
+                continue;
             }
-            if best.at.cost > before - LOWER {
-                return Ok(best);
+            if e.at.cost < best.at.cost - LOWER {
+                others.push(std::mem::replace(&mut best, e));
+            } else {
+                others.push(e);
             }
         }
+        let rival = |e: &&Estimate| {
+            let far = (&best.solution.root * self.between(&best.at.x, &e.at.x)).norm();
+            e.converged && e.at.cost < best.at.cost + RIVAL && far > APART
+        };
+        best.rivals = others.iter().filter(rival).count();
         Ok(best)
     }
 

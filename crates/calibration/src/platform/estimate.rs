@@ -23,6 +23,8 @@ const PASSES: usize = 40;
 const SETTLED: f64 = 1e-4;
 /// It has settled, too, where no step leads further down and the last is less than this.
 const NEARLY: f64 = 0.02;
+/// Seed of first estimates that are drawn.
+const SEED: u64 = 1;
 /// Halvings of a step that leads away.
 const HALVINGS: usize = 12;
 /// Eigenvalues below this part of the largest are none: a direction that no prior has a part in.
@@ -218,6 +220,8 @@ pub(crate) struct Estimate {
     pub solution: Solution,
     pub passes: usize,
     pub converged: bool,
+    /// Other minima that are nearly as low.
+    pub rivals: usize,
 }
 
 impl Problem<'_> {
@@ -409,7 +413,7 @@ impl Problem<'_> {
         // where nothing leads further down, what is left of a step is what the model bends within it
         let size = (&solution.root * &solution.x).norm();
         converged |= size <= NEARLY * self.scale(&at);
-        Ok(Estimate { at, solution, passes, converged })
+        Ok(Estimate { at, solution, passes, converged, rivals: 0 })
     }
 
     /// The estimate from `x`; where `first` is true from what multiple shooting makes of it, and where that does not settle or fits poorly from `x` itself too.
@@ -421,7 +425,7 @@ impl Problem<'_> {
         if !first {
             return self.settle(x);
         }
-        let found = self.lowest(self.first(x)?)?;
+        let found = self.lowest(self.first(x)?, SEED)?;
         Ok(Estimate { passes: self.passes.get() - before, ..found })
     }
 

@@ -326,6 +326,7 @@ pub fn calibrate(
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
     let (mut round, mut passes, mut too_many) = (0, 0, None);
     let lay = |reading: Reading| Run::new(reading, scheme, &planned, &own);
+    let mut rivals = 0;
     let (mut beginnings, mut elsewhere, mut offsets) = (0, false, vec![None; runs.len()]);
     loop {
         round += 1;
@@ -341,6 +342,10 @@ pub fn calibrate(
             stopped: Cell::new(false),
         };
         let mut estimate = problem.estimate(x, round == 1)?;
+        if round == 1 {
+            rivals = estimate.rivals;
+        }
+        estimate.rivals = rivals;
         if beginnings < ROUNDS && !problem.stopped.get() {
             beginnings += 1;
             offsets = problem.open(&estimate, &lay)?;
