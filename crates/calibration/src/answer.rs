@@ -91,7 +91,8 @@ pub enum Finding {
     NotSettled,
     /// Estimates that bend over what the records leave open, so that no covariance describes their errors.
     Bends {
-        /// Curvature in sigma, dimensionless; null if the run cannot be followed over its prior.
+        /// Curvature in sigma, dimensionless; null if the run cannot be followed over its prior, or if another
+        /// minimum fits nearly as well.
         kappa: Option<f64>,
         /// Number of repeated estimates from data with errors drawn anew.
         refits: usize,
@@ -371,7 +372,8 @@ pub struct Fit {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Curvature {
     /// Largest difference of the run and its linear model along the longest axes of the estimates' errors, in
-    /// sigma (dimensionless): below 1 the linear covariance holds. Null if the run cannot be followed there.
+    /// sigma (dimensionless): below 1 the linear covariance holds. Null if the run cannot be followed there,
+    /// or if another minimum fits nearly as well.
     pub kappa: Option<f64>,
     /// Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 1).
     pub refits: usize,

@@ -214,7 +214,10 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
 /// What is wrong with estimates that bend.
 fn bends(kappa: Option<f64>, refits: usize, failed: usize) -> String {
     let size = kappa.map_or_else(
-        || "the run cannot be followed over what the records leave open".to_string(),
+        || {
+            "other values fit nearly as well, or the run cannot be followed over what the records leave open"
+                .to_string()
+        },
         |k| {
             format!(
                 "over what the records leave open the run differs from its linear model by {} sigma",
