@@ -128,6 +128,7 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "filter_latitude": decimal,
     "round": decimal,
     "requirement": assignments,
+    "bench": assignments,
     "value": assignments,
     "prior": assignments,
     "estimate": assignments,

@@ -184,7 +184,9 @@ def design(
         if heard is not None:
             heard(done, parts)
     found = [file.read_text(encoding="utf-8") for file in files.values()]
-    merged: obsdeg.Design = obsdeg.design(**options, **({"check": check} if check else {}), merge=found)
+    if check:
+        options = {**options, "check": check}
+    merged: obsdeg.Design = obsdeg.design(**options, merge=found)
     return merged
 
 

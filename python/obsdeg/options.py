@@ -58,7 +58,7 @@ class Positions(Assumed, Terms, total=False):
     measured_azimuth: bool
     """The azimuth psi_y^n is measured too."""
     work_limit: int
-    """Limit of the work of a verdict on a model, in millions of operations, with half as many bytes [default: 400]."""
+    """Limit of the work of a verdict on a model, in millions of operations, with half as many bytes [default: 600]."""
 
 
 class GyroNoise(TypedDict, total=False):
@@ -91,6 +91,9 @@ class Measured(TypedDict, total=False):
     """Noise of a measured azimuth per sample in deg [default: 0.001]."""
     requirement: ByName
     """Largest standard deviation allowed at the end, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: none, so that nothing is judged]."""
+    bench: ByName
+    """Standard deviations of errors that are not estimated, in ug, ppm, arcsec: ``{"K0": 20, "latitude": 10}`` [default: none]. Sigmas that are
+    judged are then total."""
     drift_noise: str
     """Random drift with its unit: ``"0.01 deg/h"`` is a bias held for one step, ``"0.001 deg/sqrt(h)"`` a random walk [default: none in
     predictions, 0.01 deg/h in simulated runs]."""

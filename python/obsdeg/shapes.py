@@ -268,6 +268,58 @@ class CarryReport(Record):
     differs: list[Difference]
     """Unknowns of both carries whose verdict differs."""
 
+OmittedClass = Literal["no_effect", "silent", "visible"]
+"""Class of an omitted error for one scheme. Exact: no noise, no weights. no_effect: Error that enters no sample: every estimate is
+immune, whatever the weights. silent: Error whose effect on all samples equals that of a change of the unknowns: no record of the
+scheme shows it, and estimates change by exactly that. visible: Error that no change of the unknowns imitates: a record shows it if it
+is large enough.
+"""
+
+
+class ExactChange(Record):
+    """Exact change of one unknown by a silent error."""
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the unknown whose estimate changes."""
+    change: str
+    """Change of the estimate as a multiple of the error, in SI units (rad, rad/s, g), such as `-wN*K0_X`."""
+
+
+class OmittedVerdict(Record):
+    """Verdict on one omitted error."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the error, such as `K0_X`, `latitude` or `attitude_x@2`."""
+    family: str
+    """Family of the error, such as `K0` or `latitude`."""
+    unit: str
+    """Unit of the error: ug, ppm, arcsec, ..."""
+    class_: OmittedClass
+    """Exact class of the error: no effect, silent or visible."""
+    changes: list[str]
+    """Unknowns that a silent error changes, among those that the samples determine, by name; empty for other classes."""
+    exact: list[ExactChange] | None
+    """Exact changes of these unknowns, where they are numbers with roots times powers of wN and wU; null if they are not, or for other
+    classes.
+    """
+
+
+class OmittedVerdicts(Record):
+    """Verdicts on everything that a scheme does not estimate."""
+
+    __slots__ = ()
+
+    terms: list[OmittedVerdict]
+    """Verdicts in the order of the error model."""
+    torquers_in_turns: bool
+    """True if torquer errors act in the stated turns; otherwise they act at the earth rate alone."""
+    error_bound: float
+    """Bound on the probability that any of the classes is wrong."""
+
 
 class ChangeKnown(Record):
     """Known value of an unknown: of a parameter, of psi or a coefficient, of a state at the start of every experiment, of an input at
@@ -523,6 +575,10 @@ class Analysis(Shape):
     """Basis of the directions that Z does not observe, without unknowns that are not excited."""
     carries: list[CarryReport]
     """Verdicts under the other carries, where they differ."""
+    omitted: OmittedVerdicts | None
+    """Exact classes of the errors that the scheme does not estimate; null where none are computed (rotating segments, the drift as
+    unknown, very many columns).
+    """
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     degenerate_loci: list[Locus] | None
@@ -764,6 +820,8 @@ class MeasurementReport(Record):
     """Noise of the gyros by their datasheet; left out where they have no noise of their own."""
     prior: str | None
     """Priors that are stated, as 1 sigma in the units of the unknowns; null if none are."""
+    bench: str | None
+    """Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out where none is."""
     by_default: list[str]
     """Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg.
@@ -808,8 +866,10 @@ class ComparisonQuantity(Record):
     """
     requirement: float | None
     """Largest sigma allowed, in the unit of `unit`; null if none is required."""
+    total: float | None
+    """Total uncertainty with the errors of the bench, in the unit of `unit`; null without a bench or a sigma."""
     margin: float | None
-    """Requirement over sigma, dimensionless: met from 1; null if there is no requirement or no sigma."""
+    """Requirement over sigma (total uncertainty with a bench), dimensionless: met from 1; null if there is no requirement or no sigma."""
     excitation: list[float]
     """Factors by which the unknown enters the drift, position by position, dimensionless: products of components of g (1 for D_F), root
     mean square over the arc of a rotating segment. Empty for psi.
@@ -880,6 +940,8 @@ class Requirements(Record):
     """Smallest margin among the sigmas that count; null if there is none."""
     missed: list[Missed]
     """Unknowns that miss their requirement, in model order."""
+    with_bench: bool | None
+    """True if the sigmas are total uncertainties, with the errors of a stated bench."""
     on_prior: list[str]
     """Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated priors alone."""
 
@@ -901,6 +963,150 @@ class OtherCarry(Record):
     """Outcome of the requirements; null if nothing was judged."""
     not_judged: str | None
     """Reason why nothing was judged; left out where something was."""
+
+
+class ChangePerUnit(Record):
+    """Change of one estimate per unit of an error."""
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the unknown whose estimate changes."""
+    unit: str
+    """Unit of the unknown whose estimate changes."""
+    per_unit: float
+    """Estimate minus truth, in the unit of the unknown per unit of the error."""
+
+
+class UsesUp(Record):
+    """Size of an error at which a requirement is just met."""
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the unknown with this requirement."""
+    size: float
+    """Size (one sigma) of the error at which the total uncertainty reaches the requirement, in the unit of the error; a requirement that
+    is missed without the error has no such size.
+    """
+
+
+class FamilyEffect(Record):
+    """Effect of a family of errors."""
+
+    __slots__ = ()
+
+    family: str
+    """Name of the family, such as `K0` or `latitude`."""
+    unit: str
+    """Unit of its sizes: ug, ppm, arcsec, ..."""
+    terms: int
+    """Number of terms of the family that the scheme does not estimate."""
+    no_effect: int | None
+    """Number of terms without effect; null where no classes were computed."""
+    silent: int | None
+    """Number of terms that no record can show; null where no classes were computed."""
+    worst: ChangePerUnit | None
+    """Largest change of a drift coefficient per unit size of all terms (root of the sum of squares); null if no drift coefficient
+    changes.
+    """
+    worst_in_sigmas: float | None
+    """Largest change of a drift coefficient per unit size in its own sigma (dimensionless per unit of the error); null if no drift
+    coefficient changes.
+    """
+    visible_from: float | None
+    """Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none is visible."""
+    uses_up: UsesUp | None
+    """Smallest size of a single term that uses up the margin of a requirement; null if none does."""
+
+
+class OmittedEffect(Record):
+    """Effect of one error that is not estimated."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the error, such as `K0_X`, `latitude` or `attitude_x@2`."""
+    family: str
+    """Family of the error, such as `K0`, `latitude` or `attitude`."""
+    unit: str
+    """Unit of its sizes: ug, ppm, arcsec, ..."""
+    class_: OmittedClass | None
+    """Exact class: no effect, silent or visible; null where none was computed."""
+    exact: list[ExactChange] | None
+    """Exact changes by a silent error, in SI units; null if they have no exact form, or for other classes."""
+    visible_from: float | None
+    """Size that a record of this scheme shows at three sigma, in the unit of `unit`; null unless the error is visible."""
+    size: float | None
+    """Size stated by the bench (one sigma), in the unit of `unit`; null where the bench states none."""
+    sensitivities: list[ChangePerUnit]
+    """Changes of the estimates per unit of the error; estimates that it does not change are left out."""
+    uses_up: UsesUp | None
+    """Size at which the error uses up the margin of a requirement; null if there is no requirement, or none that it affects."""
+
+Evaluation = Literal["A", "B"]
+"""Evaluation of a standard uncertainty, by the GUM. A: Type A: statistical, from the scatter of the samples that the estimates are
+computed from. B: Type B: by other means, such as a datasheet or an earlier calibration.
+"""
+
+
+class BudgetLine(Record):
+    """Source of uncertainty in a budget."""
+
+    __slots__ = ()
+
+    source: str
+    """Source: the samples (with the random drift and the priors that are stated), or the name of an error."""
+    evaluation: Evaluation
+    """Evaluation of its standard uncertainty: type A or B."""
+    value: float
+    """Standard uncertainty of the source, in the unit of `value_unit`."""
+    value_unit: str
+    """Unit of the standard uncertainty of the source."""
+    sensitivity: float
+    """ChangePerUnit of the unknown to the source, in the unit of the unknown per `value_unit`."""
+    contribution: float
+    """Contribution to the standard uncertainty of the unknown, in its unit: value times sensitivity, positive."""
+    percent: float
+    """Part of the squared total, in percent."""
+
+
+class Budget(Record):
+    """Uncertainty budget of one unknown."""
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the unknown of the budget."""
+    unit: str
+    """Unit of the unknown, of its contributions and of the total."""
+    total: float
+    """Total standard uncertainty: root of the sum of the squared contributions, in the unit of `unit`."""
+    requirement: float | None
+    """Largest standard uncertainty allowed, in the unit of `unit`; null if none is required."""
+    lines: list[BudgetLine]
+    """Sources of uncertainty, the largest contribution first."""
+
+
+class OmittedEffects(Record):
+    """Effect of everything that a scheme does not estimate: the other terms of the error model, the site, and the attitudes of the
+    positions.
+    """
+
+    __slots__ = ()
+
+    families: list[FamilyEffect]
+    """Effects family by family: all terms of a family have the same size, and their changes add up as squares."""
+    terms: list[OmittedEffect]
+    """Effects term by term, in the order of the error model."""
+    budgets: list[Budget]
+    """Uncertainty budgets of the unknowns that have a sigma; empty without a bench."""
+    torquers_in_turns: bool
+    """True if torquer errors (GS, GM) act in the stated turns; otherwise they act at the earth rate alone."""
+    error_bound: float | None
+    """Bound on the probability that a class is wrong, dimensionless; null where no classes were computed."""
+    not_classified: str | None
+    """Reason why there are no exact classes; null if there are."""
 
 
 class Validity(Record):
@@ -1025,6 +1231,8 @@ class Review(Record):
     """Outcome of the requirements by the predicted sigmas."""
     other_carries: list[OtherCarry]
     """Outcome of the same scheme under the other carries."""
+    omitted: OmittedEffects
+    """Effect of what the scheme does not estimate, by the weights of the predicted sigmas."""
     has_accuracy_orders: bool
     """True if accuracy orders are computed. They are not for rotating segments."""
     validity: Validity | None
@@ -1262,6 +1470,8 @@ class SearchReport(Record):
     """Smallest worst degree that all candidates together allow; null if torquer errors act during slews, so that sets have no degree."""
     constraints: list[str]
     """Constraints of the search, in words."""
+    ranked: int | None
+    """Number of schemes of least sigma that were ranked by total uncertainty with the bench; left out without a bench."""
     certificate: Certificate | None
     """Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial carry, and where the noise
     of Z is correlated, information is no sum over positions.
@@ -1307,7 +1517,9 @@ class Found(Record):
     total_s: float
     """Total time with turns, in s."""
     value: float
-    """Criterion of the scheme, in the unit of `unit`; for margin the largest sigma over its requirement, psi included where it counts."""
+    """Criterion of the scheme, in the unit of `unit`, with a bench of its total uncertainties; for margin the largest sigma over its
+    requirement, psi included where it counts.
+    """
     worst_sigma_dph: float | None
     """Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if one is stated, no drift
     noise; null if none is required.
@@ -1361,6 +1573,8 @@ class Design(Shape):
     """Schemes that no scheme found beats in both total time and criterion, by total time."""
     not_judged: list[str]
     """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
+    omitted: OmittedEffects | None
+    """Effect of what the first scheme does not estimate, by the weights of its sigmas; null without a search."""
     other_carries: list[OtherCarry]
     """Outcome of the first scheme under the other carries; empty if no scheme was searched."""
     gimbals: GimbalReport | None
@@ -1818,6 +2032,8 @@ class Simulation(Shape):
     """Outcome of the requirements in this run, by the sigmas of its filter at the end."""
     other_carries: list[OtherCarry]
     """Outcome of the same scheme under the other carries."""
+    omitted: OmittedEffects
+    """Effect of what the scheme does not estimate, by the weights of the predicted sigmas."""
     consistency: Consistency
     """Consistency of errors and innovations with the filter's covariances."""
     filter: FilterReport
@@ -2521,6 +2737,18 @@ class FindingSecondPath(Record):
     """Largest difference of both, in sigma, dimensionless."""
 
 
+class FindingSuspect(Record):
+    """Error that is not among the unknowns and explains the residuals: see `omitted`."""
+
+    __slots__ = ()
+
+    kind: Literal["suspect"]
+    errors: list[str]
+    """Names of the errors: one, or a pair where no single one explains the residuals."""
+    chi_square_fall: float
+    """Fall of chi-square with them among the unknowns, dimensionless."""
+
+
 class FindingKnown(Record):
     """Prior knowledge that does not agree with the records."""
 
@@ -2544,6 +2772,7 @@ Finding = Union[
     FindingOutliers,
     FindingRepeatability,
     FindingSecondPath,
+    FindingSuspect,
     FindingKnown,
 ]
 """Evidence against the model or its sigmas."""
@@ -2865,6 +3094,77 @@ class Assumed(Record):
     """Seed of the exact verdicts."""
 
 
+class SuspectedError(Record):
+    """Error that explains residuals, with its estimate."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the error, such as `K0_Y`."""
+    unit: str
+    """Unit of its estimate and sigma."""
+    estimate: float
+    """Estimate of the error from the residuals, in the unit of `unit`."""
+    sigma: float
+    """Standard deviation of the estimate by the stated noise, in the unit of `unit`."""
+
+
+class SuspectedChange(Record):
+    """Estimate without and with suspected errors among the unknowns."""
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the unknown that is estimated."""
+    unit: str
+    """Unit of both estimates of the unknown."""
+    estimate: float
+    """Estimate of the fit, in the unit of `unit`."""
+    with_: float
+    """Estimate with the suspected errors among the unknowns, in the unit of `unit`."""
+
+
+class Suspicion(Record):
+    """Suspicion that errors that are not estimated are in a record."""
+
+    __slots__ = ()
+
+    errors: list[SuspectedError]
+    """One error, or a pair where no single one explains the residuals."""
+    indistinguishable: list[str]
+    """Other errors that this record does not distinguish from the first one, by name."""
+    chi_square_fall: float
+    """Fall of chi-square with the errors among the unknowns, dimensionless."""
+    probability: float
+    """Bound on the probability that chance gives such a fall to any of the errors that were tried."""
+    changes: list[SuspectedChange]
+    """Estimates that the errors change most in their own sigma, the largest change first."""
+
+
+class SilentError(Record):
+    """Error that no record of a scheme shows."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the error, such as `K0_X`."""
+    changes: list[str]
+    """Names of the unknowns whose estimates it changes."""
+
+
+class Omitted(Record):
+    """Errors that a calibration does not estimate."""
+
+    __slots__ = ()
+
+    tried: int
+    """Number of errors that were tried, each by a score test on the residuals."""
+    suspicion: Suspicion | None
+    """Error or pair that explains the residuals; null where chance is enough."""
+    silent: list[SilentError]
+    """Errors that no record of this scheme shows and that change a coefficient."""
+
+
 class Setup(Record):
     """Setup of a scheme: the meaning of its coefficients, and the identity of records of its runs."""
 
@@ -2957,6 +3257,8 @@ class Calibration(Shape):
     """Records that were read, with their clocks and columns."""
     assumed: Assumed
     """Assumptions of the estimates: conditions, noise, priors and gate."""
+    omitted: Omitted
+    """Errors that the scheme does not estimate: suspicion in these records, and what they cannot show."""
     setup: Setup
     """Scheme, geometry and carry that were calibrated."""
     rests_on: list[Basis2]

@@ -36,9 +36,9 @@ def _program() -> str:
     return found
 
 
-def judge(model: str) -> dict[str, Any]:
+def judge(model: str, *options: str) -> dict[str, Any]:
     """The answer of `analyze` to a model's text, as its JSON. The one place that says who judges."""
-    command = [_program(), "analyze", "-", "--format", "json", "--solutions", "off"]
+    command = [_program(), "analyze", "-", "--format", "json", "--solutions", "off", *options]
     done = subprocess.run(command, input=model, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     answer: dict[str, Any] = json.loads(done.stdout)

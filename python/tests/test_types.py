@@ -66,6 +66,9 @@ def answers() -> Iterator[obsdeg.Answer]:
     yield obsdeg.design(minimum=True)
     yield obsdeg.design(minimum=True, terms="gyros", carry="inertial")
     yield obsdeg.design(5, carry="inertial", part=(1, 400))
+    parts = [obsdeg.design(4, observable="D_F", carry="inertial", part=(i, 2)) for i in (1, 2)]
+    yield obsdeg.design(4, observable="D_F", carry="inertial", merge=parts)
+    yield obsdeg.design(4, observable="D_F", carry="inertial", bench={"K0": 20})
 
 
 def wrong(value: Any, hint: Any, path: str, seen: dict[type, set[str]]) -> Iterator[str]:

@@ -24,7 +24,7 @@ pub struct WorkLimit(
 
 impl WorkLimit {
     /// The limit without an option.
-    pub const DEFAULT: Self = Self(400);
+    pub const DEFAULT: Self = Self(600);
 
     /// The limit in operations.
     pub fn operations(self) -> u64 {
