@@ -26,6 +26,9 @@ const FAR: f64 = 8.0;
 /// It is told that a record is read every so many rows.
 const OFTEN: usize = 10_000;
 
+/// Index, kind and scale of a column of a sensor, with its title.
+type Column<'a> = (&'a (usize, SensorKind, f64), String);
+
 /// A column of a sensor.
 pub(super) struct Channel {
     pub text: String,
@@ -126,13 +129,12 @@ impl StaticRecord {
             times.windows(2).enumerate().filter(|(_, w)| !is_usual(w)).map(|(i, _)| i + 1).collect();
         let intervals = times.windows(2).filter(|w| is_usual(w));
         let jitter = intervals.map(|w| ((w[1] - w[0]) / interval_s - 1.0).abs()).fold(0.0, f64::max);
-        let channel =
-            |(((_, sensor, scale), text), values): ((&(usize, SensorKind, f64), String), Vec<f64>)| {
-                let empty = values.iter().filter(|x| x.is_nan()).count();
-                let (sensor, scale) = (*sensor, *scale);
-                let (stretches, left_out) = stretches(values, &begins, &lines);
-                Channel { text, sensor, scale, stretches, empty, left_out }
-            };
+        let channel = |(((_, sensor, scale), text), values): (Column<'_>, Vec<f64>)| {
+            let empty = values.iter().filter(|x| x.is_nan()).count();
+            let (sensor, scale) = (*sensor, *scale);
+            let (stretches, left_out) = stretches(values, &begins, &lines);
+            Channel { text, sensor, scale, stretches, empty, left_out }
+        };
         Ok(Self {
             name: name.clone(),
             samples: times.len(),

@@ -57,7 +57,7 @@ impl Problem<'_> {
         let refits = REFITS.0.max(REFITS.1 * n);
         let bins: usize = self.runs.iter().map(|run| run.len()).sum();
         let work = (bins * n * n * refits) as f64;
-        if kappa < BENT || kappa > MOST || work > WORK || !estimate.converged || self.stopped.get() {
+        if !(BENT..=MOST).contains(&kappa) || work > WORK || !estimate.converged || self.stopped.get() {
             return Ok(out);
         }
         let mut noise = Noise::new(seed, 0);
