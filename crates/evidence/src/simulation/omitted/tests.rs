@@ -386,9 +386,10 @@ fn sensitivities_are_those_of_brute_force() {
 
 #[test]
 #[ignore = "1,000 schemes: .ci/run release"]
+#[expect(clippy::print_stderr, reason = "what was measured")]
 fn sensitivities_are_those_of_brute_force_at_length() {
     let found = largest_difference(1000, 3636);
-    println!("largest relative difference {found:e}");
+    eprintln!("largest relative difference {found:e}");
     assert!(found < 1e-6, "{found:e}");
 }
 
@@ -434,9 +435,10 @@ fn classes_are_those_of_ranks() {
 
 #[test]
 #[ignore = "200 schemes: .ci/run release"]
+#[expect(clippy::print_stderr, reason = "what was measured")]
 fn classes_are_those_of_ranks_at_length() {
     let counts = compared_classes(200, 55);
-    println!("no effect, silent, visible, undecided: {counts:?}");
+    eprintln!("no effect, silent, visible, undecided: {counts:?}");
     assert!(20 * counts[3] < counts[..3].iter().sum::<usize>());
 }
 
@@ -548,9 +550,10 @@ fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
 }
 
 /// `least`: share of the records with an error of twice the visible size in which it must be found.
+#[expect(clippy::print_stderr, reason = "what was measured")]
 fn check_shares(count: usize, seed: u64, least: f64) {
     let ([none, twice, once], power) = shares(count, seed);
-    println!(
+    eprintln!(
         "suspicion without an error {none}, found at twice the visible size {twice}, at once {once} of {power}"
     );
     let band = |p: f64| 3.3 * (p * (1.0 - p) / count as f64).sqrt();
