@@ -122,6 +122,8 @@ class Analyze(Seeded, Positions, total=False):
     """The highest order of derivatives to look at in a model that has no proven end."""
     count_limit: int
     """Limit of the work of counting the solutions of a model: millions of products at each of two points."""
+    relation_limit: int
+    """Limit of the work of relations among output derivatives: millions of products at each of two points; 0: none [default: 3000]."""
     solutions: bool
     """Solving expressions and numbers of solutions [default: True]."""
     frame: Literal["n", "platform"]

@@ -76,6 +76,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "table" => &["quantities", "answer", "x"],
         "order" => &["0", "1", "5", "40", "-1", "x"],
         "count-limit" => &["0", "1", "18446744073709551615", "-1"],
+        "relation-limit" => &["0", "1", "-1", "x"],
         "solutions" => &["off", "maybe"],
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
@@ -257,7 +258,7 @@ fn record() -> String {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 12] = [
+    const TAKEN: [&str; 13] = [
         "ascii",
         "count-limit",
         "engine-wait",
@@ -266,6 +267,7 @@ fn a_model_refuses_what_is_about_schemes() {
         "order",
         "output",
         "quiet",
+        "relation-limit",
         "seed",
         "solutions",
         "symbolic-limit",

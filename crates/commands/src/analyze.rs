@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{Analysis, AnalysisOptions};
 use obsdeg_core::solution::Frame;
-use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
+use obsdeg_core::system::{COUNT_LIMIT, RELATION_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
 use obsdeg_report::{Answer, Document, Several, Table};
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,10 @@ pub struct Analyze {
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
     pub count_limit: Option<u64>,
 
+    /// Limit of the work of relations among output derivatives, sought where counting does not decide how many solutions there are: millions of products at each of two points (5 ms each); 0: none [default: 3000]
+    #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
+    pub relation_limit: Option<u64>,
+
     /// Solving expressions and numbers of solutions
     #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(SOLUTIONS))]
     pub solutions: bool,
@@ -58,6 +62,7 @@ impl Default for Analyze {
             input: InputOptions::default(),
             order: None,
             count_limit: None,
+            relation_limit: None,
             solutions: true,
             frame: Frame::default(),
             formulas: false,
@@ -171,7 +176,7 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
 }
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
-    let &Analyze { seed, solutions, formulas, frame, count_limit, order, .. } = options;
+    let &Analyze { seed, solutions, formulas, frame, count_limit, relation_limit, order, .. } = options;
     Ok(match input {
         Input::Scheme(scheme) => {
             let options = AnalysisOptions { seed, solutions, formulas, frame };
@@ -183,7 +188,9 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
         }
         Input::Model(file) => {
             let count_limit = count_limit.unwrap_or(COUNT_LIMIT);
-            let options = SystemOptions { seed, solutions, count_limit, order: order.map(Into::into) };
+            let relation_limit = relation_limit.unwrap_or(RELATION_LIMIT);
+            let order = order.map(Into::into);
+            let options = SystemOptions { seed, solutions, count_limit, relation_limit, order };
             let found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
             Judged::Model(Box::new(found))
         }

@@ -42,7 +42,7 @@ const OF_BOTH: [&str; 18] = [
 ];
 
 /// Options that concern models alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 4] = ["order", "count_limit", "starts", "profile"];
+const OF_MODELS: [&str; 5] = ["order", "count_limit", "relation_limit", "starts", "profile"];
 
 /// The options on the command line that concern one kind of file only, as they are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

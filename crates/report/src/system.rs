@@ -18,8 +18,8 @@ fn explanation(q: &SystemQuantity) -> String {
     match (q.status, q.degree) {
         (Status::Observable, Some(0)) => format!("from the outputs themselves; {}", solutions(q)),
         (Status::Observable, _) => solutions(q),
-        (Status::Inseparable, _) => words::not_told_from(&q.partners),
-        (Status::NotExcited, _) => "moves no output".into(),
+        (Status::Inseparable, _) => format!("not identifiable: {}", words::not_told_from(&q.partners)),
+        (Status::NotExcited, _) => "not identifiable: moves no output".into(),
         (Status::NotSeen, _) => "a higher order may still solve it: no end is proven here".into(),
     }
 }
@@ -47,16 +47,14 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
     }
 }
 
-/// How many solutions an observable unknown has.
+/// How many solutions an observable unknown has, and where its expression stands.
 fn solutions(q: &SystemQuantity) -> String {
-    let number = match q.number_of_solutions {
-        Some(NumberOfSolutions::OneByExpression) => return "one solution: see below".into(),
-        Some(NumberOfSolutions::Counted(1)) => "one solution".into(),
-        Some(NumberOfSolutions::Counted(k)) => format!("{k} solutions"),
-        Some(NumberOfSolutions::Undecided(_)) => "locally unique; number of solutions not decided".into(),
-        None => "locally unique; not counted".into(),
-    };
-    if q.solution.is_some() { format!("{number}; in terms of others: see below") } else { number }
+    let words = q.identifiability_words();
+    match (&q.number_of_solutions, &q.solution) {
+        (Some(NumberOfSolutions::OneByExpression), _) => format!("{words}: see below"),
+        (_, Some(_)) => format!("{words}; in terms of others: see below"),
+        (_, None) => words,
+    }
 }
 
 /// What the numbers of solutions rest on, and why some are missing.
@@ -155,8 +153,19 @@ impl Answer for SystemAnalysis {
             };
             blocks.extend(Block::list_if_any(&heading, lines));
         }
+        blocks.extend(Block::list_if_any(
+            "Another solution with the same outputs appears when you",
+            self.solution_maps.clone(),
+        ));
         blocks.push(Block::list("The system", self.equations.clone()));
         let mut assumed = Vec::new();
+        if self.missing_functions > 0 {
+            assumed.push(format!(
+                "identifiable combinations are not all listed: {} independent one{} more of unobservable unknowns exist, none a short sum of products of powers",
+                self.missing_functions,
+                if self.missing_functions == 1 { "" } else { "s" }
+            ));
+        }
         if !self.known.is_empty() {
             assumed.push(format!("known starts: {}", self.known.join(", ")));
         }

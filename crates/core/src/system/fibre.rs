@@ -18,9 +18,11 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::Op;
+use super::global::{self, Found, Known};
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::rows::{Layout, SystemRows, Unknown};
+use super::twins::{Twin, images, twins};
 
 /// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are decided.
 const BEYOND: usize = 3;
@@ -57,7 +59,7 @@ pub(super) enum NotCounted {
     #[error(
         "starts, inputs or segments are not generic: there are several with the derivatives looked at, and those of a higher order may leave fewer"
     )]
-    NotClosed,
+    NotClosed(usize),
     /// Two points disagree.
     #[error("two random points disagree")]
     Disagree,
@@ -75,44 +77,156 @@ impl From<OverLimit> for NotCounted {
 /// The number of values of an unknown, or why it is not decided.
 pub(super) type Count = Result<usize, NotCounted>;
 
-/// The number of values that every unknown takes, in the order of the layout, as two random points in the two fields agree;
-/// with derivatives of the outputs up to the order that comes with it. At most `limit` products a point. What is not
-/// observable has no number.
+/// Limits of work, in products of two coefficients at each of two points.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Of counting solutions of the equations in the unknowns.
+    pub(super) count: u64,
+    /// Of relations among derivatives of the outputs, where the first leaves something undecided; zero: none are sought.
+    pub(super) relations: u64,
+}
+
+/// Where solutions are counted: the model at a random point in one of its two fields.
+struct Counting<'a> {
+    model: &'a SystemModel,
+    compiled: &'a Compiled,
+    judged: &'a Judgement,
+    seed: u64,
+    order: usize,
+    limit: u64,
+}
+
+impl Counting<'_> {
+    /// The random numbers of the point in a field: always the same ones.
+    fn random(&self, i: usize) -> SplitMix64 {
+        self.model.random(self.seed, &format!("solutions, field {i}"))
+    }
+
+    /// The counts in a field, with what is known beforehand.
+    fn counts(&self, fields: [Field; 2], i: usize, known: &Known) -> Vec<Count> {
+        let n = self.judged.findings.degrees.degree.len();
+        if n > UNKNOWNS {
+            return vec![Err(NotCounted::TooLarge); n];
+        }
+        let mut work = Work { left: self.limit };
+        let mut rng = self.random(i);
+        let Self { model, compiled, judged, order, .. } = *self;
+        at_point(model, compiled, judged, (fields[i], &mut rng), order, known, &mut work)
+            .unwrap_or_else(|e| vec![Err(e); n])
+    }
+
+    /// Maps between solutions, where there are several. Where the point is special and derivatives of a higher order may
+    /// leave fewer than were counted, as many as the maps prove are the number.
+    fn confirmed(&self, fields: [Field; 2], counts: &mut [Count]) -> Vec<Twin> {
+        let Self { model, compiled, judged, seed, .. } = *self;
+        let (layout, degrees) = (&judged.layout, &judged.findings.degrees);
+        let several = |c: &Count| matches!(c, Ok(2..) | Err(NotCounted::NotClosed(_)));
+        if !counts.iter().zip(&degrees.degree).any(|(c, d)| d.is_some() && several(c)) {
+            return Vec::new();
+        }
+        let mut rng = model.random(seed, "maps between solutions");
+        let found = twins(compiled, layout, &degrees.degree, fields, &mut rng);
+        let point = SystemRows::new(model, compiled, layout, fields[0], &mut rng);
+        if let Ok(point) = point
+            && degrees.rank() == layout.unknowns.len()
+        {
+            let at = point.values(compiled, layout, 0);
+            for (lane, count) in counts.iter_mut().enumerate() {
+                if let Err(NotCounted::NotClosed(k)) = *count
+                    && images(&found, compiled, layout, &fields[0], &at, lane) == k
+                {
+                    *count = Ok(k);
+                }
+            }
+        }
+        found
+    }
+
+    /// The counts in a field with what relations say, where they say something.
+    fn by_relations(
+        &self,
+        fields: [Field; 2],
+        i: usize,
+        found: &mut Found,
+        limit: u64,
+    ) -> Option<Vec<Count>> {
+        let Self { model, compiled, judged, seed, .. } = *self;
+        let point = SystemRows::new(model, compiled, &judged.layout, fields[i], &mut self.random(i)).ok()?;
+        let values = point.values(compiled, &judged.layout, model.constants.len());
+        let mut rng = model.random(seed, &format!("relations, field {i}"));
+        let system = (model, compiled, judged);
+        let known = global::known(system, fields[i], &values, found, &mut rng, &mut Work { left: limit });
+        if known == Known::default() {
+            return None;
+        }
+        let mut counts = self.counts(fields, i, &known);
+        known.unique.iter().for_each(|&lane| counts[lane] = Ok(1));
+        Some(counts)
+    }
+}
+
+/// What is known of the number of solutions.
+pub(super) struct Solutions {
+    /// The number of values that every unknown takes, in the order of the layout, as two random points in the two fields
+    /// agree. What is not observable has no number.
+    pub(super) counts: Vec<Option<Count>>,
+    /// The order of the derivatives of the outputs with which they were counted.
+    pub(super) order: usize,
+    /// Maps that take solutions to others, where there are several.
+    pub(super) twins: Vec<Twin>,
+}
+
+/// The number of values that every unknown takes.
 pub(super) fn values_taken(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
     seed: u64,
-    limit: u64,
-) -> (Vec<Option<Count>>, usize) {
+    limits: Limits,
+) -> Solutions {
     let degrees = &judged.findings.degrees;
     let last = degrees.rank_profile.iter().position(|&r| r == degrees.rank()).unwrap_or(0);
     let order =
         (last + BEYOND).min(if judged.layout.closed { usize::MAX } else { judged.layout.bound.max(last) });
+    let Some(fields) = judged.fields else {
+        let none = degrees.degree.iter().map(|degree| degree.and(Some(Err(NotCounted::NotRational))));
+        return Solutions { counts: none.collect(), order, twins: Vec::new() };
+    };
     // a relation between derivatives that holds on one component of the constraints need not hold on another
     let proven = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
-    let at = |i: usize| -> Vec<Count> {
-        let Some(fields) = judged.fields else {
-            return vec![Err(NotCounted::NotRational); degrees.degree.len()];
-        };
-        if degrees.degree.len() > UNKNOWNS {
-            return vec![Err(NotCounted::TooLarge); degrees.degree.len()];
-        }
-        let mut rng = model.random(seed, &format!("solutions, field {i}"));
-        let mut work = Work { left: limit };
-        at_point(model, compiled, judged, (fields[i], &mut rng), order, &mut work)
-            .unwrap_or_else(|e| vec![Err(e); degrees.degree.len()])
+    let agreed = |first: Vec<Count>, second: Vec<Count>| -> Vec<Count> {
+        let both = first.into_iter().zip(second).map(|counts| match counts {
+            (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
+            (Ok(a), Ok(_)) if a > 1 && !proven => Err(NotCounted::NotClosed(a)),
+            (Ok(a), Ok(_)) => Ok(a),
+            (Err(e), _) | (_, Err(e)) => Err(e),
+        });
+        both.collect()
     };
-    let first = at(0);
-    let second = if first.iter().any(Result::is_ok) { at(1) } else { first.clone() };
-    let agreed = first.into_iter().zip(second).map(|counts| match counts {
-        (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
-        (Ok(a), Ok(_)) if a > 1 && !proven => Err(NotCounted::NotClosed),
-        (Ok(a), Ok(_)) => Ok(a),
-        (Err(e), _) | (_, Err(e)) => Err(e),
-    });
-    let observable = agreed.zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
-    (observable.collect(), order)
+    let counting = Counting { model, compiled, judged, seed, order, limit: limits.count };
+    let first = counting.counts(fields, 0, &Known::default());
+    let second = match first.iter().any(Result::is_ok) {
+        true => counting.counts(fields, 1, &Known::default()),
+        false => first.clone(),
+    };
+    let mut counts = agreed(first, second);
+    let open = |counts: &[Count]| counts.iter().zip(&degrees.degree).any(|(c, d)| c.is_err() && d.is_some());
+    if open(&counts) && limits.relations > 0 && global::applies(model, compiled, judged) {
+        let mut found = Found::default();
+        let mut again = |i: usize| counting.by_relations(fields, i, &mut found, limits.relations);
+        if let Some(first) = again(0)
+            && let Some(second) = again(1)
+        {
+            for (count, new) in counts.iter_mut().zip(agreed(first, second)) {
+                if count.is_err() && new.is_ok() {
+                    *count = new;
+                }
+            }
+        }
+    }
+    let twins = counting.confirmed(fields, &mut counts);
+    let observable = counts.into_iter().zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
+    Solutions { counts: observable.collect(), order, twins }
 }
 
 /// The equations at a point.
@@ -357,6 +471,7 @@ fn equations<'a>(
     judged: &'a Judgement,
     (f, rng): (Field, &mut SplitMix64),
     order: usize,
+    known: &Known,
     work: &'a mut Work,
 ) -> Result<Equations<'a>, NotCounted> {
     let layout = &judged.layout;
@@ -369,7 +484,9 @@ fn equations<'a>(
         rows.coefficient(e * segments, 0, highest);
     }
     let values = rows.values(compiled, layout, 0);
-    let free = |lane: usize| judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane));
+    let free = |lane: usize| {
+        known.unique.contains(&lane) || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane))
+    };
     let lane = |(lane, &value): (usize, &u64)| match free(lane) {
         true => Polynomial::constant(value),
         false => Polynomial::variable(&f, lane as u32),
@@ -390,7 +507,7 @@ fn equations<'a>(
         state_weights,
         lanes: values.iter().enumerate().map(lane).collect(),
         values,
-        zero: Vec::new(),
+        zero: known.zero.clone(),
         runs: Vec::new(),
     };
     for experiment in 0..experiments {
@@ -474,10 +591,11 @@ fn at_point(
     judged: &Judgement,
     (f, rng): (Field, &mut SplitMix64),
     order: usize,
+    known: &Known,
     work: &mut Work,
 ) -> Result<Vec<Count>, NotCounted> {
     let Equations { zero, values, weights, lanes, .. } =
-        equations(model, compiled, judged, (f, rng), order, &mut *work)?;
+        equations(model, compiled, judged, (f, rng), order, known, &mut *work)?;
     let observable = judged.findings.degrees.degree.iter().map(Option::is_some);
     let wanted: Vec<Polynomial> =
         lanes.into_iter().zip(observable).map(|(p, o)| if o { p } else { Polynomial::default() }).collect();

@@ -14,6 +14,8 @@ mod elimination;
 mod fibre;
 mod formula;
 mod functions;
+mod global;
+mod identifiable;
 mod independent;
 pub mod json;
 pub(crate) mod judge;
@@ -27,6 +29,7 @@ pub(crate) mod rows;
 mod solutions;
 pub(crate) mod symmetry;
 pub(crate) mod taylor;
+mod twins;
 pub(crate) mod values;
 
 pub use answer::*;
