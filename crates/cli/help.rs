@@ -104,7 +104,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("merge", PARTS, "Put parts together to the answer of the whole; they know their options"),
     ("order", MODELS, "Highest order of derivatives where a model has no proven end"),
     ("count_limit", MODELS, "Work of counting the solutions of a model (default: 3)"),
-    ("relation_limit", MODELS, "Work of global verdicts by output relations (default: 3000; 0: off)"),
+    ("relation_limit", MODELS, "Work of global verdicts by output relations (default: 0, off)"),
     ("starts", MODELS, "Starts of the iteration"),
     ("profile", MODELS, "Unknown whose profile is drawn; once per unknown"),
     ("solutions", SOLUTIONS, "Expressions and numbers of solutions: on or off"),

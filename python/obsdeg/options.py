@@ -123,7 +123,7 @@ class Analyze(Seeded, Positions, total=False):
     count_limit: int
     """Limit of the work of counting the solutions of a model: millions of products at each of two points."""
     relation_limit: int
-    """Limit of the work of relations among output derivatives: millions of products at each of two points; 0: none [default: 3000]."""
+    """Limit of the work of relations among output derivatives: millions of products at each of two points; 0: none [default: 0]."""
     solutions: bool
     """Solving expressions and numbers of solutions [default: True]."""
     frame: Literal["n", "platform"]

@@ -21,8 +21,8 @@ use crate::remedies::Remedies;
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
 
-/// Default of [`SystemOptions::relation_limit`]: enough for most published models that other programs decide.
-pub const RELATION_LIMIT: u64 = 3000;
+/// Default of [`SystemOptions::relation_limit`]: relations are sought only where they are asked for.
+pub const RELATION_LIMIT: u64 = 0;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";

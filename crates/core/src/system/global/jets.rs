@@ -95,7 +95,9 @@ impl<'a> Source<'a> {
                         }
                     }
                 }
-                Role::UnknownInput(_) | Role::Time => return None,
+                // nothing that takes part holds the time
+                Role::Time => Signal::Time { value: 0 },
+                Role::UnknownInput(_) => return None,
             });
         }
         let lanes = orders.map_or(0, |_| lane);
