@@ -135,6 +135,7 @@ class Problem:
         need(known and self.terms == [t for t in order if t in self.terms], "problem.terms", f"expected some of {order} in this order", f"found {text(self.terms)}")
         for both in ({"M3", "M6"}, {"GM", "GM3"}):
             need(not both <= set(self.terms), "problem.terms", f"expected one of {sorted(both)}", "found both")
+        self.latitude_deg = latitude
         self.latitude = None if latitude is None else nanodeg("problem.latitude_deg", latitude)
         need(abs(self.latitude or 0) <= TURN // 4, "problem.latitude_deg", "expected -90 to 90", f"found {text(latitude)}")
         self.pole = self.latitude is not None and abs(self.latitude) == TURN // 4
@@ -549,7 +550,7 @@ def verify(data, scheme=None):
     if scheme is not None:
         of_file = read_scheme(scheme, problem)
         for key in of_file:
-            same(f"problem.{key} (scheme file: found)", problem.get(key) if isinstance(problem, dict) else None, of_file[key])
+            same(f"problem.{key}, against the scheme file", problem.get(key) if isinstance(problem, dict) else None, of_file[key])
     problem = Problem(problem)
     same("unknowns", unknowns, problem.names)
     need(kind in ("exact", "modular"), "kind", "expected exact or modular", f"found {text(kind)}")
@@ -589,6 +590,15 @@ def verify(data, scheme=None):
     return sentences(problem, claims, len(basis), how, scheme is not None)
 
 
+def fewest_positions(problem, seen):
+    """Least number of positions that may determine so many coefficients; None where the counting argument does not hold."""
+    if problem.pole or any(t not in GRAVITY for t in problem.terms):
+        return None
+    lost = {"platform": (3, 0), "inertial": (3, 1), "reset": (2, 0)}
+    each, once = (3, 0) if problem.azimuth else lost[problem.carry]
+    return -(-(seen + once) // each)
+
+
 def sentences(problem, claims, rank, how, compared):
     for name, claim in claims:
         if claim["status"] == "observable":
@@ -598,8 +608,12 @@ def sentences(problem, claims, rank, how, compared):
             yield f"{name}: inseparable at every order (null vector of {claim['hidden_by']}), excited by row {tuple(claim['excited_by'])}; verified {how}."
         else:
             yield f"{name}: not excited, every row has the entry 0; verified {how}."
-    latitude = "generic latitude" if problem.latitude is None else f"latitude {problem.latitude / 1e9:g} deg"
+    latitude = "generic latitude" if problem.latitude is None else f"latitude {problem.latitude_deg} deg"
     yield f"Rank {rank} of {len(problem.names)}; verified {how}."
+    seen = sum(claim["degree"] is not None for _, claim in claims[problem.psi : len(problem.names)])
+    if seen and (fewest := fewest_positions(problem, seen)):
+        as_few = " This one has as few." if fewest == len(problem.positions) else ""
+        yield f"Counting: no scheme of fewer than {fewest} positions makes {seen} coefficients observable under {problem.carry} carry.{as_few}"
     yield f"Assumption: the model of book/src/certificate.md with {problem.carry} carry and {latitude}, {len(problem.positions)} positions."
     yield "The scheme file is that of the certificate." if compared else "No scheme file was compared."
 
