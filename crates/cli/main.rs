@@ -25,6 +25,7 @@ mod report;
 mod schema;
 mod simulate;
 mod third_party;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -78,6 +79,8 @@ enum Command {
     Report(report::Arguments),
     /// Recompute the equations and claims of the paper: what agrees, and what does not
     Paper(paper::Arguments),
+    /// Check a certificate of `obsdeg analyze --certificate`, with code of its own
+    Verify(verify::Arguments),
     /// Print what others wrote of this build, and the texts of their licences
     Licences(licences::Arguments),
     /// Print the completion script of a shell
@@ -181,6 +184,7 @@ fn run() -> Result<(), ExitCode> {
         Command::Design(a) => design::run(&a),
         Command::Report(a) => report::run(a, given),
         Command::Paper(a) => paper::run(&a),
+        Command::Verify(a) => verify::run(&a),
         Command::Licences(a) => licences::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man(a) => completions::man(&a),

@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 use obsdeg_calibration::{Calibration, SystemCalibration};
 use obsdeg_core::analysis::Analysis;
+use obsdeg_core::certificate::Certificate;
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
@@ -22,6 +23,8 @@ use crate::output;
 enum Kind {
     /// The JSON of `obsdeg analyze`
     Analysis,
+    /// The JSON of `obsdeg analyze --certificate`
+    Certificate,
     /// The JSON of `obsdeg paper`
     Audit,
     /// The JSON of `obsdeg simulate`
@@ -63,6 +66,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut schema = match a.kind {
         Kind::Analysis => written::<Analysis>(),
+        Kind::Certificate => written::<Certificate>(),
         Kind::Audit => written::<Audit>(),
         Kind::Simulation => written::<Simulation>(),
         Kind::Crosscheck => written::<CrossCheck>(),

@@ -128,6 +128,8 @@ class Analyze(Seeded, Positions, total=False):
     """Axes of Z in solutions [default: n]."""
     formulas: bool
     """Z and its derivatives, and psi and eps at each position, as formulas."""
+    certificate: bool
+    """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
 
 
 class Simulate(Seeded, Positions, Filtered, total=False):

@@ -78,6 +78,7 @@ fn crates() -> Imports {
         "python",
         "library",
         "cli",
+        "verify",
         "web",
     ];
     let imports = |name: &&str| {

@@ -4,10 +4,13 @@ use std::ops::RangeInclusive;
 
 use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{Analysis, AnalysisOptions};
+use obsdeg_core::certificate::certify;
+use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
-use obsdeg_report::{Answer, Document, Several, Table};
+use obsdeg_report::{Answer, Document, File, Several, Table};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::arguments::{ANY, InputOptions, SEED, Word, check_whole, one_of, whole};
 use crate::host::{Host, Now};
@@ -46,6 +49,10 @@ pub struct Analyze {
     /// Print Z and its derivatives, and psi and eps at each position, as formulas
     #[arg(long, help_heading = "Solutions")]
     pub formulas: bool,
+
+    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names the file.
+    #[arg(skip)]
+    pub certificate: bool,
 }
 
 /// The orders that may be asked for.
@@ -61,6 +68,7 @@ impl Default for Analyze {
             solutions: true,
             frame: Frame::default(),
             formulas: false,
+            certificate: false,
         }
     }
 }
@@ -168,6 +176,27 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
             Judgements::Several(Several(judged))
         }
     })
+}
+
+/// The certificate of the verdicts on the one scheme that was read, under its name `certificate.json`.
+///
+/// # Errors
+/// What has no certificate.
+pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
+    let [(_, Input::Scheme(scheme))] = read else {
+        return Err(Problem::input("a certificate is of one scheme; found a model, or several files"));
+    };
+    let text = certify(scheme, options.seed)?.text().map_err(|e| Problem::internal(e.to_string()))?;
+    Ok(File { name: "certificate.json".into(), bytes: text.into_bytes() })
+}
+
+/// The SHA-256 of the certificate of a scheme, in hexadecimal digits. It does not depend on a seed.
+///
+/// # Errors
+/// What has no certificate.
+pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
+    let text = certify(scheme, SEED)?.text().map_err(|e| Problem::internal(e.to_string()))?;
+    Ok(Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {

@@ -29,7 +29,7 @@ mod simulate;
 mod source;
 mod text;
 
-pub use analyze::{Analyze, Judged, Judgements, analyze};
+pub use analyze::{Analyze, Judged, Judgements, analyze, certificate};
 pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions, Word, one_of, whole};
 pub use calibrate::{Calibrate, Calibrated, calibrate};
 pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_calibrate, call_json};
