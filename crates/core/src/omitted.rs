@@ -143,13 +143,13 @@ pub fn omitted_verdicts(
             && first.determined == second.determined
             && nonzero(&first) == nonzero(&second);
         if agree {
-            let coefficients = platform.names().len() - platform.coefficients()..;
-            let changed =
-                |v: &Vec<u64>| v.get(coefficients.clone()).is_some_and(|v| v.iter().any(|x| *x != 0));
-            let exact = match first.changes.iter().any(changed) {
-                true => exact_changes(platform, model, seed),
-                false => Vec::new(),
-            };
+            let changing = |&j: &usize| first.changes[j].iter().any(|x| *x != 0);
+            let changing: Vec<usize> = (0..model.terms().len()).filter(changing).collect();
+            let mut exact = vec![Vec::new(); model.terms().len()];
+            if !changing.is_empty() {
+                let changes = exact_changes(platform, &model.only(&changing), seed);
+                changing.into_iter().zip(changes).for_each(|(j, of)| exact[j] = of);
+            }
             let order = values.roots().order;
             return Ok(verdicts(platform, model, &first, exact, order));
         }

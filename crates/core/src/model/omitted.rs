@@ -100,6 +100,14 @@ impl OmittedModel {
         Self { terms, errors: errors.into(), turning: turning_scheme(scheme) }
     }
 
+    /// The same scheme with some of the errors: those at `kept`, in ascending order.
+    pub fn only(&self, kept: &[usize]) -> Self {
+        let coefficients = self.errors.terms();
+        let errors: Vec<_> = kept.iter().filter_map(|&j| coefficients.get(j).cloned()).collect();
+        let terms = kept.iter().map(|&j| self.terms[j].clone()).collect();
+        Self { terms, errors: errors.into(), turning: self.turning.clone() }
+    }
+
     /// The errors in order.
     pub fn terms(&self) -> &[OmittedTerm] {
         &self.terms
