@@ -209,7 +209,7 @@ pub enum Finding {
 /// Errors that a calibration does not estimate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Omitted {
-    /// Number of errors that were tried, each by a score test on the residuals.
+    /// Number of errors that were tried, each by a score test on the residuals: those that a record can show.
     pub tried: usize,
     /// Error or pair that explains the residuals; null where chance is enough.
     pub suspicion: Option<Suspicion>,

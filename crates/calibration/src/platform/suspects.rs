@@ -38,7 +38,9 @@ pub(super) fn omitted(
     let platform = &first.plan.platform;
     let model = OmittedModel::new(platform);
     let classes = omitted_verdicts(platform, &model, seed).ok();
-    let tested = tested(problem, estimate, &model)?;
+    let class = |j: usize| classes.as_ref().map(|v| v.terms[j].class);
+    let shown = (0..model.terms().len()).map(|j| class(j).is_none_or(|c| c == OmittedClass::Visible));
+    let tested = tested(problem, estimate, &model, shown.collect())?;
     let silent = classes.iter().flat_map(|v| &v.terms).filter(|t| t.class == OmittedClass::Silent);
     let silent = silent.map(|t| SilentError { name: t.name.clone(), changes: t.changes.clone() });
     let suspicion = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
@@ -60,6 +62,7 @@ fn tested(
     problem: &Problem<'_>,
     estimate: &Estimate,
     model: &OmittedModel,
+    shown: Vec<bool>,
 ) -> Result<Tested, CalibrationError> {
     let m = model.terms().len();
     let mut score = Score {
@@ -67,6 +70,7 @@ fn tested(
         against: vec![0.0; m],
         chi_square: 0.0,
         degrees_of_freedom: 0.0,
+        shown,
     };
     let mut changes = Vec::new();
     for (r, (run, (linear, keys))) in problem.runs.iter().zip(&estimate.at.runs).enumerate() {

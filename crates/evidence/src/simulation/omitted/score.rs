@@ -32,6 +32,9 @@ pub struct Score {
     pub chi_square: f64,
     /// Degrees of freedom of the fit.
     pub degrees_of_freedom: f64,
+    /// True for each error that a record can show, by its exact class; what is left of the column of another one is
+    /// the width of the prior.
+    pub shown: Vec<bool>,
 }
 
 /// One error or a pair that explains residuals.
@@ -95,7 +98,7 @@ impl Score {
     pub fn tried(&self) -> Vec<usize> {
         let m = self.against.len();
         let largest = (0..m).map(|j| self.products[(j, j)]).fold(0.0, f64::max);
-        (0..m).filter(|&j| self.products[(j, j)] > ROUNDING * largest).collect()
+        (0..m).filter(|&j| self.shown[j] && self.products[(j, j)] > ROUNDING * largest).collect()
     }
 
     /// Fall of chi-square with one error among the unknowns.

@@ -451,7 +451,7 @@ fn classes_are_those_of_ranks_at_length() {
     assert!(20 * counts[3] < counts[..3].iter().sum::<usize>());
 }
 
-/// Whether an error enters no sample of Z1 and Z3, by the letters of the axes X, Y, Z at each cardinal position: the
+/// True if an error enters no sample of Z1 and Z3, by the letters of the axes X, Y, Z at each cardinal position: the
 /// conditions that the book states, each with its proof.
 fn enters_nothing(name: &str, positions: &[String]) -> bool {
     let all = |condition: &dyn Fn(&[u8]) -> bool| positions.iter().all(|p| condition(p.as_bytes()));
@@ -522,6 +522,8 @@ struct Records {
     /// Columns of the errors: in Z, and whitened.
     columns: Vec<(Vec<f64>, Vec<f64>)>,
     products: DMatrix<f64>,
+    /// Errors that are visible by their exact class.
+    shown: Vec<bool>,
 }
 
 impl Records {
@@ -539,7 +541,10 @@ impl Records {
         while let Some(step) = stepped.step().expect("finite") {
             rows.extend(step.chunks_exact(m).map(<[f64]>::to_vec));
         }
-        let mut out = Self { plan, gains, model, columns: Vec::new(), products: DMatrix::zeros(m, m) };
+        let classes = omitted_verdicts(&plan.platform, &model, 1).expect("classes");
+        let shown = classes.terms.iter().map(|t| t.class == OmittedClass::Visible).collect();
+        let products = DMatrix::zeros(m, m);
+        let mut out = Self { plan, gains, model, columns: Vec::new(), products, shown };
         for j in 0..m {
             let z: Vec<f64> = rows.iter().map(|r| r[j]).collect();
             let whitened = out.whitened(&z);
@@ -575,6 +580,7 @@ impl Records {
             against: self.columns.iter().map(|c| dot(&c.1)).collect(),
             chi_square: dot(&own),
             degrees_of_freedom: own.len() as f64 - self.plan.unknowns() as f64,
+            shown: self.shown.clone(),
         }
     }
 
