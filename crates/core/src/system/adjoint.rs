@@ -18,6 +18,22 @@ use super::values::Values;
 /// A series in time.
 type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
 
+/// Length of the first series: most runs end within as many orders.
+const SHORT: usize = 16;
+/// How many times as long series are made that turn out too short. What was computed before is computed again.
+const LONGER: usize = 4;
+
+/// Series that the rows of an order take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Sweeps {
+    /// Length of the longest.
+    pub(super) longest: u64,
+    /// Number of sweeps through the graph, each with series that are shorter by one.
+    pub(super) count: u64,
+    /// Orders of the values that are held before, and then.
+    pub(super) values: [u64; 2],
+}
+
 /// The rows of one run.
 #[derive(Debug, Clone)]
 pub(super) struct Adjoint<'a, S: Values> {
@@ -27,8 +43,10 @@ pub(super) struct Adjoint<'a, S: Values> {
     signals: Vec<Signal<S::Element>>,
     initial: Vec<Option<Initial<S::Element>>>,
     outputs: Vec<usize>,
-    /// The values of all nodes, of this many orders.
+    /// The values of all nodes, of this many orders; 0 before the first row.
     length: usize,
+    /// With fewer orders no unknown stays unseen: series are seldom longer.
+    enough: usize,
     values: Taylor<'a, S>,
     /// Of a quotient: one over the divisor, and minus the quotient over the divisor.
     quotients: Vec<Option<[Series<S>; 2]>>,
@@ -53,27 +71,50 @@ impl<'a, S: Values> Adjoint<'a, S> {
         if signals.iter().any(|s| matches!(s, Signal::Unknown { .. })) {
             return None;
         }
-        // with fewer orders nobody sees everything
-        let length = lanes / outputs.len().max(1) + 2;
+        let enough = lanes / outputs.len().max(1) + 2;
         let (signals, initial, outputs) = (signals.to_vec(), initial.to_vec(), outputs.to_vec());
         let plan = RefCell::new(f.plan(1));
         let quotients = Vec::new();
-        let mut out = Self {
+        Some(Self {
             dag,
             f,
             lanes,
             signals,
             initial,
             outputs,
-            length,
+            length: 0,
+            enough,
             values,
             quotients,
             plan,
             order: 0,
             held: Vec::new(),
+        })
+    }
+
+    /// The length of the series with which the rows of an order are computed.
+    fn length_for(&self, order: usize) -> usize {
+        if order < self.length {
+            return self.length;
+        }
+        let longer = (LONGER * self.length).max(SHORT).min(self.enough);
+        if order < longer { longer } else { order + 1 + order / 2 }
+    }
+
+    /// What the rows of an order will take.
+    pub(super) fn sweeps(&self, order: usize) -> Sweeps {
+        let length = self.length_for(order);
+        let held = self.values.length;
+        let (from, values) = match length == self.length {
+            true => (self.order + 1, held),
+            false => (0, held.max(length)),
         };
-        out.begin();
-        Some(out)
+        let count = (order + 1).saturating_sub(from);
+        Sweeps {
+            longest: length.saturating_sub(from) as u64,
+            count: count as u64,
+            values: [held as u64, values as u64],
+        }
     }
 
     /// Values up to the length, and what is held at order 0.
@@ -137,7 +178,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
     /// The rows of an order, not below those that were asked for before, one for each output.
     pub(super) fn rows(&mut self, order: usize) -> Vec<Series<S>> {
         if order >= self.length {
-            self.length = order + 1 + order / 2;
+            self.length = self.length_for(order);
             self.begin();
         }
         while self.order < order {

@@ -229,8 +229,9 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     let judged = judge_compiled(model, &compiled, seed, order)?;
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let mut out = answer(model, &judged, &symmetries);
+    out.note = symmetries.stopped.clone();
     out.branches = branches(&compiled);
-    out.to_resolve = remedies(model, &compiled, &judged, seed, order);
+    out.to_resolve = remedies(model, &compiled, &judged, (seed, symmetries.work), order);
     out.time = compiled.uses_time().then(|| match model.time {
         StartTime::Generic => "generic".into(),
         time => time.number().to_string(),
@@ -242,7 +243,9 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
         values_taken(model, &compiled, &judged, seed, options.count_limit.saturating_mul(1_000_000));
     let single: Vec<bool> = counts.iter().map(|c| *c == Some(Ok(1))).collect();
     let (found, missing) = solutions(model, &compiled, &judged, seed, &single);
-    out.note = missing.map(|reason| reason.to_string());
+    let notes: Vec<String> =
+        symmetries.stopped.into_iter().chain(missing.map(|reason| reason.to_string())).collect();
+    out.note = (!notes.is_empty()).then(|| notes.join("; "));
     for ((u, count), found) in judged.layout.unknowns.iter().zip(counts).zip(found) {
         if let Some(q) = out.quantities.iter_mut().find(|q| q.name == u.name) {
             let shown =

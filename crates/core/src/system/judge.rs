@@ -118,7 +118,7 @@ pub(crate) struct At<S: Values> {
     gap: Gap,
     steps: Steps<S>,
     /// Operations.
-    work: u64,
+    pub(crate) work: u64,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
@@ -214,6 +214,11 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
                 "no point was found at which it holds; expected constraints that can be solved one by one, or together where all but one are linear",
             );
             return of.place.error(message.into(), 0..of.text.len());
+        }
+        Singular::Memory(bytes) => {
+            return model
+                .work_limit
+                .refuse("gradients of its operations", &format!("{:.1e} bytes", bytes as f64));
         }
         Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
         Singular::Domain(node, function) => (

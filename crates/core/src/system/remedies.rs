@@ -38,12 +38,12 @@ struct Search<'a> {
     out: Remedies,
 }
 
-/// The remedies of a model that was judged; bounds of the work stand at the head of this file.
+/// The remedies of a model that was judged, after `before` operations of other searches; bounds of the work stand at the head of this file.
 pub(super) fn remedies(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
-    seed: u64,
+    (seed, before): (u64, u64),
     order: Option<usize>,
 ) -> Remedies {
     let unknowns = &judged.layout.unknowns;
@@ -62,8 +62,8 @@ pub(super) fn remedies(
     }
     let n = unknowns.len().max(UNKNOWNS);
     let in_digits = judged.digits().map_or(MOST_VERDICTS, |_| MOST_IN_DIGITS);
-    // all together take no more than one verdict may
-    let affordable = model.work_limit.operations() / judged.work.max(1);
+    // all together, with the search for symmetries before them, take no more than one verdict may
+    let affordable = model.work_limit.operations().saturating_sub(before) / judged.work.max(1);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
     let budget = budget.min(usize::try_from(affordable).unwrap_or(usize::MAX));
     let out = Remedies::default();

@@ -3,7 +3,7 @@
 use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
-use super::adjoint::Adjoint;
+use super::adjoint::{Adjoint, Sweeps};
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
@@ -366,7 +366,8 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         let compiled = self.compiled;
         let roots: Vec<usize> =
             compiled.outputs(point.experiment).iter().chain(&compiled.combinations).copied().collect();
-        Taylor::new(
+        Taylor::within(
+            self.model.work_limit.bytes(),
             &compiled.dag,
             self.field.clone(),
             lanes,
@@ -437,16 +438,24 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                     _ => {}
                 }
             }
-            let Ok(mut taylor) = self.series(&generic, lanes) else { continue };
+            let mut taylor = match self.series(&generic, lanes) {
+                Ok(taylor) => taylor,
+                Err(Singular::Memory(bytes)) => {
+                    work.refuse(0, bytes);
+                    return None;
+                }
+                Err(_) => continue,
+            };
             let mut adjoint = self.adjoint(&generic, lanes);
             let mut whole = S::Space::new(f.clone(), lanes);
             let mut seen = S::Space::new(f.clone(), unknowns);
             for row in known {
                 seen.insert(row);
             }
-            let cost = cost_of(&taylor, adjoint.is_some(), self.compiled.outputs(point.experiment).len());
             for order in 0..=lanes {
-                if !work.spend(order, &cost) {
+                let outputs = self.compiled.outputs(point.experiment).len();
+                let sweeps = adjoint.as_ref().map(|a| a.sweeps(order));
+                if !work.spend(order, &cost_of(&taylor, sweeps, outputs)) {
                     return None;
                 }
                 let mut grew = false;
@@ -474,7 +483,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
 }
 
 /// What the rows of a run cost.
-fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: bool, outputs: usize) -> Cost {
+fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: Option<Sweeps>, outputs: usize) -> Cost {
     let [fixed, growing, nodes, products] = taylor.operations();
     Cost {
         fixed,
@@ -537,7 +546,8 @@ impl<'a, S: Values> SystemRows<'a, S> {
         let maker = Maker { model, compiled, layout, field };
         for attempt in 0..S::ATTEMPTS {
             match Self::at(&maker, rng, attempt) {
-                Err(singular) => last = singular,
+                // no other point takes less memory
+                Err(singular) if !matches!(singular, Singular::Memory(_)) => last = singular,
                 found => return found,
             }
         }
@@ -703,7 +713,8 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
         }
         let single = self.runs.len() == 1;
         for run in self.runs.iter_mut().filter(|r| !r.done) {
-            if !self.work.spend(order, &cost_of(&run.taylor, run.adjoint.is_some(), run.outputs.len())) {
+            let sweeps = run.adjoint.as_ref().map(|a| a.sweeps(order));
+            if !self.work.spend(order, &cost_of(&run.taylor, sweeps, run.outputs.len())) {
                 return false;
             }
             let mut grew = false;

@@ -8,6 +8,7 @@ use super::functions::gcd;
 use super::judge::{At, Judgement, climb_at};
 use super::model::{Compiled, SystemModel};
 use super::values::Values;
+use super::work::WorkLimit;
 use crate::degree::sparse::{extend_by_short_vectors, support_in};
 
 /// Points at which a direction must vanish, at most.
@@ -64,6 +65,48 @@ pub struct Symmetries {
     pub unexplained: Vec<Vec<usize>>,
     /// Observable combinations of unobservable unknowns.
     pub invariants: Vec<Invariant>,
+    /// Where the search ended before its end: what was too much, and the option that allows more.
+    pub stopped: Option<String>,
+    /// Operations of the search.
+    pub(super) work: u64,
+}
+
+/// Operations that a search for symmetries may still take: all together as many as one verdict.
+struct Budget {
+    limit: WorkLimit,
+    spent: u64,
+    /// True once something was refused.
+    over: bool,
+}
+
+impl Budget {
+    /// Counts operations before they are done; false if they are beyond the limit.
+    fn spend(&mut self, operations: u64) -> bool {
+        self.over |= self.spent.saturating_add(operations) > self.limit.operations();
+        if !self.over {
+            self.spent += operations;
+        }
+        !self.over
+    }
+
+    /// Why the search ended.
+    fn stopped(&self) -> Option<String> {
+        let limit = self.limit.0;
+        self.over.then(|| {
+            format!(
+                "not all symmetries were sought: the search takes more operations than one verdict may, beyond --work-limit {limit} ({:.1e} \
+                 operations); a larger --work-limit allows more",
+                self.limit.operations() as f64
+            )
+        })
+    }
+}
+
+/// Operations of a point and of the elimination of its rows, `columns` numbers each, in numbers of `words` words.
+fn cost_of_point(verdict: u64, rows: usize, columns: usize, words: usize) -> u64 {
+    let [rows, columns, words] = [rows, columns, words].map(|n| n as u64);
+    let elimination = rows.saturating_mul(columns).saturating_mul(columns).saturating_mul(words * words);
+    verdict.saturating_add(elimination)
 }
 
 /// The vector as small rationals, one at its first entry.
@@ -122,7 +165,15 @@ fn symmetries_in<S: Values>(
         }
     }
     let (mut last, mut at): (usize, Option<At<S>>) = (0, None);
+    let rank = judged.findings.degrees.rank();
+    let words = size_of::<S::Element>().div_ceil(8);
+    let mut budget = Budget { limit: model.work_limit, spent: 0, over: false };
+    // a verdict rests on two points
+    let mut verdict = judged.work / 2;
     for point in 0..POINTS {
+        if !budget.spend(cost_of_point(verdict, rank, 2 * n, words)) {
+            break;
+        }
         let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng)?;
         for i in 0..here.span.rank() {
             let row = here.span.row(i);
@@ -130,16 +181,19 @@ fn symmetries_in<S: Values>(
             let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
             basis.insert(&both);
         }
+        verdict = here.work;
         at = Some(here);
         if point >= 2 && basis.rank() == last {
             break;
         }
         last = basis.rank();
     }
-    let Some(at) = at else { return Ok(Symmetries::default()) };
+    let Some(at) = at else {
+        return Ok(Symmetries { stopped: budget.stopped(), work: budget.spent, ..Symmetries::default() });
+    };
     let mut tangents = space(n);
     let mut out = Symmetries::default();
-    let short = match basis.gap().is_decisive(S::BITS) {
+    let short = match !budget.over && basis.gap().is_decisive(S::BITS) {
         true => extend_by_short_vectors(&f, &basis.null_space(), &mut space(2 * n)),
         false => Vec::new(),
     };
@@ -154,7 +208,10 @@ fn symmetries_in<S: Values>(
     if out.found.len() < defect {
         let moved: Vec<usize> =
             (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
-        let mut draw = || climb_at(model, compiled, &judged.layout, f.clone(), &mut rng);
+        let mut draw = |columns: usize| match budget.spend(cost_of_point(verdict, rank, columns, words)) {
+            true => climb_at(model, compiled, &judged.layout, f.clone(), &mut rng).map(Some),
+            false => Ok(None),
+        };
         // constants that every segment and experiment shares may be factors too
         let changed =
             model.segments.iter().map(|s| &s.constants).chain(model.own.iter().map(|e| &e.constants));
@@ -181,6 +238,7 @@ fn symmetries_in<S: Values>(
         out.unexplained = moving.iter().map(|v| support_in(&f, v)).collect();
     }
     out.invariants = invariants(&f, n, &out.found, &at);
+    (out.stopped, out.work) = (budget.stopped(), budget.spent);
     Ok(out)
 }
 
@@ -202,14 +260,14 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
 }
 
 /// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a
-/// linear system for the a_ij from rows at several points.
+/// linear system for the a_ij from rows at several points, drawn with the number of columns as long as work is left.
 fn directions<S: Values>(
     f: &S,
     moved: &[usize],
     products: &[Vec<usize>],
     tangents: &mut S::Space,
     at: &At<S>,
-    draw: &mut dyn FnMut() -> Result<At<S>, ModelError>,
+    draw: &mut dyn FnMut(usize) -> Result<Option<At<S>>, ModelError>,
 ) -> Result<Vec<PolynomialDirection>, ModelError> {
     let width = products.len();
     let value =
@@ -218,7 +276,7 @@ fn directions<S: Values>(
     let mut basis = space(moved.len() * width);
     let (mut rank, mut still) = (0, 0);
     for _ in 0..POLYNOMIAL_POINTS {
-        let here = draw()?;
+        let Some(here) = draw(moved.len() * width)? else { break };
         let values: Vec<S::Element> = products.iter().map(|p| value(&here, p)).collect();
         for i in 0..here.span.rank() {
             let row = here.span.row(i);

@@ -66,6 +66,8 @@ pub(crate) enum Singular {
     Kink(usize, Function),
     /// Constraints that could not be solved here, this one among them.
     Constraint(usize),
+    /// Gradients that take this many bytes, beyond the limit.
+    Memory(u64),
 }
 
 /// The series of one run.
@@ -116,6 +118,25 @@ impl<'a, S: Values> Taylor<'a, S> {
         moving: bool,
         rng: SplitMix64,
     ) -> Result<Self, Singular> {
+        Self::within(u64::MAX, dag, f, lanes, signals, initial, roots, moving, rng)
+    }
+
+    /// The same where gradients take at most `most` bytes.
+    ///
+    /// # Errors
+    /// [`Singular`] when the point is none, or where they take more.
+    #[allow(clippy::too_many_arguments, reason = "all of a run")]
+    pub(crate) fn within(
+        most: u64,
+        dag: &'a Dag,
+        f: S,
+        lanes: usize,
+        signals: Vec<Signal<S::Element>>,
+        initial: &[Option<Initial<S::Element>>],
+        roots: &[usize],
+        moving: bool,
+        rng: SplitMix64,
+    ) -> Result<Self, Singular> {
         let n = dag.ops.len();
         let mut out = Self {
             dag,
@@ -139,6 +160,12 @@ impl<'a, S: Values> Taylor<'a, S> {
         out.need(roots, moving);
         out.start_values(initial)?;
         out.find_support(initial, moving);
+        let gradients = (0..n).filter(|&i| out.differentiated[i] && !out.known[i]);
+        let numbers: u64 = gradients.map(|i| out.support[i].len() as u64).sum();
+        let bytes = numbers.saturating_mul(size_of::<S::Element>() as u64);
+        if bytes > most {
+            return Err(Singular::Memory(bytes));
+        }
         out.start_duals(initial)?;
         out.length = 1;
         Ok(out)

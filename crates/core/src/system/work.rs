@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 
+use super::adjoint::Sweeps;
 use super::error::ModelError;
 
 /// Operations in a unit of the limit.
@@ -10,10 +11,9 @@ const UNIT: u64 = 1_000_000;
 const PER_BYTE: u64 = 2;
 /// Series that are held for every operation of a model, backwards.
 const HELD: u64 = 4;
-/// Operations of the three transforms of a product with two factors, for each point and each halving.
-const TRANSFORM: (u64, u64) = (9, 2);
-/// Orders that the first derivatives cost whatever their order is.
-const FIRST: u64 = 8;
+/// Operations of the three transforms of a product with two factors, for each point and each halving: half of them
+/// multiply and take two sums, which count as one and a half.
+const TRANSFORM: (u64, u64) = (9, 4);
 
 /// Limit of the work of one verdict on a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +29,28 @@ impl WorkLimit {
     /// The limit in operations.
     pub fn operations(self) -> u64 {
         self.0.saturating_mul(UNIT)
+    }
+}
+
+impl WorkLimit {
+    /// The limit in bytes of memory.
+    pub fn bytes(self) -> u64 {
+        self.operations() / PER_BYTE
+    }
+
+    /// Why a model is not judged that takes more bytes, or more operations, than the limit.
+    pub(super) fn refuse(self, step: &str, what: &str) -> ModelError {
+        ModelError {
+            what: "the model".into(),
+            message: format!(
+                "too large to be judged at the limit of work: {step} take {what}, beyond --work-limit {} ({:.1e} operations, {:.1e} \
+                 bytes); a larger --work-limit allows more, and a lower --order, a smaller model or fewer unknowns need less",
+                self.0,
+                self.operations() as f64,
+                self.bytes() as f64
+            ),
+            span: None,
+        }
     }
 }
 
@@ -57,8 +79,8 @@ pub(super) struct Cost {
     pub(super) nodes: u64,
     /// Number of those that multiply or divide two series.
     pub(super) products: u64,
-    /// True if rows are computed backwards, output by output.
-    pub(super) backwards: bool,
+    /// Series of the rows that are computed backwards, output by output; none where they are computed forwards.
+    pub(super) backwards: Option<Sweeps>,
     /// Number of outputs.
     pub(super) outputs: u64,
     /// Number of unknowns.
@@ -72,33 +94,41 @@ impl Cost {
     fn operations(&self, order: u64) -> u64 {
         let next = order.saturating_add(1);
         let rows = match self.backwards {
-            false => self.fixed.saturating_add(self.growing.saturating_mul(next)),
-            true => {
-                // the series that are left are about half as long as those before
-                let length = order / 2 + FIRST;
-                let short = length.saturating_mul(2 * length);
-                let points = (2 * length).next_power_of_two();
-                let transforms = points * u64::from(points.ilog2()) * TRANSFORM.0 / TRANSFORM.1;
-                // many digits are multiplied coefficient by coefficient
-                let product = if self.words > 1 { short } else { short.min(transforms) };
-                let sums = self.nodes.saturating_mul(2 * length);
-                let products = self.products.saturating_mul(product.saturating_add(next));
-                self.outputs.saturating_mul(sums.saturating_add(products))
-            }
+            None => self.fixed.saturating_add(self.growing.saturating_mul(next)),
+            Some(sweeps) => self.swept(sweeps),
         };
         let rank = self.outputs.saturating_mul(next).min(self.lanes);
         let elimination = self.outputs.saturating_mul(self.lanes).saturating_mul(rank);
         rows.saturating_add(elimination).saturating_mul(self.words.saturating_mul(self.words))
     }
 
+    /// Operations of the values that are missing, and of sweeps through the graph.
+    fn swept(&self, sweeps: Sweeps) -> u64 {
+        let triangle = |n: u64| n.saturating_mul(n + 1) / 2;
+        let [before, then] = sweeps.values.map(triangle);
+        let values = self.products.saturating_mul(then.saturating_sub(before));
+        let sweep = |length: u64| {
+            let short = length.saturating_mul(length);
+            let points = (2 * length.max(1)).next_power_of_two();
+            let transforms = points * u64::from(points.ilog2()) * TRANSFORM.0 / TRANSFORM.1;
+            // many digits are multiplied coefficient by coefficient
+            let product = if self.words > 1 { short } else { short.min(transforms) };
+            let sums = self.nodes.saturating_mul(length);
+            sums.saturating_add(self.products.saturating_mul(product))
+        };
+        let all = (0..sweeps.count).map(|k| sweep(sweeps.longest.saturating_sub(k)));
+        let one_output = all.fold(0, u64::saturating_add);
+        values.saturating_add(self.outputs.saturating_mul(one_output))
+    }
+
     /// Bytes of the series up to an order, and of the rows.
     fn bytes(&self, order: u64) -> u64 {
         let series = match self.backwards {
-            false => self.fixed.saturating_add(self.nodes),
-            true => self.nodes.saturating_mul(HELD),
+            None => self.fixed.saturating_add(self.nodes).saturating_mul(order + 1),
+            Some(sweeps) => self.nodes.saturating_mul(HELD).saturating_mul(sweeps.values[1]),
         };
         let rows = self.lanes.saturating_mul(self.lanes).saturating_mul(2);
-        series.saturating_mul(order + 1).saturating_add(rows).saturating_mul(8 * self.words)
+        series.saturating_add(rows).saturating_mul(8 * self.words)
     }
 }
 
@@ -112,12 +142,17 @@ impl Work {
         let most = self.limit.operations();
         let spent = self.spent.get().saturating_add(cost.operations(order as u64));
         let bytes = cost.bytes(order as u64);
-        if spent > most || bytes > most / PER_BYTE {
+        if spent > most || bytes > self.limit.bytes() {
             self.refused.set(Some((order, spent, bytes)));
             return false;
         }
         self.spent.set(spent);
         true
+    }
+
+    /// Refuses the rows of an order, which take this many bytes.
+    pub(super) fn refuse(&self, order: usize, bytes: u64) {
+        self.refused.set(Some((order, self.spent.get(), bytes)));
     }
 
     /// Operations so far.
@@ -128,22 +163,11 @@ impl Work {
     /// Why the verdict was not computed, if it was not.
     pub(crate) fn refused(&self) -> Option<ModelError> {
         let (order, spent, bytes) = self.refused.get()?;
-        let limit = self.limit.0;
-        let what = match bytes > self.limit.operations() / PER_BYTE {
+        let what = match bytes > self.limit.bytes() {
             true => format!("{:.1e} bytes", bytes as f64),
             false => format!("{:.1e} operations", spent as f64),
         };
-        Some(ModelError {
-            what: "the model".into(),
-            message: format!(
-                "too large to be judged at the limit of work: derivatives of order {order} take {what}, beyond --work-limit {limit} \
-                 ({:.1e} operations, {:.1e} bytes); a larger --work-limit allows more, and a lower --order, a smaller model or fewer unknowns \
-                 need less",
-                self.limit.operations() as f64,
-                (self.limit.operations() / PER_BYTE) as f64
-            ),
-            span: None,
-        })
+        Some(self.limit.refuse(&format!("derivatives of order {order}"), &what))
     }
 }
 
@@ -151,28 +175,32 @@ impl Work {
 mod tests {
     use super::*;
 
-    fn cost(backwards: bool) -> Cost {
+    fn cost(backwards: Option<Sweeps>) -> Cost {
         Cost { fixed: 10, growing: 6, nodes: 5, products: 3, backwards, outputs: 2, lanes: 7, words: 1 }
     }
 
     /// By hand: 10 + 6 * 4 of the rows of order 3, and 2 rows of 7 against a rank of at most 7.
     #[test]
     fn operations_by_hand() {
-        assert_eq!(cost(false).operations(3), 10 + 6 * 4 + 2 * 7 * 7);
-        assert_eq!(cost(false).operations(0), 10 + 6 + 2 * 7 * 2);
-        // series of 9: 5 sums of twice that, 3 products of 2 * 81 terms, and 4 of the values
-        assert_eq!(cost(true).operations(3), 2 * (5 * 18 + 3 * (2 * 81 + 4)) + 2 * 7 * 7);
-        // series of 108: transforms of 256 points
-        let transforms = 256 * 8 * 9 / 2;
-        assert_eq!(cost(true).operations(200), 2 * (5 * 216 + 3 * (transforms + 201)) + 2 * 7 * 7);
-        assert_eq!(Cost { words: 3, ..cost(false) }.operations(0), 9 * (10 + 6 + 2 * 7 * 2));
-        assert_eq!(cost(false).bytes(3), 8 * ((10 + 5) * 4 + 2 * 49));
+        assert_eq!(cost(None).operations(3), 10 + 6 * 4 + 2 * 7 * 7);
+        assert_eq!(cost(None).operations(0), 10 + 6 + 2 * 7 * 2);
+        // two sweeps with series of 9 and 8: 5 sums of as many, 3 products of 81 and 64 terms; values of orders 4 to 9
+        let sweeps = Sweeps { longest: 9, count: 2, values: [4, 10] };
+        let values = 3 * (5 + 6 + 7 + 8 + 9 + 10);
+        let elimination = 2 * 7 * 7;
+        assert_eq!(cost(Some(sweeps)).operations(3), values + 2 * (5 * 17 + 3 * (81 + 64)) + elimination);
+        // a series of 108: transforms of 256 points
+        let (transforms, long) = (256 * 8 * 9 / 4, Sweeps { longest: 108, count: 1, values: [200, 200] });
+        assert_eq!(cost(Some(long)).operations(200), 2 * (5 * 108 + 3 * transforms) + elimination);
+        assert_eq!(cost(Some(long)).bytes(3), 8 * (5 * 4 * 200 + 2 * 49));
+        assert_eq!(Cost { words: 3, ..cost(None) }.operations(0), 9 * (10 + 6 + 2 * 7 * 2));
+        assert_eq!(cost(None).bytes(3), 8 * ((10 + 5) * 4 + 2 * 49));
     }
 
     #[test]
     fn what_is_beyond_is_refused_with_its_option() {
         let work = Work::new(WorkLimit(1000));
-        let large = Cost { growing: 400_000_000, ..cost(false) };
+        let large = Cost { growing: 400_000_000, ..cost(None) };
         assert!(work.spend(0, &large) && work.refused().is_none());
         assert!(!work.spend(1, &large));
         assert_eq!(work.spent(), 400_000_000 + 10 + 28);
@@ -184,7 +212,7 @@ mod tests {
             "{message}"
         );
         let work = Work::new(WorkLimit(1000));
-        assert!(!work.spend(9, &Cost { fixed: 10_000_000, ..cost(false) }));
+        assert!(!work.spend(9, &Cost { fixed: 10_000_000, ..cost(None) }));
         let message = work.refused().expect("refused").to_string();
         assert!(message.contains("order 9 take 8.0e8 bytes"), "{message}");
     }
