@@ -3,6 +3,7 @@ broke."""
 
 from __future__ import annotations
 
+import copy
 import multiprocessing
 import os
 import threading
@@ -15,6 +16,16 @@ Executors = Callable[[], Executor]
 
 #: Seconds between two looks at a cluster from which nothing comes, and until it has to answer one.
 PULSE = 5.0
+#: Name of the processes of :func:`processes`.
+WORKER = "obsdeg campaign worker"
+#: Exit code of such a process that was to begin a campaign itself.
+UNGUARDED = 71
+#: Seconds for which the thread of a broken pool is waited for.
+BROKEN = 5.0
+GUARD = (
+    "the script begins its campaign again in every worker, which imports it, so that no worker can start; "
+    'put what the script does below a line `if __name__ == "__main__":`'
+)
 
 
 def processes(workers: int | None = None) -> ProcessPoolExecutor:
@@ -24,7 +35,41 @@ def processes(workers: int | None = None) -> ProcessPoolExecutor:
     something, and end when it ends, also where it is killed.
     """
     start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-    return ProcessPoolExecutor(workers, multiprocessing.get_context(start), initializer=_end_with_parent)
+    context = copy.copy(multiprocessing.get_context(start))
+    begin: Callable[..., Any] = context.Process
+
+    def named(*args: Any, **options: Any) -> Any:
+        return begin(*args, **{**options, "name": WORKER})
+
+    context.__dict__["Process"] = named
+    return ProcessPoolExecutor(workers, context, initializer=_end_with_parent)
+
+
+def check_main() -> None:
+    """Refuses to begin a campaign in a process that is still importing the script that started it.
+
+    A process of :func:`processes` ends in silence: its driver has the error, once (:func:`unguarded`).
+
+    Raises:
+        RuntimeError: what the script lacks.
+        SystemExit: the same, in the server that newer versions of Python fork workers from.
+    """
+    here = multiprocessing.current_process()
+    if not getattr(here, "_inheriting", False):
+        return
+    if here.name == WORKER:
+        os._exit(UNGUARDED)
+    raise SystemExit(GUARD) if here.name == "MainProcess" else RuntimeError(GUARD)
+
+
+def unguarded(pool: Executor) -> str | None:
+    """Why no process of a broken pool can begin, if one ended in :func:`check_main`; None otherwise."""
+    processes = dict(getattr(pool, "_processes", None) or {}) if isinstance(pool, ProcessPoolExecutor) else {}
+    manager = getattr(pool, "_executor_manager_thread", None)
+    if manager is not None:
+        # it asks for exit codes too, and each can be read once
+        manager.join(BROKEN)
+    return GUARD if any(process.exitcode == UNGUARDED for process in processes.values()) else None
 
 
 def _end_with_parent() -> None:

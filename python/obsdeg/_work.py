@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pickle import PicklingError
 from typing import Any
 
-from ._executors import PULSE, Executors, close, unreachable, workers_of
+from ._executors import PULSE, Executors, close, unguarded, unreachable, workers_of
 
 #: Errors of input: the same task would raise them again. ``obsdeg.ProblemError`` is a ValueError.
 INPUT = (ValueError, TypeError, PicklingError)
@@ -123,6 +123,8 @@ class Work:
                     # one that had tasks has them counted as losses, which end; one that takes none says
                     # nothing of any task
                     fruitless = 0 if self.waiting else fruitless + 1
+                    if (why := unguarded(pool)) is not None:
+                        raise self._without_workers(why)
                     why = unreachable(pool)
                     if why is not None or fruitless > REFUSED:
                         raise self._without_workers(why or str(broken) or type(broken).__name__) from broken

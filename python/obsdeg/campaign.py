@@ -11,7 +11,8 @@ With Dask Distributed::
         found = campaign.design("search", 40, executor=client.get_executor, positions=7, carry="inertial")
 
 With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: :func:`processes`. A script that
-starts processes has its work below ``if __name__ == "__main__":``, as everywhere in Python.
+starts processes has its work below ``if __name__ == "__main__":``, as everywhere in Python; one without it
+ends in a :class:`CampaignError` that says so.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from typing import Any, Literal
 import obsdeg
 
 from ._asked import digest, key
-from ._executors import Executors, RayExecutor, processes
+from ._executors import Executors, RayExecutor, check_main, processes
 from ._files import place
 from ._judged import FOUND, Judged, judge, name_of, parquet, row_of
 from ._judged import done as there_in
@@ -73,6 +74,7 @@ def run(
             answered for 30 s; ``pending`` has the tasks that were drawn and are not done.
         obsdeg.ProblemError: what is wrong with a task, which it names and has as ``task``.
     """
+    check_main()
     if ahead is not None:
         _check("ahead", ahead, 1)
     _check("retries", retries, 0)
@@ -158,6 +160,7 @@ def design(
         CampaignError: a part failed too often, or the scheduler of a cluster does not answer.
         obsdeg.ProblemError: what is wrong with the options.
     """
+    check_main()
     _check("parts", parts, 1)
     if not checkpoint > 0:
         raise ValueError(f"checkpoint: found {checkpoint}; expected more than 0 s")
@@ -293,6 +296,7 @@ def sweep(
             chunk is kept.
         RuntimeError: another sweep is at work in the folder.
     """
+    check_main()
     if chunk is not None:
         _check("chunk", chunk, 1)
     _check("retries", retries, 0)

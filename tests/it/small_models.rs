@@ -137,6 +137,73 @@ fn ten_thousand_small_models_end() {
     all_end(0..RELEASE);
 }
 
+/// A model of one square matrix and its entry (1,1).
+fn of_a_square(n: usize) -> String {
+    format!("name = \"m\"\n[states]\n\"A[{n},{n}]\" = \"A*A\"\n[outputs]\ny = \"A[1,1]\"\n")
+}
+
+/// What `analyze` answers in JSON, within the processor time and the memory of small models, or its error.
+fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
+    let mut file = tempfile::NamedTempFile::new().expect("a file");
+    file.write_all(text.as_bytes()).expect("written");
+    let limits = format!(
+        "ulimit -t {SECONDS}; ulimit -v {KIB}; exec \"$0\" analyze --format json \"$@\" --model \"$FILE\""
+    );
+    let done = Command::new("sh")
+        .args(["-c", &limits, env!("CARGO_BIN_EXE_obsdeg")])
+        .args(options)
+        .env("FILE", file.path())
+        .output()
+        .expect("a shell");
+    match done.status.code() {
+        Some(0) => Ok(serde_json::from_slice(&done.stdout).expect("JSON")),
+        Some(2) => Err(String::from_utf8_lossy(&done.stderr).into_owned()),
+        _ => panic!("{:?}: {}", done.status, String::from_utf8_lossy(&done.stderr)),
+    }
+}
+
+/// Matrices: the output is a generating function of its first row and column in powers of the start,
+/// `A(t) = A0 (1 - t A0)^-1`, so that it holds the moments `(A0^k)[1,1]`, k = 1, 2, ... These are those of a strictly
+/// proper transfer function of order n with a first moment of one: 2n - 1 numbers are free, and as many orders show them.
+#[test]
+fn matrices_are_judged_within_the_limits() {
+    for n in [3, 5, 10] {
+        let answer = answered(&of_a_square(n), &["--solutions", "off"]).expect("judged");
+        assert_eq!(answer["rank"], 2 * n - 1, "{n}");
+        let profile: Vec<usize> = serde_json::from_value(answer["rank_profile"].clone()).expect("a profile");
+        assert!(profile.iter().take(2 * n - 1).copied().eq(1..2 * n), "{n}: {profile:?}");
+    }
+}
+
+/// Matrices beyond a limit are refused at once, with what was too much and the option that allows more.
+#[test]
+fn matrices_beyond_the_limits_are_refused() {
+    let chain = "name = \"m\"\n[states]\n\"A[10,10]\" = \"A*B\"\n\"B[10,10]\" = \"B*C\"\n\"C[10,10]\" = \"C*A\"\n\
+                 [outputs]\ny = \"A[1,1]\"\n";
+    for (text, limit, expected) in [
+        (of_a_square(16), "100", "derivatives of order"),
+        (of_a_square(32), "600", "gradients of its operations take 5.3e8 bytes"),
+        (chain.into(), "600", "derivatives of order"),
+    ] {
+        let error = answered(&text, &["--work-limit", limit]).expect_err(expected);
+        assert!(error.contains(expected), "{expected}: {error}");
+        let option = format!("beyond --work-limit {limit} ");
+        assert!(error.contains(&option) && error.contains("a larger --work-limit allows more"), "{error}");
+    }
+}
+
+/// Where solutions are not counted, the sentence names the option that allows more work, and with more they are.
+#[test]
+fn solutions_beyond_the_limit_name_their_option() {
+    let text = "name = \"m\"\n[states]\nx = \"-a*x^2 + b*y\"\ny = \"a*b*x - c*y\"\n\
+                [parameters]\na = {}\nb = {}\nc = {}\n[outputs]\nz = \"x\"\n";
+    let reason = |limit: &str| {
+        let answer = answered(text, &["--count-limit", limit]).expect("judged");
+        answer.to_string().contains("a larger --count-limit allows more")
+    };
+    assert!(reason("0") && !reason("30"));
+}
+
 /// What an adversary wrote: each is refused with what was too much.
 #[test]
 fn small_texts_that_ask_for_too_much_are_refused() {

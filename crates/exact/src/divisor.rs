@@ -402,7 +402,7 @@ mod tests {
     const P: u64 = (1 << 60) + 33;
 
     fn algebra(seed: u64) -> Algebra {
-        Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: Work { left: 1 << 32 } }
+        Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: Work::new(1 << 32) }
     }
 
     /// A polynomial of some small terms.

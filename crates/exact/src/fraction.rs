@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn fractions_are_their_values() {
         let f = Field::new((1 << 60) + 33);
-        let mut s = Algebra { f, rng: SplitMix64::new(3), work: Work { left: 1 << 32 } };
+        let mut s = Algebra { f, rng: SplitMix64::new(3), work: Work::new(1 << 32) };
         let mut rng = SplitMix64::new(7);
         for _ in 0..60 {
             let point: Vec<u64> = (0..4).map(|_| f.from_u64(rng.next_u64())).collect();

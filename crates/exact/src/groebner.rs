@@ -14,6 +14,9 @@ use crate::{Field, SplitMix64, interrupt};
 pub struct Work {
     /// What is left.
     pub left: u64,
+    /// True once more was asked for than was left. Without it [`OverLimit`] comes from a power above 255, which no
+    /// amount of work allows.
+    pub used_up: bool,
 }
 
 /// The work is beyond its limit.
@@ -21,13 +24,20 @@ pub struct Work {
 pub struct OverLimit;
 
 impl Work {
+    /// So much of it.
+    pub const fn new(left: u64) -> Self {
+        Self { left, used_up: false }
+    }
+
     /// Takes so much.
     ///
     /// # Errors
     /// [`OverLimit`] when less is left.
     pub fn take(&mut self, amount: u64) -> Result<(), OverLimit> {
         interrupt::check();
-        self.left = self.left.checked_sub(amount).ok_or(OverLimit)?;
+        let left = self.left.checked_sub(amount);
+        self.used_up |= left.is_none();
+        self.left = left.ok_or(OverLimit)?;
         Ok(())
     }
 }
@@ -484,7 +494,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ENOUGH: Work = Work { left: 50_000_000 };
+    const ENOUGH: Work = Work::new(50_000_000);
 
     fn field() -> Field {
         Field::new((1 << 60) + 33)
@@ -659,9 +669,10 @@ mod tests {
         assert_eq!(basis.dimension(100), Ok(Some(16)));
         assert!(is_basis_of(&basis, &input, &[1; 5]));
         let needed = ENOUGH.left - work.left;
-        let mut short = Work { left: needed / 2 };
+        assert!(!work.used_up);
+        let mut short = Work::new(needed / 2);
         let part = Basis::new(&f, &[1; 5], &input, &mut short);
-        assert!(!part.is_complete());
+        assert!(!part.is_complete() && short.used_up);
         // all that was found is in the ideal
         assert!(part.elements().iter().all(|p| divided(p.clone(), &basis.elements(), &[1; 5]).is_empty()));
     }

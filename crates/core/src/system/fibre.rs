@@ -48,8 +48,13 @@ pub(super) enum NotCounted {
     #[error("an equation has more than {TERMS} terms")]
     TooLong,
     /// Beyond the limit.
-    #[error("the elimination is beyond its limit of work")]
+    #[error(
+        "the elimination takes more products of coefficients than --count-limit allows; a larger --count-limit allows more"
+    )]
     OverLimit,
+    /// A power that the elimination does not form.
+    #[error("the elimination would form powers above 255, whatever --count-limit")]
+    TooHigh,
     /// More than counted.
     #[error("there are more than {SOLUTIONS}")]
     TooMany,
@@ -99,9 +104,14 @@ pub(super) fn values_taken(
             return vec![Err(NotCounted::TooLarge); degrees.degree.len()];
         }
         let mut rng = model.random(seed, &format!("solutions, field {i}"));
-        let mut work = Work { left: limit };
-        at_point(model, compiled, judged, (fields[i], &mut rng), order, &mut work)
-            .unwrap_or_else(|e| vec![Err(e); degrees.degree.len()])
+        let mut work = Work::new(limit);
+        let counts = at_point(model, compiled, judged, (fields[i], &mut rng), order, &mut work)
+            .unwrap_or_else(|e| vec![Err(e); degrees.degree.len()]);
+        let why = |e: NotCounted| match e {
+            NotCounted::OverLimit if !work.used_up => NotCounted::TooHigh,
+            e => e,
+        };
+        counts.into_iter().map(|count| count.map_err(why)).collect()
     };
     let first = at(0);
     let second = if first.iter().any(Result::is_ok) { at(1) } else { first.clone() };
@@ -502,7 +512,7 @@ fn at_point(
     let count = |p: &Polynomial| -> Count {
         if !basis.is_complete() {
             // what is a number in an ideal is one in every larger one
-            let number = basis.remainder(p, &mut Work { left: REMAINDER })?.as_constant().is_some();
+            let number = basis.remainder(p, &mut Work::new(REMAINDER))?.as_constant().is_some();
             return if number { Ok(1) } else { Err(NotCounted::OverLimit) };
         }
         let minimal = basis.minimal_polynomial(p, SOLUTIONS, work)?.ok_or(NotCounted::TooMany)?;

@@ -35,6 +35,8 @@ struct Search<'a> {
     roles: Vec<(Role, Vec<usize>)>,
     /// Verdicts that may still be computed.
     budget: usize,
+    /// Where it is the work that bounds them, the option that allows more, after a semicolon.
+    within: &'static str,
     out: Remedies,
 }
 
@@ -65,9 +67,11 @@ pub(super) fn remedies(
     // all together, with the search for symmetries before them, take no more than one verdict may
     let affordable = model.work_limit.operations().saturating_sub(before) / judged.work.max(1);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
-    let budget = budget.min(usize::try_from(affordable).unwrap_or(usize::MAX));
+    let affordable = usize::try_from(affordable).unwrap_or(usize::MAX);
+    let within = if affordable < budget { "; a larger --work-limit allows more" } else { "" };
+    let budget = budget.min(affordable);
     let out = Remedies::default();
-    let mut search = Search { model, judged, seed, order, open, roles, budget, out };
+    let mut search = Search { model, judged, seed, order, open, roles, budget, within, out };
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
@@ -93,9 +97,10 @@ impl Search<'_> {
         }
         if tried < count {
             let text = format!(
-                "{} of {count} known values and outputs: at most {} are tried",
+                "{} of {count} known values and outputs: at most {} are tried{}",
                 count - tried,
-                self.budget
+                self.budget,
+                self.within
             );
             self.out.not_tried.push(text);
         }
@@ -157,7 +162,8 @@ impl Search<'_> {
             }
         }
         if !complete {
-            self.out.not_tried.push(format!("some pairs of changes: at most {most} are judged"));
+            let text = format!("some pairs of changes: at most {most} are judged{}", self.within);
+            self.out.not_tried.push(text);
         }
     }
 

@@ -64,7 +64,9 @@ pub(super) enum NoExpressions {
     )]
     NotRational,
     /// The work of the elimination.
-    #[error("solving expressions are missing where the elimination is beyond its limit of work")]
+    #[error(
+        "solving expressions are missing where the elimination is beyond its limit of work, which no option raises"
+    )]
     OverLimit,
 }
 
@@ -97,7 +99,7 @@ pub(super) fn solutions(
         Err(reason) => return none(Some(reason)),
     };
     let mut rng = model.random(seed, "solving expressions");
-    let s = Algebra { f: fields[0], rng: model.random(seed, "elimination"), work: Work { left: WORK } };
+    let s = Algebra { f: fields[0], rng: model.random(seed, "elimination"), work: Work::new(WORK) };
     let (mut out, complete) = match by_elimination(s, model, compiled, judged, &signals) {
         Ok(found) => found,
         Err(reason) => return none(Some(reason)),
