@@ -36,7 +36,7 @@ def processes(workers: int | None = None) -> ProcessPoolExecutor:
     """
     start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
     context = copy.copy(multiprocessing.get_context(start))
-    begin: Callable[..., Any] = context.Process
+    begin: Callable[..., Any] = getattr(context, "Process")  # no attribute of the type
 
     def named(*args: Any, **options: Any) -> Any:
         return begin(*args, **{**options, "name": WORKER})

@@ -442,3 +442,34 @@ def test_kills_lose_nothing_and_repeat_nothing(tmp_path: Path, seed: int) -> Non
     assert len(counted) == 160 and set(counted.values()) == {6}, what
     assert rows["error"].isna().all()
     assert [p.name for p in folder.iterdir() if p.suffix != ".parquet"] == []
+
+
+UNGUARDED = """
+import sys
+from obsdeg import campaign
+{start}
+if sys.argv[1] == "design":
+    campaign.design(sys.argv[2], 3, positions=3, carry="inertial", observable=["D_F"])
+elif sys.argv[1] == "sweep":
+    campaign.sweep(sys.argv[2], campaign.grid(angles=[[(0, 0, 0), (180, 0, 0)]], latitude=range(40)))
+else:
+    list(campaign.run(abs, range(5)))
+"""
+#: Workers as systems without a fork server start them.
+SPAWNED = """
+import multiprocessing
+multiprocessing.get_all_start_methods = lambda: ["spawn"]
+"""
+
+
+@pytest.mark.parametrize("start", ["", SPAWNED], ids=["default", "spawn"])
+@pytest.mark.parametrize("command", ["design", "sweep", "run"])
+def test_a_script_without_a_guard_ends_with_one_error(tmp_path: Path, command: str, start: str) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED.format(start=start))
+    asked = [sys.executable, str(script), command, str(tmp_path / "out")]
+    ended = subprocess.run(asked, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1
+    assert ended.stderr.count("Traceback") == 1, ended.stderr
+    assert 'below a line `if __name__ == "__main__":`' in ended.stderr
+    assert not list(tmp_path.glob("out/*")) and not list(tmp_path.glob("out/.*"))
