@@ -78,9 +78,13 @@ fn positions_are_edited() {
     says(b, "D_IX", 3, "inseparable");
     write(b, "#letters", "NNE");
     wait(b, "wrong letters", "document.getElementById('notice').textContent.includes('NNE')");
+    let answers = "performance.getEntriesByName('table').length";
+    let before = b.value(answers);
     write(b, "#beta-number", "12.5");
     wait(b, "a number", "obsdeg.scheme().includes('12.5')");
+    // the answer to what was asked before it does not take the refusal away
     write(b, "#beta-number", "x");
+    wait(b, "the answer before", &format!("{answers} > {before}"));
     wait(b, "no number", "document.getElementById('notice').textContent.includes('beta: expected a number')");
     choose(b, "#snap", "45");
     assert_eq!(b.value("document.getElementById('gamma').step"), json!("45"));

@@ -7,7 +7,7 @@ function say(text, kind = '') {
 }
 
 const source = (scheme, name = state.name) => ({ name, text: toToml(scheme) });
-let resting = null, answered = null;
+let resting = null, answered = null, problems = 0;
 const isStale = () => $('verdicts').classList.contains('stale');
 
 function askVerdicts() { answered = verdictsNow(); }
@@ -15,7 +15,7 @@ function askVerdicts() { answered = verdictsNow(); }
 async function verdictsNow() {
   put($('drop-one'), '\u00a0');
   if (needed.of !== JSON.stringify(state.scheme)) drawNeeds(null);
-  const began = live.began ?? performance.now();
+  const began = live.began ?? performance.now(), before = problems;
   live.began = null;
   const scheme = copy(state.scheme);
   if (!scheme.position?.length) {
@@ -33,7 +33,8 @@ async function verdictsNow() {
     put($('summary'), 'not judged: what is below is of the scheme before');
     return wrong(found.problem);
   }
-  if ($('notice').dataset.problem) { say(''); delete $('notice').dataset.problem; }
+  // an entry that was refused after this question stays refused
+  if (Number($('notice').dataset.problem) <= before) { say(''); delete $('notice').dataset.problem; }
   verdicts.now = found;
   drawVerdicts();
   performance.measure('table', { start: began, end: performance.now() });
@@ -41,7 +42,7 @@ async function verdictsNow() {
 }
 
 function wrong(problem) {
-  $('notice').dataset.problem = 'yes';
+  $('notice').dataset.problem = ++problems;
   say(problem.message);
 }
 
