@@ -3158,7 +3158,7 @@ class Omitted(Record):
     __slots__ = ()
 
     tried: int
-    """Number of errors that were tried, each by a score test on the residuals."""
+    """Number of errors that were tried, each by a score test on the residuals: those that a record can show."""
     suspicion: Suspicion | None
     """Error or pair that explains the residuals; null where chance is enough."""
     silent: list[SilentError]
