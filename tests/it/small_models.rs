@@ -142,7 +142,7 @@ fn of_a_square(n: usize) -> String {
     format!("name = \"m\"\n[states]\n\"A[{n},{n}]\" = \"A*A\"\n[outputs]\ny = \"A[1,1]\"\n")
 }
 
-/// What `analyze` answers in JSON, within the processor time and the memory of small models, or its error.
+/// Answer of `analyze` in JSON, within the processor time and the memory of small models, or its error.
 fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
     let mut file = tempfile::NamedTempFile::new().expect("a file");
     file.write_all(text.as_bytes()).expect("written");
@@ -164,7 +164,8 @@ fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
 
 /// Matrices: the output is a generating function of its first row and column in powers of the start,
 /// `A(t) = A0 (1 - t A0)^-1`, so that it holds the moments `(A0^k)[1,1]`, k = 1, 2, ... These are those of a strictly
-/// proper transfer function of order n with a first moment of one: 2n - 1 numbers are free, and as many orders show them.
+/// proper transfer function of order n with a first moment of one: 2n - 1 numbers are free, and as many orders show
+/// them.
 #[test]
 fn matrices_are_judged_within_the_limits() {
     for n in [3, 5, 10] {

@@ -20,7 +20,7 @@ type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
 
 /// Length of the first series: most runs end within as many orders.
 const SHORT: usize = 16;
-/// How many times as long series are made that turn out too short. What was computed before is computed again.
+/// Factor by which series that turn out too short are lengthened. All their orders are computed again.
 const LONGER: usize = 4;
 
 /// Series that the rows of an order take.
@@ -101,7 +101,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         if order < longer { longer } else { order + 1 + order / 2 }
     }
 
-    /// What the rows of an order will take.
+    /// Series that the rows of an order will take, from what is held now.
     pub(super) fn sweeps(&self, order: usize) -> Sweeps {
         let length = self.length_for(order);
         let held = self.values.length;

@@ -40,7 +40,8 @@ struct Search<'a> {
     out: Remedies,
 }
 
-/// The remedies of a model that was judged, after `before` operations of other searches; bounds of the work stand at the head of this file.
+/// The remedies of a model that was judged, after `before` operations of other searches; bounds of the work stand
+/// at the head of this file.
 pub(super) fn remedies(
     model: &SystemModel,
     compiled: &Compiled,
