@@ -216,7 +216,8 @@ def analyze(*what: Judged, progress: Progress | bool | None = None, **options: A
         progress: called ten times a second; ``True`` for a bar of tqdm. Where it returns False the analysis ends
             with a ``KeyboardInterrupt``, as it does where a key is pressed.
         options: ``angles``, ``carry``, ``latitude`` [deg], ``terms``, ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``,
-            ``count_limit``, ``solutions``, ``frame``, ``formulas``, ``seed``: those of ``obsdeg analyze``.
+            ``count_limit``, ``solutions``, ``frame``, ``formulas``, ``omitted``, ``seed``:
+            those of ``obsdeg analyze``.
 
     Returns:
         An :class:`Analysis`, of a model a :class:`SystemAnalysis`; of several :class:`Judgements`.

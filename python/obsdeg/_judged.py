@@ -28,7 +28,7 @@ def _rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
     if "scheme" in task:
         what = [given if isinstance(given, obsdeg.Scheme) else obsdeg.Scheme.from_text(given)]
     options = {name: value for name, value in task.items() if name != "scheme"}
-    exact = {"solutions": False, **{k: v for k, v in options.items() if k not in _MEASURED}}
+    exact = {"solutions": False, "omitted": False, **{k: v for k, v in options.items() if k not in _MEASURED}}
     verdicts = obsdeg.analyze(*what, **exact).to_dict()
     numbers = {}
     if _MEASURED & options.keys():

@@ -133,6 +133,8 @@ class Analyze(Seeded, Positions, total=False):
     """Axes of Z in solutions [default: n]."""
     formulas: bool
     """Z and its derivatives, and psi and eps at each position, as formulas."""
+    omitted: bool
+    """Exact classes (no effect, silent, visible) of the errors that a scheme does not estimate [default: True]."""
 
 
 class Simulate(Seeded, Positions, Filtered, total=False):

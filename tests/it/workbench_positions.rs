@@ -301,8 +301,8 @@ fn it_keeps_up() {
             quickest = Some(found);
         }
     }
-    // below a tenth of a second an answer is felt at once; other programs run beside this test, so the bound is wide
-    assert!(quickest.is_some_and(|[median, _]| median < 100.0), "{quickest:?} ms");
+    // a frame of the display in two: the table follows the hand
+    assert!(quickest.is_some_and(|[median, _]| median < 30.0), "{quickest:?} ms");
     // a crash is said, and the next question is answered
     let said = b.value("obsdeg.ask('nothing there', []).then(() => 'answered', p => p.message)");
     assert!(

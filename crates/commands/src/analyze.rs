@@ -46,6 +46,10 @@ pub struct Analyze {
     /// Print Z and its derivatives, and psi and eps at each position, as formulas
     #[arg(long, help_heading = "Solutions")]
     pub formulas: bool,
+
+    /// Exact classes (no effect, silent, visible) of the errors that a scheme does not estimate
+    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
+    pub omitted: bool,
 }
 
 /// The orders that may be asked for.
@@ -61,6 +65,7 @@ impl Default for Analyze {
             solutions: true,
             frame: Frame::default(),
             formulas: false,
+            omitted: true,
         }
     }
 }
@@ -68,6 +73,9 @@ impl Default for Analyze {
 /// The words of `--solutions`.
 const SOLUTIONS: [Word<bool>; 2] =
     [("on", "all that there are", true), ("off", "none; never starts the symbolic engine", false)];
+
+/// The words of `--omitted`.
+const OMITTED: [Word<bool>; 2] = [("on", "all families of errors", true), ("off", "none; quicker", false)];
 
 /// The words of `--frame`.
 const FRAMES: [Word<Frame>; 2] = [
@@ -185,10 +193,10 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
 }
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
-    let &Analyze { seed, solutions, formulas, frame, count_limit, order, .. } = options;
+    let &Analyze { seed, solutions, formulas, frame, omitted, count_limit, order, .. } = options;
     Ok(match input {
         Input::Scheme(scheme) => {
-            let options = AnalysisOptions { seed, solutions, formulas, frame };
+            let options = AnalysisOptions { seed, solutions, formulas, frame, omitted };
             Judged::Scheme(Box::new(obsdeg_core::analysis::analyze(
                 scheme,
                 options,

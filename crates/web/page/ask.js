@@ -25,7 +25,7 @@ async function verdictsNow() {
     put($('summary'), 'no position yet: add one');
     return;
   }
-  const request = { sources: [source(scheme)], solutions: false };
+  const request = { sources: [source(scheme)], solutions: false, omitted: false };
   const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(failed);
   if (!found) return;
   $('verdicts').classList.toggle('stale', !!found.problem);
@@ -91,7 +91,7 @@ function askRest() {
 async function without(at) {
   const scheme = copy(state.scheme);
   scheme.position.splice(at, 1);
-  const said = await behind.ask('call', ['analyze', { sources: [source(scheme)], solutions: false }], { lane: `sweep without ${at}` }).catch(failed);
+  const said = await behind.ask('call', ['analyze', { sources: [source(scheme)], solutions: false, omitted: false }], { lane: `sweep without ${at}` }).catch(failed);
   if (!said?.text || !verdicts.now) return null;
   const less = byName(JSON.parse(said.text)), lost = [], later = [];
   for (const q of verdicts.now.answer.quantities) {
@@ -177,7 +177,7 @@ async function sweep(axis, mine) {
   const fresh = () => mine === round && sweepKey(axis) === key;
   for (let i = 0; i < found.grid.length; i++) {
     if (found.degrees[i]) continue;
-    const said = await behind.ask('call', ['analyze', { sources: [texts[i]], solutions: false }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
+    const said = await behind.ask('call', ['analyze', { sources: [texts[i]], solutions: false, omitted: false }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
     if (!fresh()) return;
     if (!said?.text) return;
     found.degrees[i] = degreesOf(said);
@@ -256,7 +256,7 @@ async function sweepLatitudes(mine) {
   for (const [i, angle] of LATITUDES.entries()) {
     if (degrees[i]) continue;
     const at = source({ ...rest, latitude_deg: angle });
-    const said = await behind.ask('call', ['analyze', { sources: [at], solutions: false }], { lane: `sweep latitude ${i}` }).catch(() => null);
+    const said = await behind.ask('call', ['analyze', { sources: [at], solutions: false, omitted: false }], { lane: `sweep latitude ${i}` }).catch(() => null);
     if (mine !== round || key !== keyNow() || !said?.text) return;
     degrees[i] = degreesOf(said);
   }

@@ -157,7 +157,7 @@ async function take() {
 
 /** Opens a text: a scheme as positions, anything else in the editor. */
 async function openText(text, name) {
-  const [read, judged] = await Promise.all([live.ask('toml', [text]), live.ask('call', ['analyze', { sources: [{ name, text }], solutions: false }])])
+  const [read, judged] = await Promise.all([live.ask('toml', [text]), live.ask('call', ['analyze', { sources: [{ name, text }], solutions: false, omitted: false }])])
     .catch((p) => [{ problem: p }, {}]);
   const value = read.value, scheme = value && Array.isArray(value.position) && !value.states;
   if (scheme && !judged.problem) {

@@ -38,7 +38,7 @@ async function compareWith(step) {
   const mine = tourStep;
   verdicts.before = null;
   if (step === undefined) return;
-  const request = { sources: [source(TOUR[step][2], 'tour.toml')], solutions: false };
+  const request = { sources: [source(TOUR[step][2], 'tour.toml')], solutions: false, omitted: false };
   const found = await live.ask('verdicts', [request], { lane: 'tour' }).catch(() => null);
   if (!found?.answer || mine !== tourStep) return;
   verdicts.before = found;

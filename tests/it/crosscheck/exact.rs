@@ -32,18 +32,29 @@ fn values(name: &str, value: f64) -> Vec<Assignment> {
 /// Six odd attitudes under platform carry need shorter runs to begin with.
 #[test]
 fn the_iterated_filter_is_what_it_believes() {
+    iterated_is_what_it_believes(30, 12);
+}
+
+#[test]
+#[ignore = "a minute: .ci/run release"]
+fn the_iterated_filter_is_what_it_believes_in_200_runs() {
+    iterated_is_what_it_believes(200, 50);
+}
+
+/// `runs` of the iterated filter (half as many of six odd attitudes), `others` of the extended and of the linear one.
+fn iterated_is_what_it_believes(runs: usize, others: usize) {
     const SIX: [&str; 6] = ["0,0,0", "180,0,0", "90,0,0", "-90,0,0", "0,0,90", "0,0,-90"];
     let carries = [Carry::Platform, Carry::Inertial];
-    let schemes = carries.map(|c| scheme(&SIX, c)).into_iter().chain(carries.map(paper)).map(|s| (s, 200));
-    for (scheme, runs) in schemes.chain([(scheme(&S6, Carry::Platform), 100)]) {
+    let schemes = carries.map(|c| scheme(&SIX, c)).into_iter().chain(carries.map(paper)).map(|s| (s, runs));
+    for (scheme, runs) in schemes.chain([(scheme(&S6, Carry::Platform), runs / 2)]) {
         let (filter, anees, nis) = statistics(&scheme, &Conditions::default(), runs);
         assert!(filter == FilterKind::Iterated && anees.pass && nis.pass, "{anees:?} {nis:?}");
     }
     for carry in carries {
         let with = |filter| Conditions { filter: Some(filter), ..Conditions::default() };
-        let (_, anees, nis) = statistics(&paper(carry), &with(FilterKind::Extended), 50);
+        let (_, anees, nis) = statistics(&paper(carry), &with(FilterKind::Extended), others);
         assert!(anees.measured > 40.0 && nis.measured < 2.2, "{carry}: {anees:?} {nis:?}");
-        let (_, anees, nis) = statistics(&paper(carry), &with(FilterKind::Linear), 50);
+        let (_, anees, nis) = statistics(&paper(carry), &with(FilterKind::Linear), others);
         assert!(anees.measured > 1e4 && nis.measured > 10.0, "{carry}: {anees:?} {nis:?}");
     }
 }
@@ -111,10 +122,20 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
 /// believes to be.
 #[test]
 fn the_whole_platform_is_consistent() {
+    whole_platform_is_consistent(12);
+}
+
+#[test]
+#[ignore = "half a minute: .ci/run release"]
+fn the_whole_platform_is_consistent_in_60_runs() {
+    whole_platform_is_consistent(60);
+}
+
+fn whole_platform_is_consistent(runs: usize) {
     let text = std::fs::read_to_string("examples/self-calibration/scheme.toml").expect("the example");
     let scheme = obsdeg_core::model::scheme_file::read(&text).expect("a scheme");
     let conditions = Conditions { truth: Truth::Exact, ..Conditions::of(&scheme) };
-    let (filter, anees, nis) = statistics(&scheme, &conditions, 60);
+    let (filter, anees, nis) = statistics(&scheme, &conditions, runs);
     assert!(filter == FilterKind::Iterated && anees.pass && nis.pass, "{anees:?} {nis:?}");
     assert_eq!((anees.expected, nis.expected), (36.0, 3.0));
 }

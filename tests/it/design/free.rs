@@ -171,13 +171,23 @@ fn free_attitudes_are_never_worse(tasks: impl Iterator<Item = (CriterionName, &'
 
 /// Ten random tasks, every criterion, angles in steps of 5 and of 7 degrees.
 #[test]
+fn two_tasks_are_never_worse() {
+    free_attitudes_are_never_worse(ten_tasks().take(2));
+}
+
+#[test]
+#[ignore = "a minute: .ci/run release"]
 fn ten_tasks_are_never_worse() {
-    let tasks = CRITERIA.into_iter().enumerate().flat_map(|(i, criterion)| {
+    free_attitudes_are_never_worse(ten_tasks());
+}
+
+/// Three to six positions: criterion, terms, number of positions, step in 1e-9 degrees.
+fn ten_tasks() -> impl Iterator<Item = (CriterionName, &'static str, usize, i64)> {
+    CRITERIA.into_iter().enumerate().flat_map(|(i, criterion)| {
         let terms = ["F", "FI", "FO", "IS", "FS"][i];
         let k = [3, 6, 5, 4, 6][i];
         [(criterion, terms, k, 5_000_000_000), (criterion, "F", 3, 7_000_000_000)]
-    });
-    free_attitudes_are_never_worse(tasks);
+    })
 }
 
 /// Twelve coefficients at six, nine and twelve positions: `cargo test --test it -- --ignored thirty_tasks`.

@@ -55,8 +55,8 @@ pub struct Analysis {
     pub null_space: Vec<Vec<Component>>,
     /// Verdicts under the other carries, where they differ.
     pub carries: Vec<CarryReport>,
-    /// Exact classes of the errors that the scheme does not estimate; null where none are computed (rotating
-    /// segments, the drift as unknown, very many columns).
+    /// Exact classes of the errors that the scheme does not estimate; null with `--omitted off` and where none are
+    /// computed (rotating segments, the drift as unknown, very many columns).
     pub omitted: Option<OmittedVerdicts>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,

@@ -44,11 +44,13 @@ pub struct AnalysisOptions {
     pub formulas: bool,
     /// Axes of Z in solutions.
     pub frame: Frame,
+    /// Whether the exact classes of the errors that are not estimated are wanted.
+    pub omitted: bool,
 }
 
 impl Default for AnalysisOptions {
     fn default() -> Self {
-        Self { seed: 1, solutions: true, formulas: false, frame: Frame::N }
+        Self { seed: 1, solutions: true, formulas: false, frame: Frame::N, omitted: true }
     }
 }
 
@@ -86,8 +88,9 @@ pub fn analyze(
     let (carries, untold) = carry_reports(&platform, &findings.verdicts)?;
     let to_resolve = remedies::remedies(&platform, verdicts, &findings.verdicts, &carries);
     printer.notes.extend(untold);
-    let model = OmittedModel::new(&platform);
-    let omitted = omitted_verdicts(&platform, &model, options.seed).ok().filter(|o| !o.terms.is_empty());
+    let omitted = options.omitted.then(|| OmittedModel::new(&platform));
+    let omitted = omitted.and_then(|model| omitted_verdicts(&platform, &model, options.seed).ok());
+    let omitted = omitted.filter(|o| !o.terms.is_empty());
     if scheme.slews() && !scheme.torquers_act() {
         printer.notes.push(
             "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at once, and with slews of \

@@ -39,21 +39,27 @@ pub trait Ring {
 
 impl Ring for Field {
     type Element = u64;
+    #[inline]
     fn zero(&self) -> u64 {
         0
     }
+    #[inline]
     fn one(&self) -> u64 {
         Field::one(self)
     }
+    #[inline]
     fn add(&self, a: &u64, b: &u64) -> u64 {
         Field::add(self, *a, *b)
     }
+    #[inline]
     fn mul(&self, a: &u64, b: &u64) -> u64 {
         Field::mul(self, *a, *b)
     }
+    #[inline]
     fn neg(&self, a: &u64) -> u64 {
         Field::neg(self, *a)
     }
+    #[inline]
     fn is_zero(&self, a: &u64) -> bool {
         *a == 0
     }
@@ -94,21 +100,27 @@ pub struct Float;
 
 impl Ring for Float {
     type Element = f64;
+    #[inline]
     fn zero(&self) -> f64 {
         0.0
     }
+    #[inline]
     fn one(&self) -> f64 {
         1.0
     }
+    #[inline]
     fn add(&self, a: &f64, b: &f64) -> f64 {
         a + b
     }
+    #[inline]
     fn mul(&self, a: &f64, b: &f64) -> f64 {
         a * b
     }
+    #[inline]
     fn neg(&self, a: &f64) -> f64 {
         -a
     }
+    #[inline]
     fn is_zero(&self, a: &f64) -> bool {
         *a == 0.0
     }

@@ -338,7 +338,7 @@ fn single_position(seed: u64) -> Result<Local, AnalysisError> {
         combinations: vec!["wN*psi_y^n - eps_z^n".into(), "wN*psi_z^n + eps_y^n".into()],
         ..positions(&PAPER[..1])
     };
-    let options = AnalysisOptions { seed, solutions: false, ..AnalysisOptions::default() };
+    let options = AnalysisOptions { seed, solutions: false, omitted: false, ..AnalysisOptions::default() };
     let local = analyze(&scheme, options, None)?;
     let unknown = |name: &str| local.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
     let mut asked = local.combinations.iter().filter(|c| c.requested).map(|c| c.degree);
