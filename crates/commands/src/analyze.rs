@@ -47,7 +47,7 @@ pub struct Analyze {
     #[arg(long, help_heading = "Solutions")]
     pub formulas: bool,
 
-    /// Exact classes (no effect, silent, visible) of the errors that a scheme does not estimate
+    /// Exact classes of the errors that a scheme does not estimate
     #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
     pub omitted: bool,
 }
