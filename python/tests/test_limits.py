@@ -189,3 +189,13 @@ def test_a_bar_without_tqdm_says_what_to_install() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     said = "progress=True draws a bar with the package `tqdm`, which is not installed"
     assert done.stdout.strip() == f"{said}: pip install 'obsdeg[progress]', or give a function"
+
+
+def test_what_is_quoted_does_not_steer_a_terminal(tmp_path: Path) -> None:
+    file = tmp_path / "\x1b[31m.jl"
+    file.write_text(JULIA.format(rate="x(t) \x1b\u202e \x07 y"))
+    for raised in (lambda: parse("x \x1b\u202e\x00 y"), lambda: load(file)):
+        with pytest.raises(ImportProblem) as problem:
+            raised()
+        said = str(problem.value)
+        assert said.isprintable() and "\\x1b\\u202e" in said, said

@@ -221,28 +221,53 @@ fn an_interrupt_ends_with_its_code() {
     assert_eq!(below(folder.path()).len(), 1);
 }
 
-/// Runs that are interrupted at random times leave what was there, or the whole file, and nothing else.
+/// A model of one state, whose figures take little time.
+const SMALL: &str = "name = 'm'\n[states]\nx = '-x'\n[outputs]\ny = 'x'\n[simulation]\nduration = 5\nstep = 0.5\n\
+                     values = { x = 1 }\npriors = { x = 0.5 }\nnoise = { y = 0.1 }\n";
+
+/// Runs that are interrupted at random times leave what was there, or the whole folder, and nothing else: of ten runs one
+/// draws the figures of a scheme, the others those of a small model.
 #[expect(clippy::print_stderr, reason = "what was measured")]
 fn interruptions_leave_nothing(count: u64) {
-    let (folder, at) = folder();
-    let scheme = at("scheme.toml");
-    let command = |i: u64| obsdeg(&["simulate", "--scheme", &scheme, "-q", "-o", &at(&format!("run-{i}"))]);
-    let begun = std::time::Instant::now();
-    assert!(command(count).output().expect("it runs").status.success());
-    let whole = begun.elapsed();
+    let (_folder, at) = folder();
+    let inputs = [["--scheme", &at("scheme.toml")], ["--model", &at("small.toml")]];
+    fs::write(at("small.toml"), SMALL).expect("written");
+    let command = |input: [&str; 2], to: &str| {
+        obsdeg(&["simulate", input[0], input[1], "-q", "-o", &at(to), "--seed", "1"])
+    };
+    let whole = inputs.map(|input| {
+        let begun = std::time::Instant::now();
+        let to = format!("whole{}", input[0]);
+        assert!(command(input, &to).output().expect("it runs").status.success());
+        (begun.elapsed(), to)
+    });
+    let names_in = |folder: &str| -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("a folder");
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+    };
     let mut random = obsdeg_exact::SplitMix64::new(37);
     let mut interrupted = 0;
     for i in 0..count {
-        let mut child = command(i).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
+        let kind = usize::from(i % 10 > 0);
+        let to = format!("run-{i}");
+        let mut child = command(inputs[kind], &to)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
         // most of them while files are written
         let part = 0.5 + 0.6 * random.below(1000) as f64 / 1000.0;
-        std::thread::sleep(whole.mul_f64(part));
+        std::thread::sleep(whole[kind].0.mul_f64(part));
         Command::new("kill").args(["-INT", &child.id().to_string()]).output().expect("kill");
         interrupted += u64::from(!child.wait().expect("it ends").success());
-        let left = fs::read_dir(folder.path()).expect("a folder");
-        let names = left.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
-        let hidden: Vec<String> = names.filter(|name| name.starts_with('.')).collect();
+        let names = names_in(&at(""));
+        let hidden: Vec<&String> = names.iter().filter(|name| name.starts_with('.')).collect();
         assert!(hidden.is_empty(), "{i}: {hidden:?}");
+        // a folder that is there is whole
+        if names.contains(&to) {
+            let files = [&to, &whole[kind].1].map(|name| names_in(&at(name)).len());
+            assert_eq!(files[0], files[1], "{i}");
+        }
     }
     eprintln!("{interrupted} of {count} interrupted");
     assert!(interrupted > 0);

@@ -234,3 +234,58 @@ fn small_texts_that_ask_for_too_much_are_refused() {
         assert!(done.status.code() == Some(2) && stderr.contains(expected), "{expected}: {beginning}");
     }
 }
+
+/// Models of the generator whose work was not counted once: an elimination of long polynomials, and remedies of a model that
+/// is judged in many digits.
+#[test]
+fn models_that_took_too_long_end() {
+    let drawn = |seed: u64| model(&mut SplitMix64::of(seed, "small models", &["any"]));
+    let long = answered(&drawn(2684), &[]).expect("judged");
+    assert!(long["note"].as_str().expect("a note").contains("beyond its limit of work"), "{}", long["note"]);
+    // the output is the time, which says nothing of any unknown
+    let blind = answered(&drawn(2747), &[]).expect("judged");
+    assert_eq!(blind["rank"], 0);
+    let all =
+        |text: &str| blind["quantities"].as_array().expect("unknowns").iter().all(|q| q["status"] == text);
+    assert!(all("not_excited"), "{blind}");
+    let resolve = blind["to_resolve"].to_string();
+    assert!(resolve.contains("a larger --work-limit allows more"), "{resolve}");
+}
+
+/// Constraints, functions and powers whose work grows faster than their text: each ends within the limits, refused with the
+/// option that allows more, or judged.
+#[test]
+fn work_beside_the_rows_is_counted() {
+    let states = |n: usize, rate: &str| (0..n).map(|i| format!("x{i} = \"{rate}\"\n")).collect::<String>();
+    // twelve polynomials of degree 390 in each of 20 experiments
+    let circles: Vec<String> = (0..12).map(|i| format!("\"(x{i} + x{})^390 = x{i}^2 + 2\"", i + 1)).collect();
+    let polynomials = format!(
+        "name = \"m\"\nexperiments = 20\nconstraints = [{}]\n[states]\n{}[outputs]\ny = \"x0\"\n",
+        circles.join(", "),
+        states(13, "0")
+    );
+    let vector = "name = \"m\"\nconstraints = [\"norm(A) = 1\", \"A[1] = 2\"]\n[states]\n\"A[300]\" = \"-A\"\n\
+                  [outputs]\ny = \"A[1]\"\n";
+    for (text, expected) in
+        [(polynomials.as_str(), "points at which its constraints hold"), (vector, "beyond --work-limit 600 ")]
+    {
+        let error = answered(text, &[]).expect_err(expected);
+        assert!(error.contains(expected) && error.contains("a larger --work-limit allows more"), "{error}");
+    }
+    // one sum of 1,200 sines: the proof that they are independent is refused, digits judge it; 1,199 directions are left
+    let sines: Vec<String> = (0..1200).map(|i| format!("sin(x{i}*x{})", (i + 1) % 1200)).collect();
+    let sines =
+        format!("name = \"m\"\n[states]\n{}[outputs]\ny = \"{}\"\n", states(1200, "0"), sines.join(" + "));
+    let answer = answered(&sines, &[]).expect("judged");
+    assert_eq!((&answer["rank"], &answer["unobservable_directions"]), (&1.into(), &1199.into()));
+    assert!(
+        answer["note"].as_str().expect("a note").contains("a larger --work-limit allows more"),
+        "{}",
+        answer["note"]
+    );
+    // powers beyond 32 bits: x shows itself, x'/x the power of p; no expression is formed
+    let high = "name = \"m\"\n[states]\nx = \"-((((p^1000)^1000)^1000)^10)*x\"\n[parameters]\np = {}\n\
+                [outputs]\ny = \"x\"\n";
+    let answer = answered(high, &[]).expect("judged");
+    assert_eq!(answer["rank_profile"], serde_json::json!([1, 2, 2]));
+}

@@ -11,6 +11,15 @@ use crate::groebner::{OverLimit, Work};
 use crate::multivariate::{Monomial, Polynomial};
 use crate::{Field, SplitMix64, polynomial};
 
+/// Work of a term of a product, or of a copy: its monomial is made anew, and finds its place among the others.
+const TERM: u64 = 4;
+/// Terms from which on a polynomial is no longer near the processor, and how much more each costs then.
+const FAR: (u64, u64) = (4096, 8);
+/// Work of an inverse of a number.
+const INVERSE: u64 = 16;
+/// Highest power of a variable: images along it are dense.
+const POWER: u64 = 1 << 16;
+
 /// Polynomial algebra within a limit of work.
 pub struct Algebra {
     /// The field of the coefficients.
@@ -19,6 +28,11 @@ pub struct Algebra {
     pub rng: SplitMix64,
     /// The work that is left.
     pub work: Work,
+}
+
+/// Work of this many terms that are made or copied.
+pub(crate) fn work_of(terms: u64) -> u64 {
+    terms.saturating_mul(if terms > FAR.0 { TERM * FAR.1 } else { TERM })
 }
 
 /// A monomial in lexicographic order, the first variable greatest.
@@ -122,12 +136,31 @@ impl Algebra {
         self.f.from_u64(1 + self.rng.below(self.f.modulus() - 1))
     }
 
-    /// `a b`.
+    /// Takes the work of keeping this many terms, which bounds their memory.
     ///
     /// # Errors
     /// [`OverLimit`].
+    pub fn keep(&mut self, terms: usize) -> Result<(), OverLimit> {
+        self.work.take((TERM * FAR.1).saturating_mul(terms as u64))
+    }
+
+    /// Takes the work of copies of polynomials.
+    pub(crate) fn copies<'p>(
+        &mut self,
+        of: impl IntoIterator<Item = &'p Polynomial>,
+    ) -> Result<(), OverLimit> {
+        self.work.take(1 + of.into_iter().map(|p| work_of(p.len() as u64)).sum::<u64>())
+    }
+
+    /// `a b`.
+    ///
+    /// # Errors
+    /// [`OverLimit`]; also of powers above 65536.
     pub fn product(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
-        self.work.take(1 + 4 * (a.len() * b.len()) as u64)?;
+        self.work.take(1 + work_of((a.len() as u64).saturating_mul(b.len() as u64)))?;
+        if u64::from(a.highest_power()) + u64::from(b.highest_power()) > POWER {
+            return Err(OverLimit);
+        }
         let mut out = Polynomial::default();
         out.add_product(&self.f, a, b);
         Ok(out)
@@ -149,13 +182,14 @@ impl Algebra {
     /// [`OverLimit`].
     pub fn quotient(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Option<Polynomial>, OverLimit> {
         let f = self.f;
+        self.copies([a, a])?;
         if let Some(c) = b.as_constant() {
             return Ok(Some(a.scaled(&f, f.inv(c))));
         }
         // along one variable first, which shows most of what does not divide
         let point = self.point(a, b);
         for v in b.variables() {
-            let [x, y] = [a, b].map(|p| image(&f, p, &point, v));
+            let [x, y] = self.images(a, b, &point, v)?;
             if !polynomial::remainder(&f, &x, &y).is_empty() {
                 return Ok(None);
             }
@@ -167,7 +201,8 @@ impl Algebra {
         while let Some((m, c)) = rest.last_key_value() {
             let Some(m) = ratio(&m.0, top) else { return Ok(None) };
             let c = f.mul(*c, inverse);
-            self.work.take(1 + 4 * b.len() as u64)?;
+            // the product, and its terms among the others
+            self.copies([b, b])?;
             let mut step = Polynomial::default();
             step.put(&f, m, f.neg(c));
             let mut product = Polynomial::default();
@@ -190,12 +225,28 @@ impl Algebra {
         (0..last).map(|_| self.number()).collect()
     }
 
+    /// Images of two polynomials along a variable, with the work of one modulo the other.
+    fn images(
+        &mut self,
+        a: &Polynomial,
+        b: &Polynomial,
+        point: &[u64],
+        v: u32,
+    ) -> Result<[Vec<u64>; 2], OverLimit> {
+        self.copies([a, b])?;
+        let [x, y] = [a, b].map(|p| u64::from(p.degree_in(v)) + 1);
+        self.work.take(x.saturating_mul(y) + INVERSE * x.min(y))?;
+        Ok([a, b].map(|p| image(&self.f, p, point, v)))
+    }
+
     /// The greatest common divisor, with leading coefficient one.
     ///
     /// # Errors
     /// [`OverLimit`].
     pub fn divisor(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
         let f = self.f;
+        // powers that all terms share, and what is left without them
+        self.copies([a, a, b, b])?;
         if a.is_empty() || b.is_empty() {
             return Ok(self.monic(if a.is_empty() { b } else { a }));
         }
@@ -219,10 +270,9 @@ impl Algebra {
         }
         let point = self.point(a, b);
         let (of_a, of_b) = (a.variables(), b.variables());
-        self.work.take((of_a.len() * a.len() + of_b.len() * b.len()) as u64)?;
         let mut held: Vec<(u32, usize)> = Vec::new();
         for &v in of_a.intersection(&of_b) {
-            let [x, y] = [a, b].map(|p| image(&f, p, &point, v));
+            let [x, y] = self.images(a, b, &point, v)?;
             let degree = polynomial::gcd(&f, x, y).len().saturating_sub(1);
             held.extend((degree > 0).then_some((v, degree)));
         }
@@ -237,6 +287,7 @@ impl Algebra {
                 return Ok(self.monic(p));
             }
         }
+        self.copies([a, b])?;
         let kept = |v: u32| held.iter().any(|h| h.0 == v);
         let mut parts = Vec::new();
         for p in [a, b] {
@@ -265,12 +316,18 @@ impl Algebra {
         let Some((&(v, bound), others)) = held.split_last() else {
             return Ok(Polynomial::constant(f.one()));
         };
-        self.work.take(4 * (a.len() + b.len()) as u64)?;
+        self.copies([a, a, b, b])?;
+        let degrees = [a, b].map(|p| u64::from(p.degree_in(v)) + 1);
         let [mut a, mut b] = [a, b].map(|p| along(p, v));
+        // the dense coefficients: their values at a point, and their common divisors
+        let [x, y] =
+            [(&a, degrees[0]), (&b, degrees[1])].map(|(parts, d)| d.saturating_mul(parts.len() as u64));
+        let dense = x.saturating_add(y);
         let mut content = Vec::new();
-        for parts in [&mut a, &mut b] {
+        for (parts, degree) in [(&mut a, degrees[0]), (&mut b, degrees[1])] {
             let mut own = Vec::new();
             for c in parts.values() {
+                self.work.take((c.len() as u64).saturating_mul(degree.saturating_mul(2)))?;
                 own = polynomial::gcd(&f, own, c.clone());
             }
             for c in parts.values_mut() {
@@ -281,13 +338,14 @@ impl Algebra {
         let top = |parts: &BTreeMap<Lex, Vec<u64>>| parts.values().next_back().cloned().unwrap_or_default();
         let scale = polynomial::gcd(&f, top(&a), top(&b));
         let points = bound + scale.len();
+        let terms = TERM * (a.len() + b.len()) as u64;
         let mut values: BTreeMap<Lex, Vec<(u64, u64)>> = BTreeMap::new();
         let mut at = Vec::new();
         while at.len() < points {
+            self.work.take(dense.saturating_add(terms))?;
             let x = self.number();
             let leads = [top(&a), top(&b)].map(|c| polynomial::value(&f, &c, x));
             if leads.contains(&0) || at.contains(&x) {
-                self.work.take(1)?;
                 continue;
             }
             let [p, q] = [&a, &b].map(|parts| {
@@ -309,7 +367,8 @@ impl Algebra {
             // where a term is missing it is zero
             let missing: Vec<u64> = at.iter().copied().filter(|x| !list.iter().any(|y| y.0 == *x)).collect();
             list.extend(missing.into_iter().map(|x| (x, 0)));
-            self.work.take((points * points) as u64)?;
+            // values where there is none, differences, and the common divisor with those before
+            self.work.take((points as u64).saturating_mul(points as u64).saturating_mul(INVERSE))?;
             let c = polynomial::interpolate(&f, &list);
             own = polynomial::gcd(&f, own, c.clone());
             parts.insert(m, c);
@@ -358,6 +417,7 @@ impl Algebra {
     fn divisor_within(&mut self, p: &Polynomial) -> Result<Option<Polynomial>, OverLimit> {
         let f = self.f;
         for v in p.variables() {
+            self.copies([p, p, p])?;
             let mut parts = p.split(v).into_values();
             let Some(first) = parts.next() else { continue };
             let mut others = Polynomial::default();
@@ -483,5 +543,43 @@ mod tests {
         assert_eq!(s.quotient(&square, &sum), Ok(Some(sum.clone())));
         s.work.left = 3;
         assert_eq!(s.product(&sum, &sum), Err(OverLimit));
+    }
+
+    /// A pass over the terms is work, also where nothing is multiplied: copies without a power that all terms share, images
+    /// along a variable, a division by a number. Dense images are as long as the power is high.
+    #[test]
+    fn what_is_copied_is_counted() {
+        let mut s = algebra(3);
+        let f = s.f;
+        let power = |e: u32| {
+            let mut out = Polynomial::default();
+            out.put(&f, vec![(0, e)], f.one());
+            out
+        };
+        let mut long = Polynomial::default();
+        (0..1000).for_each(|k| long.put(&f, vec![(0, 1), (1, k + 1)], f.from_u64(k.into())));
+        let two = Polynomial::constant(f.from_u64(2));
+        let mut spent = |work: &mut dyn FnMut(&mut Algebra)| {
+            let before = s.work.left;
+            work(&mut s);
+            before - s.work.left
+        };
+        let copies = 2 * TERM * long.len() as u64;
+        assert!(spent(&mut |s| drop(s.divisor(&long, &two).expect("work"))) >= copies);
+        assert!(spent(&mut |s| drop(s.quotient(&long, &two).expect("work"))) >= copies);
+        // 1000 and 2000 numbers along the variable
+        let images = spent(&mut |s| {
+            let mut a = power(1000);
+            a.put(&f, vec![(1, 1)], f.one());
+            let mut b = power(2000);
+            b.put(&f, vec![(1, 2)], f.one());
+            s.divisor(&a, &b).expect("work");
+        });
+        assert!(images >= 1000 * 2000, "{images}");
+        // powers that no number of 32 bits holds are refused before, whatever work is left
+        let high = power(40_000);
+        assert_eq!(s.product(&high, &high), Err(OverLimit));
+        assert_eq!(s.product(&power(u32::MAX), &high), Err(OverLimit));
+        assert_eq!(s.product(&power(32_768), &power(32_768)), Ok(power(65_536)));
     }
 }

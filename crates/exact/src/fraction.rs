@@ -4,6 +4,9 @@ use crate::divisor::Algebra;
 use crate::groebner::OverLimit;
 use crate::multivariate::Polynomial;
 
+/// Work of a power of a fraction that is kept, beside its terms.
+const POWER: u64 = 64;
+
 /// `numerator / denominator` without a common divisor; the denominator's leading coefficient is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fraction {
@@ -50,6 +53,7 @@ impl Algebra {
     /// `a / d` for a divisor `d` of `a`.
     fn over(&mut self, a: &Polynomial, d: &Polynomial) -> Result<Polynomial, OverLimit> {
         if d.as_constant() == Some(self.f.one()) {
+            self.copies([a])?;
             return Ok(a.clone());
         }
         self.quotient(a, d)?.ok_or(OverLimit)
@@ -113,11 +117,14 @@ impl Algebra {
     /// # Errors
     /// [`OverLimit`].
     pub fn put_into(&mut self, p: &Polynomial, v: u32, value: &Fraction) -> Result<Fraction, OverLimit> {
+        self.copies([p, p])?;
         let parts = p.split(v);
         let degree = parts.keys().next_back().copied().unwrap_or(0);
         if degree == 0 {
             return Ok(self.whole(p.clone()));
         }
+        // all powers are kept
+        self.work.take(POWER * u64::from(degree))?;
         // sum of c_k n^k d^(m-k), over d^m
         let mut powers = vec![[Polynomial::constant(self.f.one()), Polynomial::constant(self.f.one())]];
         for k in 0..degree as usize {
@@ -125,6 +132,7 @@ impl Algebra {
                 self.product(&powers[k][0], &value.numerator)?,
                 self.product(&powers[k][1], &value.denominator)?,
             ];
+            self.keep(next[0].len() + next[1].len())?;
             powers.push(next);
         }
         let mut above = Polynomial::default();

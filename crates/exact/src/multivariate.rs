@@ -88,6 +88,11 @@ impl Polynomial {
         self.terms.keys().flat_map(|m| m.iter().filter(|p| p.0 == v)).map(|p| p.1).max().unwrap_or(0)
     }
 
+    /// The highest power of any variable; 0 of a number.
+    pub fn highest_power(&self) -> u32 {
+        self.terms.keys().flat_map(|m| m.iter().map(|p| p.1)).max().unwrap_or(0)
+    }
+
     /// What each power of a variable is multiplied with.
     pub fn split(&self, v: u32) -> BTreeMap<u32, Self> {
         let mut out: BTreeMap<u32, Self> = BTreeMap::new();
@@ -167,6 +172,18 @@ impl Polynomial {
         out
     }
 
+    /// Products of coefficients that [`replaced`](Self::replaced) takes at most with a value of this many terms.
+    pub fn products_of_replaced(&self, v: u32, terms: usize) -> u64 {
+        let (power, own) = (u64::from(self.degree_in(v)), self.len() as u64);
+        // a power k of t terms has at most (k + t - 1 over t - 1)
+        let more = (terms as u64).saturating_sub(1).min(power);
+        let most = power.saturating_add(terms as u64).saturating_sub(1);
+        let highest =
+            (0..more).fold(1u128, |n, i| (n * u128::from(most - i) / u128::from(i + 1)).min(1 << 60)) as u64;
+        let powers = highest.saturating_mul(power).saturating_mul(terms as u64);
+        powers.saturating_add(own.saturating_mul(highest))
+    }
+
     /// With `value` in place of a variable.
     pub fn replaced(&self, f: &Field, v: u32, value: &Self) -> Self {
         let mut powers = vec![Self::constant(f.one())];
@@ -206,5 +223,42 @@ impl Polynomial {
         let value =
             |m: &Monomial| m.iter().fold(f.one(), |x, &(v, e)| f.mul(x, f.pow(point[v as usize], e.into())));
         self.terms().fold(0, |sum, (m, c)| f.add(sum, f.mul(c, value(m))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By counting: the powers of a sum up to the one that is put in, and its terms with every term.
+    #[test]
+    fn products_of_what_is_put_in() {
+        let f = Field::new((1 << 60) + 33);
+        for (power, terms) in [(1, 1), (3, 1), (5, 2), (4, 3), (7, 4), (2, 9)] {
+            let mut p = Polynomial::default();
+            p.put(&f, vec![(0, power)], f.one());
+            p.put(&f, vec![(0, 1), (20, 1)], f.one());
+            let mut value = Polynomial::default();
+            (0..terms).for_each(|i| value.put(&f, vec![(i + 1, 1)], f.one()));
+            let (mut products, mut last) = (0, Polynomial::constant(f.one()));
+            for _ in 0..power {
+                products += (last.len() * value.len()) as u64;
+                let mut next = Polynomial::default();
+                next.add_product(&f, &last, &value);
+                last = next;
+            }
+            products += (last.len() + value.len()) as u64;
+            let bound = p.products_of_replaced(0, value.len());
+            assert!(
+                bound >= products && bound <= products * u64::from(power) + products,
+                "{bound} {products}"
+            );
+            assert_eq!(p.highest_power(), power);
+        }
+        // refused long before it is formed
+        let mut p = Polynomial::default();
+        p.put(&f, vec![(0, 1000)], f.one());
+        assert!(p.products_of_replaced(0, 4) > 100_000_000 && p.products_of_replaced(0, 60) > 1 << 59);
+        assert_eq!(Polynomial::constant(f.one()).products_of_replaced(0, 60), 1);
     }
 }

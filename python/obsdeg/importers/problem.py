@@ -27,7 +27,7 @@ class ImportProblem(ValueError):
     def __str__(self) -> str:
         where = ": ".join(part for part in (self.file, self.place) if part)
         hint = f" ({self.hint})" if self.hint else ""
-        return f"{where + ': ' if where else ''}found {self.construct}; expected {self.expected}{hint}"
+        return visible(f"{where + ': ' if where else ''}found {self.construct}; expected {self.expected}{hint}")
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_again, (self.construct, self.expected, self.place, self.hint, self.file))
@@ -39,3 +39,8 @@ class OverLimit(ImportProblem):
 
 def _again(construct: str, expected: str, place: str, hint: str, file: str) -> ImportProblem:
     return ImportProblem(construct, expected, place=place, hint=hint, file=file)
+
+
+def visible(text: str) -> str:
+    """The text with an escape in place of every character that is not printed: a quoted file does not steer a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

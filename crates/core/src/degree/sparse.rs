@@ -29,6 +29,12 @@ fn reduced<S: Scalars>(field: &S, rows: &[Vec<S::Element>], columns: &[usize]) -
         .collect()
 }
 
+/// Products that [`extend_by_short_vectors`] takes at most: every order of the columns eliminates all rows.
+pub(crate) fn products_of_short_vectors(rows: usize, columns: usize) -> u64 {
+    let orders = if columns <= SMALL { ORDERS } else { 2 };
+    [rows, rows, columns, orders].iter().fold(1, |product: u64, &n| product.saturating_mul(n as u64))
+}
+
 /// The columns where a vector is not zero.
 pub(crate) fn support(vector: &[u64]) -> Vec<usize> {
     (0..vector.len()).filter(|&c| vector[c] != 0).collect()
@@ -83,6 +89,16 @@ mod tests {
         assert_eq!(supports, [vec![0, 1], vec![2, 3]]);
         assert_eq!(span.rank(), 2);
         assert!(span.contains(&row([5, -5, 1, 2])));
+    }
+
+    /// By hand: two orders for each of eight shifts of a few columns, one shift of many; in each every row meets every
+    /// row before it, in all columns.
+    #[test]
+    fn products_by_hand() {
+        assert_eq!(products_of_short_vectors(3, 10), 16 * 3 * 3 * 10);
+        assert_eq!(products_of_short_vectors(100, 1000), 2 * 100 * 100 * 1000);
+        assert_eq!(products_of_short_vectors(0, 1000), 0);
+        assert_eq!(products_of_short_vectors(usize::MAX, usize::MAX), u64::MAX);
     }
 
     /// Short vectors that were planted are found, which takes several orders of the columns.

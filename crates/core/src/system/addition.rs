@@ -292,6 +292,7 @@ mod tests {
     use crate::system::model_file;
     use crate::system::taylor::{Signal, Taylor};
     use crate::system::values::Values;
+    use crate::system::work::{Work, WorkLimit};
     use obsdeg_exact::{Reals, SplitMix64};
 
     /// Rewritten graphs have the values they had, in 256 bits at a random point, and no two functions of related arguments.
@@ -324,7 +325,8 @@ mod tests {
                 let starts = vec![None; numbers.len()];
                 let seed = SplitMix64::new(0);
                 let roots = compiled.outputs(0);
-                let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, roots, false, seed);
+                let (dag, work) = (&compiled.dag, Work::new(WorkLimit::DEFAULT));
+                let at = Taylor::new(dag, Reals::<4>, 0, signals, &starts, roots, false, seed, &work);
                 at.expect("a point").start(roots[0])
             };
             let off = value(&before).sub(&value(&after));

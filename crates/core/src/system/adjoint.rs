@@ -14,6 +14,7 @@ use obsdeg_exact::interrupt;
 use super::dag::{Dag, Op};
 use super::taylor::{Initial, Signal, Taylor};
 use super::values::Values;
+use super::work::Sweeps;
 
 /// A series in time.
 type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
@@ -22,17 +23,6 @@ type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
 const SHORT: usize = 16;
 /// Factor by which series that turn out too short are lengthened. All their orders are computed again.
 const LONGER: usize = 4;
-
-/// Series that the rows of an order take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Sweeps {
-    /// Length of the longest.
-    pub(super) longest: u64,
-    /// Number of sweeps through the graph, each with series that are shorter by one.
-    pub(super) count: u64,
-    /// Orders of the values that are held before, and then.
-    pub(super) values: [u64; 2],
-}
 
 /// The rows of one run.
 #[derive(Debug, Clone)]
@@ -302,6 +292,7 @@ mod tests {
 
     use crate::system::model_file;
     use crate::system::rows::{Layout, Maker, random_field};
+    use crate::system::work::Work;
 
     /// Against duals in every node, to orders beyond the first length.
     #[test]
@@ -317,7 +308,8 @@ mod tests {
             let layout = Layout::new(&model, &compiled, None);
             let mut rng = SplitMix64::new(5);
             let field: Field = random_field(&mut rng);
-            let maker = Maker { model: &model, compiled: &compiled, layout: &layout, field };
+            let work = Work::new(model.work_limit);
+            let maker = Maker { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
             let (mut forward, mut adjoint) = maker.both(&mut rng);
             let mut factorial = field.one();
             for order in 0..12 {

@@ -10,11 +10,17 @@ use obsdeg_exact::polynomial::{interpolate, root};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::dag::{Dag, Op};
+use super::values::NotHeld;
+use super::work::{PER_NODE, Step, Work};
 
 /// Draws of a block: half of all quadratic equations have a root in a field.
 const TRIES: usize = 60;
 /// Highest degree of a constraint on a line.
 const MAX_DEGREE: usize = 400;
+/// Operations of a root of a polynomial and of its interpolation, for the square of its degree: powers modulo the
+/// polynomial up to the prime, 61 squares of it and as many products by halves, each with its remainder, and a division of
+/// two numbers for every pair of points.
+const PER_SQUARE: u64 = 512;
 
 /// The slots that a node depends on.
 pub(crate) fn slots_of(dag: &Dag, node: usize) -> BTreeSet<usize> {
@@ -48,6 +54,11 @@ struct Constraint<'a> {
 }
 
 impl Constraint<'_> {
+    /// Operations of its value.
+    fn operations(&self) -> u64 {
+        self.node as u64 + PER_NODE * self.nodes.len() as u64
+    }
+
     /// Numerator and denominator at values of the slots.
     fn at(&self, values: &[u64]) -> (u64, u64) {
         let f = self.f;
@@ -129,7 +140,7 @@ impl Constraint<'_> {
 /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero: a random solution.
 ///
 /// # Errors
-/// The constraint that could not be solved.
+/// [`NotHeld`]: the constraint that could not be solved, or that the work is beyond its limit.
 pub(crate) fn hold(
     dag: &Dag,
     constraints: &[usize],
@@ -137,9 +148,16 @@ pub(crate) fn hold(
     free: &[bool],
     f: &Field,
     rng: &mut SplitMix64,
-) -> Result<(), usize> {
-    let of = |&node: &usize| Constraint { dag, f, node, nodes: below(dag, node) };
-    let all: Vec<Constraint<'_>> = constraints.iter().map(of).collect();
+    work: &Work,
+) -> Result<(), NotHeld> {
+    let mut all: Vec<Constraint<'_>> = Vec::new();
+    for &node in constraints {
+        let nodes = below(dag, node);
+        let known: usize = all.iter().map(|g| g.nodes.len()).sum();
+        let bytes = 32 * (known + nodes.len()) as u64;
+        work.take(Step::Constraints, 2 * PER_NODE * nodes.len() as u64, bytes)?;
+        all.push(Constraint { dag, f, node, nodes });
+    }
     // entries that mirror each other are one node
     let first = |c: &usize| constraints[..*c].iter().all(|node| *node != constraints[*c]);
     let mut open: Vec<(usize, BTreeSet<usize>)> = (all.iter().enumerate().filter(|(c, _)| first(c)))
@@ -147,17 +165,27 @@ pub(crate) fn hold(
         .collect();
     while let Some((_, slots)) = open.iter().min_by_key(|(_, slots)| slots.len()) {
         let slots: Vec<usize> = slots.iter().copied().collect();
+        let left: usize = open.iter().map(|(_, s)| s.len()).sum();
+        work.take(Step::Constraints, (left as u64).saturating_mul(slots.len() as u64), 0)?;
         let block: Vec<usize> =
             (open.iter()).filter(|(_, s)| s.iter().all(|s| slots.contains(s))).map(|(c, _)| *c).collect();
         let block_of: Vec<&Constraint<'_>> = block.iter().map(|&c| &all[c]).collect();
         // where nothing is left to choose they hold or not
-        let holds = |values: &[u64]| block_of.iter().all(|g| matches!(g.at(values), (0, d) if d != 0));
+        let operations = block_of.iter().map(|g| g.operations()).fold(0, u64::saturating_add);
+        let holds = |values: &[u64]| {
+            work.take(Step::Constraints, operations, 0).is_ok()
+                && block_of.iter().all(|g| matches!(g.at(values), (0, d) if d != 0))
+        };
         let found = match slots.is_empty() {
             true => holds(values),
-            false => (0..TRIES).any(|_| solve(&block_of, &slots, values, f, rng).is_some() && holds(values)),
+            false => {
+                (0..TRIES).any(|_| solve(&block_of, &slots, values, f, rng, work).is_some() && holds(values))
+            }
         };
         if !found {
-            return Err(block[0]);
+            // what was refused once is refused in every try
+            work.take(Step::Constraints, 0, 0)?;
+            return Err(NotHeld::Constraint(block[0]));
         }
         open.retain(|(c, _)| !block.contains(c));
         for (_, left) in &mut open {
@@ -174,8 +202,13 @@ fn solve(
     values: &mut [u64],
     f: &Field,
     rng: &mut SplitMix64,
+    work: &Work,
 ) -> Option<()> {
     let m = block.len();
+    let take = |operations: u64| work.take(Step::Constraints, operations, 0).ok();
+    // along every slot, and at the points that show whether a constraint is linear
+    let operations = block.iter().map(|g| g.operations()).fold(0, u64::saturating_add);
+    take(operations.saturating_mul(m as u64 + 8).saturating_add((m as u64).saturating_pow(3)))?;
     for &s in slots {
         values[s] = rng.below(f.modulus());
     }
@@ -221,6 +254,8 @@ fn solve(
     if degree > MAX_DEGREE {
         return None;
     }
+    let points = degree as u64 + 1;
+    take(points * bent.operations() + points * points * PER_SQUARE)?;
     let samples: Vec<(u64, u64)> = (0..=degree as u64).map(|t| f.from_u64(t)).map(|t| (t, at(t))).collect();
     let polynomial = interpolate(f, &samples);
     let t = if polynomial.is_empty() { 0 } else { root(f, &polynomial, rng)? };

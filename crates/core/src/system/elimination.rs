@@ -172,10 +172,12 @@ impl Elimination<'_> {
     /// The equation that is linear in a state at the least cost: its number, the state, and what that is.
     fn best(&mut self, equations: &[Equation]) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
         let mut best: Option<(Cost, usize, usize, [Polynomial; 2])> = None;
-        for (e, equation) in equations.iter().enumerate() {
+        // slope and rest together have its terms
+        let short = |e: &(usize, &Equation)| e.1.zero.len() <= SUBSTITUTED;
+        for (e, equation) in equations.iter().enumerate().filter(short) {
             for (i, &v) in self.system.states.iter().enumerate() {
                 let Some([slope, rest]) = linear(&equation.zero, v) else { continue };
-                if self.holds_state(&slope) || rest.len() + slope.len() > SUBSTITUTED {
+                if self.holds_state(&slope) {
                     continue;
                 }
                 let unknown = self.system.parameters.iter().any(|&p| slope.terms_with(p) > 0);

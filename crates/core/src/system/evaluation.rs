@@ -4,8 +4,9 @@ use obsdeg_exact::{Ball, Field, RealSpace, Reals, RowSpace, Scalars, SplitMix64,
 
 use super::constraints::hold;
 use super::dag::Dag;
-use super::taylor::{Signal, Taylor};
-use super::values::Values;
+use super::taylor::{Signal, Singular, Taylor};
+use super::values::{NotHeld, Values};
+use super::work::{Step, Work, product};
 use crate::language::{Function, from_i128};
 
 /// An element as if at random, of a kind of function and its argument.
@@ -85,8 +86,9 @@ impl Values for Field {
         values: &mut [u64],
         free: &[bool],
         rng: &mut SplitMix64,
-    ) -> Result<(), usize> {
-        hold(dag, constraints, values, free, self, rng)
+        work: &Work,
+    ) -> Result<(), NotHeld> {
+        hold(dag, constraints, values, free, self, rng, work)
     }
 }
 
@@ -185,8 +187,9 @@ impl<const N: usize> Values for Reals<N> {
         values: &mut [Ball<N>],
         free: &[bool],
         _: &mut SplitMix64,
-    ) -> Result<(), usize> {
-        hold_by_newton(dag, constraints, values, free)
+        work: &Work,
+    ) -> Result<(), NotHeld> {
+        hold_by_newton(dag, constraints, values, free, work)
     }
 }
 
@@ -200,9 +203,16 @@ fn hold_by_newton<const N: usize>(
     constraints: &[usize],
     values: &mut [Ball<N>],
     free: &[bool],
-) -> Result<(), usize> {
+    work: &Work,
+) -> Result<(), NotHeld> {
+    let failed = NotHeld::Constraint(0);
     let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
+    // the rank of the rows, their products, and the system of these
+    let (rows, columns) = (constraints.len() as u64, places.len() as u64);
+    let pairs = rows.saturating_mul(rows).saturating_mul(rows.saturating_add(columns.saturating_mul(2)));
+    let operations = pairs.saturating_mul(product::<Ball<N>>());
     for _ in 0..STEPS {
+        work.take(Step::Constraints, operations, 0)?;
         let signal = |s: usize| Signal::Constant {
             value: values[s],
             lane: places.iter().position(|place| *place == s),
@@ -210,8 +220,8 @@ fn hold_by_newton<const N: usize>(
         let signals = (0..values.len()).map(signal).collect();
         let starts = vec![None; values.len()];
         let seed = SplitMix64::new(0);
-        let at = Taylor::new(dag, Reals::<N>, places.len(), signals, &starts, constraints, false, seed)
-            .map_err(|_| 0usize)?;
+        let at = Taylor::new(dag, Reals::<N>, places.len(), signals, &starts, constraints, false, seed, work)
+            .map_err(|e| if e == Singular::Refused { NotHeld::Refused } else { failed })?;
         // independent rows (J | -g): those that add to the rank of J
         let (mut rank, mut rows) = (RealSpace::new(Reals, places.len()), Vec::new());
         let mut off = f64::NEG_INFINITY;
@@ -241,13 +251,13 @@ fn hold_by_newton<const N: usize>(
             system.insert(&line);
         }
         let solution = system.null_space();
-        let [y] = solution.as_slice() else { return Err(0) };
-        let scale = y[m].inverse().ok_or(0usize)?;
+        let [y] = solution.as_slice() else { return Err(failed) };
+        let scale = y[m].inverse().ok_or(failed)?;
         for (k, &s) in places.iter().enumerate() {
             for ((row, _), weight) in rows.iter().zip(y) {
                 values[s] = values[s].add(&row[k].mul(weight).mul(&scale)).midpoint();
             }
         }
     }
-    Err(0)
+    Err(failed)
 }

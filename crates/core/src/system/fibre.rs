@@ -21,6 +21,7 @@ use super::dag::Op;
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::rows::{Layout, SystemRows, Unknown};
+use super::work;
 
 /// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are decided.
 const BEYOND: usize = 3;
@@ -30,6 +31,8 @@ const SOLUTIONS: usize = 64;
 const UNKNOWNS: usize = 60;
 /// A polynomial of more terms is not formed.
 const TERMS: usize = 400;
+/// Higher powers are not formed: a basis has none above 255.
+const POWER: u64 = 1 << 16;
 /// The least weight of a state; parameters have weight one.
 const STATE: u32 = 2;
 /// The work that one remainder by an unfinished basis may take.
@@ -168,6 +171,9 @@ impl Equations<'_> {
         b: &Polynomial,
     ) -> Result<(), NotCounted> {
         self.work.take(1 + 8 * (a.len() * b.len()) as u64)?;
+        if u64::from(a.highest_power()) + u64::from(b.highest_power()) > POWER {
+            return Err(NotCounted::TooHigh);
+        }
         sum.add_product(&self.f, a, b);
         if sum.len() > TERMS { Err(NotCounted::TooLong) } else { Ok(()) }
     }
@@ -300,7 +306,7 @@ impl Equations<'_> {
             for q in nodes.chain(&mut self.lanes).chain(&mut self.zero) {
                 self.work.take(1 + q.len() as u64 / 4)?;
                 if q.terms_with(v) > 0 {
-                    self.work.take(8 * (q.len() * value.len()) as u64)?;
+                    self.work.take(q.products_of_replaced(v, value.len()).saturating_mul(8))?;
                     *q = q.replaced(&f, v, &value);
                 }
             }
@@ -365,12 +371,13 @@ fn equations<'a>(
     model: &SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
-    (f, rng): (Field, &mut SplitMix64),
+    (f, rng, verdict): (Field, &mut SplitMix64, &'a work::Work),
     order: usize,
     work: &'a mut Work,
 ) -> Result<Equations<'a>, NotCounted> {
     let layout = &judged.layout;
-    let mut rows = SystemRows::new(model, compiled, layout, f, rng).map_err(|_| NotCounted::NoPoint)?;
+    let mut rows =
+        SystemRows::new(model, compiled, layout, f, rng, verdict).map_err(|_| NotCounted::NoPoint)?;
     let segments = compiled.segments.len().max(1);
     let experiments = model.experiments.max(1);
     for e in 0..experiments {
@@ -486,8 +493,9 @@ fn at_point(
     order: usize,
     work: &mut Work,
 ) -> Result<Vec<Count>, NotCounted> {
+    let verdict = work::Work::new(model.work_limit);
     let Equations { zero, values, weights, lanes, .. } =
-        equations(model, compiled, judged, (f, rng), order, &mut *work)?;
+        equations(model, compiled, judged, (f, rng, &verdict), order, &mut *work)?;
     let observable = judged.findings.degrees.degree.iter().map(Option::is_some);
     let wanted: Vec<Polynomial> =
         lanes.into_iter().zip(observable).map(|(p, o)| if o { p } else { Polynomial::default() }).collect();

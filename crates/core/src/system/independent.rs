@@ -23,6 +23,7 @@ use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::{Layout, Maker, random_field};
 use super::taylor::{Signal, Taylor};
 use super::values::Values;
+use super::work::{Spent, Step, Work};
 use crate::language::Function;
 
 /// Most points at which gradients are taken.
@@ -45,6 +46,7 @@ pub(super) fn independent_functions(
     compiled: &Compiled,
     layout: &Layout,
     rng: &mut SplitMix64,
+    spent: &mut Spent,
 ) -> Option<usize> {
     let functions = functions(compiled);
     if functions.is_empty() {
@@ -62,22 +64,33 @@ pub(super) fn independent_functions(
         }
         sets[usize::from(real)].insert((inverse, if inverse { node } else { of }));
     }
-    let maker = Maker { model, compiled, layout, field: random_field(rng) };
-    let free = sets.iter().all(|nodes| is_free(&maker, nodes, rng));
-    (free && is_somewhere(model, compiled, layout, rng)).then_some(functions.len())
+    // beyond its limit nothing is said of them
+    let work = Work::new(model.work_limit);
+    let maker = Maker { model, compiled, layout, field: random_field(rng), work: &work };
+    let free = sets.iter().all(|nodes| is_free(&maker, nodes, rng))
+        && is_somewhere(model, compiled, layout, rng, &work);
+    spent.add(&work);
+    free.then_some(functions.len())
 }
 
 /// Whether there is a real point at which rates and outputs are defined: then they are around it.
-fn is_somewhere(model: &SystemModel, compiled: &Compiled, layout: &Layout, rng: &mut SplitMix64) -> bool {
+fn is_somewhere(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    rng: &mut SplitMix64,
+    work: &Work,
+) -> bool {
     let field = Reals::<2>;
-    let maker = Maker { model, compiled, layout, field };
+    let maker = Maker { model, compiled, layout, field, work };
     let roots: Vec<usize> =
         compiled.rates(0).iter().chain(compiled.outputs(0)).chain(&compiled.combinations).copied().collect();
     (0..<Reals<2> as Values>::ATTEMPTS).any(|attempt| {
         let Some(values) = maker.values(rng, attempt) else { return false };
         let starts = vec![None; values.len()];
         let signals = values.into_iter().map(|value| Signal::Constant { value, lane: None }).collect();
-        Taylor::new(&compiled.dag, field, 0, signals, &starts, &roots, false, SplitMix64::new(0)).is_ok()
+        let seed = SplitMix64::new(0);
+        Taylor::new(&compiled.dag, field, 0, signals, &starts, &roots, false, seed, work).is_ok()
     })
 }
 
@@ -149,15 +162,21 @@ fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &
         let signals = values.iter().enumerate().map(signal).collect();
         let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
         let dag = &compiled.dag;
-        let Ok(at) = Taylor::new(dag, maker.field, lanes.len(), signals, &starts, &roots, false, seed) else {
-            return false;
-        };
+        let at =
+            Taylor::new(dag, maker.field, lanes.len(), signals, &starts, &roots, false, seed, maker.work);
+        let Ok(at) = at else { return false };
         for (row, &node) in rows.iter_mut().zip(&roots) {
             let start = row.len();
             row.resize(start + lanes.len(), 0);
             for (&lane, x) in at.lanes_of(node).iter().zip(at.dual(node, 0)) {
                 row[start + lane as usize] = *x;
             }
+        }
+        // each row against all before it
+        let (count, columns) = (rows.len() as u64, rows[0].len() as u64);
+        let elimination = count.saturating_mul(count).saturating_mul(columns);
+        if maker.work.take(Step::Independence, elimination, 8 * count.saturating_mul(2 * columns)).is_err() {
+            return false;
         }
         let mut space = Echelon::new(maker.field, rows[0].len());
         if rows.iter().all(|row| space.insert(row)) {

@@ -12,6 +12,7 @@ use super::real_points::has_real_point;
 use super::rows::{Layout, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
+use super::work::{Spent, Work};
 use crate::degree::findings::{ByPrimes, Findings};
 use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
@@ -42,7 +43,7 @@ pub struct Judgement {
     /// Functions whose values are proven to be independent of each other, so that random ones stand for them; `None` where true values
     /// were taken.
     pub independent_functions: Option<usize>,
-    /// Operations of the verdicts, at both points.
+    /// Operations of the verdicts, at all points that were drawn.
     pub work: u64,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
@@ -117,8 +118,6 @@ pub(crate) struct At<S: Values> {
     closed: bool,
     gap: Gap,
     steps: Steps<S>,
-    /// Operations.
-    pub(crate) work: u64,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
@@ -161,16 +160,38 @@ impl<S: Values> At<S> {
     }
 }
 
-/// Climbs the staircase of a system at a random point of a field.
+/// Climbs the staircase of a system at a random point of a field, and adds the operations to those that were `spent`,
+/// whether or not there is a verdict.
 pub(crate) fn climb_at<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
     layout: &Layout,
     field: S,
     rng: &mut SplitMix64,
+    spent: &mut Spent,
 ) -> Result<At<S>, ModelError> {
-    let mut rows = SystemRows::new(model, compiled, layout, field.clone(), rng)
-        .map_err(|s| singular::<S>(model, compiled, s))?;
+    let work = Work::new(model.work_limit);
+    let found = climbed(model, compiled, layout, field, rng, &work);
+    spent.add(&work);
+    found
+}
+
+fn climbed<S: Values>(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    field: S,
+    rng: &mut SplitMix64,
+    work: &Work,
+) -> Result<At<S>, ModelError> {
+    let refused = || work.refused().map_or(Ok(()), Err);
+    let mut rows = match SystemRows::new(model, compiled, layout, field.clone(), rng, work) {
+        Ok(rows) => rows,
+        Err(reason) => {
+            refused()?;
+            return Err(singular::<S>(model, compiled, reason));
+        }
+    };
     let gradients = rows.combinations().to_vec();
     let mut found = vec![None; gradients.len()];
     let mut basis = <S::Space as RowSpace>::new(field.clone(), layout.unknowns.len());
@@ -183,7 +204,7 @@ pub(crate) fn climb_at<S: Values>(
         }
         steps.add(order, basis);
     });
-    rows.work().refused().map_or(Ok(()), Err)?;
+    refused()?;
     let combinations = found
         .into_iter()
         .zip(&gradients)
@@ -196,8 +217,7 @@ pub(crate) fn climb_at<S: Values>(
     let values = rows.values(compiled, layout, model.constants.len());
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
-    let work = rows.work().spent();
-    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps, work })
+    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
 /// Where the model has no value, in words.
@@ -215,11 +235,8 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
             );
             return of.place.error(message.into(), 0..of.text.len());
         }
-        Singular::Memory(bytes) => {
-            return model
-                .work_limit
-                .refuse("gradients of its operations", &format!("{:.1e} bytes", bytes as f64));
-        }
+        // said before, with what was too much
+        Singular::Refused => return refuse("the limit of work".into()),
         Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
         Singular::Domain(node, function) => (
             node,
@@ -252,8 +269,21 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
 /// # Errors
 /// [`ModelError`].
 pub fn judge(model: &SystemModel, seed: u64, bound: Option<usize>) -> Result<Judgement, ModelError> {
+    judge_counted(model, seed, bound, &mut Spent::default())
+}
+
+/// Judges a model, and adds the operations at all points to those that were `spent`, whether or not there is a verdict.
+///
+/// # Errors
+/// [`ModelError`].
+pub(super) fn judge_counted(
+    model: &SystemModel,
+    seed: u64,
+    bound: Option<usize>,
+    spent: &mut Spent,
+) -> Result<Judgement, ModelError> {
     let compiled = model.compile()?;
-    judge_compiled(model, &compiled, seed, bound)
+    judge_within(model, &compiled, (seed, bound), spent)
 }
 
 /// Judges a model that was compiled.
@@ -266,24 +296,33 @@ pub fn judge_compiled(
     seed: u64,
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
+    judge_within(model, compiled, (seed, bound), &mut Spent::default())
+}
+
+fn judge_within(
+    model: &SystemModel,
+    compiled: &Compiled,
+    (seed, bound): (u64, Option<usize>),
+    spent: &mut Spent,
+) -> Result<Judgement, ModelError> {
     let layout = checked_layout(model, compiled, bound)?;
     let rational = compiled.dag.is_rational();
     if !rational {
         let mut rng = model.random(seed, "values of functions");
         let apart = written_apart(compiled);
         let apart = apart.as_ref().unwrap_or(compiled);
-        let independent = independent_functions(model, apart, &layout, &mut rng);
+        let independent = independent_functions(model, apart, &layout, &mut rng, spent);
         // where prime fields fail, for whatever reason, digits say why
         if let Some(count) = independent
-            && let Ok(judged) = judge_in_fields(model, apart, &layout, seed)
+            && let Ok(judged) = judge_in_fields(model, apart, &layout, seed, spent)
         {
-            has_real_point(model, compiled, &layout, seed)?;
+            has_real_point(model, compiled, &layout, seed, spent)?;
             return Ok(Judgement { independent_functions: Some(count), ..judged });
         }
-        return judge_in_digits(model, compiled, seed, bound);
+        return judge_by_digits(model, compiled, &layout, seed, spent);
     }
-    let judged = judge_in_fields(model, compiled, &layout, seed)?;
-    has_real_point(model, compiled, &layout, seed)?;
+    let judged = judge_in_fields(model, compiled, &layout, seed, spent)?;
+    has_real_point(model, compiled, &layout, seed, spent)?;
     Ok(Judgement { independent_functions: Some(0), ..judged })
 }
 
@@ -293,20 +332,22 @@ fn judge_in_fields(
     compiled: &Compiled,
     layout: &Layout,
     seed: u64,
+    spent: &mut Spent,
 ) -> Result<Judgement, ModelError> {
+    let before = spent.operations;
     // long series are multiplied by transforms, which need roots of unity
     let orders = layout.unknowns.len() / model.outputs.len().max(1);
     let order = if orders < LONG { 1 } else { (4 * orders as u64).next_power_of_two() };
     let runs = compiled.segments.len().max(1) * model.experiments.max(1);
     for attempt in 0..ATTEMPTS {
-        let judged = |i: usize| {
+        let mut judged = |i: usize| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
             let field = match order {
                 1 => random_field(&mut rng),
                 // it has divisors enough
                 _ => RootField::random(order, &mut rng).map_or_else(|_| random_field(&mut rng), |k| k.field),
             };
-            climb_at(model, compiled, layout, field, &mut rng).map(|at| (field, at))
+            climb_at(model, compiled, layout, field, &mut rng, spent).map(|at| (field, at))
         };
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
         if first.agrees(&second) {
@@ -322,7 +363,8 @@ fn judge_in_fields(
             let span = first.span.clone();
             let judged = Judgement::of(layout.clone(), first, SystemCertainty::Primes(primes), seed);
             let fields = compiled.dag.is_rational().then_some([p, q]);
-            return Ok(Judgement { span: fields.map(|_| span), fields, ..judged });
+            let work = spent.operations - before;
+            return Ok(Judgement { span: fields.map(|_| span), fields, work, ..judged });
         }
     }
     Err(refuse(format!(
@@ -341,10 +383,21 @@ pub fn judge_in_digits(
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
     let layout = checked_layout(model, compiled, bound)?;
+    judge_by_digits(model, compiled, &layout, seed, &mut Spent::default())
+}
+
+fn judge_by_digits(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    seed: u64,
+    spent: &mut Spent,
+) -> Result<Judgement, ModelError> {
+    let before = spent.operations;
     let mut reason = String::new();
     for pair in [pair::<4, 6>, pair::<6, 10>, pair::<10, 16>, pair::<16, 32>] {
-        match pair(model, compiled, &layout, seed)? {
-            Ok(judged) => return Ok(judged),
+        match pair(model, compiled, layout, seed, spent)? {
+            Ok(judged) => return Ok(Judgement { work: spent.operations - before, ..judged }),
             Err(why) => reason = why,
         }
     }
@@ -374,6 +427,7 @@ fn pair<const A: usize, const B: usize>(
     compiled: &Compiled,
     layout: &Layout,
     seed: u64,
+    spent: &mut Spent,
 ) -> Result<Result<Judgement, String>, ModelError> {
     let random = |i: usize| model.random(seed, &format!("verdicts, {A} and {B} words, point {i}"));
     let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
@@ -385,11 +439,11 @@ fn pair<const A: usize, const B: usize>(
             decimal(gap.nonzero)
         )
     };
-    let first = climb_at(model, compiled, layout, Reals::<A>, &mut random(0))?;
+    let first = climb_at(model, compiled, layout, Reals::<A>, &mut random(0), spent)?;
     if !first.gap.is_decisive(64 * A as i64) {
         return Ok(Err(unclear(first.gap, digits[0])));
     }
-    let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1))?;
+    let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1), spent)?;
     if !second.gap.is_decisive(64 * B as i64) {
         return Ok(Err(unclear(second.gap, digits[1])));
     }
@@ -424,7 +478,7 @@ impl Judgement {
             span: None,
             fields: None,
             independent_functions: None,
-            work: 2 * at.work,
+            work: 0,
         }
     }
 }

@@ -5,7 +5,8 @@ use obsdeg_exact::Reals;
 use super::error::ModelError;
 use super::model::{Compiled, Role, StateStart, SystemModel};
 use super::rows::{Layout, Maker};
-use super::values::Values;
+use super::values::{NotHeld, Values};
+use super::work::{Spent, Work};
 
 /// Starts of Newton's method: the values of the file first, then random points, the later the farther.
 const TRIES: usize = 200;
@@ -15,16 +16,33 @@ const FARTHER: usize = 10;
 /// Looks for a real point at which all constraints hold.
 ///
 /// # Errors
-/// [`ModelError`] where none was found.
+/// [`ModelError`] where none was found, or where the search is beyond the limit of work.
 pub(super) fn has_real_point(
     model: &SystemModel,
     compiled: &Compiled,
     layout: &Layout,
     seed: u64,
+    spent: &mut Spent,
+) -> Result<(), ModelError> {
+    if model.constraints.is_empty() {
+        return Ok(());
+    }
+    let work = Work::new(model.work_limit);
+    let found = sought(model, compiled, layout, seed, &work);
+    spent.add(&work);
+    found
+}
+
+fn sought(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    seed: u64,
+    work: &Work,
 ) -> Result<(), ModelError> {
     let Some(first) = model.constraints.first() else { return Ok(()) };
     let field = Reals::<4>;
-    let maker = Maker { model, compiled, layout, field };
+    let maker = Maker { model, compiled, layout, field, work };
     let mut rng = model.random(seed, "real points");
     let free: Vec<bool> = (compiled.roles.iter())
         .map(|role| match *role {
@@ -42,10 +60,13 @@ pub(super) fn has_real_point(
                     value.filter(|_| free[slot]).map_or(values[slot], obsdeg_exact::Ball::from_f64);
             }
         }
-        if field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut rng).is_ok() {
-            return Ok(());
+        match field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut rng, work) {
+            Ok(()) => return Ok(()),
+            Err(NotHeld::Refused) => break,
+            Err(_) => {}
         }
     }
+    work.refused().map_or(Ok(()), Err)?;
     let all = if model.constraints.len() > 1 { " together with the others" } else { "" };
     let message = format!(
         "no real point was found at which it holds{all}, in {TRIES} tries from random points; if there is one, give it under \

@@ -4,11 +4,12 @@ use std::cmp::Reverse;
 
 use obsdeg_exact::Reals;
 
-use super::judge::{Judgement, climb_at, judge};
+use super::judge::{Judgement, climb_at, judge_counted};
 use super::model::{
     Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
 };
 use super::values::Values;
+use super::work::{Spent, WorkLimit};
 use crate::language::{Expression, Node};
 use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
 
@@ -33,10 +34,12 @@ struct Search<'a> {
     open: Vec<usize>,
     /// Names of the columns, each once, with all columns that it has.
     roles: Vec<(Role, Vec<usize>)>,
-    /// Verdicts that may still be computed.
+    /// Most verdicts on single changes.
     budget: usize,
-    /// Where it is the work that bounds them, the option that allows more, after a semicolon.
-    within: &'static str,
+    /// Operations that are left.
+    left: u64,
+    /// True once it was these that ended the search.
+    ended: bool,
     out: Remedies,
 }
 
@@ -66,19 +69,19 @@ pub(super) fn remedies(
     let n = unknowns.len().max(UNKNOWNS);
     let in_digits = judged.digits().map_or(MOST_VERDICTS, |_| MOST_IN_DIGITS);
     // all together, with the search for symmetries before them, take no more than one verdict may
-    let affordable = model.work_limit.operations().saturating_sub(before) / judged.work.max(1);
+    let left = model.work_limit.operations().saturating_sub(before);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
-    let affordable = usize::try_from(affordable).unwrap_or(usize::MAX);
-    let within = if affordable < budget { "; a larger --work-limit allows more" } else { "" };
-    let budget = budget.min(affordable);
     let out = Remedies::default();
-    let mut search = Search { model, judged, seed, order, open, roles, budget, within, out };
+    let mut search = Search { model, judged, seed, order, open, roles, budget, left, ended: false, out };
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
             let field = Reals::<8>;
             let mut rng = model.random(seed, "remedies");
-            if let Ok(at) = climb_at(model, compiled, &judged.layout, field, &mut rng) {
+            let mut spent = Spent::default();
+            let at = climb_at(model, compiled, &judged.layout, field, &mut rng, &mut spent);
+            search.left = search.left.saturating_sub(spent.operations);
+            if let Ok(at) = at {
                 search.all(&Directions::of(field, &at.span));
             }
         }
@@ -92,16 +95,18 @@ impl Search<'_> {
     /// Single changes, then pairs for what these do not resolve.
     fn all<S: Values>(&mut self, directions: &Directions<S>) {
         let singles = self.singles(directions);
-        let (count, tried) = (singles.len(), singles.len().min(self.budget));
-        for change in singles.into_iter().take(tried) {
-            self.judge(vec![change]);
+        let (count, mut tried) = (singles.len(), 0);
+        for change in singles.into_iter().take(self.budget) {
+            if self.judge(vec![change]).is_none() {
+                break;
+            }
+            tried += 1;
         }
         if tried < count {
             let text = format!(
-                "{} of {count} known values and outputs: at most {} are tried{}",
+                "{} of {count} known values and outputs: at most {tried} are tried{}",
                 count - tried,
-                self.budget,
-                self.within
+                self.option()
             );
             self.out.not_tried.push(text);
         }
@@ -148,7 +153,7 @@ impl Search<'_> {
         let mut complete = directions.pairs(&values, None, self.left(), |i, j| {
             work = work.checked_sub(1)?;
             let changes = [i, j].map(|k| self.known(self.roles[k].0));
-            Some(self.judge(changes.into()))
+            self.judge(changes.into())
         });
         // rows of an output more are those of another random point: only the engine can say what two of them
         // tell
@@ -156,14 +161,15 @@ impl Search<'_> {
             if self.left().is_empty() {
                 break;
             }
-            complete &= work > 0;
-            if let Some(left) = work.checked_sub(1) {
-                work = left;
-                self.judge([i, j].map(|k| self.output(outputs[k])).into());
+            let changes = [i, j].map(|k| self.output(outputs[k]));
+            if work == 0 || self.judge(changes.into()).is_none() {
+                complete = false;
+                break;
             }
+            work -= 1;
         }
         if !complete {
-            let text = format!("some pairs of changes: at most {most} are judged{}", self.within);
+            let text = format!("some pairs of changes: at most {most} are judged{}", self.option());
             self.out.not_tried.push(text);
         }
     }
@@ -194,15 +200,33 @@ impl Search<'_> {
         Change::Output { state: self.named(role).name.clone() }
     }
 
-    /// Judges the model with some changes, and enters what they resolve.
-    fn judge(&mut self, changes: Vec<Change>) -> Vec<usize> {
-        self.out.verdicts += 1;
-        let model = changed(self.model, &changes);
+    /// Where it was the work that ended the search, the option that allows more, after a semicolon.
+    fn option(&self) -> &'static str {
+        if self.ended { "; a larger --work-limit allows more" } else { "" }
+    }
+
+    /// Judges the model with some changes, and enters what they resolve; `None` where that takes more operations than are
+    /// left.
+    fn judge(&mut self, changes: Vec<Change>) -> Option<Vec<usize>> {
+        if self.left < self.judged.work {
+            self.ended = true;
+            return None;
+        }
+        let mut model = changed(self.model, &changes);
+        model.work_limit = WorkLimit::within(self.left);
         // given values add nothing beyond the last order of the model itself
         let closed = !self.judged.rests_on_bound && changes.iter().all(|c| c.known().is_some());
         let last = self.judged.findings.degrees.rank_profile.len().saturating_sub(1);
         let order = if closed { Some(last) } else { self.order };
-        let Ok(judged) = judge(&model, self.seed, order) else { return Vec::new() };
+        let mut spent = Spent::default();
+        let judged = judge_counted(&model, self.seed, order, &mut spent);
+        self.left = self.left.saturating_sub(spent.operations);
+        if spent.refused && judged.is_err() {
+            self.ended = true;
+            return None;
+        }
+        self.out.verdicts += 1;
+        let Ok(judged) = judged else { return Some(Vec::new()) };
         let unknowns = &self.judged.layout.unknowns;
         let found: Vec<(usize, usize)> = (self.open.iter())
             .filter_map(|&c| Some((c, judged.verdict(&model, &unknowns[c].name)?.degree?)))
@@ -212,7 +236,7 @@ impl Search<'_> {
         if !resolves.is_empty() {
             self.out.remedies.push(Remedy { changes, resolves, loses: Vec::new() });
         }
-        found.into_iter().map(|(c, _)| c).collect()
+        Some(found.into_iter().map(|(c, _)| c).collect())
     }
 }
 

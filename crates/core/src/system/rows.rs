@@ -3,11 +3,11 @@
 use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
-use super::adjoint::{Adjoint, Sweeps};
+use super::adjoint::Adjoint;
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
-use super::work::{Cost, Work};
+use super::work::{Cost, Step, Sweeps, Work};
 use crate::degree::rows::DerivativeRows;
 
 /// Orders that are followed where no end is proven, at least.
@@ -108,8 +108,8 @@ pub(crate) struct SystemRows<'a, S: Values> {
     lanes: usize,
     runs: Vec<Run<'a, S>>,
     bound: usize,
-    /// Work of all rows so far.
-    work: Work,
+    /// Work of the points that were tried, and of all rows so far.
+    work: &'a Work,
     /// Of the ranks at generic points.
     gap: Gap,
 }
@@ -171,6 +171,7 @@ pub(super) struct Maker<'a, 'b, S: Values> {
     pub(super) compiled: &'a Compiled,
     pub(super) layout: &'b Layout,
     pub(super) field: S,
+    pub(super) work: &'b Work,
 }
 
 impl<'a, S: Values> Maker<'a, '_, S> {
@@ -187,8 +188,11 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         time: S::Element,
         rng: &mut SplitMix64,
         attempt: usize,
-    ) -> Point<S> {
+    ) -> Result<Point<S>, Singular> {
         let (f, model) = (&self.field, self.model);
+        // each slot looks for its lane
+        let looks = self.compiled.roles.len().saturating_mul(self.layout.unknowns.len());
+        self.work.take(Step::Points, looks as u64, 0)?;
         let mut random = || f.random(rng, attempt);
         let mut signals = Vec::new();
         let mut initial = vec![None; self.compiled.roles.len()];
@@ -216,7 +220,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                 Role::Time => Signal::Time { value: time },
             });
         }
-        Point { signals, initial, seed: rng.next_u64(), experiment }
+        Ok(Point { signals, initial, seed: rng.next_u64(), experiment })
     }
 
     /// Values of all slots at a start: those that are given, random ones of all else. `None` where a given one is not defined.
@@ -226,7 +230,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             |n: usize, rng: &mut SplitMix64| (0..n).map(|_| f.random(rng, attempt)).collect::<Vec<_>>();
         let (parameters, constants) =
             (random(self.model.parameters.len(), rng), random(self.model.constants.len(), rng));
-        let mut point = self.draw(0, (&parameters, &constants), f.random(rng, attempt), rng, attempt);
+        let mut point = self.draw(0, (&parameters, &constants), f.random(rng, attempt), rng, attempt).ok()?;
         self.set_constants(&mut point, &given(self.compiled.constants(0)), false).ok()?;
         self.set_states(&mut point, &given(&self.compiled.starts)).ok()?;
         let value = |(signal, start): (&Signal<S::Element>, &Option<Initial<S::Element>>)| match signal {
@@ -250,6 +254,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             nodes,
             false,
             SplitMix64::new(point.seed),
+            self.work,
         )
     }
 
@@ -324,9 +329,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         };
         let free: Vec<bool> = compiled.roles.iter().map(free).collect();
         let mut own = SplitMix64::new(rng.next_u64());
-        self.field
-            .hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut own)
-            .map_err(Singular::Constraint)?;
+        self.field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut own, self.work)?;
         for (slot, x) in values.into_iter().enumerate() {
             match (&mut point.signals[slot], &mut point.initial[slot]) {
                 (Signal::Constant { value, .. }, _) => *value = x,
@@ -353,6 +356,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             &compiled.constraints,
             true,
             SplitMix64::new(point.seed),
+            self.work,
         )?;
         let row = |&node: &usize| dense(f, lanes, seen.lanes_of(node), seen.dual(node, 0));
         let rows = compiled.constraints.iter().map(row).collect();
@@ -366,8 +370,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         let compiled = self.compiled;
         let roots: Vec<usize> =
             compiled.outputs(point.experiment).iter().chain(&compiled.combinations).copied().collect();
-        Taylor::within(
-            self.model.work_limit.bytes(),
+        Taylor::new(
             &compiled.dag,
             self.field.clone(),
             lanes,
@@ -376,6 +379,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             &roots,
             true,
             SplitMix64::new(point.seed),
+            self.work,
         )
     }
 
@@ -397,7 +401,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
     pub(super) fn both(&self, rng: &mut SplitMix64) -> (Taylor<'a, S>, Adjoint<'a, S>) {
         let f = &self.field;
         let parameters: Vec<S::Element> = self.model.parameters.iter().map(|_| f.random(rng, 0)).collect();
-        let mut point = self.draw(0, (&parameters, &[]), f.zero(), rng, 0);
+        let mut point = self.draw(0, (&parameters, &[]), f.zero(), rng, 0).expect("work");
         self.set_states(&mut point, &given(&self.compiled.starts)).expect("starts");
         let lanes = self.layout.unknowns.len();
         let forward = self.series(&point, lanes).expect("a point");
@@ -412,7 +416,6 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         point: &Point<S>,
         known: &[Vec<S::Element>],
         rng: &mut SplitMix64,
-        work: &Work,
     ) -> Option<(usize, Gap)> {
         let f = &self.field;
         let unknowns = self.layout.unknowns.len();
@@ -440,10 +443,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             }
             let mut taylor = match self.series(&generic, lanes) {
                 Ok(taylor) => taylor,
-                Err(Singular::Memory(bytes)) => {
-                    work.refuse(0, bytes);
-                    return None;
-                }
+                Err(Singular::Refused) => return None,
                 Err(_) => continue,
             };
             let mut adjoint = self.adjoint(&generic, lanes);
@@ -455,7 +455,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             for order in 0..=lanes {
                 let outputs = self.compiled.outputs(point.experiment).len();
                 let sweeps = adjoint.as_ref().map(|a| a.sweeps(order));
-                if !work.spend(order, &cost_of(&taylor, sweeps, outputs)) {
+                if !self.work.spend(order, &cost_of(&taylor, sweeps, outputs)) {
                     return None;
                 }
                 let mut grew = false;
@@ -534,27 +534,32 @@ impl<'a, S: Values> SystemRows<'a, S> {
     /// The rows of a system at a random point.
     ///
     /// # Errors
-    /// [`Singular`] when no point could be found.
+    /// [`Singular`] when no point could be found, or where `work` refused to look further.
     pub(crate) fn new(
         model: &SystemModel,
         compiled: &'a Compiled,
         layout: &Layout,
         field: S,
         rng: &mut SplitMix64,
+        work: &'a Work,
     ) -> Result<Self, Singular> {
         let mut last = Singular::Division(0);
-        let maker = Maker { model, compiled, layout, field };
+        let maker = Maker { model, compiled, layout, field, work };
         for attempt in 0..S::ATTEMPTS {
-            match Self::at(&maker, rng, attempt) {
-                // no other point takes less memory
-                Err(singular) if !matches!(singular, Singular::Memory(_)) => last = singular,
+            match Self::at(&maker, work, rng, attempt) {
+                Err(singular) if singular != Singular::Refused => last = singular,
                 found => return found,
             }
         }
         Err(last)
     }
 
-    fn at(maker: &Maker<'a, '_, S>, rng: &mut SplitMix64, attempt: usize) -> Result<Self, Singular> {
+    fn at(
+        maker: &Maker<'a, '_, S>,
+        work: &'a Work,
+        rng: &mut SplitMix64,
+        attempt: usize,
+    ) -> Result<Self, Singular> {
         let (model, compiled, f) = (maker.model, maker.compiled, &maker.field);
         let lanes = maker.layout.unknowns.len();
         let mut parameters: Vec<S::Element> =
@@ -563,7 +568,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         let whole = [CompiledSegment::default()];
         let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
-        let (mut runs, mut gap, work) = (Vec::new(), Gap::OPEN, Work::new(model.work_limit));
+        let (mut runs, mut gap) = (Vec::new(), Gap::OPEN);
         let any_time = model.time == StartTime::Generic;
         let time = match model.time {
             StartTime::Zero => f.zero(),
@@ -571,7 +576,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
             StartTime::Generic => f.random(rng, attempt),
         };
         for experiment in 0..model.experiments.max(1) {
-            let mut point = maker.draw(experiment, (&parameters, &constants), time, rng, attempt);
+            let mut point = maker.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
             maker.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
             maker.hold_constraints(&mut point, experiment == 0, rng)?;
             let value = |slot: usize| match &point.signals[slot] {
@@ -605,7 +610,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
                     () if arbitrary => End::Open,
                     () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => End::Stagnation,
                     () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
-                    () => match maker.generic_rank(&point, &known, rng, &work) {
+                    () => match maker.generic_rank(&point, &known, rng) {
                         None => End::Open,
                         Some((rank, clear)) => {
                             gap = gap.and(clear);
@@ -626,11 +631,6 @@ impl<'a, S: Values> SystemRows<'a, S> {
     /// The gradients of the combinations at the start of the first run.
     pub(crate) fn combinations(&self) -> &[Vec<S::Element>] {
         self.runs.first().map_or(&[], |r| &r.combinations)
-    }
-
-    /// Work of the rows so far, and whether more was refused.
-    pub(crate) fn work(&self) -> &Work {
-        &self.work
     }
 
     /// How clear the ranks of single runs were.

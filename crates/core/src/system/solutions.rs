@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use obsdeg_exact::divisor::Algebra;
 use obsdeg_exact::fraction::Fraction;
-use obsdeg_exact::groebner::{OverLimit, Work};
+use obsdeg_exact::groebner::Work;
 use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Field, SplitMix64};
 
@@ -21,6 +21,7 @@ use super::judge::Judgement;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::SystemRows;
 use super::values::Values;
+use super::work::Work as VerdictWork;
 use crate::language::{Environment, Names, evaluate, parse_with};
 
 /// Most unknowns.
@@ -231,8 +232,8 @@ fn fractions(
             Op::Primitive { .. } | Op::Pi => return Err(NoExpressions::NotRational),
         };
         match made {
-            Ok(fraction) => out.push(Some(fraction)),
-            Err(OverLimit) => return Ok(None),
+            Ok(fraction) if s.keep(fraction.terms()).is_ok() => out.push(Some(fraction)),
+            _ => return Ok(None),
         }
     }
     Ok(Some(out))
@@ -426,11 +427,12 @@ fn check(
     symbols: &[Symbol],
     expressions: &[Option<String>],
 ) -> Vec<bool> {
-    let Ok(mut rows) = SystemRows::new(model, compiled, &judged.layout, field, rng) else {
+    let work = VerdictWork::new(model.work_limit);
+    let Ok(mut rows) = SystemRows::new(model, compiled, &judged.layout, field, rng, &work) else {
         return vec![false; expressions.len()];
     };
-    let used = |s: &&Symbol| expressions.iter().flatten().any(|e| words(e).any(|w| w == s.raw));
-    let values: Vec<(String, u64)> = (symbols.iter().filter(used))
+    let used: BTreeSet<&str> = expressions.iter().flatten().flat_map(|e| words(e)).collect();
+    let values: Vec<(String, u64)> = (symbols.iter().filter(|s| used.contains(s.raw.as_str())))
         .filter_map(|s| Some((s.raw.clone(), rows.derivative(s.node?, s.order))))
         .collect();
     let truth = rows.values(compiled, &judged.layout, 0);

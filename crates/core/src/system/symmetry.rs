@@ -8,8 +8,8 @@ use super::functions::gcd;
 use super::judge::{At, Judgement, climb_at};
 use super::model::{Compiled, SystemModel};
 use super::values::Values;
-use super::work::WorkLimit;
-use crate::degree::sparse::{extend_by_short_vectors, support_in};
+use super::work::{Spent, WorkLimit, product};
+use crate::degree::sparse::{extend_by_short_vectors, products_of_short_vectors, support_in};
 
 /// Points at which a direction must vanish, at most.
 const POINTS: usize = 8;
@@ -67,14 +67,17 @@ pub struct Symmetries {
     pub invariants: Vec<Invariant>,
     /// Where the search ended before its end: what was too much, and the option that allows more.
     pub stopped: Option<String>,
-    /// Operations of the search.
+    /// Operations of the points of the search.
     pub(super) work: u64,
 }
 
-/// Operations that a search for symmetries may still take: all together as many as one verdict.
+/// Operations that a search for symmetries may still take: all points together as many as one verdict, and all searches
+/// for short vectors as many again.
 struct Budget {
     limit: WorkLimit,
     spent: u64,
+    /// Operations of the searches for short vectors.
+    short: u64,
     /// True once something was refused.
     over: bool,
 }
@@ -87,6 +90,24 @@ impl Budget {
             self.spent += operations;
         }
         !self.over
+    }
+
+    /// Independent vectors of the span of `rows` as short as possible, beyond what `span` holds; none where they are beyond
+    /// the limit.
+    fn short_vectors<S: Values>(
+        &mut self,
+        f: &S,
+        rows: &[Vec<S::Element>],
+        span: &mut S::Space,
+    ) -> Vec<Vec<S::Element>> {
+        let products = products_of_short_vectors(rows.len(), span.columns());
+        let short = self.short.saturating_add(products.saturating_mul(product::<S::Element>()));
+        if short > self.limit.operations() {
+            self.over = true;
+            return Vec::new();
+        }
+        self.short = short;
+        extend_by_short_vectors(f, rows, span)
     }
 
     /// Why the search ended.
@@ -102,10 +123,11 @@ impl Budget {
     }
 }
 
-/// Operations of a point and of the elimination of its rows, `columns` numbers each, in numbers of `words` words.
-fn cost_of_point(verdict: u64, rows: usize, columns: usize, words: usize) -> u64 {
-    let [rows, columns, words] = [rows, columns, words].map(|n| n as u64);
-    let elimination = rows.saturating_mul(columns).saturating_mul(columns).saturating_mul(words * words);
+/// Operations of a point and of the elimination of its rows, `columns` numbers each.
+fn cost_of_point<S: Values>(verdict: u64, rows: usize, columns: usize) -> u64 {
+    let [rows, columns] = [rows, columns].map(|n| n as u64);
+    let elimination =
+        rows.saturating_mul(columns).saturating_mul(columns).saturating_mul(product::<S::Element>());
     verdict.saturating_add(elimination)
 }
 
@@ -166,22 +188,22 @@ fn symmetries_in<S: Values>(
     }
     let (mut last, mut at): (usize, Option<At<S>>) = (0, None);
     let rank = judged.findings.degrees.rank();
-    let words = size_of::<S::Element>().div_ceil(8);
-    let mut budget = Budget { limit: model.work_limit, spent: 0, over: false };
+    let mut budget = Budget { limit: model.work_limit, spent: 0, short: 0, over: false };
     // a verdict rests on two points
     let mut verdict = judged.work / 2;
     for point in 0..POINTS {
-        if !budget.spend(cost_of_point(verdict, rank, 2 * n, words)) {
+        if !budget.spend(cost_of_point::<S>(verdict, rank, 2 * n)) {
             break;
         }
-        let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng)?;
+        let mut spent = Spent::default();
+        let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent)?;
         for i in 0..here.span.rank() {
             let row = here.span.row(i);
             let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
             let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
             basis.insert(&both);
         }
-        verdict = here.work;
+        verdict = spent.operations;
         at = Some(here);
         if point >= 2 && basis.rank() == last {
             break;
@@ -194,7 +216,7 @@ fn symmetries_in<S: Values>(
     let mut tangents = space(n);
     let mut out = Symmetries::default();
     let short = match !budget.over && basis.gap().is_decisive(S::BITS) {
-        true => extend_by_short_vectors(&f, &basis.null_space(), &mut space(2 * n)),
+        true => budget.short_vectors(&f, &basis.null_space(), &mut space(2 * n)),
         false => Vec::new(),
     };
     for v in short {
@@ -208,9 +230,12 @@ fn symmetries_in<S: Values>(
     if out.found.len() < defect {
         let moved: Vec<usize> =
             (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
-        let mut draw = |columns: usize| match budget.spend(cost_of_point(verdict, rank, columns, words)) {
-            true => climb_at(model, compiled, &judged.layout, f.clone(), &mut rng).map(Some),
-            false => Ok(None),
+        let mut draw = |budget: &mut Budget, columns: usize| {
+            if !budget.spend(cost_of_point::<S>(verdict, rank, columns)) {
+                return Ok(None);
+            }
+            let mut spent = Spent::default();
+            climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent).map(Some)
         };
         // constants that every segment and experiment shares may be factors too
         let changed =
@@ -228,16 +253,23 @@ fn symmetries_in<S: Values>(
             {
                 break;
             }
-            out.polynomial.extend(directions(&f, &moved, &products, &mut tangents, &at, &mut draw)?);
+            out.polynomial.extend(directions(
+                &f,
+                &moved,
+                &products,
+                &mut tangents,
+                &at,
+                (&mut budget, &mut draw),
+            )?);
         }
     }
     if out.found.len() + out.polynomial.len() < defect {
         let among_excited = |v: &Vec<S::Element>| support_in(&f, v).iter().all(|&c| excited[c]);
         let rest: Vec<Vec<S::Element>> = at.span.null_space().into_iter().filter(among_excited).collect();
-        let moving = extend_by_short_vectors(&f, &rest, &mut tangents);
+        let moving = budget.short_vectors(&f, &rest, &mut tangents);
         out.unexplained = moving.iter().map(|v| support_in(&f, v)).collect();
     }
-    out.invariants = invariants(&f, n, &out.found, &at);
+    out.invariants = invariants(&f, n, &out.found, &at, &mut budget);
     (out.stopped, out.work) = (budget.stopped(), budget.spent);
     Ok(out)
 }
@@ -259,15 +291,18 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
     out
 }
 
+/// A verdict at one more random point, for rows of this many columns; none once the work is used up.
+type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<At<S>>, ModelError> + 'a;
+
 /// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a
-/// linear system for the a_ij from rows at several points, drawn with the number of columns as long as work is left.
+/// linear system for the a_ij from rows at several points, which `draw` makes as long as work is left.
 fn directions<S: Values>(
     f: &S,
     moved: &[usize],
     products: &[Vec<usize>],
     tangents: &mut S::Space,
     at: &At<S>,
-    draw: &mut dyn FnMut(usize) -> Result<Option<At<S>>, ModelError>,
+    (budget, draw): (&mut Budget, &mut Draw<'_, S>),
 ) -> Result<Vec<PolynomialDirection>, ModelError> {
     let width = products.len();
     let value =
@@ -276,7 +311,7 @@ fn directions<S: Values>(
     let mut basis = space(moved.len() * width);
     let (mut rank, mut still) = (0, 0);
     for _ in 0..POLYNOMIAL_POINTS {
-        let Some(here) = draw(moved.len() * width)? else { break };
+        let Some(here) = draw(budget, moved.len() * width)? else { break };
         let values: Vec<S::Element> = products.iter().map(|p| value(&here, p)).collect();
         for i in 0..here.span.rank() {
             let row = here.span.row(i);
@@ -294,7 +329,7 @@ fn directions<S: Values>(
     }
     let here: Vec<S::Element> = products.iter().map(|p| value(at, p)).collect();
     let mut out = Vec::new();
-    for v in extend_by_short_vectors(f, &basis.null_space(), &mut space(moved.len() * width)) {
+    for v in budget.short_vectors(f, &basis.null_space(), &mut space(moved.len() * width)) {
         let mut tangent = vec![f.zero(); tangents.columns()];
         for (part, &m) in v.chunks_exact(width).zip(moved) {
             tangent[m] = f.dot(&f.zero(), part.iter().zip(&here));
@@ -313,7 +348,13 @@ fn directions<S: Values>(
 
 /// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they are
 /// observable.
-fn invariants<S: Values>(f: &S, n: usize, found: &[Symmetry], at: &At<S>) -> Vec<Invariant> {
+fn invariants<S: Values>(
+    f: &S,
+    n: usize,
+    found: &[Symmetry],
+    at: &At<S>,
+    budget: &mut Budget,
+) -> Vec<Invariant> {
     let mut out = Vec::new();
     let scalings: Vec<&Symmetry> = found.iter().filter(|s| s.translation.is_empty()).collect();
     let translations: Vec<&Symmetry> = found.iter().filter(|s| s.scaling.is_empty()).collect();
@@ -333,7 +374,7 @@ fn invariants<S: Values>(f: &S, n: usize, found: &[Symmetry], at: &At<S>) -> Vec
         // the null vectors of what is not moved are units
         let kept: Vec<Vec<S::Element>> =
             rows.null_space().into_iter().filter(|v| support_in(f, v).iter().all(|&c| moved[c])).collect();
-        for m in extend_by_short_vectors(f, &kept, &mut space()) {
+        for m in budget.short_vectors(f, &kept, &mut space()) {
             let Some(k) = rationals(f, &m) else { continue };
             let exponents = integers(&k);
             // d(prod x^m) = prod x^m sum m_i dx_i / x_i

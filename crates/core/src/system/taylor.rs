@@ -11,7 +11,8 @@ use obsdeg_exact::{SplitMix64, interrupt};
 
 use super::constraints::below;
 use super::dag::{Dag, Op};
-use super::values::Values;
+use super::values::{NotHeld, Values};
+use super::work::{PER_NODE, Refused, Step, Work, operations_of, product};
 use crate::language::Function;
 
 /// What a slot holds in one run.
@@ -66,8 +67,23 @@ pub(crate) enum Singular {
     Kink(usize, Function),
     /// Constraints that could not be solved here, this one among them.
     Constraint(usize),
-    /// Gradients that take this many bytes, beyond the limit.
-    Memory(u64),
+    /// Values or gradients beyond the limit of work, which says what was too much.
+    Refused,
+}
+
+impl From<Refused> for Singular {
+    fn from(_: Refused) -> Self {
+        Self::Refused
+    }
+}
+
+impl From<NotHeld> for Singular {
+    fn from(reason: NotHeld) -> Self {
+        match reason {
+            NotHeld::Constraint(c) => Self::Constraint(c),
+            NotHeld::Refused => Self::Refused,
+        }
+    }
 }
 
 /// The series of one run.
@@ -106,7 +122,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     /// slot). Rates take part when `moving`. Without lanes these are the values alone.
     ///
     /// # Errors
-    /// [`Singular`] when the point is none.
+    /// [`Singular`] when the point is none, or where its values and gradients are beyond the limit of `work`.
     #[allow(clippy::too_many_arguments, reason = "all of a run")]
     pub(crate) fn new(
         dag: &'a Dag,
@@ -117,25 +133,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         roots: &[usize],
         moving: bool,
         rng: SplitMix64,
-    ) -> Result<Self, Singular> {
-        Self::within(u64::MAX, dag, f, lanes, signals, initial, roots, moving, rng)
-    }
-
-    /// The same where gradients take at most `most` bytes.
-    ///
-    /// # Errors
-    /// [`Singular`] when the point is none, or where they take more.
-    #[allow(clippy::too_many_arguments, reason = "all of a run")]
-    pub(crate) fn within(
-        most: u64,
-        dag: &'a Dag,
-        f: S,
-        lanes: usize,
-        signals: Vec<Signal<S::Element>>,
-        initial: &[Option<Initial<S::Element>>],
-        roots: &[usize],
-        moving: bool,
-        rng: SplitMix64,
+        work: &Work,
     ) -> Result<Self, Singular> {
         let n = dag.ops.len();
         let mut out = Self {
@@ -158,14 +156,12 @@ impl<'a, S: Values> Taylor<'a, S> {
         };
         out.classify();
         out.need(roots, moving);
-        out.start_values(initial)?;
-        out.find_support(initial, moving);
+        out.start_values(initial, work)?;
+        out.find_support(initial, moving, work)?;
         let gradients = (0..n).filter(|&i| out.differentiated[i] && !out.known[i]);
         let numbers: u64 = gradients.map(|i| out.support[i].len() as u64).sum();
         let bytes = numbers.saturating_mul(size_of::<S::Element>() as u64);
-        if bytes > most {
-            return Err(Singular::Memory(bytes));
-        }
+        work.take(Step::Gradients, numbers.saturating_mul(2 * product::<S::Element>()), bytes)?;
         out.start_duals(initial)?;
         out.length = 1;
         Ok(out)
@@ -239,7 +235,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
     }
 
-    fn start_values(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
+    fn start_values(&mut self, initial: &[Option<Initial<S::Element>>], work: &Work) -> Result<(), Singular> {
+        work.take(Step::Points, PER_NODE * self.dag.ops.len() as u64, 0)?;
         for (i, op) in self.dag.ops.iter().enumerate() {
             // what a slot holds is asked for even where nothing uses it
             let x = match *op {
@@ -250,7 +247,10 @@ impl<'a, S: Values> Taylor<'a, S> {
                     | Signal::Unknown { value, .. }
                     | Signal::Time { value } => *value,
                 },
-                _ if self.needed[i] => self.start_value(i)?,
+                op if self.needed[i] => {
+                    work.take(Step::Points, operations_of::<S::Element>(op), 0)?;
+                    self.start_value(i)?
+                }
                 _ => continue,
             };
             self.values[i].push(x);
@@ -301,13 +301,19 @@ impl<'a, S: Values> Taylor<'a, S> {
     }
 
     /// Which lanes a node can depend on, at any order.
-    fn find_support(&mut self, initial: &[Option<Initial<S::Element>>], moving: bool) {
+    fn find_support(
+        &mut self,
+        initial: &[Option<Initial<S::Element>>],
+        moving: bool,
+        work: &Work,
+    ) -> Result<(), Singular> {
         let n = self.dag.ops.len();
         if self.lanes == 0 {
             self.support = vec![Arc::from([]); n];
-            return;
+            return Ok(());
         }
         let words = self.lanes.div_ceil(64);
+        let (operations, bytes) = (2 * n as u64 * words as u64, 8 * n as u64 * words as u64);
         let mut sets = vec![0u64; n * words];
         let mut own = |i: usize, lane: usize| sets[i * words + lane / 64] |= 1 << (lane % 64);
         for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
@@ -323,6 +329,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
         // what a node is made of, until nothing is added
         loop {
+            work.take(Step::Gradients, operations, bytes)?;
             let mut grew = false;
             for i in (0..n).filter(|&i| self.needed[i]) {
                 let parts = match self.dag.ops[i] {
@@ -358,6 +365,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             })
             .collect();
         self.support.resize(n, Arc::from([]));
+        Ok(())
     }
 
     fn start_duals(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {

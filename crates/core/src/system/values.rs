@@ -3,7 +3,23 @@
 use obsdeg_exact::{Scalars, SplitMix64};
 
 use super::dag::Dag;
+use super::work::{Refused, Work};
 use crate::language::Function;
+
+/// Why no point was found at which constraints hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NotHeld {
+    /// This constraint could not be solved.
+    Constraint(usize),
+    /// The work is beyond its limit.
+    Refused,
+}
+
+impl From<Refused> for NotHeld {
+    fn from(_: Refused) -> Self {
+        Self::Refused
+    }
+}
 
 /// A field in which a model has values.
 pub(crate) trait Values: Scalars {
@@ -40,7 +56,7 @@ pub(crate) trait Values: Scalars {
     /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero.
     ///
     /// # Errors
-    /// The constraint that could not be solved.
+    /// The constraint that could not be solved, or that the work is beyond its limit.
     fn hold(
         &self,
         dag: &Dag,
@@ -48,5 +64,6 @@ pub(crate) trait Values: Scalars {
         values: &mut [Self::Element],
         free: &[bool],
         rng: &mut SplitMix64,
-    ) -> Result<(), usize>;
+        work: &Work,
+    ) -> Result<(), NotHeld>;
 }

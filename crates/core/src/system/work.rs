@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::adjoint::Sweeps;
+use super::dag::Op;
 use super::error::ModelError;
 
 /// Operations in a unit of the limit.
@@ -14,6 +14,29 @@ const HELD: u64 = 4;
 /// Operations of the three transforms of a product with two factors, for each point and each halving: half of them
 /// multiply and take two sums, which count as one and a half.
 const TRANSFORM: (u64, u64) = (9, 4);
+
+/// Operations that cost as much as what a series keeps of an operation, whether or not it takes part.
+pub(super) const PER_NODE: u64 = 32;
+/// Products that cost as much as an inverse, and as a function.
+const PER_INVERSE: u64 = 64;
+const PER_FUNCTION: u64 = 256;
+
+/// Operations of a product of two numbers, by their words of 64 bits.
+pub(super) fn product<E>() -> u64 {
+    let words = size_of::<E>().div_ceil(8) as u64;
+    words * words
+}
+
+/// Operations of an operation's value in such numbers.
+pub(super) fn operations_of<E>(op: Op) -> u64 {
+    let products = match op {
+        Op::Number { decimals, .. } => PER_INVERSE + u64::from(decimals.unsigned_abs()),
+        Op::Divide(..) => PER_INVERSE,
+        Op::Primitive { .. } => PER_FUNCTION,
+        _ => 1,
+    };
+    products * product::<E>()
+}
 
 /// Limit of the work of one verdict on a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +56,11 @@ impl WorkLimit {
 }
 
 impl WorkLimit {
+    /// The largest limit that allows no more than these operations.
+    pub(super) fn within(operations: u64) -> Self {
+        Self(operations / UNIT)
+    }
+
     /// The limit in bytes of memory.
     pub fn bytes(self) -> u64 {
         self.operations() / PER_BYTE
@@ -60,12 +88,56 @@ impl Default for WorkLimit {
     }
 }
 
+/// What may be beyond the limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// Values of the model at the random points that are tried.
+    Points,
+    /// Random points at which constraints hold.
+    Constraints,
+    /// The proof that functions are independent of each other.
+    Independence,
+    /// Gradients of all operations at a point.
+    Gradients,
+    /// Derivatives of an order.
+    Derivatives(usize),
+}
+
+impl Step {
+    /// What takes the work, in words.
+    fn words(self) -> String {
+        match self {
+            Self::Points => "values of its operations at random points".into(),
+            Self::Constraints => "points at which its constraints hold".into(),
+            Self::Independence => "gradients of the arguments of its functions".into(),
+            Self::Gradients => "gradients of its operations".into(),
+            Self::Derivatives(order) => format!("derivatives of order {order}"),
+        }
+    }
+}
+
+/// The work is beyond its limit; [`Work::refused`] says why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Refused;
+
 /// Work of one verdict at one random point.
 #[derive(Debug, Clone)]
 pub(crate) struct Work {
     limit: WorkLimit,
     spent: Cell<u64>,
-    refused: Cell<Option<(usize, u64, u64)>>,
+    /// What was refused first: the step, with the operations and the bytes that it would have reached.
+    refused: Cell<Option<(Step, u64, u64)>>,
+}
+
+/// Series that the rows of an order take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Sweeps {
+    /// Length of the longest.
+    pub(super) longest: u64,
+    /// Number of sweeps through the graph, each with series that are shorter by one.
+    pub(super) count: u64,
+    /// Orders of the values that are held before, and then.
+    pub(super) values: [u64; 2],
 }
 
 /// What the derivatives of a run cost.
@@ -139,35 +211,52 @@ impl Work {
 
     /// Counts the rows of an order before they are computed; false if they are beyond the limit.
     pub(super) fn spend(&self, order: usize, cost: &Cost) -> bool {
-        let most = self.limit.operations();
-        let spent = self.spent.get().saturating_add(cost.operations(order as u64));
-        let bytes = cost.bytes(order as u64);
-        if spent > most || bytes > self.limit.bytes() {
-            self.refused.set(Some((order, spent, bytes)));
-            return false;
+        let (operations, bytes) = (cost.operations(order as u64), cost.bytes(order as u64));
+        self.take(Step::Derivatives(order), operations, bytes).is_ok()
+    }
+
+    /// Counts operations before they are done, and bytes before they are taken.
+    ///
+    /// # Errors
+    /// [`Refused`] if they are beyond the limit, or something was before.
+    pub(super) fn take(&self, step: Step, operations: u64, bytes: u64) -> Result<(), Refused> {
+        if self.refused.get().is_some() {
+            return Err(Refused);
+        }
+        let spent = self.spent.get().saturating_add(operations);
+        if spent > self.limit.operations() || bytes > self.limit.bytes() {
+            self.refused.set(Some((step, spent, bytes)));
+            return Err(Refused);
         }
         self.spent.set(spent);
-        true
-    }
-
-    /// Refuses the rows of an order, which take this many bytes.
-    pub(super) fn refuse(&self, order: usize, bytes: u64) {
-        self.refused.set(Some((order, self.spent.get(), bytes)));
-    }
-
-    /// Operations so far.
-    pub(crate) fn spent(&self) -> u64 {
-        self.spent.get()
+        Ok(())
     }
 
     /// Why the verdict was not computed, if it was not.
     pub(crate) fn refused(&self) -> Option<ModelError> {
-        let (order, spent, bytes) = self.refused.get()?;
+        let (step, spent, bytes) = self.refused.get()?;
         let what = match bytes > self.limit.bytes() {
             true => format!("{:.1e} bytes", bytes as f64),
             false => format!("{:.1e} operations", spent as f64),
         };
-        Some(self.limit.refuse(&format!("derivatives of order {order}"), &what))
+        Some(self.limit.refuse(&step.words(), &what))
+    }
+}
+
+/// Operations of several verdicts or points.
+#[derive(Debug, Default)]
+pub(crate) struct Spent {
+    /// Operations, whether or not they led to a verdict.
+    pub(crate) operations: u64,
+    /// True if one of them was refused more.
+    pub(crate) refused: bool,
+}
+
+impl Spent {
+    /// Adds what was done at a point.
+    pub(super) fn add(&mut self, work: &Work) {
+        self.operations = self.operations.saturating_add(work.spent.get());
+        self.refused |= work.refused.get().is_some();
     }
 }
 
@@ -203,7 +292,7 @@ mod tests {
         let large = Cost { growing: 400_000_000, ..cost(None) };
         assert!(work.spend(0, &large) && work.refused().is_none());
         assert!(!work.spend(1, &large));
-        assert_eq!(work.spent(), 400_000_000 + 10 + 28);
+        assert_eq!(work.spent.get(), 400_000_000 + 10 + 28);
         let message = work.refused().expect("refused").to_string();
         assert!(
             message.contains(
@@ -215,5 +304,33 @@ mod tests {
         assert!(!work.spend(9, &Cost { fixed: 10_000_000, ..cost(None) }));
         let message = work.refused().expect("refused").to_string();
         assert!(message.contains("order 9 take 8.0e8 bytes"), "{message}");
+    }
+
+    /// What was refused once stays refused, however little is asked for next, and the first reason stands.
+    #[test]
+    fn a_refusal_stays() {
+        let work = Work::new(WorkLimit(1));
+        assert_eq!(
+            [(400_000, 0), (600_000, 500_000)].map(|(n, b)| work.take(Step::Points, n, b)),
+            [Ok(()); 2]
+        );
+        assert_eq!(work.take(Step::Gradients, 0, 500_001), Err(Refused));
+        assert_eq!(work.take(Step::Constraints, 0, 0), Err(Refused));
+        let message = work.refused().expect("refused").to_string();
+        assert!(message.contains("gradients of its operations take 5.0e5 bytes"), "{message}");
+        let mut spent = Spent::default();
+        spent.add(&work);
+        spent.add(&work);
+        assert!(spent.refused && spent.operations == 2_000_000);
+        for (step, words) in [
+            (Step::Points, "values of its operations at random points take 1.0e7 operations"),
+            (Step::Constraints, "points at which its constraints hold take"),
+            (Step::Independence, "gradients of the arguments of its functions take"),
+        ] {
+            let work = Work::new(WorkLimit(1));
+            assert_eq!(work.take(step, 10_000_000, 0), Err(Refused));
+            let message = work.refused().expect("refused").to_string();
+            assert!(message.contains(words) && message.contains("--work-limit 1 "), "{message}");
+        }
     }
 }
